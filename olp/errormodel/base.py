@@ -1,0 +1,51 @@
+"""What every error model offers. error = actual - commanded, of the tool tip relative to the workpiece.
+
+All positions are axis positions in mm, rows X, Y, Z; angles in rad, right-handed about +X, +Y, +Z.
+A model is a value: no state, no text, no files. A sum of models is a model (`olp.errormodel.total`).
+
+Play state: `play` is (n, 3) in [-1, 1] per axis. +1: the axis last moved in + and its lost motion is
+taken up; -1: the same in -; 0: unknown or in the middle. With a lost motion of b mm an axis adds
+-b/2 * play to its own position. Without `play` models give the mean of both directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+
+class ErrorModel(Protocol):
+    """A vectorised model of the tip's position error."""
+
+    def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3) error in mm at axis positions (n, 3) with tool vectors (3,) or (n, 3)."""
+        ...
+
+    def rotation(self, axis_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3) orientation error of the tool relative to the workpiece in rad."""
+        ...
+
+    def contributions(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Iterator[tuple[str, Array]]:
+        """(name, (n, 3) mm) by source, e.g. "EXX", "ECX", "C0Y", "cyclic EXX", "lost motion X"; only non-zero
+        sources; their sum is the error to first order."""
+        ...
+
+    @property
+    def depends_on(self) -> Mask:
+        """(3, 3): [i, j] is True where error component i changes with the position of axis j."""
+        ...
+
+    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+        """(n, 3) lost motion b of each axis at its position, None where no axis has any."""
+        ...
+
+    def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
+        """(n,) upper bound in mm, anywhere in the box, of how far the error along a straight move by delta_mm
+        (n, 3) departs from the straight line between its values at both ends."""
+        ...

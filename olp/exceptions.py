@@ -1,0 +1,85 @@
+"""Every exception that `olp` raises.
+
+OlpError
+├── UsageError             the call itself is wrong                        exit 2
+├── InputError             a file is unreadable, invalid or refused        exit 3
+│   ├── ConfigError        machine, calibration or job file
+│   ├── ProgramError       a program, with its line
+│   │   └── AlreadyCorrected
+│   └── OutsideBox         a command leaves the calibrated volume
+└── CannotCompute          good input, no answer                           exit 4
+    └── NotInvertible
+
+Each holds its data and builds its message in `__str__`, as
+`file:line: what was found; what was expected; what to do`.
+"""
+
+from __future__ import annotations
+
+
+class OlpError(Exception):
+    """Base of all errors of `olp`; `exit_code` is the status of the command line."""
+
+    exit_code = 4
+
+    def __init__(self, message: str, *, file: str | None = None, line: int | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = file
+        self.line = line
+
+    def __str__(self) -> str:
+        place = ":".join(str(part) for part in (self.file, self.line) if part is not None)
+        return f"{place}: {self.message}" if place else self.message
+
+    def in_file(self, file: str) -> OlpError:
+        """Name the file, unless one is named already; returns the same error for `raise`."""
+        if self.file is None:
+            self.file = file
+        return self
+
+
+class UsageError(OlpError):
+    """The call is wrong: an option that does not exist, a missing argument."""
+
+    exit_code = 2
+
+
+class InputError(OlpError):
+    """A file cannot be read, is invalid, or is refused."""
+
+    exit_code = 3
+
+
+class ConfigError(InputError):
+    """A machine, calibration or job file is invalid; `problems` lists every one of them."""
+
+    def __init__(
+        self, message: str, *, file: str | None = None, line: int | None = None, problems: tuple[str, ...] = ()
+    ) -> None:
+        super().__init__(message, file=file, line=line)
+        self.problems = problems or (message,)
+
+    def __str__(self) -> str:
+        prefix = f"{self.file}: " if self.file else ""
+        return "\n".join(prefix + problem for problem in self.problems)
+
+
+class ProgramError(InputError):
+    """A program is refused; `line` counts from 1 in the source file."""
+
+
+class AlreadyCorrected(ProgramError):
+    """The program carries the stamp of an earlier correction."""
+
+
+class OutsideBox(InputError):
+    """A corrected command leaves the calibrated box."""
+
+
+class CannotCompute(OlpError):
+    """The input is good and there is no answer."""
+
+
+class NotInvertible(CannotCompute):
+    """No command reaches the target within 1e-9 mm: the error grows as fast as the position."""

@@ -1,0 +1,126 @@
+"""Values that describe one machine and one job on it. Lengths in mm, row order X, Y, Z everywhere.
+
+A tool vector runs from the gauge point to the tip; a work offset is the axis position of the
+program's origin, with no tool length active.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+#: All 24 serial chains of three linear axes, workpiece to tool, with `F` the machine frame.
+CHAINS = frozenset("".join(p) for p in itertools.permutations("FXYZ"))
+
+#: ISO 230-1 names of the 18 component errors and 3 squareness errors.
+COMPONENTS = tuple(f"E{direction}{axis}" for axis in "XYZ" for direction in "XYZABC")
+SQUARENESS = ("C0Y", "B0Z", "A0Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Limits of one linear axis: travel (min, max) in mm; mm/s, mm/s2, mm/s3."""
+
+    travel_mm: tuple[float, float]
+    least_increment_mm: float
+    velocity_mm_s: float
+    acceleration_mm_s2: float
+    jerk_mm_s3: float
+
+
+@dataclass(frozen=True, slots=True)
+class WorkOffset:
+    """A work offset such as G54.
+
+    `set_by` is "touch" (touched off on the raw machine, so the touched point keeps its place) or
+    "true" (located by other means). `touched_at_mm` is the axis position at the touch; an axis that
+    is None there takes its default, the offset plus the length of `touch_tool`.
+    """
+
+    name: str
+    offset_mm: Vector = ZERO
+    rotation_deg: Vector = ZERO
+    set_by: Literal["touch", "true"] = "touch"
+    touched_at_mm: tuple[float | None, float | None, float | None] = (None, None, None)
+    touch_tool: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A row of the control's tool table, and the lever for angular errors.
+
+    `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to
+    minus the length; a negative Z length is a touch-off value and gives no lever. `set_by` "touch"
+    means that the length was set on the raw machine at axis position `touched_at_mm`.
+    """
+
+    number: int
+    length_mm: Vector = ZERO
+    radius_mm: float = 0.0
+    gauge_to_tip_mm: Vector | None = None
+    set_by: Literal["touch", "true"] = "true"
+    touched_at_mm: Vector | None = None
+
+    @property
+    def lever_mm(self) -> Vector | None:
+        """Gauge point to tip; None where only a touch-off value is known."""
+        if self.gauge_to_tip_mm is not None:
+            return self.gauge_to_tip_mm
+        x, y, z = self.length_mm
+        if z < 0:
+            return None
+        return (0.0 - x, 0.0 - y, 0.0 - z)
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A machine file: chain, limits, offsets, tools and what its control already corrects."""
+
+    name: str
+    chain: str
+    controller: str
+    axes: Mapping[str, Axis]
+    calibration: str | None = None
+    compensated_by_controller: frozenset[str] = frozenset()
+    work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
+    tools: Mapping[int, Tool] = field(default_factory=dict)
+    default_tool: int | None = None
+    default_work_offset: str = "G54"
+    length_active: bool = False
+
+    @property
+    def least_increment_mm(self) -> Vector:
+        x, y, z = (self.axes[a].least_increment_mm for a in "XYZ")
+        return (x, y, z)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What changes per job. `work_offsets` and `tools` override the machine's, one by one."""
+
+    program: str | None = None
+    machine: str | None = None
+    start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
+    payload_kg: float = 0.0
+    temperatures_degC: Mapping[str, float] = field(default_factory=dict)
+    work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
+    tools: Mapping[int, Tool] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """Machine and job together: all that an interpreter of programs needs to know."""
+
+    machine: Machine
+    job: Job = field(default_factory=Job)
+
+    def work_offset(self, name: str) -> WorkOffset | None:
+        return self.job.work_offsets.get(name) or self.machine.work_offsets.get(name)
+
+    def tool(self, number: int) -> Tool | None:
+        return self.job.tools.get(number) or self.machine.tools.get(number)
