@@ -6,6 +6,9 @@ A model is a value: no state, no text, no files. A sum of models is a model (`ol
 Play state: `play` is (n, 3) in [-1, 1] per axis. +1: the axis last moved in + and its lost motion is
 taken up; -1: the same in -; 0: unknown or in the middle. With a lost motion of b mm an axis adds
 -b/2 * play to its own position. Without `play` models give the mean of both directions.
+
+A NaN axis position is unknown: error components that depend on that axis (`depends_on`) are NaN, the others
+finite. Models never test the box; without "hold" the caller asks `inside`.
 """
 
 from __future__ import annotations
@@ -31,9 +34,20 @@ class ErrorModel(Protocol):
         """(n, 3) orientation error of the tool relative to the workpiece in rad."""
         ...
 
-    def contributions(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Iterator[tuple[str, Array]]:
+    def contributions(
+        self, axis_mm: Array, tool_mm: Array, play: Array | None = None
+    ) -> Iterator[tuple[str, Array]]:
         """(name, (n, 3) mm) by source, e.g. "EXX", "ECX", "C0Y", "cyclic EXX", "lost motion X"; only non-zero
         sources; their sum is the error to first order."""
+        ...
+
+    @property
+    def box_mm(self) -> Array:
+        """(3, 2) calibrated axis positions."""
+        ...
+
+    def inside(self, axis_mm: Array) -> Mask:
+        """(n, 3) True where an axis position lies in the box, faces included; NaN does not."""
         ...
 
     @property

@@ -1,0 +1,48 @@
+"""Error models: what the tool really does, relative to the workpiece, for every axis position.
+
+`build` makes the model of a calibration; `total` adds models. See `base` for what every model offers.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.bodies import build_bodies
+from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.errormodel.chain import RigidBody
+from olp.errormodel.huddersfield import huddersfield
+from olp.errormodel.reversal import play_states
+from olp.errormodel.thermal import ThermalExpansion
+from olp.errormodel.total import total
+from olp.exceptions import ConfigError
+from olp.machine import COMPONENTS, SQUARENESS
+
+__all__ = ["Calibration", "Curve", "Cyclic", "ErrorModel", "Thermal", "build", "play_states", "total"]
+
+
+def build(
+    calibration: Calibration,
+    chain: str,
+    *,
+    outside: Literal["refuse", "hold"] = "refuse",
+    skip_components: frozenset[str] = frozenset(),
+) -> ErrorModel:
+    """The model of a calibration on a chain such as "FXYZ" (workpiece to tool, F the frame).
+
+    `outside` "hold" evaluates the model at the nearest point of the box; with "refuse" the caller tests
+    `inside`. `skip_components` are ISO 230-1 names that the control corrects already: their curves, cyclic
+    terms and squareness are left out. Raises ConfigError.
+    """
+    unknown = sorted(skip_components.difference(COMPONENTS, SQUARENESS))
+    if unknown:
+        raise ConfigError(f"component '{unknown[0]}' to skip; expected ISO 230-1 names such as EXX or C0Y")
+    hold = outside == "hold"
+    models: list[ErrorModel] = []
+    if calibration.model == "huddersfield":
+        models.append(huddersfield(calibration, chain, hold, skip_components))
+    else:
+        models.append(RigidBody(calibration.box_mm, hold, build_bodies(calibration, chain, skip_components)))
+    if calibration.thermal is not None:
+        models.append(ThermalExpansion.of(calibration.thermal, calibration.box_mm, hold))
+    return total(models)

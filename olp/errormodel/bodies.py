@@ -1,0 +1,129 @@
+"""The three moving bodies of a chain: what each carries, and the lever on which its angles act.
+
+Contribution of axis j: E_j(q) + eps_j(q) x [L_j(P, t) - L_j(P_line(q), t_line)] with L_j the tool vector plus
+the axes after j toward the tool, plus axis j itself where it carries the workpiece. Every translation
+component returns its measured value on its own line; so each row has a lever of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.errormodel.base import Array
+from olp.errormodel.calibration import Calibration, Curve
+from olp.errormodel.components import AxisComponents
+from olp.exceptions import ConfigError
+from olp.machine import CHAINS, ZERO, Vector
+from olp.tables import Column
+from olp.units import AXES
+
+#: Short forms of sine and cosine may miss this much, over the box and with this much tool.
+TRIGONOMETRY_MM = 2e-11
+TOOL_REACH_MM = 1000.0
+
+#: The third coordinate: the lever of angle a on row i is coordinate _OTHER[i, a].
+_OTHER = {(i, a): 3 - i - a for i in range(3) for a in range(3) if i != a}
+
+
+@dataclass(frozen=True, slots=True)
+class Lever:
+    """Coordinate k is q_k + t_k - offset_k where `moves`, t_k - offset_k elsewhere; lengths in mm."""
+
+    moves: tuple[bool, bool, bool]
+    offset_mm: Vector
+
+    def at(self, position: list[Array], tool: list[Column]) -> list[Column]:
+        """Three columns, from columns of axis positions and of the tool vector."""
+        arms = [tool[k] - self.offset_mm[k] for k in range(3)]
+        return [position[k] + arms[k] if self.moves[k] else arms[k] for k in range(3)]
+
+    def reach_mm(self, box_mm: Array, tool_mm: Array) -> Array:
+        """(3,) largest absolute coordinate in the box for tool vectors (m, 3)."""
+        arms = tool_mm - np.array(self.offset_mm)
+        moves = np.array(self.moves)[:, None]
+        ends = np.where(moves, box_mm, 0.0)
+        return np.asarray(np.abs(ends.T[:, None, :] + arms[None, :, :]).max(axis=(0, 1)))
+
+
+Levers = tuple[tuple[tuple[int, ...], Lever], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """Axis `axis` of the chain. `shear` (3,) times (q - datum) is its squareness; `levers` lists (rows,
+    lever). `sine_terms` 1 or 2: so many terms of the sine series (and cosine to second order) are exact to
+    TRIGONOMETRY_MM; 0: take sine and cosine themselves."""
+
+    axis: int
+    carries_workpiece: bool
+    components: AxisComponents
+    shear: Vector
+    datum_mm: float
+    levers: Levers
+    sine_terms: int
+
+
+def build_bodies(
+    calibration: Calibration, chain: str, skip: frozenset[str], *, tool_terms: bool = True
+) -> tuple[Body, ...]:
+    """Bodies from tool to workpiece; raises ConfigError for an unknown chain."""
+    if chain not in CHAINS:
+        raise ConfigError(f"chain '{chain}'; expected X, Y, Z and F from workpiece to tool, such as FXYZ")
+    order = chain.replace("F", "")
+    square = {name: 0.0 if name in skip else angle for name, angle in calibration.squareness.items()}
+    c0y, b0z, a0z = (square.get(name, 0.0) for name in ("C0Y", "B0Z", "A0Z"))
+    shears: dict[str, Vector] = {"X": ZERO, "Y": (0.0 - c0y, 0.0, 0.0), "Z": (b0z, 0.0 - a0z, 0.0)}
+    bodies = []
+    for place in reversed(range(3)):
+        axis, after = order[place], order[place + 1 :]
+        carries = chain.index(axis) < chain.index("F")
+        j = AXES.index(axis)
+        components = AxisComponents.of(calibration, axis, skip)
+        levers = _levers(calibration, axis, after, carries, tool_terms)
+        terms = _sine_terms(components, levers, calibration.box_mm)
+        bodies.append(Body(j, carries, components, shears[axis], calibration.datum_mm[j], levers, terms))
+    return tuple(bodies)
+
+
+def _sine_terms(components: AxisComponents, levers: Levers, box_mm: Array) -> int:
+    peak = max((v.peak for v in components.variation[3:] if v is not None), default=0.0)
+    tool = np.array([[TOOL_REACH_MM] * 3, [-TOOL_REACH_MM] * 3])
+    reach = max(float(lever.reach_mm(box_mm, tool).max()) for _, lever in levers)
+    if peak**4 / 8.0 * reach > TRIGONOMETRY_MM:
+        return 0
+    return 2 if peak**3 / 6.0 * reach > TRIGONOMETRY_MM else 1
+
+
+def _levers(calibration: Calibration, axis: str, after: str, carries: bool, tool_terms: bool) -> Levers:
+    curves = calibration.curves_of(axis)
+    holder = {name: curve for curve in curves for name in curve.names}
+    default = curves[0] if len(curves) == 1 else None
+
+    def lever(sources: list[Curve | None]) -> Lever:
+        """Of one row, coordinate by coordinate from the curve it was measured with."""
+        moves, offset = [False] * 3, [0.0] * 3
+        for k, source in enumerate(sources):
+            tool = source.tool_mm[k] if source is not None and tool_terms else 0.0
+            own = AXES[k] == axis
+            table = own and carries and source is not None and source.reference == "table"
+            moves[k] = AXES[k] in after or table
+            line = source.line_mm if source is not None and not own else None
+            # On its own line an axis stands where it stands; seen from a reflector on its table, it has moved
+            # from the datum.
+            at = (calibration.datum_mm if line is None else line)[k] if moves[k] else 0.0
+            offset[k] = at + tool
+        return Lever((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
+
+    rows: dict[Lever, list[int]] = {}
+    for i in range(3):
+        measured = holder.get(f"E{AXES[i]}{axis}", default)
+        # A row without a curve is zero on the lines on which the angles were measured.
+        sources: list[Curve | None] = [measured] * 3
+        if measured is None:
+            for a, name in enumerate("ABC"):
+                if a != i:
+                    sources[_OTHER[i, a]] = holder.get(f"E{name}{axis}")
+        rows.setdefault(lever(sources), []).append(i)
+    return tuple((tuple(members), lever) for lever, members in rows.items())

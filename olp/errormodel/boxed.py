@@ -1,0 +1,44 @@
+"""The calibrated box that every model knows, and the one check of a caller's arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.errormodel.base import Array, Mask
+from olp.exceptions import UsageError
+
+
+def as_points(axis_mm: object, name: str = "axis_mm") -> Array:
+    """Rows (n, 3) of float64, whatever the number type; raises UsageError on any other shape."""
+    points = np.asarray(axis_mm, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise UsageError(f"{name} has shape {points.shape}; expected (n, 3), a row X, Y, Z per point")
+    return points
+
+
+def as_tool(tool_mm: object, n: int) -> Array:
+    """A tool vector (3,) or one per point (n, 3); raises UsageError on any other shape."""
+    tool = np.asarray(tool_mm, dtype=np.float64)
+    if tool.shape not in ((3,), (n, 3)):
+        raise UsageError(f"tool_mm has shape {tool.shape}; expected (3,) or ({n}, 3)")
+    return tool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Boxed:
+    """`box_mm` (3, 2). With `hold` a model is evaluated at the nearest point of the box; without it the caller
+    tests `inside`, and outside its range a curve keeps its end value so that iterations near a face stay finite."""
+
+    box_mm: Array
+    hold: bool
+
+    def inside(self, axis_mm: Array) -> Mask:
+        """(n, 3) True where an axis position (n, 3) lies in the box, faces included; NaN does not."""
+        points = as_points(axis_mm)
+        return (points >= self.box_mm[:, 0]) & (points <= self.box_mm[:, 1])
+
+    def clamped(self, axis_mm: Array) -> Array:
+        """(n, 3) the positions at which the model is evaluated."""
+        return np.clip(axis_mm, self.box_mm[:, 0], self.box_mm[:, 1]) if self.hold else axis_mm

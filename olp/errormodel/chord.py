@@ -1,0 +1,122 @@
+"""How far a function of one axis can depart from its chord over a move of length d: rigorous upper bounds.
+
+With f'' as a measure (kinks are point masses) the departure is the integral of a tent kernel, at most
+d/4 high and d^2/8 in area, against f''. Hence d^2/8 * max|f''|, d/4 * (variation of f' in any window of
+length d), and the range of f bound it; the least of them holds. A product f * m with a linear lever m
+departs by at most bound(f) * max|m| + |change of f| * |change of m| / 4.
+
+Bounds are tabled over d on eight bins an octave; the bin is read off the bits of the number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.errormodel.calibration import Cyclic
+from olp.tables import Interpolant
+
+#: Bins run from 2^-20 to 2^20 mm; a binary64 shifted by 49 bits keeps its exponent and 3 bits of mantissa.
+_SHIFT = 49
+_FIRST = int(np.array([2.0**-20]).view(np.int64)[0]) >> _SHIFT
+_COUNT = 40 * 8
+_EDGES = np.array((np.arange(_COUNT + 1) + _FIRST) << _SHIFT, dtype=np.int64).view(np.float64)
+LOWER_MM, UPPER_MM = _EDGES[:-1], _EDGES[1:]
+#: Windows start on this many points per piece of a curve.
+_WINDOWS = 4
+
+
+def bins(length_mm: Array) -> npt.NDArray[np.int64]:
+    """(n,) bin of each length >= 0; to be gathered with mode="clip"."""
+    return (length_mm.view(np.int64) >> _SHIFT) - _FIRST
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variation:
+    """Bounds of one function f over its whole range, in units u of f.
+
+    peak = max|f| (u); slope = max|f'|; curvature = max|f''| away from kinks; smooth (bins,) bounds the
+    departure of the smooth part at the upper edge of a bin; kinks (bins,) times the length d bounds that of
+    the kinks; change (bins,) times d bounds |f(q + d) - f(q)|.
+    """
+
+    peak: float
+    slope: float
+    curvature: float
+    smooth: Array
+    kinks: Array
+    change: Array
+
+    @property
+    def varies(self) -> bool:
+        return self.slope > 0.0
+
+    @classmethod
+    def total(cls, parts: Sequence[Variation]) -> Variation:
+        return cls(
+            sum(p.peak for p in parts),
+            sum(p.slope for p in parts),
+            sum(p.curvature for p in parts),
+            sum((p.smooth for p in parts), np.zeros(_COUNT)),
+            sum((p.kinks for p in parts), np.zeros(_COUNT)),
+            sum((p.change for p in parts), np.zeros(_COUNT)),
+        )
+
+    @classmethod
+    def of_cyclic(cls, term: Cyclic) -> Variation:
+        peak, rate = abs(term.amplitude), 2.0 * math.pi / term.period_mm
+        slope, curvature = peak * rate, peak * rate * rate
+        smooth = np.minimum(curvature / 8.0 * UPPER_MM**2, 2.0 * peak)
+        return cls(peak, slope, curvature, smooth, np.zeros(_COUNT), np.minimum(slope, 2.0 * peak / LOWER_MM))
+
+    @classmethod
+    def of_curve(cls, curve: Interpolant, column: int, cell_mm: float) -> Variation:
+        """Of a column of an interpolant that is resampled in cells of `cell_mm`, whose kinks count too."""
+        y = curve.y[:, column]
+        span = float(y.max() - y.min())
+        slope = float(curve.max_slope()[column])
+        curvature = float(curve.max_curvature()[column])
+        change = np.minimum(slope, span / LOWER_MM)
+        peak = float(np.abs(y).max())
+        if curve.kind == "linear":
+            return cls(peak, slope, 0.0, np.zeros(_COUNT), 0.25 * _kink_windows(curve, column), change)
+        resampled = 0.25 * curvature * cell_mm**2
+        smooth = np.minimum(curvature / 8.0 * UPPER_MM**2, 0.25 * UPPER_MM * _smooth_windows(curve, column))
+        smooth = np.minimum(smooth, span) + resampled
+        return cls(peak, slope, curvature, smooth, np.zeros(_COUNT), change)
+
+
+def _kink_windows(curve: Interpolant, column: int) -> Array:
+    """(bins,) largest sum of |jumps of slope| that a window of a bin's upper length can hold."""
+    jumps = np.abs(np.diff(np.diff(curve.y[:, column]) / np.diff(curve.x)))
+    if not len(jumps):
+        return np.zeros(_COUNT)
+    at, total = curve.x[1:-1], np.concatenate([[0.0], np.cumsum(jumps)])
+    last = np.searchsorted(at, (at[:, None] + UPPER_MM[None, :]).ravel(), side="right").reshape(
+        len(at), _COUNT
+    )
+    return np.asarray((total[last] - total[:-1, None]).max(axis=0))
+
+
+def _smooth_windows(curve: Interpolant, column: int) -> Array:
+    """(bins,) bound of the variation of f' in a window of a bin's upper length.
+
+    f'' is linear in each piece, so the trapezoid of |f''| over a sub-piece is no less than its integral; a
+    window is widened to whole sub-pieces.
+    """
+    start, end = (d[:, column] for d in curve.second_derivatives())
+    share = np.arange(_WINDOWS + 1) / _WINDOWS
+    second = np.abs(start[:, None] + (end - start)[:, None] * share)
+    width = np.diff(curve.x)[:, None] / _WINDOWS
+    pieces = (0.5 * width * (second[:, :-1] + second[:, 1:])).ravel()
+    at = np.concatenate([(curve.x[:-1, None] + width * np.arange(_WINDOWS)).ravel(), curve.x[-1:]])
+    total = np.concatenate([[0.0], np.cumsum(pieces)])
+    ends = np.searchsorted(at, (at[1:, None] + UPPER_MM[None, :]).ravel(), side="left").reshape(
+        len(pieces), _COUNT
+    )
+    return np.asarray((total[np.minimum(ends, len(pieces))] - total[:-1, None]).max(axis=0))

@@ -1,0 +1,109 @@
+"""Lost motion as a play: where each axis lies in its backlash along a sequence of commands.
+
+With lost motion b the error of an axis follows e <- clip(e - dc, -b/2, +b/2), dc the change of command. In
+terms of play = -2 e / b this is play <- clip(play * b_before / b + 2 dc / b, -1, +1). For b <= 0 (a control
+that over-compensates, or an axis without lost motion) play is the sign of the last motion.
+
+Such maps p -> clip(m p + s, low, high) are closed under composition; a move longer than b maps all states to
+one. So a doubling scan over the few moves that do not is enough: its passes grow with the logarithm of
+the longest run of short moves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.errormodel.boxed import as_points
+from olp.exceptions import UsageError
+
+
+def play_states(axis_mm: Array, lost_motion_mm: Array, start: Array | None = None) -> Array:
+    """(n, 3) play in [-1, 1] at each of successive commands axis_mm (n, 3) with lost motion (n, 3) or (3,).
+
+    `start` (3,) is the play at the first command; None or NaN there: unknown. The middle of what is possible
+    is returned: 0 until a motion narrows it. Raises UsageError for a wrong shape.
+    """
+    low, high = play_interval(axis_mm, lost_motion_mm, start)
+    low += high
+    low *= 0.5
+    return low
+
+
+def play_interval(axis_mm: Array, lost_motion_mm: Array, start: Array | None = None) -> tuple[Array, Array]:
+    """Least and greatest possible play, both (n, 3); equal once the lost motion has been taken up.
+
+    A NaN command (an axis whose position is not known) makes the state unknown there and at the next one; a
+    NaN lost motion counts as none.
+    """
+    commands = as_points(axis_mm)
+    width = np.asarray(lost_motion_mm, dtype=np.float64)
+    if width.shape not in ((3,), commands.shape):
+        raise UsageError(f"lost_motion_mm has shape {width.shape}; expected (3,) or {commands.shape}")
+    state = np.full(3, np.nan) if start is None else np.asarray(start, dtype=np.float64)
+    if state.shape != (3,):
+        raise UsageError(f"start has shape {state.shape}; expected (3,)")
+    low, high = np.zeros(commands.shape), np.zeros(commands.shape)
+    if len(commands):
+        for j in range(3):
+            one_width = np.full(len(commands), width[j]) if width.ndim == 1 else width[:, j].copy()
+            command = np.ascontiguousarray(commands[:, j])
+            one_width[np.isnan(one_width)] = 0.0
+            low[:, j], high[:, j] = _interval(command, one_width, float(state[j]))
+    return low, high
+
+
+def _interval(command: Array, width: Array, start: float) -> tuple[Array, Array]:
+    """Least and greatest play (n,) of one axis."""
+    motion = np.diff(command)
+    lost = np.isnan(motion)
+    same = (motion == 0.0) & ((width[1:] == width[:-1]) | (width[1:] <= 0.0))
+    # Commands that leave the axis alone repeat the state before them.
+    kept = np.concatenate([[0], np.flatnonzero(~same) + 1])
+    moved = kept[1:] - 1
+    low, high = np.full(len(kept), -1.0), np.full(len(kept), 1.0)
+    gain, shift = np.ones(len(kept)), np.zeros(len(kept))
+    if len(moved):
+        _maps(motion[moved], width[moved], width[moved + 1], gain[1:], shift[1:], low[1:], high[1:])
+    sources = np.concatenate([[True], lost[moved]])
+    low[sources], high[sources] = -1.0, 1.0
+    _scan(gain, shift, low, high, sources)
+    if not np.isnan(start) and not np.isnan(command[0]):
+        # Until the first loss of position the maps run from the given state.
+        known = slice(0, int(np.flatnonzero(sources)[1]) if sources.sum() > 1 else len(kept))
+        low[known] = np.clip(gain[known] * start + shift[known], low[known], high[known])
+        high[known] = low[known]
+    repeats = np.diff(np.concatenate([kept, [len(command)]]))
+    return np.repeat(low, repeats), np.repeat(high, repeats)
+
+
+def _maps(
+    motion: Array, before: Array, width: Array, gain: Array, shift: Array, low: Array, high: Array
+) -> None:
+    """Fill in the map of each motion; low and high are the image of [-1, 1]."""
+    slack = width > 0.0
+    safe = np.where(slack, width, 1.0)
+    gain[:] = np.where(slack & (before > 0.0), before / safe, 1.0)
+    sense = np.where(motion > 0.0, np.inf, np.where(motion < 0.0, -np.inf, 0.0))
+    shift[:] = np.where(slack, 2.0 * motion / safe, sense)
+    low[:] = np.clip(shift - gain, -1.0, 1.0)
+    high[:] = np.clip(shift + gain, -1.0, 1.0)
+
+
+def _scan(gain: Array, shift: Array, low: Array, high: Array, sources: npt.NDArray[np.bool_]) -> None:
+    """Compose each map with all before it, back to the last source, in place."""
+    first = np.maximum.accumulate(np.where(sources, np.arange(len(gain)), 0))
+    active = np.flatnonzero(low != high)
+    reach = 1
+    while True:
+        active = active[(active - reach >= first[active]) & (low[active] != high[active])]
+        if not len(active):
+            return
+        before = active - reach
+        g, s, a, b = gain[active], shift[active], low[active], high[active]
+        new_gain, new_shift = g * gain[before], g * shift[before] + s
+        new_low = np.clip(g * low[before] + s, a, b)
+        new_high = np.clip(g * high[before] + s, a, b)
+        gain[active], shift[active], low[active], high[active] = new_gain, new_shift, new_low, new_high
+        reach *= 2

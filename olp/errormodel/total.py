@@ -1,0 +1,65 @@
+"""A sum of models is a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.boxed import as_points
+from olp.exceptions import UsageError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Total:
+    """Errors, rotations, lost motions and bounds add; the box is what all models share."""
+
+    models: tuple[ErrorModel, ...]
+
+    def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        return self._added(lambda model: model.error(axis_mm, tool_mm, play))
+
+    def rotation(self, axis_mm: Array, play: Array | None = None) -> Array:
+        return self._added(lambda model: model.rotation(axis_mm, play))
+
+    def contributions(
+        self, axis_mm: Array, tool_mm: Array, play: Array | None = None
+    ) -> Iterator[tuple[str, Array]]:
+        for model in self.models:
+            yield from model.contributions(axis_mm, tool_mm, play)
+
+    @property
+    def depends_on(self) -> Mask:
+        return np.asarray(np.any([model.depends_on for model in self.models], axis=0))
+
+    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+        found = [lost for model in self.models if (lost := model.lost_motion_mm(axis_mm)) is not None]
+        return sum(found[1:], found[0]) if found else None
+
+    def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
+        return self._added(lambda model: model.chord_bound(delta_mm, tool_mm))
+
+    @property
+    def box_mm(self) -> Array:
+        boxes = np.array([model.box_mm for model in self.models])
+        return np.stack([boxes[:, :, 0].max(axis=0), boxes[:, :, 1].min(axis=0)], axis=1)
+
+    def inside(self, axis_mm: Array) -> Mask:
+        points, box = as_points(axis_mm), self.box_mm
+        return (points >= box[:, 0]) & (points <= box[:, 1])
+
+    def _added(self, part: Callable[[ErrorModel], Array]) -> Array:
+        first, *others = self.models
+        result = part(first)
+        for model in others:
+            result += part(model)
+        return result
+
+
+def total(models: Sequence[ErrorModel]) -> ErrorModel:
+    """The sum of one or more models; raises UsageError for none."""
+    if not models:
+        raise UsageError("no error model to add; expected at least one")
+    return models[0] if len(models) == 1 else Total(tuple(models))

@@ -1,0 +1,166 @@
+"""Loads machine, job and calibration files into the values that the rest of `olp` works on.
+
+Paths inside a file are relative to that file. Every loader raises InputError where a file cannot be read and
+ConfigError with all problems of the file where it is wrong; both end the command line with exit code 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+
+from olp.exceptions import UsageError
+from olp.files.calibration import load_calibration
+from olp.files.problems import Problem, config_error, validate
+from olp.files.schemas import JobFile, MachineFile, MeshTable, Tools, WorkOffsets
+from olp.files.toml_text import Path, dotted, line_of, read_toml
+from olp.files.write import PathLike, read_bytes
+from olp.machine import Axis, Job, Machine, Setup, Tool, WorkOffset
+from olp.units import AXES
+
+__all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
+
+
+def load_machine(path: PathLike) -> Machine:
+    """The machine of an olp-machine-1 file; `calibration` becomes a path that can be opened."""
+    return _read_machine(path)[0]
+
+
+def load_job(path: PathLike) -> Job:
+    """The job of an olp-job-1 file; `program` and `machine` become paths that can be opened."""
+    return _read_job(path)[0]
+
+
+def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None = None) -> Setup:
+    """Machine and job together; without `machine_path` the job's `machine` is taken.
+
+    Refuses names that neither file defines: the tool at the start, touch tools, frames of meshes. Raises
+    UsageError where no machine file is named anywhere.
+    """
+    job, meshes, job_lines = _read_job(job_path) if job_path is not None else (Job(), (), {})
+    machine_path = machine_path if machine_path is not None else job.machine
+    if machine_path is None:
+        what = f"{job_path} names no machine" if job_path is not None else "no machine file is given"
+        raise UsageError(f"{what}; name the machine file with -m, or with the key machine of the job file")
+    machine, machine_lines = _read_machine(machine_path)
+    setup = Setup(machine, job)
+    found = _undefined_tools(setup, machine.work_offsets, machine_lines)
+    if machine.default_tool is not None and setup.tool(machine.default_tool) is None:
+        found.append(_no_tool(("job_defaults", "tool"), machine.default_tool, machine_lines))
+    if found:
+        raise config_error(found, str(machine_path))
+    found = _undefined_tools(setup, job.work_offsets, job_lines)
+    for index, mesh in enumerate(meshes):
+        if mesh.frame != "machine" and setup.work_offset(mesh.frame) is None:
+            key: Path = ("meshes", index, "frame")
+            sentence = (
+                f'{dotted(key)} = "{mesh.frame}" is no work offset of machine or job; expected "machine"'
+            )
+            found.append((line_of(key, job_lines), f"{sentence} or the name of one of [work_offsets]"))
+    if found:
+        raise config_error(found, str(job_path))
+    return setup
+
+
+def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
+    values, lines = read_toml(read_bytes(path), str(path))
+    file = validate(MachineFile, values, lines, str(path))
+    axes = {
+        axis: Axis(
+            travel_mm=table.travel_mm,
+            least_increment_mm=table.least_increment_mm,
+            velocity_mm_s=table.velocity_mm_s,
+            acceleration_mm_s2=table.acceleration_mm_s2,
+            jerk_mm_s3=table.jerk_mm_s3,
+        )
+        for axis, table in ((axis, getattr(file.axes, axis)) for axis in AXES)
+    }
+    machine = Machine(
+        name=file.name,
+        chain=file.chain,
+        controller=file.controller,
+        axes=axes,
+        calibration=beside(path, file.calibration),
+        compensated_by_controller=file.compensated_by_controller,
+        work_offsets=_work_offsets(file.work_offsets),
+        tools=_tools(file.tools),
+        default_tool=file.job_defaults.tool,
+        default_work_offset=file.job_defaults.work_offset,
+        length_active=file.job_defaults.length_active,
+    )
+    return machine, lines
+
+
+def _read_job(path: PathLike) -> tuple[Job, Sequence[MeshTable], Mapping[Path, int]]:
+    values, lines = read_toml(read_bytes(path), str(path))
+    file = validate(JobFile, values, lines, str(path))
+    missing: list[Problem] = []
+    for index, mesh in enumerate(file.meshes):
+        where = beside(path, mesh.file)
+        if where is None or not FilePath(where).is_file():
+            key: Path = ("meshes", index, "file")
+            sentence = (
+                f'{dotted(key)} = "{mesh.file}" is no file here; expected a path relative to the job file'
+            )
+            missing.append((line_of(key, lines), sentence))
+    if missing:
+        raise config_error(missing, str(path))
+    job = Job(
+        program=beside(path, file.program),
+        machine=beside(path, file.machine),
+        start_mm=file.start_mm.values,
+        payload_kg=file.payload_kg,
+        temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),
+        work_offsets=_work_offsets(file.work_offsets),
+        tools=_tools(file.tools),
+    )
+    return job, file.meshes, lines
+
+
+def _work_offsets(tables: WorkOffsets) -> dict[str, WorkOffset]:
+    return {
+        name: WorkOffset(
+            name=name,
+            offset_mm=(table.X_mm, table.Y_mm, table.Z_mm),
+            rotation_deg=(table.A_deg, table.B_deg, table.C_deg),
+            set_by=table.set_by,
+            touched_at_mm=table.touched_at_mm.values,
+            touch_tool=table.touch_tool,
+        )
+        for name, table in tables.items()
+    }
+
+
+def _tools(tables: Tools) -> dict[int, Tool]:
+    return {
+        int(number): Tool(
+            number=int(number),
+            length_mm=(table.X_mm, table.Y_mm, table.Z_mm),
+            radius_mm=table.radius_mm,
+            gauge_to_tip_mm=table.gauge_to_tip_mm,
+            set_by=table.set_by,
+            touched_at_mm=table.touched_at_mm.complete if table.touched_at_mm else None,
+        )
+        for number, table in tables.items()
+    }
+
+
+def _undefined_tools(
+    setup: Setup, offsets: Mapping[str, WorkOffset], lines: Mapping[Path, int]
+) -> list[Problem]:
+    return [
+        _no_tool(("work_offsets", name, "touch_tool"), offset.touch_tool, lines)
+        for name, offset in offsets.items()
+        if offset.touch_tool is not None and setup.tool(offset.touch_tool) is None
+    ]
+
+
+def _no_tool(key: Path, number: int, lines: Mapping[Path, int]) -> Problem:
+    return line_of(
+        key, lines
+    ), f"{dotted(key)} = {number} is not defined; expected the number of a table [tools.N]"
+
+
+def beside(naming: PathLike, named: str | None) -> str | None:
+    """A path inside a file, as seen from the folder of that file; an absolute path stays as it is."""
+    return None if named is None else str(FilePath(naming).parent / named)

@@ -1,0 +1,125 @@
+"""The kinds of values in files: numbers with limits, chains, names of errors and of work offsets."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from typing import Annotated
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from olp.machine import CHAINS, COMPONENTS, SQUARENESS
+
+#: Dialect profiles that can be read and written today.
+CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas")
+ISO_NAMES = COMPONENTS + SQUARENESS
+SIGN = "actual-minus-commanded"
+
+# Numbers only: a frame of another language may have any name, but a misspelt G-code would never be used.
+_TOOL_NUMBER = "(0|[1-9][0-9]*)"
+_G_OFFSET = re.compile(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?")
+
+
+def refusal(sentence: str) -> PydanticCustomError:
+    """An error whose sentence is complete: it is shown after the key path as it stands."""
+    return PydanticCustomError("olp", "{sentence}", {"sentence": sentence})
+
+
+def shown(value: object) -> str:
+    """A value as it may stand in a TOML file, cut where it is long."""
+    if isinstance(value, str):
+        text = f'"{value}"'
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, datetime.date):
+        text = value.isoformat()
+    else:
+        text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < pair[1]:
+        raise refusal(
+            f"= [{pair[0]:g}, {pair[1]:g}] mm is empty; expected [min, max] in mm with min below max"
+        )
+    return pair
+
+
+def _chain(value: object) -> object:
+    if not isinstance(value, str) or value not in CHAINS:
+        raise refusal(
+            f"= {shown(value)} is no chain; expected one of the 24 orders of F, X, Y, Z from workpiece to "
+            'tool, such as "FXYZ" (all axes carry the tool) or "YFXZ" (the table moves in Y)'
+        )
+    return value
+
+
+def _controller(value: object) -> object:
+    if value not in CONTROLLERS:
+        raise refusal(
+            f"= {shown(value)} is not a controller that olp knows; built are: {', '.join(CONTROLLERS)}"
+        )
+    return value
+
+
+def _sign(value: object) -> object:
+    if value != SIGN:
+        raise refusal(
+            f'= {shown(value)} is not taken; olp stores errors as "{SIGN}": for values of the opposite sense '
+            "(commanded minus actual, or compensation values) multiply curve columns, squareness and cyclic "
+            f'amplitudes by -1, then write sign = "{SIGN}"'
+        )
+    return value
+
+
+def _iso_names(value: object) -> frozenset[str]:
+    if value == "all":
+        return frozenset({"all"})
+    if not isinstance(value, list):
+        raise refusal(
+            f'= {shown(value)}; expected a list of ISO 230-1 names such as ["EXX", "C0Y"], or "all"'
+        )
+    unknown = [shown(item) for item in value if item not in ISO_NAMES]
+    if unknown:
+        raise refusal(
+            f"names {', '.join(unknown)}; expected ISO 230-1 names: E, direction X Y Z A B C, axis X Y Z "
+            "(EXX, EYX, EAX ...), or C0Y, B0Z, A0Z"
+        )
+    return frozenset(value)
+
+
+def _offset_name(name: str) -> str:
+    if re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
+        raise refusal('is no work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
+    return name
+
+
+def _tool_number(name: str) -> str:
+    if not re.fullmatch(_TOOL_NUMBER, name):
+        raise refusal("is no tool number; expected a whole number as name, such as [tools.1]")
+    return name
+
+
+Interval = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ascending)]
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Text = Annotated[str, Field(min_length=1)]
+IsoNames = Annotated[
+    frozenset[str],
+    PlainValidator(_iso_names),
+    WithJsonSchema(
+        {"anyOf": [{"type": "array", "items": {"enum": list(ISO_NAMES)}}, {"const": "all"}], "default": []}
+    ),
+]
+ToolNumber = Annotated[
+    str, AfterValidator(_tool_number), WithJsonSchema({"type": "string", "pattern": f"^{_TOOL_NUMBER}$"})
+]
+OffsetName = Annotated[str, Field(min_length=1), AfterValidator(_offset_name)]
+Chain = Annotated[str, BeforeValidator(_chain), Field(json_schema_extra={"enum": sorted(CHAINS)})]
+Controller = Annotated[
+    str, BeforeValidator(_controller), Field(json_schema_extra={"enum": list(CONTROLLERS)})
+]
+Sign = Annotated[str, BeforeValidator(_sign), Field(json_schema_extra={"const": SIGN})]

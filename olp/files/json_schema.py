@@ -1,0 +1,39 @@
+"""JSON Schemas of machine, calibration and job files, for editors that complete and check TOML."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from olp.exceptions import UsageError
+from olp.files.schemas import FILES
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema(kind: str) -> dict[str, Any]:
+    """The JSON Schema of a "machine", "calibration" or "job" file; raises UsageError for any other kind."""
+    if kind not in FILES:
+        raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(FILES)}')
+    schema = _cleaned(FILES[kind].model_json_schema(by_alias=True, mode="validation"))
+    return {"$schema": DIALECT, "title": f"olp {kind} file", **schema}
+
+
+def json_schema_text(kind: str) -> str:
+    """The schema as JSON text; raises UsageError as `json_schema` does."""
+    return json.dumps(json_schema(kind), indent=2) + "\n"
+
+
+def _cleaned(node: Any) -> Any:
+    """Without titles that only repeat a key, and without null, which TOML cannot say."""
+    if isinstance(node, list):
+        return [_cleaned(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    kept = {k: _cleaned(v) for k, v in node.items() if k != "title" and (k, v) != ("default", None)}
+    if "patternProperties" in kept:
+        kept["additionalProperties"] = False
+    options = [option for option in kept.pop("anyOf", []) if option != {"type": "null"}]
+    if len(options) == 1:
+        return options[0] | kept
+    return kept | ({"anyOf": options} if options else {})

@@ -1,0 +1,275 @@
+"""Imports the machine from a LinuxCNC configuration: INI file, tool table and stored work offsets.
+
+Source: the LinuxCNC integrator manual (INI configuration, tool table) and the parameter list of its
+G-code manual: 5220 holds the active offset, 5221 to 5390 hold G54 to G59.3, nine axes and a rotation
+each, in machine units.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from olp.exceptions import InputError
+from olp.files.write import PathLike, read_bytes
+from olp.machine import Axis, Machine, Tool, Vector, WorkOffset
+from olp.units import AXES, MM_PER_INCH
+
+#: Jerk where the configuration states none: full acceleration is reached within this time in s.
+JERK_TIME_S = 0.05
+#: LinuxCNC takes any number of decimals; this is what its users write.
+LEAST_INCREMENT_MM = 0.0001
+
+OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+
+_UNITS_MM = {"mm": 1.0, "metric": 1.0, "in": MM_PER_INCH, "inch": MM_PER_INCH, "imperial": MM_PER_INCH}
+_CARTESIAN = ("trivkins", "corexykins")
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TOOL_WORD = re.compile(rf"([A-Z])\s*({_NUMBER})", re.IGNORECASE)
+_MAX_INCLUDES = 20
+
+Sections = dict[str, dict[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """A machine and what a person must know or decide about it, one sentence a note."""
+
+    machine: Machine
+    notes: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class _Reading:
+    """One import under way."""
+
+    file: str
+    sections: Sections
+    notes: list[str] = field(default_factory=list)
+    mm: float = 1.0
+
+    def text(self, section: str, key: str) -> str | None:
+        return self.sections.get(section, {}).get(key)
+
+    def number(self, section: str, key: str) -> float | None:
+        text = self.text(section, key)
+        if text is None:
+            return None
+        match = re.match(_NUMBER, text)
+        if match is None:
+            raise InputError(f'[{section}] {key} = "{text}" is no number', file=self.file)
+        return float(match[0])
+
+    def length(self, section: str, key: str) -> float | None:
+        number = self.number(section, key)
+        return None if number is None else number * self.mm
+
+
+def from_linuxcnc(ini_path: PathLike, chain: str = "FXYZ") -> Imported:
+    """The machine that a LinuxCNC INI file describes; the file says nothing of the chain, so it is given.
+
+    Raises InputError where a file cannot be read, or where the INI file has no units, no limits, or
+    not all of the axes X, Y, Z.
+    """
+    path = Path(ini_path)
+    reading = _Reading(str(path), _sections(path))
+    reading.mm = _unit_mm(reading)
+    joints = _joints(reading)
+    axes = {letter: _axis(reading, letter, joints[letter]) for letter in AXES}
+    compensated = _compensated(reading, joints)
+    tools = _tools(reading, path)
+    offsets, active = _offsets(reading, path)
+    name = reading.text("EMC", "MACHINE") or path.stem
+    machine = Machine(
+        name=name,
+        chain=chain,
+        controller="linuxcnc",
+        axes=axes,
+        compensated_by_controller=compensated,
+        work_offsets=offsets,
+        tools=tools,
+        default_work_offset=active,
+    )
+    return Imported(machine, (f"The INI file does not state the chain; {chain} is assumed.", *reading.notes))
+
+
+def _unit_mm(reading: _Reading) -> float:
+    """Length of a machine unit in mm; LinuxCNC takes a name, or a number of units per mm."""
+    units = (reading.text("TRAJ", "LINEAR_UNITS") or "").casefold()
+    if units in _UNITS_MM:
+        return _UNITS_MM[units]
+    if re.fullmatch(_NUMBER, units) and float(units) > 0:
+        return 1.0 / float(units)
+    found = f'"{units}"' if units else "missing"
+    raise InputError(f"[TRAJ] LINEAR_UNITS is {found}; expected mm or inch", file=reading.file)
+
+
+def _lines(path: Path, depth: int = 0) -> Iterator[str]:
+    """The lines of an INI file, with those of `#INCLUDE` files in their place."""
+    for line in read_bytes(path).decode("utf-8", "replace").splitlines():
+        include = re.match(r"\s*#INCLUDE\s+(\S.*)", line)
+        if include and depth < _MAX_INCLUDES:
+            yield from _lines(path.parent / Path(include[1].strip()).expanduser(), depth + 1)
+        else:
+            yield line.strip()
+
+
+def _sections(path: Path) -> Sections:
+    """Section to key to its first value."""
+    sections: Sections = {}
+    current: dict[str, str] = {}
+    for line in _lines(path):
+        if line.startswith("[") and "]" in line:
+            current = sections.setdefault(line[1 : line.index("]")].strip(), {})
+        elif line and line[0] not in "#;" and "=" in line:
+            key, _, value = line.partition("=")
+            current.setdefault(key.strip(), value.strip())
+    return sections
+
+
+def _joints(reading: _Reading) -> dict[str, list[str]]:
+    """The sections that describe the joints of each axis; none where kinematics lie between them."""
+    coordinates = (reading.text("TRAJ", "COORDINATES") or "XYZ").upper().replace(" ", "")
+    kinematics = reading.text("KINS", "KINEMATICS") or "trivkins"
+    stated = re.search(r"coordinates\s*=\s*([A-Z]+)", kinematics, re.IGNORECASE)
+    order = stated[1].upper() if stated else "XYZABCUVW"
+    module = kinematics.split()[0]
+    missing = [letter for letter in AXES if letter not in coordinates]
+    if missing:
+        what = f"[TRAJ] COORDINATES = {coordinates} lacks {', '.join(missing)}"
+        raise InputError(f"{what}; expected a machine with the linear axes X, Y and Z", file=reading.file)
+    rotary = [letter for letter in coordinates if letter not in AXES]
+    if rotary:
+        reading.notes.append(f"Axes {', '.join(rotary)} are left out: olp corrects X, Y and Z.")
+    if module != "trivkins":
+        if module not in _CARTESIAN:
+            reading.notes.append(
+                f"KINEMATICS = {module}: check that X, Y, Z are three linear axes in series; "
+                "olp corrects no other machine."
+            )
+        return {letter: [] for letter in AXES}
+    joints: dict[str, list[str]] = {}
+    for letter in AXES:
+        numbers = [index for index, owner in enumerate(order) if owner == letter]
+        joints[letter] = [f"JOINT_{n}" for n in numbers if f"JOINT_{n}" in reading.sections]
+        # Before version 2.8 one section served as axis and joint.
+        joints[letter] += [f"AXIS_{n}" for n in numbers if f"AXIS_{n}" in reading.sections]
+    return joints
+
+
+def _axis(reading: _Reading, letter: str, joints: list[str]) -> Axis:
+    """The tightest of what the sections of an axis and its joints state."""
+    sections = [f"AXIS_{letter}", *joints]
+
+    def all_of(key: str) -> list[float]:
+        values = (reading.length(section, key) for section in sections)
+        return [value for value in values if value is not None]
+
+    def least(key: str, *caps: str) -> float | None:
+        values = all_of(key) + [v for cap in caps if (v := reading.length("TRAJ", cap)) is not None]
+        return min((value for value in values if value > 0), default=None)
+
+    low, high = max(all_of("MIN_LIMIT"), default=None), min(all_of("MAX_LIMIT"), default=None)
+    if low is None or high is None or not low < high:
+        raise InputError(
+            f"axis {letter} has no travel; expected MIN_LIMIT below MAX_LIMIT in [AXIS_{letter}]",
+            file=reading.file,
+        )
+    velocity = least("MAX_VELOCITY", "MAX_LINEAR_VELOCITY", "MAX_VELOCITY")
+    acceleration = least("MAX_ACCELERATION", "MAX_LINEAR_ACCELERATION", "MAX_ACCELERATION")
+    if velocity is None or acceleration is None:
+        key = "MAX_VELOCITY" if velocity is None else "MAX_ACCELERATION"
+        raise InputError(f"axis {letter} has no {key}; expected it in [AXIS_{letter}]", file=reading.file)
+    jerk = least("MAX_JERK", "MAX_LINEAR_JERK")
+    if jerk is None:
+        jerk = acceleration / JERK_TIME_S
+        note = f"The INI file states no jerk; full acceleration within {JERK_TIME_S:g} s is assumed."
+        reading.notes.extend([note] if note not in reading.notes else [])
+    return Axis(
+        travel_mm=(low, high),
+        least_increment_mm=LEAST_INCREMENT_MM,
+        velocity_mm_s=velocity,
+        acceleration_mm_s2=acceleration,
+        jerk_mm_s3=jerk,
+    )
+
+
+def _compensated(reading: _Reading, joints: Mapping[str, list[str]]) -> frozenset[str]:
+    """ISO names of what COMP_FILE corrects; a control's own backlash has no such name and gives a note."""
+    names = set()
+    for letter, sections in joints.items():
+        for section in sections:
+            table = reading.text(section, "COMP_FILE")
+            if table:
+                names.add(f"E{letter}{letter}")
+                reading.notes.append(
+                    f"[{section}] COMP_FILE = {table} corrects E{letter}{letter}, so it is listed in "
+                    "compensated_by_controller; if it was active while measuring, list it in "
+                    "active_during_measurement of the calibration instead."
+                )
+            elif backlash := reading.length(section, "BACKLASH"):
+                reading.notes.append(
+                    f"[{section}] BACKLASH = {backlash:g} mm is taken up by the control: measure with it "
+                    f"active, or leave {letter}_um out of [backlash] in the calibration."
+                )
+    return frozenset(names)
+
+
+def _tools(reading: _Reading, ini: Path) -> dict[int, Tool]:
+    name = reading.text("EMCIO", "TOOL_TABLE")
+    if name is None:
+        reading.notes.append("[EMCIO] TOOL_TABLE is not given: add [tools.N] by hand.")
+        return {}
+    path = ini.parent / name
+    if not path.is_file():
+        reading.notes.append(f"The tool table {name} does not exist: add [tools.N] by hand.")
+        return {}
+    tools: dict[int, Tool] = {}
+    for line in read_bytes(path).decode("utf-8", "replace").splitlines():
+        words = {
+            letter.upper(): float(number) for letter, number in _TOOL_WORD.findall(line.partition(";")[0])
+        }
+        if "T" not in words:
+            continue
+        x, y, z = (words.get(letter, 0.0) * reading.mm for letter in AXES)
+        number = int(words["T"])
+        if number in tools:
+            reading.notes.append(f"Tool {number} stands twice in {name}; the last row is taken.")
+        tools[number] = Tool(number, length_mm=(x, y, z), radius_mm=abs(words.get("D", 0.0)) * reading.mm / 2)
+    negative = [str(number) for number, tool in tools.items() if tool.lever_mm is None]
+    if negative:
+        reading.notes.append(
+            f"Tools {', '.join(negative)} have a negative Z, a touch-off value and no length: "
+            "give gauge_to_tip_mm to use them."
+        )
+    return tools
+
+
+def _offsets(reading: _Reading, ini: Path) -> tuple[dict[str, WorkOffset], str]:
+    """Work offsets G54 to G59.3 and the name of the active one."""
+    name = reading.text("RS274NGC", "PARAMETER_FILE")
+    path = ini.parent / name if name else None
+    if path is None or not path.is_file():
+        reading.notes.append(f"The parameter file {name or ''} does not exist: set the work offsets by hand.")
+        return {"G54": WorkOffset("G54")}, "G54"
+    values: dict[int, float] = {}
+    for line in read_bytes(path).decode("utf-8", "replace").splitlines():
+        row = re.match(rf"\s*(\d+)\s+({_NUMBER})\s*$", line)
+        if row:
+            values[int(row[1])] = float(row[2])
+    if values.get(5210) and any(values.get(5211 + i) for i in range(3)):
+        reading.notes.append(f"A G92 offset is active in {name}; it is not imported: cancel it with G92.1.")
+    offsets = {}
+    for index, offset in enumerate(OFFSETS):
+        first = 5221 + 20 * index
+        x, y, z = (values.get(first + i, 0.0) * reading.mm for i in range(3))
+        rotation: Vector = (0.0, 0.0, values.get(first + 9, 0.0))
+        offsets[offset] = WorkOffset(offset, offset_mm=(x, y, z), rotation_deg=rotation)
+    reading.notes.append(
+        'The work offsets count as touched off on the raw machine (set_by = "touch"); name the '
+        'tool in touch_tool, or write set_by = "true" where they were located by other means.'
+    )
+    active = int(values.get(5220, 1.0))
+    return offsets, OFFSETS[active - 1] if 1 <= active <= len(OFFSETS) else "G54"

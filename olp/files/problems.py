@@ -1,0 +1,159 @@
+"""Sentences for what pydantic finds wrong in a file: the key, its line, and what was expected."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeVar, get_args, get_origin
+
+from pydantic import ValidationError
+
+from olp.exceptions import ConfigError
+from olp.files.fields import shown
+from olp.files.schemas import Table, is_table
+from olp.files.toml_text import Path, dotted, line_of
+
+#: A line, where it is known, and a sentence.
+Problem = tuple[int | None, str]
+T = TypeVar("T", bound=Table)
+
+#: More problems than this say no more than the first ones do.
+MOST_PROBLEMS = 40
+
+_WANTED = {
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "string_type": "text in quotes",
+    "string_too_short": "text that is not empty",
+    "tuple_type": "a list in brackets",
+    "list_type": "an array of tables, written with [[ ]]",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "date_type": "a date without quotes, such as 2026-05-14",
+    "date_from_datetime_inexact": "a date without a time",
+}
+
+
+def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, int], file: str) -> T:
+    """The typed file; raises one ConfigError that lists every problem in the order of lines."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        items: list[dict[str, Any]] = [dict(item) for item in error.errors(include_url=False)]
+    # A misspelt key is one problem, not also a missing one.
+    meant = {_meant(model, item["loc"]) for item in items if item["type"] == "extra_forbidden"}
+    kept = [item for item in items if item["type"] != "missing" or item["loc"] not in meant]
+    raise config_error([_problem(model, item, lines) for item in kept], file)
+
+
+def config_error(found: Iterable[Problem], file: str | None) -> ConfigError:
+    """One error from (line, sentence) pairs, sorted by line; each sentence gets its line in front."""
+    ordered = sorted(dict.fromkeys(found), key=lambda item: item[0] or 0)
+    problems = tuple(f"line {line}: {text}" if line else text for line, text in ordered)
+    if len(problems) > MOST_PROBLEMS:
+        more = len(problems) - MOST_PROBLEMS
+        problems = (
+            *problems[:MOST_PROBLEMS],
+            f"and {more} more problems; correct the first ones and try again",
+        )
+    return ConfigError("; ".join(problems), file=file, line=ordered[0][0], problems=problems)
+
+
+def _problem(model: type[Table], error: dict[str, Any], lines: Mapping[Path, int]) -> Problem:
+    kind, path = error["type"], tuple(part for part in error["loc"] if part != "[key]")
+    owner, description = _field(model, path)
+    key = dotted(path)
+    line = line_of(path, lines)
+    if kind == "missing":
+        wanted = _list_wanted(path, description) or description
+        return line, f"{key} is missing; expected {wanted}"
+    if kind == "extra_forbidden":
+        return line, _unknown(owner, path, key, error["input"])
+    if kind == "olp":
+        return line, f"{key} {error['ctx']['sentence']}"
+    value = shown(error["input"])
+    wanted = _wanted(kind, error.get("ctx", {}), path)
+    return line, f"{key} = {value}; expected {wanted}: {description}"
+
+
+def _wanted(kind: str, context: Mapping[str, Any], path: Path) -> str:
+    if kind == "literal_error":
+        return "one of " + str(context["expected"]).replace("'", '"')
+    if kind == "greater_than":
+        return f"a number above {context['gt']:g}"
+    if kind == "greater_than_equal":
+        return f"a number of {context['ge']:g} or above"
+    if kind == "too_long":
+        return f"{context['max_length']} values"
+    return _WANTED.get(kind, kind.replace("_", " "))
+
+
+def _list_wanted(path: Path, description: str) -> str:
+    """A list that is too short misses an item, whose path ends in a number."""
+    return f"one more value: {description}" if isinstance(path[-1], int) else ""
+
+
+def _field(model: type[Table], path: Path) -> tuple[type[Table], str]:
+    """The table model that a path ends in, and the description of the last key that it names."""
+    owner: type[Table] = model
+    description = ""
+    inside: Any = model
+    for part in path:
+        if is_table(inside):
+            owner = inside
+            field = {f.alias or name: f for name, f in owner.model_fields.items()}.get(str(part))
+            if field is None:
+                break
+            description = field.description or ""
+            inside = field.annotation
+            # The next part of the path names one of many tables, no key.
+            if get_origin(inside) in (dict, list):
+                continue
+        inside = next(_tables(inside), inside)
+    return owner, description
+
+
+def _tables(annotation: Any) -> Iterator[Any]:
+    """The table models named anywhere in an annotation such as `dict[str, ToolTable]`."""
+    if is_table(annotation):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _tables(part)
+
+
+def _unknown(owner: type[Table], path: Path, key: str, value: object) -> str:
+    name = str(path[-1])
+    if name in owner.not_built:
+        return (
+            f"{key} ({owner.not_built[name]}) is part of the format but not built in this version of olp; "
+            "it is never ignored: remove it from the file if the correction does not need it"
+        )
+    if isinstance(value, dict) and len(path) > 1 and name.isdigit() and "work_offsets" in path:
+        return f'{key} is split at the point; expected quotes: [work_offsets."{path[-2]}.{name}"]'
+    known = _keys(owner)
+    near = nearest(name, known)
+    return f"{key} is no known key; " + (
+        f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
+    )
+
+
+def _keys(table: type[Table]) -> list[str]:
+    return [field.alias or name for name, field in table.model_fields.items()]
+
+
+def _meant(model: type[Table], path: Path) -> Path:
+    """The path that an unknown key most likely means; the path itself where nothing is near."""
+    owner, _ = _field(model, path)
+    return (*path[:-1], nearest(str(path[-1]), _keys(owner)) or path[-1])
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that a misspelt one most likely means."""
+    folded = {candidate.casefold(): candidate for candidate in known}
+    found = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
+    without_unit = [candidate for candidate in folded if candidate.startswith(name.casefold() + "_")]
+    return next((folded[candidate] for candidate in (*without_unit, *found)), None)

@@ -1,0 +1,342 @@
+"""The keys of machine, calibration and job files, as pydantic models.
+
+One class per TOML table; a key that no class names is refused. Every description completes the sentence
+"expected ...", states the unit, and goes into the exported JSON Schema as well.
+"""
+
+from __future__ import annotations
+
+import datetime
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+from olp.files.fields import (
+    CONTROLLERS,
+    SIGN,
+    Chain,
+    Controller,
+    Interval,
+    IsoNames,
+    NotNegative,
+    OffsetName,
+    Positive,
+    Sign,
+    Text,
+    ToolNumber,
+    Triple,
+    refusal,
+)
+from olp.machine import COMPONENTS
+
+
+class Table(BaseModel):
+    """A TOML table. `not_built` holds keys of the contract that this version cannot honour, and why."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+    not_built: ClassVar[dict[str, str]] = {}
+
+
+class Position(Table):
+    """Axis positions in mm; an axis that is not named is not known."""
+
+    X: float | None = Field(default=None, description="a position of axis X in mm")
+    Y: float | None = Field(default=None, description="a position of axis Y in mm")
+    Z: float | None = Field(default=None, description="a position of axis Z in mm")
+
+    @property
+    def values(self) -> tuple[float | None, float | None, float | None]:
+        return (self.X, self.Y, self.Z)
+
+    @property
+    def complete(self) -> tuple[float, float, float] | None:
+        """The three positions, None where one is missing."""
+        x, y, z = self.values
+        return None if x is None or y is None or z is None else (x, y, z)
+
+
+class AxisTable(Table):
+    travel_mm: Interval = Field(description="the lowest and highest axis position, [min, max] in mm")
+    least_increment_mm: Positive = Field(description="the smallest step that the control takes, in mm")
+    velocity_mm_s: Positive = Field(description="the largest velocity of the axis, in mm/s")
+    acceleration_mm_s2: Positive = Field(description="the largest acceleration of the axis, in mm/s2")
+    jerk_mm_s3: Positive = Field(description="the largest jerk of the axis, in mm/s3")
+
+
+class AxesTable(Table):
+    X: AxisTable = Field(description="the limits of axis X, a table [axes.X]")
+    Y: AxisTable = Field(description="the limits of axis Y, a table [axes.Y]")
+    Z: AxisTable = Field(description="the limits of axis Z, a table [axes.Z]")
+
+
+class WorkOffsetTable(Table):
+    X_mm: float = Field(
+        default=0.0, description="the axis position X of the program's origin, in mm; 0 if left out"
+    )
+    Y_mm: float = Field(
+        default=0.0, description="the axis position Y of the program's origin, in mm; 0 if left out"
+    )
+    Z_mm: float = Field(
+        default=0.0, description="the axis position Z of the program's origin, in mm; 0 if left out"
+    )
+    A_deg: float = Field(
+        default=0.0, description="the rotation of the frame about X, in degrees; 0 if left out"
+    )
+    B_deg: float = Field(
+        default=0.0, description="the rotation of the frame about Y, in degrees; 0 if left out"
+    )
+    C_deg: float = Field(
+        default=0.0, description="the rotation of the frame about Z, in degrees; 0 if left out"
+    )
+    set_by: Literal["touch", "true"] = Field(
+        default="touch",
+        description='"touch" (touched off on the uncorrected machine) or "true" (located by other means)',
+    )
+    touched_at_mm: Position = Field(
+        default_factory=Position,
+        description="the axis positions in mm at the touch, { X = .., Y = .., Z = .. }; one left out takes "
+        "the offset plus the length of touch_tool",
+    )
+    touch_tool: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="the number of the tool that touched, one of [tools]"
+    )
+
+    @field_validator("touched_at_mm", "touch_tool")
+    @classmethod
+    def _only_if_touched(cls, value: object, info: ValidationInfo) -> object:
+        if info.data.get("set_by") == "true" and value is not None:
+            raise refusal('contradicts set_by = "true"; expected set_by = "touch", or leave this key out')
+        return value
+
+
+class ToolTable(Table):
+    X_mm: float = Field(default=0.0, description="the tool offset in X as in the control's tool table, in mm")
+    Y_mm: float = Field(default=0.0, description="the tool offset in Y as in the control's tool table, in mm")
+    Z_mm: float = Field(default=0.0, description="the tool length as in the control's tool table, in mm")
+    radius_mm: NotNegative = Field(default=0.0, description="the tool radius, in mm")
+    gauge_to_tip_mm: Triple | None = Field(
+        default=None,
+        description="the vector from gauge point to tip, [X, Y, Z] in mm; [-X, -Y, -Z] if left out",
+    )
+    set_by: Literal["touch", "true"] = Field(
+        default="true",
+        description='"touch" (length set on the uncorrected machine) or "true" (measured by other means)',
+    )
+    touched_at_mm: Position | None = Field(
+        default=None,
+        validate_default=True,
+        description="the axis positions in mm where the length was set, { X = .., Y = .., Z = .. }",
+    )
+
+    @field_validator("touched_at_mm")
+    @classmethod
+    def _with_touch(cls, value: Position | None, info: ValidationInfo) -> Position | None:
+        set_by = info.data.get("set_by")
+        if set_by == "true" and value is not None:
+            raise refusal('is given, but set_by is "true"; expected set_by = "touch", or leave this key out')
+        if set_by == "touch" and (value is None or value.complete is None):
+            raise refusal(
+                'is incomplete; expected { X = .., Y = .., Z = .. } in mm, because set_by = "touch"'
+            )
+        return value
+
+
+class JobDefaultsTable(Table):
+    tool: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="the number of the tool in the spindle at the start, one of [tools]"
+    )
+    work_offset: Text = Field(
+        default="G54", description='the work offset that is active at the start, such as "G54"'
+    )
+    length_active: bool = Field(default=False, description="whether the tool length is active at the start")
+
+
+WorkOffsets = dict[OffsetName, WorkOffsetTable]
+Tools = dict[ToolNumber, ToolTable]
+
+
+class MachineFile(Table):
+    """olp-machine-1: one machine, its limits, work offsets and tools."""
+
+    schema_: Literal["olp-machine-1"] = Field(alias="schema", description='the format, "olp-machine-1"')
+    name: Text = Field(description="the name of the machine, which its calibration repeats")
+    chain: Chain = Field(
+        description='the order of axes from workpiece to tool with F for the frame, such as "FXYZ"'
+    )
+    controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
+    calibration: Text | None = Field(
+        default=None, description="the path of the calibration file, relative to this file"
+    )
+    compensated_by_controller: IsoNames = Field(
+        default=frozenset(),
+        description="the errors that the control corrects now and did not correct while measuring: a list of "
+        'ISO 230-1 names, or "all"',
+    )
+    axes: AxesTable = Field(description="the tables [axes.X], [axes.Y] and [axes.Z]")
+    work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
+    tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
+    job_defaults: JobDefaultsTable = Field(
+        default_factory=JobDefaultsTable, description="the state at the start of a program"
+    )
+
+
+class CurveTable(Table):
+    file: Text = Field(description="the path of a CSV file with columns such as X_mm, EXX_um, EBX_urad")
+    line_mm: Position = Field(
+        default_factory=Position,
+        description="where the other axes stood while measuring, such as { Y = 0.0, Z = 0.0 } in mm; the "
+        "datum if left out",
+    )
+    tool_mm: Triple = Field(
+        default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"
+    )
+    reference: Literal["functional-point", "table"] = Field(
+        default="functional-point",
+        description='"functional-point" (measured at the tip on its line) or "table" (the reflector stayed '
+        "fixed on a moving table)",
+    )
+    interpolation: Literal["linear", "pchip"] = Field(default="pchip", description='"linear" or "pchip"')
+
+
+class SquarenessTable(Table):
+    C0Y_urad: float = Field(default=0.0, description="the squareness of Y to X, in urad")
+    B0Z_urad: float = Field(default=0.0, description="the squareness of Z to X, in urad")
+    A0Z_urad: float = Field(default=0.0, description="the squareness of Z to Y, in urad")
+
+
+class BacklashTable(Table):
+    X_um: float = Field(default=0.0, description="the lost motion of axis X, in um")
+    Y_um: float = Field(default=0.0, description="the lost motion of axis Y, in um")
+    Z_um: float = Field(default=0.0, description="the lost motion of axis Z, in um")
+
+
+class CyclicTable(Table):
+    component: Literal[COMPONENTS] = Field(  # type: ignore[valid-type]
+        description='the ISO 230-1 name of a component error, such as "EXX"'
+    )
+    period_mm: Positive = Field(description="the period along the axis, in mm")
+    amplitude_um: float | None = Field(
+        default=None, description="the amplitude (peak) of a linear error, in um"
+    )
+    amplitude_urad: float | None = Field(
+        default=None, validate_default=True, description="the amplitude (peak) of an angular error, in urad"
+    )
+    phase_rad: float = Field(default=0.0, description="the phase at axis position 0, in rad")
+
+    @field_validator("amplitude_urad")
+    @classmethod
+    def _unit_fits(cls, urad: float | None, info: ValidationInfo) -> float | None:
+        component = info.data.get("component")
+        if component is None or "amplitude_um" not in info.data:
+            return urad
+        um = info.data["amplitude_um"]
+        angular = component[1] in "ABC"
+        if (um if angular else urad) is not None or (urad if angular else um) is None:
+            wanted = "amplitude_urad, in urad" if angular else "amplitude_um, in um"
+            raise refusal(f"does not fit component {component}; expected exactly one amplitude: {wanted}")
+        return urad
+
+
+class ThermalTable(Table):
+    X_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of X, in um/(m K)")
+    Y_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Y, in um/(m K)")
+    Z_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Z, in um/(m K)")
+    workpiece_um_m_K: float = Field(default=0.0, description="the expansion of the workpiece, in um/(m K)")
+    fixed_at_mm: Triple = Field(
+        default=(0.0, 0.0, 0.0), description="the axis positions where the scales are fixed, [X, Y, Z] in mm"
+    )
+    clamped_at_mm: Triple = Field(
+        default=(0.0, 0.0, 0.0),
+        description="the axis positions where the workpiece is clamped, [X, Y, Z] in mm",
+    )
+
+
+class CalibrationFile(Table):
+    """olp-calibration-1: the measured errors of one machine, actual minus commanded."""
+
+    not_built: ClassVar[dict[str, str]] = {
+        "maps": "volumetric error maps",
+        "compliance": "load-dependent errors",
+        "covariance": "uncertainty of the calibration",
+    }
+    schema_: Literal["olp-calibration-1"] = Field(
+        alias="schema", description='the format, "olp-calibration-1"'
+    )
+    machine: Text = Field(description="the name in the machine file that this calibration belongs to")
+    measured: datetime.date = Field(description="the date of measuring, such as 2026-05-14, without quotes")
+    valid_until: datetime.date | None = Field(
+        default=None, description="the last date of validity, such as 2027-05-14, without quotes"
+    )
+    temperature_degC: float = Field(description="the temperature of scales while measuring, in degC")
+    sign: Sign = Field(description=f'the sign of all values, "{SIGN}"')
+    model: Literal["rigid-body", "huddersfield"] = Field(description='"rigid-body" or "huddersfield"')
+    datum_mm: Triple = Field(description="the axis positions from which levers count, [X, Y, Z] in mm")
+    box_mm: Annotated[tuple[Interval, Interval, Interval], Field(strict=False)] = Field(
+        description="the calibrated axis positions, [[min, max], [min, max], [min, max]] of X, Y, Z in mm"
+    )
+    active_during_measurement: IsoNames = Field(
+        default=frozenset(),
+        description="the errors that the control corrected while measuring, a list of ISO 230-1 names",
+    )
+    curves: list[CurveTable] = Field(default=[], description="tables [[curves]]")
+    squareness: SquarenessTable = Field(default_factory=SquarenessTable, description="the table [squareness]")
+    backlash: BacklashTable = Field(default_factory=BacklashTable, description="the table [backlash]")
+    cyclic: list[CyclicTable] = Field(default=[], description="tables [[cyclic]]")
+    thermal: ThermalTable | None = Field(default=None, description="the table [thermal]")
+
+    @field_validator("valid_until")
+    @classmethod
+    def _not_before_measured(cls, value: datetime.date | None, info: ValidationInfo) -> datetime.date | None:
+        measured = info.data.get("measured")
+        if value is not None and measured is not None and value < measured:
+            raise refusal(f"= {value} is before measured = {measured}; expected a later date")
+        return value
+
+
+class TemperaturesTable(Table):
+    X_scale: float | None = Field(default=None, description="the temperature of the scale of X, in degC")
+    Y_scale: float | None = Field(default=None, description="the temperature of the scale of Y, in degC")
+    Z_scale: float | None = Field(default=None, description="the temperature of the scale of Z, in degC")
+    workpiece: float | None = Field(default=None, description="the temperature of the workpiece, in degC")
+
+
+class MeshTable(Table):
+    file: Text = Field(description="the path of a mesh such as an STL file, relative to this file")
+    role: Literal["workpiece", "fixture", "machine"] = Field(
+        description='"workpiece", "fixture" or "machine"'
+    )
+    frame: Text = Field(
+        default="machine", description='the work offset that places the mesh, such as "G54", or "machine"'
+    )
+
+
+class JobFile(Table):
+    """olp-job-1: what changes from job to job."""
+
+    schema_: Literal["olp-job-1"] = Field(alias="schema", description='the format, "olp-job-1"')
+    program: Text | None = Field(default=None, description="the path of the program, relative to this file")
+    machine: Text | None = Field(
+        default=None, description="the path of the machine file, relative to this file"
+    )
+    start_mm: Position = Field(
+        default_factory=Position,
+        description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
+    )
+    payload_kg: NotNegative = Field(default=0.0, description="the mass of workpiece and fixture, in kg")
+    temperatures_degC: TemperaturesTable = Field(
+        default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
+    )
+    work_offsets: WorkOffsets = Field(
+        default={}, description="tables [work_offsets.NAME], which override the machine's"
+    )
+    tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
+    meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
+
+
+#: File kind to its model, in the order in which a user meets them.
+FILES: dict[str, type[Table]] = {"machine": MachineFile, "calibration": CalibrationFile, "job": JobFile}
+
+
+def is_table(annotation: Any) -> bool:
+    """Whether an annotation is one of the table models."""
+    return isinstance(annotation, type) and issubclass(annotation, Table)

@@ -1,0 +1,187 @@
+"""The first files of a new machine, written as text that loads, with comments that say what to replace."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from olp.exceptions import UsageError
+from olp.files.linuxcnc import Imported, from_linuxcnc
+from olp.files.toml_text import comment, toml_key, toml_lines, toml_value
+from olp.files.write import PathLike, write_files
+from olp.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
+from olp.units import AXES
+
+__all__ = ["Imported", "from_linuxcnc", "machine_toml", "starter_machine", "starter_set", "write_starter"]
+
+#: A date that no calibration has: an untouched starter set counts as expired.
+PLACEHOLDER_DATE = datetime.date(2000, 1, 1)
+Travel = Mapping[str, tuple[float, float]]
+
+_POINTS = 11
+
+
+def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
+    """A machine as the text of an olp-machine-1 file, notes as comments; loads as an equal machine."""
+    lines = [line for note in notes for line in comment(note)]
+    compensated = sorted(machine.compensated_by_controller)
+    lines += toml_lines({"schema": "olp-machine-1", "name": machine.name})
+    lines += [
+        f"{line}  # from workpiece to tool, F the frame" for line in toml_lines({"chain": machine.chain})
+    ]
+    lines += toml_lines({"controller": machine.controller, "calibration": machine.calibration})
+    lines += comment("What the control corrects now and did not correct while measuring, by ISO 230-1 name.")
+    lines += toml_lines({"compensated_by_controller": "all" if compensated == ["all"] else compensated})
+    for name in AXES:
+        axis = machine.axes[name]
+        lines += ["", f"[axes.{name}]"]
+        lines += toml_lines({key: getattr(axis, key) for key in Axis.__dataclass_fields__})
+    lines += ["", *comment("Axis position of the program's origin, no tool length active.")]
+    for offset in machine.work_offsets.values():
+        lines += [f"[work_offsets.{toml_key(offset.name)}]", *_work_offset(offset)]
+    lines += ["", *comment("The control's tool table: Z_mm is the tool length.")]
+    for tool in machine.tools.values():
+        lines += [f"[tools.{tool.number}]", *_tool(tool)]
+    lines += ["", *comment("The state at the start of a program.")]
+    lines += ["[job_defaults]"]
+    lines += toml_lines(
+        {
+            "tool": machine.default_tool,
+            "work_offset": machine.default_work_offset,
+            "length_active": machine.length_active,
+        }
+    )
+    return "\n".join(lines) + "\n"
+
+
+def _work_offset(offset: WorkOffset) -> Iterator[str]:
+    rotation = zip(("A_deg", "B_deg", "C_deg"), offset.rotation_deg, strict=True)
+    yield from toml_lines({f"{axis}_mm": value for axis, value in zip(AXES, offset.offset_mm, strict=True)})
+    yield from toml_lines({key: value for key, value in rotation if value})
+    touched = {axis: v for axis, v in zip(AXES, offset.touched_at_mm, strict=True) if v is not None}
+    yield from toml_lines(
+        {"set_by": offset.set_by, "touched_at_mm": touched or None, "touch_tool": offset.touch_tool}
+    )
+
+
+def _tool(tool: Tool) -> Iterator[str]:
+    x, y, z = tool.length_mm
+    yield from toml_lines({"X_mm": x or None, "Y_mm": y or None, "Z_mm": z, "radius_mm": tool.radius_mm})
+    yield from toml_lines({"gauge_to_tip_mm": tool.gauge_to_tip_mm})
+    if tool.touched_at_mm is not None:
+        at = dict(zip(AXES, tool.touched_at_mm, strict=True))
+        yield from toml_lines({"set_by": tool.set_by, "touched_at_mm": at})
+
+
+def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = "linuxcnc") -> Machine:
+    """A machine with plausible limits, one work offset at the middle of X and Y, and one tool."""
+    if chain not in CHAINS:
+        raise UsageError(f'"{chain}" is no chain; expected an order of F, X, Y, Z from workpiece to tool')
+    for axis in AXES:
+        low, high = travel_mm.get(axis, (0.0, 0.0))
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise UsageError(f"travel of {axis} is [{low:g}, {high:g}] mm; expected min below max")
+    axes = {
+        axis: Axis(
+            travel_mm=(float(travel_mm[axis][0]), float(travel_mm[axis][1])),
+            least_increment_mm=0.001,
+            velocity_mm_s=250.0,
+            acceleration_mm_s2=1000.0,
+            jerk_mm_s3=20000.0,
+        )
+        for axis in AXES
+    }
+    x, y = ((axes[a].travel_mm[0] + axes[a].travel_mm[1]) / 2 for a in "XY")
+    z = axes["Z"].travel_mm[0]
+    return Machine(
+        name=name,
+        chain=chain,
+        controller=controller,
+        axes=axes,
+        calibration="calibration.toml",
+        work_offsets={"G54": WorkOffset("G54", offset_mm=(x, y, z), set_by="true")},
+        tools={1: Tool(1, length_mm=(0.0, 0.0, 100.0), radius_mm=5.0)},
+        default_tool=1,
+    )
+
+
+def starter_set(machine: Machine, measured: datetime.date = PLACEHOLDER_DATE) -> dict[str, str]:
+    """File name to text: machine, calibration with one curve file an axis (all errors zero), and job."""
+    notes = [f"Machine {machine.name}. Replace travel, limits, offsets and tools by those of your machine."]
+    files = {
+        "machine.toml": machine_toml(machine, notes),
+        "calibration.toml": _calibration_toml(machine, measured),
+        "job.toml": _job_toml(machine),
+    }
+    return files | {f"{axis.lower()}.csv": _curve_csv(axis, machine.axes[axis]) for axis in AXES}
+
+
+def write_starter(
+    folder: PathLike, machine: Machine, *, measured: datetime.date = PLACEHOLDER_DATE, force: bool = False
+) -> list[Path]:
+    """Write the starter set into an existing folder, all files or none; raises as `write_files` does."""
+    files = {Path(folder) / name: text.encode() for name, text in starter_set(machine, measured).items()}
+    write_files(files, force=force)
+    return list(files)
+
+
+def _calibration_toml(machine: Machine, measured: datetime.date) -> str:
+    box = [list(machine.axes[axis].travel_mm) for axis in AXES]
+    lines = [
+        *comment(
+            "Errors of the machine: actual minus commanded, of the tool relative to the workpiece. The curves"
+        ),
+        *comment("hold zeros, which correct nothing: put measured values there, then set dates and box."),
+        *toml_lines({"schema": "olp-calibration-1", "machine": machine.name, "measured": measured}),
+        *toml_lines({"valid_until": measured, "temperature_degC": 20.0, "sign": "actual-minus-commanded"}),
+        *toml_lines({"model": "rigid-body", "datum_mm": ZERO}),
+        *comment("Calibrated axis positions [min, max] of X, Y, Z; nothing outside is corrected."),
+        *toml_lines({"box_mm": box, "active_during_measurement": []}),
+    ]
+    for axis in AXES:
+        others = {other: 0.0 for other in AXES if other != axis}
+        lines += ["", "[[curves]]", *toml_lines({"file": f"{axis.lower()}.csv"})]
+        lines += [f"{line}  # where the other axes stood" for line in toml_lines({"line_mm": others})]
+        lines += [f"{line}  # tool while measuring" for line in toml_lines({"tool_mm": ZERO})]
+        lines += toml_lines({"interpolation": "pchip"})
+    lines += ["", *comment("Squareness, right-handed: Y to X about Z, Z to X about Y, Z to Y about X.")]
+    lines += ["[squareness]", *toml_lines({"C0Y_urad": 0.0, "B0Z_urad": 0.0, "A0Z_urad": 0.0})]
+    lines += ["", *comment("Constant lost motion of each axis.")]
+    lines += ["[backlash]", *toml_lines({f"{axis}_um": 0.0 for axis in AXES})]
+    return "\n".join(lines) + "\n"
+
+
+def _curve_csv(axis: str, limits: Axis) -> str:
+    names = [name for name in COMPONENTS if name[2] == axis]
+    columns = [f"{axis}_mm", *(f"{name}_{'um' if name[1] in AXES else 'urad'}" for name in names)]
+    rows = [
+        ",".join([repr(float(position)), *["0.0"] * len(names)])
+        for position in np.linspace(*limits.travel_mm, _POINTS)
+    ]
+    title = (
+        f"# Errors of axis {axis} by position: actual minus commanded; columns that are left out are zero."
+    )
+    return "\n".join([title, ",".join(columns), *rows]) + "\n"
+
+
+def _job_toml(machine: Machine) -> str:
+    job = Job(program="part.nc", machine="machine.toml")
+    lines = [
+        *comment("What changes from job to job; offsets and tools here override the machine's, one by one."),
+        *toml_lines({"schema": "olp-job-1", "program": job.program, "machine": job.machine}),
+        *comment("Where the axes stand at the start, if that is known:"),
+        "# start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }",
+        *toml_lines({"payload_kg": job.payload_kg}),
+        "",
+        *comment("Temperatures count only if the calibration has a table [thermal]:"),
+        "# [temperatures_degC]",
+        "# X_scale = 20.0",
+        "# workpiece = 20.0",
+    ]
+    for name, offset in machine.work_offsets.items():
+        value = toml_value(offset.offset_mm[0])
+        lines += ["", f"# [work_offsets.{toml_key(name)}]", f"# X_mm = {value}"]
+    return "\n".join(lines) + "\n"

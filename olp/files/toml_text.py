@@ -1,0 +1,162 @@
+"""TOML text in and out: the values of a file with the line of each key, and values as TOML."""
+
+from __future__ import annotations
+
+import datetime
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+
+from olp.exceptions import ConfigError
+
+#: A key path, such as ("axes", "X", "travel_mm") or ("curves", 0, "file").
+Path = tuple[str | int, ...]
+
+_KEY = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|[A-Za-z0-9_-]+')
+_KEY_LINE = re.compile(rf"\s*((?:{_KEY.pattern})(?:\s*\.\s*(?:{_KEY.pattern}))*)\s*=(.*)")
+_HEADER = re.compile(r"\s*(\[\[?)(.*?)\]\]?\s*(?:#.*)?$")
+_STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int]]:
+    """Values and key lines of a TOML file; raises ConfigError with the line where the text is no TOML."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        problem = (
+            f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
+        )
+        raise ConfigError(problem, file=file, line=line) from None
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(str(error), text, file) from None
+    return values, key_lines(text)
+
+
+def _syntax_error(message: str, text: str, file: str) -> ConfigError:
+    at = re.search(r"\(at (?:line (\d+), column \d+|end of document)\)", message)
+    lines = text.split("\n")
+    line = int(at[1]) if at and at[1] else max(len(lines), 1)
+    found = lines[line - 1].strip()
+    what = re.sub(r"\s*\(at .*\)", "", message)
+    hint = "correct this line"
+    value = _STRING_OR_COMMENT.sub("", found).partition("=")[2]
+    if "[" not in value and re.search(r"\d,\d", value):
+        hint = "write a decimal point instead of the comma"
+    elif found.count('"') % 2:
+        hint = "close the quotes"
+    elif "Invalid value" in what:
+        hint = "text needs quotes, and a file name on Windows single quotes"
+    problem = (
+        f"line {line}: {found!r} is no TOML ({what}); expected key = value, [table] or [[table]]; {hint}"
+    )
+    return ConfigError(problem, file=file, line=line)
+
+
+def _split(dotted: str) -> tuple[str, ...]:
+    return tuple(part[1:-1] if part[0] in "\"'" else part for part in _KEY.findall(dotted))
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """The line, counted from 1, of each table header and of each key that starts a line of valid TOML."""
+    lines: dict[Path, int] = {}
+    counts: dict[Path, int] = {}
+    table: Path = ()
+    depth = 0
+    quotes = ""
+    for number, line in enumerate(text.split("\n"), 1):
+        if quotes:
+            if quotes not in line:
+                continue
+            line = line.partition(quotes)[2]
+            quotes = ""
+        elif depth == 0 and (header := _HEADER.match(line)):
+            table = _enter(_split(header[2]), header[1] == "[[", counts)
+            lines.setdefault(table, number)
+            continue
+        elif depth == 0 and (key := _KEY_LINE.match(line)):
+            path = table + _split(key[1])
+            for end in range(len(table) + 1, len(path) + 1):
+                lines.setdefault(path[:end], number)
+            line = key[2]
+        opening = re.search(r'"""|\'\'\'', line)
+        if opening and opening[0] not in line[opening.end() :]:
+            quotes = opening[0]
+            line = line[: opening.start()]
+        bare = _STRING_OR_COMMENT.sub("", line)
+        depth += bare.count("[") + bare.count("{") - bare.count("]") - bare.count("}")
+    return lines
+
+
+def _enter(header: tuple[str, ...], is_array: bool, counts: dict[Path, int]) -> Path:
+    """The key path of a header, with the current index behind each array of tables."""
+    path: Path = ()
+    for end, part in enumerate(header, 1):
+        path += (part,)
+        if is_array and end == len(header):
+            counts[path] = counts.get(path, -1) + 1
+        if path in counts:
+            path += (counts[path],)
+    return path
+
+
+def line_of(path: Path, lines: Mapping[Path, int]) -> int | None:
+    """The line of the nearest key at or above a path."""
+    return next((lines[path[:end]] for end in range(len(path), 0, -1) if path[:end] in lines), None)
+
+
+def dotted(path: Path) -> str:
+    """A key path as a reader writes it: `curves[0].file`, counted from 0."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += ("." if text else "") + (part if _BARE.fullmatch(part) else f'"{part}"')
+    return text
+
+
+def toml_value(value: object) -> str:
+    """A value as TOML; floats are written so that they read back exactly."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, int | float | datetime.date):
+        return repr(value) if isinstance(value, int | float) else value.isoformat()
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{toml_key(str(k))} = {toml_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
+    raise TypeError(f"no TOML for {type(value).__name__}")
+
+
+def toml_key(name: str) -> str:
+    """A key, quoted where a bare one is not allowed."""
+    return name if _BARE.fullmatch(name) else _quoted(name)
+
+
+def toml_lines(values: Mapping[str, object]) -> Iterator[str]:
+    """`key = value` lines; keys whose value is None are left out."""
+    return (f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items() if value is not None)
+
+
+def comment(sentence: str) -> Iterator[str]:
+    """A sentence as comment lines of at most 100 characters."""
+    line = "#"
+    # TOML takes no control characters, not even in a comment.
+    for word in "".join(c if c.isprintable() else " " for c in sentence).split():
+        if len(line) + len(word) > 99:
+            yield line
+            line = "#"
+        line += " " + word
+    yield line
+
+
+def _quoted(text: str) -> str:
+    escapes = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+    body = "".join(escapes.get(c, c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}") for c in text)
+    return f'"{body}"'

@@ -1,0 +1,175 @@
+"""Edits of a text: numbers replaced, words and blocks inserted, everything else carried byte for byte.
+
+An edit replaces `start`..`end` of the source by a prefix (from a short table) and a number. All edits of
+a stretch are rendered and spliced at once, in columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Bytes = npt.NDArray[np.uint8]
+Index = npt.NDArray[np.int64]
+
+_POW10 = 10 ** np.arange(19, dtype=np.int64)
+#: four digits of text at a time
+_DIGITS = np.frombuffer("".join(f"{i:04d}" for i in range(10_000)).encode(), np.uint32).copy()
+#: a prefix without a number behind it
+BARE = np.iinfo(np.int64).min
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edits:
+    """(n,) columns. `mantissa` / 10**`decimals` is the number, BARE for none; `prefix` indexes a table of
+    bytes; `order` breaks ties between insertions at one place."""
+
+    start: Index
+    end: Index
+    mantissa: Index
+    decimals: npt.NDArray[np.int8]
+    prefix: npt.NDArray[np.int32]
+    order: npt.NDArray[np.int32]
+
+    @staticmethod
+    def join(parts: list[Edits]) -> Edits:
+        """All edits in the order of the text."""
+        columns = [np.concatenate([getattr(p, name) for p in parts]) for name in Edits.__slots__]
+        start, order = columns[0], columns[5]
+        # each part is sorted by itself, which a merge sort turns to account
+        index = np.lexsort((order, start)) if len(parts) > 1 else np.arange(len(start))
+        return Edits(*(column[index] for column in columns))
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+class Prefixes:
+    """A table of the few byte strings that stand before inserted numbers."""
+
+    def __init__(self) -> None:
+        self.table: list[bytes] = [b""]
+        self._index: dict[bytes, int] = {b"": 0}
+
+    def __call__(self, text: bytes) -> int:
+        found = self._index.get(text)
+        if found is None:
+            found = self._index[text] = len(self.table)
+            self.table.append(text)
+        return found
+
+
+def splice(source: Bytes, offset: int, edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> Bytes:
+    """The text of `source` (which stands at `offset` of the whole) with its edits made."""
+    if not len(edits):
+        return source
+    text, length = render(edits, prefixes, leading_zero=leading_zero)
+    start, end = edits.start - offset, edits.end - offset
+    count = len(start)
+    grow = np.cumsum(length - (end - start))
+    total = len(source) + int(grow[-1])
+    runs = np.zeros(2 * count + 1, np.int64)
+    flags = np.zeros(2 * count + 1, bool)
+    flags[1::2] = True
+    runs[1::2] = length
+    runs[0] = start[0]
+    runs[2:-1:2] = start[1:] - end[:-1]
+    runs[-1] = len(source) - end[-1]
+    fresh = np.repeat(flags, runs)
+    runs[1::2] = end - start
+    removed = np.repeat(flags, runs)
+    out = np.zeros(total, np.uint8)
+    out[fresh] = text
+    out[~fresh] = source[~removed]
+    return out
+
+
+def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Bytes, Index]:
+    """All prefixes and numbers as one run of bytes, and the length of each."""
+    bare = edits.mantissa == BARE
+    mantissa = np.where(bare, 0, edits.mantissa)
+    decimals = edits.decimals.astype(np.int64)
+    negative = mantissa < 0
+    size = np.abs(mantissa)
+    power = _POW10[decimals]
+    whole = size // power
+    fraction = size - whole * power
+    slow = np.flatnonzero((decimals > 8) | (whole >= 10**8))
+    if slow.size:
+        whole[slow] = fraction[slow] = 0
+    widths = np.array([len(p) for p in prefixes.table], np.int64)
+    left = int(widths[edits.prefix].max()) + 1
+    whole_groups = 1 if int(whole.max(initial=0)) < 10_000 else 2
+    fraction_groups = 1 if int(decimals.max(initial=0)) <= 4 else 2
+    point = left + 4 * whole_groups
+    width = point + 1 + 4 * fraction_groups
+    text = np.zeros((len(size), width), np.uint8)
+    if whole_groups == 2:
+        high = whole // 10_000
+        text[:, left : left + 4] = _DIGITS[high].view(np.uint8).reshape(-1, 4)
+        text[:, left + 4 : point] = _DIGITS[whole - high * 10_000].view(np.uint8).reshape(-1, 4)
+    else:
+        text[:, left:point] = _DIGITS[whole].view(np.uint8).reshape(-1, 4)
+    text[:, point] = 46
+    scaled = fraction * _POW10[np.maximum(4 * fraction_groups - decimals, 0)]
+    if fraction_groups == 2:
+        high = scaled // 10_000
+        text[:, point + 1 : point + 5] = _DIGITS[high % 10_000].view(np.uint8).reshape(-1, 4)
+        text[:, point + 5 :] = _DIGITS[scaled - high * 10_000].view(np.uint8).reshape(-1, 4)
+    else:
+        text[:, point + 1 :] = _DIGITS[scaled % 10_000].view(np.uint8).reshape(-1, 4)
+    digits = np.ones(len(size), np.int64)
+    for n in range(1, 4 * whole_groups):
+        digits += whole >= _POW10[n]
+    if not leading_zero:
+        digits -= (whole == 0) & (decimals > 0)
+    begin = point - digits
+    end = np.where(decimals > 0, point + 1 + decimals, point)
+    begin[bare] = end[bare] = point
+    begin -= negative
+    rows = np.flatnonzero(negative)
+    text[rows, begin[rows]] = 45
+    with_prefix = np.flatnonzero(edits.prefix)
+    for which in np.unique(edits.prefix[with_prefix]).tolist():
+        chosen = with_prefix[edits.prefix[with_prefix] == which]
+        for i, byte in enumerate(reversed(prefixes.table[which])):
+            text[chosen, begin[chosen] - 1 - i] = byte
+    begin -= widths[edits.prefix]
+    column = np.arange(width)
+    valid = (column >= begin[:, None]) & (column < end[:, None])
+    length = end - begin
+    flat = text[valid]
+    if slow.size:
+        return _with_slow(flat, length, edits, prefixes, slow, leading_zero)
+    return flat, length
+
+
+def _with_slow(
+    flat: Bytes, length: Index, edits: Edits, prefixes: Prefixes, slow: Index, leading_zero: bool
+) -> tuple[Bytes, Index]:
+    """Put in the rare numbers with more than eight digits on a side of the point."""
+    stop = np.cumsum(length)
+    pieces: list[Bytes] = []
+    at = 0
+    length = length.copy()
+    for i in slow.tolist():
+        pieces.append(flat[at : int(stop[i] - length[i])])
+        word = prefixes.table[int(edits.prefix[i])] + number_text(
+            int(edits.mantissa[i]), int(edits.decimals[i]), leading_zero=leading_zero
+        )
+        pieces.append(np.frombuffer(word, np.uint8))
+        at = int(stop[i])
+        length[i] = len(word)
+    pieces.append(flat[at:])
+    return np.concatenate(pieces), length
+
+
+def number_text(mantissa: int, decimals: int, *, leading_zero: bool = True) -> bytes:
+    """One number, fixed point, all decimals written."""
+    digits = str(abs(mantissa)).rjust(decimals + 1, "0")
+    whole, fraction = digits[: len(digits) - decimals], digits[len(digits) - decimals :]
+    if not leading_zero and whole == "0" and decimals:
+        whole = ""
+    return (("-" if mantissa < 0 else "") + whole + ("." + fraction if decimals else "")).encode()

@@ -1,0 +1,279 @@
+"""Lexer of word-address text (RS-274, ISO 6983 and kin): bytes to columns, one row a word.
+
+Bytes are never decoded. White space means nothing, also inside numbers; `(...)` and `;` start
+comments; `/` at the start of a block is block delete; a line that starts with `%` is a tape mark.
+A line that holds anything but words (letter, number) is *odd*: its words are dropped and its number
+is reported, so that the interpreter can decide whether it may be carried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Bytes = npt.NDArray[np.uint8]
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Bytes lexed at a time: the working columns then stay in the second-level cache.
+CHUNK = 1 << 18
+
+_U = np.uint64
+_PAD = 8
+_HIGH = np.array([0] + [(~((1 << (8 * (8 - n))) - 1)) & (2**64 - 1) for n in range(1, 9)], dtype=np.uint64)
+_POW10 = 10 ** np.arange(19, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WordChunk:
+    """Words of consecutive lines. Positions count from the start of the text, lines from 0 in the chunk.
+
+    `mantissa` / 10**`decimals` is the number as written; `pointed` tells whether it has a decimal point.
+    `first_word[i]` is the index of line i's first word, with one extra entry for the end.
+    """
+
+    letter: Bytes
+    mantissa: Index
+    decimals: npt.NDArray[np.int8]
+    pointed: Mask
+    start: Index
+    number: Index
+    end: Index
+    line: Index
+    first_word: Index
+    line_start: Index
+    line_end: Index
+    deleted: Mask
+    marks: Index
+    odd: Index
+    first_line: int
+
+
+def chunks(data: bytes, size: int = CHUNK) -> Iterator[WordChunk]:
+    """Lex a whole text, chunk by chunk, each ending at a line end."""
+    text = np.frombuffer(data, np.uint8)
+    lone_cr = b"\r" in data and data.count(b"\r") != data.count(b"\r\n")
+    at = line = 0
+    while at < len(data):
+        cut = len(data)
+        if at + size < len(data):
+            newline = data.find(b"\n", at + size)
+            if lone_cr:
+                ends = [p for p in (newline, data.find(b"\r", at + size)) if p >= 0]
+                newline = min(ends) if ends else -1
+                if newline >= 0 and data[newline : newline + 2] == b"\r\n":
+                    newline += 1
+            cut = newline + 1 if newline >= 0 else cut
+        chunk = lex(text[at:cut], at, line, lone_cr=lone_cr)
+        line += len(chunk.line_start)
+        at = cut
+        yield chunk
+
+
+def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = False) -> WordChunk:
+    """Lex whole lines; `offset` and `first_line` are where they stand in the text."""
+    size = len(text)
+    if lone_cr:
+        text = text.copy()
+        following = np.append(text[1:], 0)
+        text[(text == 13) & (following != 10)] = 10
+    newline = np.flatnonzero(text == 10)
+    ends = newline if size and newline.size and newline[-1] == size - 1 else np.append(newline, size)
+    lines = len(ends)
+    starts = np.empty(lines, np.int64)
+    starts[0] = 0
+    starts[1:] = ends[:-1] + 1
+
+    keep = text > 32
+    keep[newline] = True
+    deleted = np.zeros(lines, bool)
+    marks = _line_heads(text, starts, ends, keep, deleted)
+    _drop_comments(text, ends, keep)
+    where = np.flatnonzero(keep)
+    compact = np.full(len(where) + 2 * _PAD + 1, 10, np.uint8)
+    compact[_PAD : _PAD + len(where)] = text[where]
+    body = compact[_PAD : _PAD + len(where) + 1]
+
+    # '+' ',' '-' '.' '/' and digits; ',' and '/' make their line odd below
+    numeric = (compact[_PAD - 1 : _PAD + len(where) + 1] - np.uint8(43)) < 15
+    edges = np.flatnonzero(numeric[1:] != numeric[:-1])
+    begin, stop = edges[0::2], edges[1::2]
+    letter = compact[begin + (_PAD - 1)] & np.uint8(0xDF)
+    bad = _misplaced(body, begin, letter, numeric)
+    mantissa, decimals, pointed, malformed = _numbers(compact, body, begin, stop)
+    if malformed.size:
+        bad = np.concatenate((bad, begin[malformed]))
+
+    line_breaks = np.flatnonzero(body[: len(where)] == 10)
+    if len(line_breaks) < lines:
+        line_breaks = np.append(line_breaks, len(where))
+    first_word = np.empty(lines + 1, np.int64)
+    first_word[0] = 0
+    first_word[1:] = np.searchsorted(begin, line_breaks)
+    line = np.repeat(np.arange(lines), np.diff(first_word))
+    odd = np.unique(np.searchsorted(line_breaks, bad)) if bad.size else np.zeros(0, np.int64)
+    if odd.size:
+        good = ~np.isin(line, odd)
+        begin, stop, letter, line = begin[good], stop[good], letter[good], line[good]
+        mantissa, decimals, pointed = mantissa[good], decimals[good], pointed[good]
+        first_word = np.searchsorted(line, np.arange(lines + 1))
+    content_end = ends.copy()
+    has_cr = (ends > starts) & (text[np.maximum(ends - 1, 0)] == 13)
+    content_end[has_cr] -= 1
+    return WordChunk(
+        letter=letter,
+        mantissa=mantissa,
+        decimals=decimals,
+        pointed=pointed,
+        start=where[begin - 1] + offset,
+        number=where[begin] + offset,
+        end=where[stop - 1] + (offset + 1),
+        line=line,
+        first_word=first_word,
+        line_start=starts + offset,
+        line_end=content_end + offset,
+        deleted=deleted,
+        marks=marks,
+        odd=odd,
+        first_line=first_line,
+    )
+
+
+def _line_heads(text: Bytes, starts: Index, ends: Index, keep: Mask, deleted: Mask) -> Index:
+    """Take `/` and `%` at the start of lines out of `keep`; returns the lines with a tape mark."""
+    heads = np.flatnonzero((text == 47) | (text == 37))
+    if not heads.size:
+        return np.zeros(0, np.int64)
+    marks = []
+    lines = np.searchsorted(ends, heads)
+    previous = -1
+    for at, line in zip(heads.tolist(), lines.tolist(), strict=True):
+        if line == previous or keep[starts[line] : at].any():
+            continue
+        previous = line
+        if text[at] == 37:
+            marks.append(line)
+            keep[at : ends[line]] = False
+        else:
+            deleted[line] = True
+            keep[at] = False
+            # "/2": an optional switch number, only where a word follows it
+            if at + 1 < ends[line] and 49 <= text[at + 1] <= 57:
+                keep[at + 1] = False
+    return np.array(marks, np.int64)
+
+
+def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> None:
+    """Clear `keep` inside comments: `(` to `)` or the end of the line, `;` to the end of the line."""
+    opening = np.flatnonzero((text == 40) | (text == 59))
+    if not opening.size:
+        return
+    line_end = ends[np.searchsorted(ends, opening)]
+    closing = np.flatnonzero(text == 41)
+    stop = line_end
+    if closing.size:
+        nearest = np.append(closing, len(text))[np.searchsorted(closing, opening)]
+        stop = np.where((text[opening] == 40) & (nearest < line_end), nearest + 1, line_end)
+    if (opening[1:] < stop[:-1]).any():
+        real, last = [], 0
+        for i, (at, to) in enumerate(zip(opening.tolist(), stop.tolist(), strict=True)):
+            if at >= last:
+                real.append(i)
+                last = to
+        opening, stop = opening[real], stop[real]
+    lengths = np.zeros(2 * len(opening) + 1, np.int64)
+    lengths[1::2] = stop - opening
+    lengths[2:-1:2] = opening[1:] - stop[:-1]
+    lengths[0] = opening[0]
+    lengths[-1] = len(text) - stop[-1]
+    comment = np.zeros(2 * len(opening) + 1, bool)
+    comment[1::2] = True
+    inside = np.repeat(comment, lengths)
+    inside &= text != 10
+    keep[inside] = False
+
+
+def _misplaced(body: Bytes, begin: Index, letter: Bytes, numeric: Mask) -> Index:
+    """Positions (in the compact text) of anything that is not part of a word."""
+    alphabetic = (letter - np.uint8(65)) < 26
+    length = len(body) - 1
+    symbols = body[:length]
+    breaks = np.count_nonzero(symbols == 10)
+    separators = np.count_nonzero((symbols == 44) | (symbols == 47))
+    if alphabetic.all() and not separators and len(begin) + breaks == length - np.count_nonzero(numeric):
+        return np.zeros(0, np.int64)
+    number = numeric[1 : length + 1]
+    is_letter = ((symbols & np.uint8(0xDF)) - np.uint8(65)) < 26
+    followed = np.append(number[1:], False)
+    wrong = ~number & (symbols != 10) & ~(is_letter & followed)
+    wrong |= (symbols == 44) | (symbols == 47)
+    return np.concatenate((np.flatnonzero(wrong), begin[~alphabetic]))
+
+
+def _numbers(
+    compact: Bytes, body: Bytes, begin: Index, stop: Index
+) -> tuple[Index, npt.NDArray[np.int8], Mask, Index]:
+    """Mantissa, decimals, has-a-point and the indices of malformed numbers, eight digits at a time."""
+    count = len(begin)
+    if not count:
+        return np.zeros(0, np.int64), np.zeros(0, np.int8), np.zeros(0, bool), np.zeros(0, np.int64)
+    first = body[begin]
+    negative = first == 45
+    signed = negative | (first == 43)
+    digits = begin + signed
+    dots = np.flatnonzero(body == 46)
+    point = stop
+    pointed = np.zeros(count, bool)
+    if dots.size:
+        nearest = np.append(dots, len(body) + 1)[np.searchsorted(dots, begin)]
+        pointed = nearest < stop
+        point = np.where(pointed, nearest, stop)
+    whole = point - digits
+    fraction = np.maximum(stop - point - 1, 0)
+    signs = np.count_nonzero((body == 43) | (body == 45))
+    suspects = np.zeros(0, np.int64)
+    if np.count_nonzero(pointed) != len(dots) or np.count_nonzero(signed) != signs:
+        suspects = np.arange(count)
+    else:
+        suspects = np.flatnonzero((whole > 8) | (fraction > 8) | (whole + fraction == 0))
+    # window[i] holds the eight bytes before position i of `body`
+    window = np.ndarray((len(compact) - 7,), "<u8", compact.data, 0, (1,))
+    value = _eight_digits(window[point], np.minimum(whole, 8))
+    if fraction.any():
+        value = value * _POW10[np.minimum(fraction, 8)] + _eight_digits(window[stop], np.minimum(fraction, 8))
+    mantissa = np.where(negative, -value, value)
+    decimals = fraction.astype(np.int8)
+    malformed = []
+    for i in suspects.tolist():
+        parsed = _slow_number(bytes(body[begin[i] : stop[i]]))
+        if parsed is None:
+            malformed.append(i)
+        else:
+            mantissa[i], decimals[i] = parsed
+    return mantissa, decimals, pointed, np.array(malformed, np.int64)
+
+
+def _eight_digits(window: npt.NDArray[np.uint64], count: Index) -> Index:
+    """The last `count` ASCII digits of each eight-byte window as integers, by multiply and shift."""
+    x = (window ^ _U(0x3030303030303030)) & _HIGH[count]
+    x = x * _U(10) + (x >> _U(8))
+    low = (x & _U(0x000000FF000000FF)) * _U(0x000F424000000064)
+    high = ((x >> _U(16)) & _U(0x000000FF000000FF)) * _U(0x0000271000000001)
+    return ((low + high) >> _U(32)).astype(np.int64)
+
+
+def _slow_number(text: bytes) -> tuple[int, int] | None:
+    """One number of any length; None where it is not one. Beyond 18 digits the last ones are dropped."""
+    body = text[1:] if text[:1] in b"+-" else text
+    whole, dot, fraction = body.partition(b".")
+    if not (whole + fraction).isdigit():
+        return None
+    whole = whole.lstrip(b"0")
+    if len(whole) > 12:
+        return None
+    fraction = fraction[: 18 - len(whole)]
+    value = int((whole + fraction) or b"0")
+    return (-value if text[:1] == b"-" else value), len(fraction)

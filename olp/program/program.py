@@ -1,0 +1,103 @@
+"""A program as read: immutable bytes, word columns, nominal moves, and which word holds which coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.program.profiles import Profile
+from olp.program.state import Capture, PathMode
+from olp.toolpath import Toolpath
+
+Index = npt.NDArray[np.int64]
+Small = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Words:
+    """All words of the text: `start` of the letter, `number` and `end` of its digits, as byte positions;
+    the number is `mantissa` / 10**`decimals`. `first_word` (lines + 1,) leads from line to words."""
+
+    letter: npt.NDArray[np.uint8]
+    mantissa: Index
+    decimals: npt.NDArray[np.int8]
+    pointed: npt.NDArray[np.bool_]
+    start: Small
+    number: Small
+    end: Small
+    first_word: Small
+
+    def of_line(self, line: int) -> range:
+        """Indices of the words of a line, counted from 1."""
+        return range(int(self.first_word[line - 1]), int(self.first_word[line]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArcSlots:
+    """Per arc of the toolpath: (m, 5) indices of its I, J, K, R, P words or -1, and whether I, J, K are absolute."""
+
+    word: Small
+    absolute: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """One block of a canned cycle: its moves `first`..`last` of the toolpath and its words by letter.
+
+    `x_mm`, `y_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
+    `series` counts contiguous cycles; a block of one series inherits R and Z of the one before.
+    """
+
+    line: int
+    first: int
+    last: int
+    words: Mapping[str, int]
+    plane: int
+    place_mm: tuple[float, float]
+    r_mm: float
+    z_mm: float
+    initial_mm: float
+    incremental: bool
+    repeats: int
+    series: int
+    code: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted."""
+
+    data: bytes
+    profile: Profile
+    toolpath: Toolpath
+    words: Words | None
+    slot: Small
+    arc_slots: ArcSlots
+    line_start: Small
+    line_end: Small
+    captures: tuple[Capture, ...] = ()
+    path_modes: tuple[PathMode, ...] = ()
+    holes: tuple[Hole, ...] = ()
+    remarks: tuple[tuple[str, int, str], ...] = field(default=())
+    end_line: int = 0
+
+    @property
+    def lines(self) -> int:
+        return len(self.line_start)
+
+    def text(self, line: int) -> str:
+        """The text of a line, counted from 1, for people."""
+        return self.data[int(self.line_start[line - 1]) : int(self.line_end[line - 1])].decode("latin-1")
+
+    def eol(self, line: int) -> bytes:
+        """The line end that a block after this line takes: this line's, or the first one of the text."""
+        end = int(self.line_end[line - 1])
+        if self.data[end : end + 2] == b"\r\n":
+            return b"\r\n"
+        if self.data[end : end + 1] in (b"\n", b"\r"):
+            return self.data[end : end + 1]
+        return b"\r\n" if b"\r\n" in self.data[:4096] else b"\n"
+

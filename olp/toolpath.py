@@ -1,0 +1,118 @@
+"""The nominal path of a program as columns: axis positions of the machine, in program order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.machine import ZERO, Vector
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+
+class Kind(IntEnum):
+    """What a move is. Arcs run clockwise or counter-clockwise seen against their plane's normal."""
+
+    RAPID = 0
+    LINE = 1
+    ARC_CW = 2
+    ARC_CCW = 3
+    PROBE = 4
+
+
+class Flag(IntFlag):
+    """What else is known of a move."""
+
+    PASS = 1  #: never corrected: G53, G28, G30, a section switched off
+    DELETED = 2  #: in a block that the block-delete switch removes
+    CYCLE = 4  #: made by a canned cycle: has no words of its own
+    WHOLE = 8  #: never split: the block moves a rotary axis too
+    INCREMENTAL = 16  #: its words are distances
+    MACHINE = 32  #: G53: its words are axis positions
+    INVERSE_TIME = 64  #: G93: its F word is one over its time
+    CONTROL = 128  #: made by the control itself, without words: axes become unknown (M6, G28, after a probe)
+
+
+#: Plane number to (first, second, third) axis, right-handed: G17, G18, G19.
+PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """How words became axis positions for a stretch of moves, and which tool was in the spindle.
+
+    Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and active tool length).
+    `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the touch-off
+    of the work offset on the raw machine, None where it was located by other means; `tool_touched`
+    likewise for the length of the active tool.
+    """
+
+    unit_mm: float = 1.0
+    offset_mm: Vector = ZERO
+    tool_mm: Vector = ZERO
+    tool: int | None = None
+    work_offset: str = ""
+    touched: tuple[Vector, Vector] | None = None
+    tool_touched: tuple[Vector, Vector] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arcs:
+    """Arcs and helices: `move` (m,) index, `centre_mm` (m, 3) with the start's third coordinate, `plane`
+    (m,) 0..2, `sweep_rad` (m,) signed about the plane's normal, whole turns included."""
+
+    move: Index
+    centre_mm: Array
+    plane: npt.NDArray[np.int8]
+    sweep_rad: Array
+
+    @staticmethod
+    def none() -> Arcs:
+        return Arcs(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, np.int8), np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.move)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Toolpath:
+    """(n,) `kind`, `flag`, `line` (from 1), `frame`; (n, 3) `end_mm`, NaN where an axis is unknown."""
+
+    kind: npt.NDArray[np.uint8]
+    flag: npt.NDArray[np.uint8]
+    line: npt.NDArray[np.int32]
+    frame: npt.NDArray[np.int32]
+    end_mm: Array
+    frames: tuple[Frame, ...]
+    arcs: Arcs = field(default_factory=Arcs.none)
+    start_mm: tuple[float, float, float] = (float("nan"),) * 3
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def starts_mm(self, first: int = 0, last: int | None = None) -> Array:
+        """(m, 3) axis positions at the start of moves `first`..`last`."""
+        last = len(self) if last is None else last
+        out = np.empty((last - first, 3))
+        if last > first:
+            out[1:] = self.end_mm[first : last - 1]
+            out[0] = self.end_mm[first - 1] if first else self.start_mm
+        return out
+
+    def tool_mm(self, first: int = 0, last: int | None = None) -> Array:
+        """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3)."""
+        return self.per_frame([f.tool_mm for f in self.frames], first, last)
+
+    def per_frame(self, values: list[Vector], first: int = 0, last: int | None = None) -> Array:
+        """One vector a frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
+        table = np.array(values, float).reshape(len(values), 3)
+        if len(values) == 1 or (table == table[0]).all():
+            return table[0]
+        part = self.frame[first:last]
+        if len(part) and (part == part[0]).all():
+            return np.asarray(table[part[0]], float)
+        return np.asarray(table[part], float)
