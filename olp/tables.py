@@ -116,8 +116,9 @@ class DenseTable:
     """Piecewise linear columns on fine nodes. `cells` holds per column the value (real part) and the rise
     over the cell (imaginary part), so one gather serves both; a constant column is a plain float.
 
-    `nodes` is None for a uniform grid from `low` with `step`; else the nodes, found by bisection, and the
-    imaginary part is the slope. `step` is then the widest cell.
+    `nodes` is None for a uniform grid from `low` with `step`. Else it holds the nodes, the imaginary part is
+    the slope, and `step` is the widest cell; `guide` gives the cell at the start of each of many equal bins,
+    none of which holds two nodes (None: bisect).
     """
 
     low: float
@@ -125,6 +126,7 @@ class DenseTable:
     count: int
     nodes: Array | None
     cells: tuple[npt.NDArray[np.complex128] | float, ...]
+    guide: npt.NDArray[np.intp] | None = None
 
     def lookup(self, q: Array) -> list[Column]:
         """One (k,) array, or a float where constant, per column at finite q (k,); end values outside."""
@@ -145,15 +147,26 @@ class DenseTable:
 
     def _locate(self, q: Array) -> tuple[npt.NDArray[np.intp], Array]:
         if self.nodes is not None:
-            q = np.clip(q, self.nodes[0], self.nodes[-1])
-            index = np.searchsorted(self.nodes, q, side="right") - 1
-            return index, q - self.nodes[index]
+            return self._locate_node(np.clip(q, self.nodes[0], self.nodes[-1]), self.nodes)
         u = q - self.low
         u *= 1.0 / self.step
         np.clip(u, 0.0, self.count - 1.0, out=u)
         floor = np.floor(u)
         u -= floor
         return floor.astype(np.intp), u
+
+    def _locate_node(self, q: Array, nodes: Array) -> tuple[npt.NDArray[np.intp], Array]:
+        if self.guide is None:
+            index = np.searchsorted(nodes, q, side="right") - 1
+            return index, q - nodes[index]
+        at = q - self.low
+        at *= (len(self.guide) - 1) / (nodes[-1] - nodes[0])
+        index = self.guide.take(at.astype(np.intp), mode="clip")
+        # Rounding may name the bin before or after: one step either way mends it.
+        index -= nodes.take(index, mode="clip") > q
+        index += nodes.take(index + 1, mode="clip") <= q
+        np.clip(index, 0, self.count - 1, out=index)
+        return index, q - nodes.take(index, mode="clip")
 
 
 def dense_table(
@@ -184,9 +197,19 @@ def dense_table(
     pieces = np.maximum(1, np.ceil(widths / fine)).astype(np.intp)
     parts = [a + (b - a) * np.arange(k) / k for a, b, k in zip(knots[:-1], knots[1:], pieces, strict=True)]
     nodes = np.concatenate([*parts, knots[-1:]])
-    return DenseTable(
-        low, float(np.diff(nodes).max()), len(nodes), nodes, _cells(evaluate(nodes), np.diff(nodes))
-    )
+    widths = np.diff(nodes)
+    cells_of_nodes = _cells(evaluate(nodes), widths)
+    return DenseTable(low, float(widths.max()), len(nodes), nodes, cells_of_nodes, _guide(nodes))
+
+
+def _guide(nodes: Array) -> npt.NDArray[np.intp] | None:
+    """Cell at the start of each bin, bins shorter than the shortest cell; None where that takes too many."""
+    span = float(nodes[-1] - nodes[0])
+    bins = math.ceil(1.01 * span / float(np.diff(nodes).min()))
+    if bins > 4 * MAX_CELLS:
+        return None
+    starts = nodes[0] + span * (np.arange(bins + 1) / bins)
+    return np.asarray(np.clip(np.searchsorted(nodes, starts, side="right") - 1, 0, len(nodes) - 1), np.intp)
 
 
 def _common_step(knots: Array) -> float | None:

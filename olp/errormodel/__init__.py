@@ -12,13 +12,23 @@ from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.chain import RigidBody
 from olp.errormodel.huddersfield import huddersfield
-from olp.errormodel.reversal import play_states
+from olp.errormodel.reversal import play_interval, play_states
 from olp.errormodel.thermal import ThermalExpansion
 from olp.errormodel.total import total
 from olp.exceptions import ConfigError
 from olp.machine import COMPONENTS, SQUARENESS
 
-__all__ = ["Calibration", "Curve", "Cyclic", "ErrorModel", "Thermal", "build", "play_states", "total"]
+__all__ = [
+    "Calibration",
+    "Curve",
+    "Cyclic",
+    "ErrorModel",
+    "Thermal",
+    "build",
+    "play_interval",
+    "play_states",
+    "total",
+]
 
 
 def build(

@@ -28,8 +28,10 @@ def as_tool(tool_mm: object, n: int) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boxed:
-    """`box_mm` (3, 2). With `hold` a model is evaluated at the nearest point of the box; without it the caller
-    tests `inside`, and outside its range a curve keeps its end value so that iterations near a face stay finite."""
+    """`box_mm` (3, 2). With `hold` a model is evaluated at the nearest point of the box. Without it the
+    caller tests `inside`; outside its range a curve keeps its end value, so that iterations near a face
+    stay finite.
+    """
 
     box_mm: Array
     hold: bool

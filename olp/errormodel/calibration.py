@@ -111,7 +111,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Cyclic:
-    """amplitude * sin(2 pi q / period + phase) on a component, q = position of its axis; peak in mm or rad."""
+    """amplitude * sin(2 pi q / period + phase) on a component, q the position of its axis; mm or rad."""
 
     component: str
     period_mm: float
@@ -202,13 +202,13 @@ class Calibration:
             (low, high), x = self.box_mm[j], curve.position_mm
             if x[0] > low + COVER_MM or x[-1] < high - COVER_MM:
                 problems.append(
-                    f"curve of axis {curve.axis} runs from {x[0]:g} to {x[-1]:g} mm; expected all of the box, "
-                    f"{low:g} to {high:g} mm; measure the rest or make box_mm smaller"
+                    f"curve of axis {curve.axis} runs from {x[0]:g} to {x[-1]:g} mm; expected all of the "
+                    f"box, {low:g} to {high:g} mm; measure the rest or make box_mm smaller"
                 )
             if curve.forward and self.backlash_mm[j] != 0.0:
                 problems.append(
-                    f"backlash of axis {curve.axis} and a curve with a direction column; expected one of the two, "
-                    "or the lost motion counts twice"
+                    f"backlash of axis {curve.axis} and a curve with a direction column; expected one of "
+                    "the two, or the lost motion counts twice"
                 )
             for name in sorted(seen & set(curve.names)):
                 problems.append(f"{name} stands in two curves; expected each component once; merge the files")

@@ -23,8 +23,9 @@ _BLOCK = 8192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AxisBound:
-    """Bound for a move by d along one axis: min(curvature/8 (d^2 + 2 h min(d, h)), smooth[bin]) + d kinks[bin]
-    + d / 4 * sum_k change_k[bin] |delta_k|, h the cell of its table."""
+    """For a move that takes this axis by d, with h the cell of its table:
+    min(curvature/8 (d^2 + 2 h min(d, h)), smooth[bin]) + d (kinks[bin] + sum_k change_k[bin] |delta_k|).
+    """
 
     axis: int
     cell_mm: float

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import json
 import re
 from typing import Annotated
 
@@ -29,7 +30,7 @@ def refusal(sentence: str) -> PydanticCustomError:
 def shown(value: object) -> str:
     """A value as it may stand in a TOML file, cut where it is long."""
     if isinstance(value, str):
-        text = f'"{value}"'
+        text = json.dumps(value, ensure_ascii=False)
     elif isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, datetime.date):

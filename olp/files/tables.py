@@ -60,7 +60,10 @@ def parse_curves(data: bytes, file: str) -> CurveTable:
         line = data[: error.start].count(b"\n") + 1
         sentence = f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
         raise config_error([(line, sentence)], file) from None
-    records = _records(text)
+    try:
+        records = _records(text)
+    except csv.Error as error:
+        raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
     if not records:
         raise config_error([(None, "holds no header; expected columns such as X_mm, EXX_um, EYX_um")], file)
     line, header = records[0]

@@ -33,6 +33,9 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(str(error), text, file) from None
+    except (ValueError, RecursionError):
+        problem = "holds a number of thousands of digits or brackets nested beyond reason; correct it"
+        raise ConfigError(problem, file=file) from None
     return values, key_lines(text)
 
 
@@ -115,7 +118,7 @@ def dotted(path: Path) -> str:
         if isinstance(part, int):
             text += f"[{part}]"
         else:
-            text += ("." if text else "") + (part if _BARE.fullmatch(part) else f'"{part}"')
+            text += ("." if text else "") + toml_key(part)
     return text
 
 

@@ -38,10 +38,10 @@ def write_bytes(path: PathLike, data: bytes, *, force: bool = False, inputs: Ite
 
 
 def write_files(files: Mapping[Path, bytes], *, force: bool = False, inputs: Iterable[PathLike] = ()) -> None:
-    """Write files, each whole or not at all, and none if one of them cannot be written.
+    """Write files, each whole or not at all; where one cannot be written, none is put in place.
 
-    Each goes to a temporary file beside its target, is synced, and then replaces the target. A device
-    such as the null device is written to in place. Raises UsageError where a target is one of `inputs`
+    Each goes to a temporary file beside its target and is synced; then all replace their targets. A device
+    such as the null device is written to directly. Raises UsageError where a target is one of `inputs`
     (also with `force`), exists and `force` is not given, or lies in no folder; OlpError where the system
     refuses to write.
     """

@@ -98,7 +98,7 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
     fraction = size - whole * power
     slow = np.flatnonzero((decimals > 8) | (whole >= 10**8))
     if slow.size:
-        whole[slow] = fraction[slow] = 0
+        whole[slow] = fraction[slow] = decimals[slow] = 0
     widths = np.array([len(p) for p in prefixes.table], np.int64)
     left = int(widths[edits.prefix].max()) + 1
     whole_groups = 1 if int(whole.max(initial=0)) < 10_000 else 2

@@ -147,6 +147,10 @@ class Reader:
         self._expect("]")
         return inside
 
+    def unbracketed(self) -> Expression:
+        """An expression without brackets around it, as Macro B has it to the right of `=`."""
+        return self._level(0)
+
     def _level(self, level: int) -> Expression:
         levels = _LEVELS[self.dialect]
         if level == len(levels):

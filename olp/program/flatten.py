@@ -14,6 +14,7 @@ offsets, a position that the program has not commanded. Parameters that were nev
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from decimal import Decimal
 
@@ -21,13 +22,21 @@ from olp.exceptions import ProgramError, UsageError
 from olp.program.cycles import Stroke
 from olp.program.expressions import Dialect, filled, whole
 from olp.program.flatten_lines import Line, Word
-from olp.program.flatten_run import Frame, Unit, Variables, Walk
+from olp.program.flatten_run import Walk
 from olp.program.flatten_state import CYCLE_WORDS, State, Value
+from olp.program.flatten_unit import Frame, Unit
+from olp.program.flatten_values import Variables
 from olp.units import AXES
 
-_DIALECTS: dict[str, Dialect] = {"linuxcnc": "linuxcnc", "grbl": "linuxcnc", "fanuc": "fanuc", "haas": "fanuc"}
+_DIALECTS: dict[str, Dialect] = {
+    "linuxcnc": "linuxcnc",
+    "grbl": "linuxcnc",
+    "fanuc": "fanuc",
+    "haas": "fanuc",
+}
 # Words of a Fanuc that take no decimal point.
 _COUNTS = frozenset("gmnpltdhos")
+_COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
 
 
@@ -62,27 +71,26 @@ def flatten(
         raise UsageError(f"profile {profile!r} cannot be flattened; expected one of {', '.join(_DIALECTS)}")
     writer = _Flattener(dialect, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
     main = Unit(data, dialect, file)
-    walk = Walk(
-        main, writer.variables, subprograms, writer.block, dialect=dialect, block_delete=block_delete, limit=limit
-    )
-    walk.run()
+    visit = writer.block
+    Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
     return writer.text(main)
 
 
-def number_text(value: float, letter: str, dialect: Dialect) -> str:
+def number_text(value: float, letter: str, dialect: Dialect, exact: bool = False) -> str:
     """A number that came from an expression: 10 significant digits, at most 4 decimals on a Fanuc.
 
-    A Fanuc reads a number without a point in least increments, so lengths get one there.
+    `exact` gives all digits: the centre of an arc with R is the square root of a difference of its ends,
+    which loses half of them. A Fanuc reads a number without a point in least increments, so lengths get
+    one there.
     """
     if dialect == "fanuc" and letter in _COUNTS and letter != "g":
         return str(whole(value, f"the value of {letter.upper()}"))
     if not math.isfinite(value):
         raise ProgramError(f"the value of {letter.upper()} is not finite")
-    decimals = 12 if value == 0 else min(12, max(0, 9 - math.floor(math.log10(abs(value)))))
+    decimals = 0 if value == 0 else min(12, max(0, 9 - math.floor(math.log10(abs(value)))))
     if dialect == "fanuc":
         decimals = min(decimals, 4)
-    # Half away from zero on the shortest decimal form, so that 0.00005 does not depend on its binary tail.
-    text = f"{round(Decimal(repr(value)), decimals):f}"
+    text = f"{Decimal(repr(value)):f}" if exact and dialect == "linuxcnc" else f"{value:.{decimals}f}"
     if "." in text:
         text = text.rstrip("0")
     if dialect == "linuxcnc" or letter == "g":
@@ -120,14 +128,14 @@ class _Flattener:
             self.state.forget()
             return False
         values = [(word.letter, self._value(word)) for word in line.words]
-        settings = [(setting.target(self.variables), setting.value(self.variables)) for setting in line.assignments]
-        kept = [
-            (word, value) for i, (word, (_, value)) in enumerate(zip(line.words, values, strict=True)) if i not in without
-        ]
-        active: list[Value] = [(w.letter, self._tracked(w, v)) for w, v in kept if not self._vacant(w, v)]
+        settings = [(a.target(self.variables), a.value(self.variables)) for a in line.assignments]
+        cut = set(without)
+        for i, word in enumerate(line.words):
+            if self._vacant(word, values[i][1]) or (word.letter == "n" and seen):
+                cut.add(i)
+        kept = (i for i in range(len(line.words)) if i not in cut)
+        active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
         strokes: tuple[Stroke, ...] | None = None
-        cut = {i for i in range(len(line.words)) if i in without}
-        cut |= {i for i, w in enumerate(line.words) if self._vacant(w, values[i][1]) or (w.letter == "n" and seen)}
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
         if self.state.is_cycle(active):
             strokes = self._cycle(active)
@@ -135,10 +143,10 @@ class _Flattener:
             self.state.apply(active)
         if strokes is not None and self.expand_cycles:
             cut |= {i for i, w in enumerate(line.words) if self._of_cycle(w, values[i][1])}
-            self._write(line, values, cut)
+            self._write(line, values, cut, exact=False)
             self._write_strokes(strokes, line, before)
         else:
-            self._write(line, values, cut)
+            self._write(line, values, cut, exact=frame.unit.radius_arcs)
         for target, value in settings:
             self.variables.assign(target, value)
         return any(letter == "m" and value in _ENDS for letter, value in active)
@@ -165,7 +173,7 @@ class _Flattener:
                 self.state.forget()
             return None
         if self.dialect == "fanuc" and self.state.codes(active) & {740, 840}:
-            raise ProgramError("G74 and G84 are synchronised by the control and cannot be written as plain moves")
+            raise ProgramError("G74 and G84 are synchronised by the control: plain moves cannot replace them")
         return self.state.cycle(active, self.peck_clearance)
 
     def _of_cycle(self, word: Word, value: float | None) -> bool:
@@ -173,7 +181,9 @@ class _Flattener:
             return self.state.is_cycle([("g", value)]) and round(filled(value) * 10) == self.state.motion
         return word.letter in CYCLE_WORDS
 
-    def _write(self, line: Line, values: list[tuple[str, float | None]], cut: set[int]) -> None:
+    def _write(
+        self, line: Line, values: list[tuple[str, float | None]], cut: set[int], *, exact: bool
+    ) -> None:
         if line.plain and not cut and line.flow is None:
             self._out.append((line.raw, line.eol))
             return
@@ -188,10 +198,13 @@ class _Flattener:
             if i in cut:
                 splices.append((word.start, word.end, b""))
             elif word.value is not None:
-                text = number_text(filled(value), letter, self.dialect)
+                text = number_text(filled(value), letter, self.dialect, exact)
                 splices.append((word.value_start, word.end, text.encode()))
         for start, end, text_bytes in sorted(splices):
-            pieces += [line.raw[at:start], text_bytes]
+            inner = _COMMENT.findall(line.raw[start:end])
+            pieces += [line.raw[at:start], text_bytes, *inner]
+            if not text_bytes:
+                end += len(line.raw[end:]) - len(line.raw[end:].lstrip(b" \t"))
             at = end
         pieces.append(line.raw[at:])
         rest = [word for i, word in enumerate(line.words) if i not in cut]

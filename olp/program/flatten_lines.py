@@ -196,7 +196,7 @@ def _assignment(reader: Reader, places: list[int]) -> Assignment:
     if not reader.text.startswith("=", reader.at):
         raise ProgramError("a parameter stands where a word is expected, without '='")
     reader.at += 1
-    value = reader.value()
+    value = reader.unbracketed() if reader.dialect == "fanuc" else reader.value()
     return Assignment(target, value, places[start], places[reader.at - 1] + 1)
 
 

@@ -2,220 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
-import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 from olp.exceptions import ProgramError
-from olp.program.expressions import Dialect, filled, whole
-from olp.program.flatten_lines import Flow, Line, compile_line, split_lines
-from olp.program.flatten_state import State
+from olp.program.expressions import filled, whole
+from olp.program.flatten_lines import Flow, Line
+from olp.program.flatten_unit import Frame, Unit
+from olp.program.flatten_values import Variables, macro_arguments
 
 #: LinuxCNC allows 10 levels, Fanuc 4 to 10; more than this is a recursion without end.
 MAX_LEVEL = 50
 
-_MAYBE_O = re.compile(rb"[\s/]*(?:\([^)]*\)\s*)*(?:[nN][\d\s]*)?[oO]")
-_LINUXCNC_LOCAL = 30
-_LINUXCNC_FREE = 5060
-_LINUXCNC_LAST = 5602
-_FANUC_LOCAL = 33
-_FANUC_COMMON = 1000
-_ARGUMENTS = dict(zip("abcijkdefhmqrstuvwxyz", (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, *range(17, 27)), strict=True))
-_NOT_ARGUMENTS = frozenset("glnop")
-_COUNT_ARGUMENTS = frozenset("dhmst")
-_CALL_WORDS = frozenset("plg")
-
-_units = itertools.count()
-
-
-class Unit:
-    """One text (the program or a file of a subprogram), compiled line by line when first met."""
-
-    def __init__(self, data: bytes, dialect: Dialect, file: str | None) -> None:
-        self.key = next(_units)
-        self.file = file
-        self.dialect: Dialect = dialect
-        self.lines = split_lines(data)
-        self.ends_with_eol = data.endswith((b"\n", b"\r"))
-        self._compiled: dict[int, Line] = {}
-        self._flows: list[tuple[int, Flow]] | None = None
-        self._found: dict[tuple[int, str, frozenset[str]], int] = {}
-
-    def line(self, index: int) -> Line:
-        if index not in self._compiled:
-            try:
-                self._compiled[index] = compile_line(self.lines[index], index + 1, self.dialect)
-            except ProgramError as error:
-                error.line = index + 1
-                raise
-        return self._compiled[index]
-
-    def flows(self) -> list[tuple[int, Flow]]:
-        """Index and statement of every line with flow."""
-        if self._flows is None:
-            self._flows = []
-            for index, raw in enumerate(self.lines):
-                if self.dialect == "linuxcnc" and not _MAYBE_O.match(raw):
-                    continue
-                flow = self.line(index).flow
-                if flow is not None:
-                    self._flows.append((index, flow))
-        return self._flows
-
-    def definition(self, label: str, keyword: str) -> int | None:
-        """Index of the first `sub` or `program` with this label."""
-        return next((i for i, flow in self.flows() if flow.keyword == keyword and flow.label == label), None)
-
-    def next(self, index: int, label: str, keywords: frozenset[str]) -> int:
-        """Index of the next statement with this label, in the same subprogram; ProgramError if none."""
-        key = (index, label, keywords)
-        if key not in self._found:
-            self._found[key] = self._search(index, label, keywords)
-        return self._found[key]
-
-    def _search(self, index: int, label: str, keywords: frozenset[str]) -> int:
-        inner = ""
-        for i, flow in self.flows():
-            if i <= index:
-                continue
-            if inner:
-                inner = "" if (flow.keyword, flow.label) == ("endsub", inner) else inner
-                continue
-            if flow.label == label and flow.keyword in keywords:
-                return i
-            if flow.keyword == "sub":
-                inner = flow.label
-            elif flow.keyword in ("endsub", "program"):
-                break
-        raise ProgramError(f"no {' or '.join(sorted(keywords)).upper()} with label {label} follows")
-
-    def block_number(self, number: int, index: int) -> int:
-        """Index of the line N`number` in the program around `index`: forward first, then from its start."""
-        bounds = [i for i, flow in self.flows() if flow.keyword == "program"]
-        start = max((i for i in bounds if i <= index), default=0)
-        stop = min((i for i in bounds if i > index), default=len(self.lines))
-        for i in (*range(index + 1, stop), *range(start, index + 1)):
-            if any(w.letter == "n" and w.value is None and w.number == number for w in self.line(i).words):
-                return i
-        raise ProgramError(f"GOTO {number}: the program has no block N{number}")
-
-
-@dataclass(slots=True)
-class Frame:
-    """One level of the run: where it stands, its local parameters and its open loops."""
-
-    unit: Unit
-    at: int
-    label: str
-    locals: dict[int, float | None]
-    names: dict[str, float]
-    start: int = 0
-    repeats: int = 0
-    taken: set[str] = field(default_factory=set)
-    loops: dict[str, int] = field(default_factory=dict)
-    dos: dict[str, int] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
-    own_locals: bool = True
-
-
-class Variables:
-    """Parameters of the run. What only the control knows raises ProgramError."""
-
-    def __init__(self, state: State) -> None:
-        self.state = state
-        self.common: dict[int, float | None] = {}
-        self.globals: dict[str, float] = {"_value": 0.0, "_value_returned": 0.0}
-        self.locals: dict[int, float | None] = {}
-        self.names: dict[str, float] = {}
-
-    def number(self, index: int) -> float | None:
-        if self.state.dialect == "fanuc":
-            return self._fanuc(index)
-        if not 1 <= index <= _LINUXCNC_LAST:
-            raise ProgramError(f"#{index} is out of range; parameters are #1 to #{_LINUXCNC_LAST}")
-        if index <= _LINUXCNC_LOCAL:
-            return self.locals.get(index, 0.0)
-        if index <= _LINUXCNC_FREE:
-            return self.common.get(index, 0.0)
-        if 5420 <= index <= 5422:
-            return self.state.at(index - 5420)
-        raise ProgramError(
-            f"#{index} is kept by the control (probe result, offset, tool or position) and not known off line; "
-            "set a free parameter (#31 to #5060) instead"
-        )
-
-    def _fanuc(self, index: int) -> float | None:
-        if index == 0:
-            return None
-        if 0 < index <= _FANUC_LOCAL:
-            return self.locals.get(index)
-        if index in self.common:
-            return self.common[index]
-        for base in (5001, 5041):
-            if base <= index <= base + 2:
-                return self.state.at(index - base)
-        raise ProgramError(
-            f"#{index} is not set by the program before and not known off line; assign it in the program"
-        )
-
-    def named(self, name: str) -> float:
-        known = self._predefined(name)
-        if known is not None:
-            return known()
-        table = self.globals if name.startswith("_") else self.names
-        if name not in table:
-            raise ProgramError(f"#<{name}> is not set by the program before and not known off line")
-        return table[name]
-
-    def exists(self, name: str) -> bool:
-        if name.startswith(("_ini[", "_hal[")):
-            raise ProgramError(f"#<{name}> belongs to the control and is not known off line")
-        return self._predefined(name) is not None or name in (self.globals if name.startswith("_") else self.names)
-
-    def _predefined(self, name: str) -> Callable[[], float] | None:
-        state = self.state
-        if name in ("_x", "_y", "_z"):
-            return lambda: state.at("xyz".index(name[1]))
-        if name in ("_metric", "_imperial"):
-            return lambda: float((self._set(state.unit, name) == 21) is (name == "_metric"))
-        if name in ("_absolute", "_incremental"):
-            return lambda: float(state.absolute is (name == "_absolute"))
-        if name == "_plane":
-            return lambda: state.plane * 10.0
-        if name in ("_feed", "_rpm"):
-            return lambda: float(self._set(state.feed if name == "_feed" else state.speed, name))
-        return None
-
-    def _set(self, value: float | None, name: str) -> float:
-        if value is None:
-            raise ProgramError(f"#<{name}> is asked for before the program sets it")
-        return value
-
-    def assign(self, target: int | str, value: float | None) -> None:
-        if isinstance(target, str):
-            if self._predefined(target) is not None:
-                raise ProgramError(f"#<{target}> belongs to the control and cannot be set")
-            (self.globals if target.startswith("_") else self.names)[target] = filled(value)
-        elif self.state.dialect == "fanuc":
-            self._assign_fanuc(target, value)
-        elif 1 <= target <= _LINUXCNC_LOCAL:
-            self.locals[target] = value
-        elif 1 <= target <= _LINUXCNC_FREE:
-            self.common[target] = value
-        else:
-            raise ProgramError(f"#{target} belongs to the control: setting it has effects that no plain block has")
-
-    def _assign_fanuc(self, index: int, value: float | None) -> None:
-        if 1 <= index <= _FANUC_LOCAL:
-            self.locals[index] = value
-        elif 100 <= index < _FANUC_COMMON:
-            self.common[index] = value
-        elif index == 3000:
-            raise ProgramError("the program stops here with an alarm of its own (#3000)")
-        elif index not in (3003, 3004):
-            raise ProgramError(f"#{index} belongs to the control: setting it has effects that no plain block has")
-
+# LinuxCNC's turning cycles, which name a subprogram by Q.
+_PROFILE_CYCLES = {("g", code) for code in (70.0, 71.0, 71.1, 71.2, 72.0, 72.1, 72.2)}
 
 #: Writes one executed line, given the indices of the words to leave out; True where the program ends.
 WriteBlock = Callable[[Line, Frame, frozenset[int]], bool]
@@ -231,14 +30,13 @@ class Walk:
         subprograms: Callable[[str], bytes | None],
         write: WriteBlock,
         *,
-        dialect: Dialect,
         block_delete: bool,
         limit: int,
     ) -> None:
         self.main = main
         self.variables = variables
         self.write = write
-        self.dialect: Dialect = dialect
+        self.dialect = main.dialect
         self.block_delete = block_delete
         self.limit = limit
         self._subprograms = subprograms
@@ -261,7 +59,7 @@ class Walk:
                 visits += 1
                 if visits > self.limit:
                     raise ProgramError(
-                        f"the run visits more than {self.limit} blocks; a loop may have no end, or raise the limit"
+                        f"the run visits more than {self.limit} blocks; a loop has no end, or raise the limit"
                     )
                 line = frame.unit.line(index)
                 frame.at += 1
@@ -331,12 +129,12 @@ class Walk:
         return filled(flow.values[0](self.variables)) != 0
 
     def _do_sub(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.at = frame.unit.next(index, flow.label, frozenset({"endsub"})) + 1
+        frame.at = frame.unit.following(index, flow.label, frozenset({"endsub"})) + 1
 
     def _do_if(self, flow: Flow, frame: Frame, index: int) -> None:
         frame.taken.discard(flow.label)
         while not self._true(flow):
-            index = frame.unit.next(index, flow.label, frozenset({"elseif", "else", "endif"}))
+            index = frame.unit.following(index, flow.label, frozenset({"elseif", "else", "endif"}))
             frame.at = index + 1
             found = frame.unit.line(index).flow
             if found is None or found.keyword != "elseif":
@@ -347,7 +145,7 @@ class Walk:
     def _do_elseif(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label not in frame.taken:
             raise ProgramError(f"{flow.keyword.upper()} without an IF with label {flow.label}")
-        frame.at = frame.unit.next(index, flow.label, frozenset({"endif"}))
+        frame.at = frame.unit.following(index, flow.label, frozenset({"endif"}))
 
     _do_else = _do_elseif
 
@@ -370,7 +168,7 @@ class Walk:
             frame.loops[flow.label] = index
         else:
             frame.loops.pop(flow.label, None)
-            frame.at = frame.unit.next(index, flow.label, frozenset({"endwhile"})) + 1
+            frame.at = frame.unit.following(index, flow.label, frozenset({"endwhile"})) + 1
 
     def _do_endwhile(self, flow: Flow, frame: Frame, index: int) -> None:
         frame.at = self._open(frame.loops, flow)
@@ -381,10 +179,10 @@ class Walk:
             frame.counts[flow.label] = count
             frame.loops[flow.label] = index
         else:
-            frame.at = frame.unit.next(index, flow.label, frozenset({"endrepeat"})) + 1
+            frame.at = frame.unit.following(index, flow.label, frozenset({"endrepeat"})) + 1
 
     def _do_endrepeat(self, flow: Flow, frame: Frame, index: int) -> None:
-        start = self._open(frame.counts and frame.loops, flow)
+        start = self._open(frame.loops, flow)
         frame.counts[flow.label] -= 1
         if frame.counts[flow.label] > 0:
             frame.at = start + 1
@@ -392,14 +190,14 @@ class Walk:
             del frame.counts[flow.label], frame.loops[flow.label]
 
     def _do_break(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.at = frame.unit.next(index, flow.label, self._loop_end(flow, frame)) + 1
+        frame.at = frame.unit.following(index, flow.label, self._loop_end(flow, frame)) + 1
         for table in (frame.dos, frame.loops, frame.counts):
             table.pop(flow.label, None)
 
     def _do_continue(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label in frame.dos:
-            raise ProgramError("CONTINUE within DO … WHILE ends the loop in some releases of LinuxCNC; use IF")
-        frame.at = frame.unit.next(index, flow.label, self._loop_end(flow, frame))
+            raise ProgramError("CONTINUE within DO ... WHILE ends the loop in LinuxCNC 2.9; use IF")
+        frame.at = frame.unit.following(index, flow.label, self._loop_end(flow, frame))
 
     def _loop_end(self, flow: Flow, frame: Frame) -> frozenset[str]:
         if flow.label in frame.dos:
@@ -416,7 +214,7 @@ class Walk:
         if self._true(flow):
             frame.loops[flow.label] = index
         else:
-            frame.at = frame.unit.next(index, flow.label, frozenset({"end"})) + 1
+            frame.at = frame.unit.following(index, flow.label, frozenset({"end"})) + 1
 
     def _do_end(self, flow: Flow, frame: Frame, index: int) -> None:
         frame.at = self._open(frame.loops, flow)
@@ -435,12 +233,13 @@ class Walk:
         label = flow.label
         if flow.dynamic is not None:
             label = str(whole(filled(flow.dynamic(self.variables)), "the label of CALL"))
-        arguments: dict[int, float | None] = {i: v(self.variables) for i, v in enumerate(flow.values, start=1)}
+        arguments = {i: value(self.variables) for i, value in enumerate(flow.values, start=1)}
         unit, start = self._find(label, "sub", frame.unit)
         self._enter(Frame(unit, start + 1, label, arguments, {}, start=start + 1))
 
     def _do_endsub(self, flow: Flow, frame: Frame, index: int) -> None:
-        if len(self._frames) == 1 or flow.label != frame.label:
+        # RETURN may carry any label, as LinuxCNC takes it.
+        if len(self._frames) == 1 or (flow.keyword == "endsub" and flow.label != frame.label):
             raise ProgramError(f"{flow.keyword.upper()} with label {flow.label} outside of its SUB")
         value = flow.values[0](self.variables) if flow.values else None
         self.variables.globals |= {"_value": filled(value), "_value_returned": float(bool(flow.values))}
@@ -456,7 +255,7 @@ class Walk:
         if label not in self._files:
             data = self._subprograms(label)
             if data is None:
-                raise ProgramError(f"subprogram {label} is not in the file, and no file of that name was given")
+                raise ProgramError(f"subprogram {label} is not in the file, and no file of it was given")
             self._files[label] = Unit(data, self.dialect, label)
         unit = self._files[label]
         start = unit.definition(label, keyword)
@@ -477,12 +276,13 @@ class Walk:
         return frame
 
     def _calls(self, line: Line, frame: Frame, index: int) -> bool | None:
-        """Carry out M98, M97, M99 and G65; None where the line has none of them, else whether the run ends."""
+        """Carry out M98, M97, M99 and G65; None where the line has none, else whether the run ends."""
         codes = {(w.letter, w.number) for w in line.words if w.letter in "mg" and w.value is None}
-        if ("m", 70.0) in codes or ("m", 73.0) in codes or (("m", 72.0) in codes and len(self._frames) > 1):
-            if len(self._frames) > 1 or ("m", 73.0) in codes:
-                raise ProgramError("modes saved by M70 or M73 within a subprogram come back when it ends; write them out")
-            return None
+        saves = self.dialect == "linuxcnc" and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
+        if saves and (len(self._frames) > 1 or ("m", 73.0) in saves):
+            raise ProgramError("M70, M72 and M73 act on a level of subprograms, which plain blocks lack")
+        if self.dialect == "linuxcnc" and codes & _PROFILE_CYCLES:
+            raise ProgramError("G70 to G72 take their profile from a subprogram, which plain blocks lack")
         if ("g", 66.0) in codes or ("g", 66.1) in codes:
             raise ProgramError("G66 calls a macro after every move, which is not unrolled; call it with G65")
         if ("g", 65.0) in codes:
@@ -518,8 +318,7 @@ class Walk:
             for i, w in enumerate(line.words)
             if w.letter in ("p", "l") or (w.letter == "m" and w.number in (97, 98))
         )
-        if len(without) < len(line.words) or line.comments:
-            self.write(line, frame, without)
+        self.write(line, frame, without)
         if local:
             unit, start = frame.unit, frame.unit.block_number(number, index) - 1
         else:
@@ -544,8 +343,7 @@ class Walk:
         without = frozenset(
             i for i, w in enumerate(line.words) if w.letter == "p" or (w.letter == "m" and w.number == 99)
         )
-        if len(without) < len(line.words) or line.comments:
-            self.write(line, frame, without)
+        self.write(line, frame, without)
         if frame.repeats > 0:
             frame.repeats -= 1
             frame.at = frame.start
@@ -562,33 +360,10 @@ class Walk:
             raise ProgramError("G65 has no P word")
         count = self._word(line, "l")
         repeats = 1 if count is None else whole(count, "the repeat count L")
-        arguments = dict(self._arguments(line))
-        if line.comments:
-            self.write(line, frame, frozenset(range(len(line.words))))
+        arguments = dict(macro_arguments(line, self.variables))
+        self.write(line, frame, frozenset(range(len(line.words))))
         label = str(whole(number, "the program number P"))
         unit, start = self._find(label, "program", frame.unit)
         self._enter(
             Frame(unit, start + 1, label, arguments, {}, start=start + 1, repeats=max(repeats, 1) - 1)
         )
-
-    def _arguments(self, line: Line) -> Iterator[tuple[int, float | None]]:
-        """(variable, value) of G65's words; I, J, K may come in several sets, as in argument list II."""
-        group, last = 0, ""
-        for word in line.words:
-            letter = word.letter
-            if letter in _NOT_ARGUMENTS:
-                continue
-            if letter not in _ARGUMENTS:
-                raise ProgramError(f"G65 has the argument {letter.upper()}, which is no argument of a macro")
-            value = word.number if word.value is None else word.value(self.variables)
-            if word.value is None and not word.pointed and value != 0 and letter not in _COUNT_ARGUMENTS:
-                raise ProgramError(
-                    f"the argument {letter.upper()} has no decimal point: the control scales it by its least "
-                    "increment; write the point"
-                )
-            index = _ARGUMENTS[letter]
-            if letter in "ijk":
-                group += bool(last) and letter <= last
-                last = letter
-                index += 3 * group
-            yield index, value

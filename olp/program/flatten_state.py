@@ -60,6 +60,8 @@ class State:
     feed: float | None = None
     speed: float | None = None
     initial: float | None = None
+    saved: tuple[bool, int | None, int, bool, bool, str] | None = None
+    held_absolute: bool = True
     held: dict[str, float | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -143,6 +145,8 @@ class State:
                     self.spindle = int(value)
                 elif value == 6 or value >= 100:
                     self.forget()
+                elif 70 <= value <= 72 and self.dialect == "linuxcnc":
+                    self._keep_modes(int(value))
         return codes
 
     def _after(self, codes: set[int]) -> None:
@@ -170,23 +174,40 @@ class State:
             self.position = [None if p is None or factor is None else p * factor for p in self.position]
             self.unit = unit
 
+    def _keep_modes(self, code: int) -> None:
+        """M70 saves the modes, M71 drops them, M72 brings them back."""
+        if code == 70:
+            modes = (self.absolute, self.unit, self.plane)
+            self.saved = (*modes, self.retract_to_r, self.inverse_time, self.path)
+        elif code == 71:
+            self.saved = None
+        elif self.saved is None:
+            raise ProgramError("M72 without saved modes; M70 must come before")
+        else:
+            unit = self.saved[1]
+            if unit is None and self.unit is not None:
+                self.forget()
+            self.absolute, _, self.plane, self.retract_to_r, self.inverse_time, self.path = self.saved
+            if unit is not None:
+                self._change_unit(unit)
+
     def _path_mode(self, codes: set[int], words: Sequence[Value]) -> None:
         if 640 in codes:
-            given = [(letter.upper(), value) for letter, value in words if letter in ("p", "q")]
-            self.path = "G64" + "".join(f" {letter}{value:.9g}" for letter, value in given if value is not None)
+            given = [(letter, value) for letter, value in words if letter in ("p", "q") and value is not None]
+            self.path = "G64" + "".join(f" {letter.upper()}{value:.9g}" for letter, value in given)
         else:
             self.path = "G61.1" if 611 in codes else "G61"
 
     def cycle(self, words: Sequence[Value], clearance: float | None) -> tuple[Stroke, ...]:
         """Follow a block that makes a canned cycle; its strokes. ProgramError where a value is not known."""
         for letter, value in words:
-            if letter in ("a", "b", "c", "u", "v", "w"):
+            if letter in ("a", "b", "c", "u", "v", "w", "@", "^"):
                 raise ProgramError(f"a canned cycle moves {letter.upper()}, which is not understood")
             if letter == "m" and value in _STOPS:
                 raise ProgramError(f"M{value:g} in the block of a canned cycle; give it a block of its own")
         codes = self._modes(words)
         if self.inverse_time or self.compensated or self.odd_frame:
-            raise ProgramError("a canned cycle in inverse time, with cutter compensation or in a turned frame")
+            raise ProgramError("a canned cycle in inverse time, cutter compensation or a turned frame")
         chosen = codes & CODES
         code = next(iter(chosen)) if chosen else self.motion
         if code is None:
@@ -202,6 +223,10 @@ class State:
         if self.initial is None:
             self.initial = self.at(tool)
         depth = AXES[tool].lower()
+        turned = self.dialect == "fanuc" and self.held and self.held_absolute is not self.absolute
+        if turned and not {depth, "r"} <= given.keys():
+            raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth anew")
+        self.held_absolute = self.absolute
         self.held |= {letter: given[letter] for letter in (depth, "r", "q", "p") if letter in given}
         repeats = self._repeats(given)
         if repeats == 0:
@@ -285,7 +310,7 @@ class State:
             return clearance or 0.0
         if self.dialect == "fanuc":
             raise ProgramError(
-                f"G{code // 10} pecks with a clearance that a parameter of the control sets; give peck_clearance"
+                f"G{code // 10} pecks with a clearance that the control's parameter sets; give peck_clearance"
             )
         if self.unit is None:
             raise ProgramError(f"G{code // 10} before any G20 or G21, on which its peck clearance depends")

@@ -206,21 +206,18 @@ class _Reader:
     def _motion(self, chunk: WordChunk, codes: _Codes) -> npt.NDArray[np.int16]:
         chosen = codes.act == Act.MOTION
         at, code = codes.line[chosen], codes.code[chosen]
-        if self.profile.cycles_apart and (code >= 730).any():
-            # cycles and G80 are a group of their own: G80 hands back to the last of G0 to G3
-            keep = []
+        if (code == 800).any():
+            # G80 may stand beside another motion code, which wins
+            beside = np.isin(at, at[1:][at[1:] == at[:-1]])
+            at, code = at[~(beside & (code == 800))], code[~(beside & (code == 800))]
+        if self.profile.cycles_apart:
+            # cycles are a group of their own: a lone G80 hands back to the last of G0 to G3
             code = code.copy()
-            for i, (line, c) in enumerate(zip(at.tolist(), code.tolist(), strict=True)):
+            for i, c in enumerate(code.tolist()):
                 if c == 800:
-                    if (at == line).sum() > 1:
-                        continue
                     code[i] = -1 if self.linear_motion is None else self.linear_motion
                 elif c < 330:
                     self.linear_motion = c
-                keep.append(i)
-            at, code = at[keep], code[keep]
-        elif code.size and code[-1] < 330:
-            self.linear_motion = int(code[-1])
         return self._in_force(chunk, at, code, self.state.motion)
 
     def _program_end(self, chunk: WordChunk, last: int) -> int:

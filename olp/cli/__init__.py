@@ -1,0 +1,87 @@
+"""The command line: one module a verb, imported when that verb is called.
+
+Every error of `olp` becomes one `olp: error: ...` on stderr and an exit code here, and nowhere else.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+
+import click
+
+from olp import __version__
+from olp.cli.common import silence_stdout, talk
+from olp.exceptions import OlpError
+
+#: Verb to what it does. Kept here so that `olp --help` imports no verb.
+VERBS = {
+    "init": "Write the first files of a new machine into a folder.",
+    "inspect": "Say what a program does, or what a machine's calibration holds.",
+    "correct": "Correct a program with the machine's calibrated errors, and prove it.",
+    "verify": "Prove a corrected program from the two texts alone.",
+    "simulate": "Write the path that the machine would really take, as CSV.",
+    "schema": "Print the JSON Schema of a machine, calibration or job file.",
+    "explain": "Explain the code of a finding, or list all codes.",
+}
+
+INTERRUPTED = 130
+
+
+class _Verbs(click.Group):
+    """A group of verbs that are imported late."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in VERBS:
+            return None
+        command: click.Command = importlib.import_module(f"olp.cli.{name}").command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in VERBS and not name.startswith("-"):
+            near = difflib.get_close_matches(name, VERBS, 1)
+            hint = f"did you mean {near[0]}?" if near else "see olp --help"
+            ctx.fail(f"there is no verb {name!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Verbs"):
+            formatter.write_dl(list(VERBS.items()))
+
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except OlpError as error:
+            for line in str(error).split("\n"):
+                talk(f"olp: error: {line}")
+            ctx.exit(error.exit_code)
+        except KeyboardInterrupt:
+            talk("olp: interrupted")
+            ctx.exit(INTERRUPTED)
+        except BrokenPipeError:
+            # The reader of stdout has gone, which is its right; what it asked for is lost only to itself.
+            silence_stdout()
+            ctx.exit(0)
+
+
+_HELP = """Corrects off-line programs of machines with three linear axes by the machine's calibrated errors.
+
+The result goes to stdout, all talk to stderr; - is stdin or stdout; no file is overwritten without --force.
+
+\b
+Exit codes: 0 good; 1 findings at or above --fail-on; 2 wrong call; 3 input unreadable or refused;
+4 no answer; 130 interrupted."""
+
+main = _Verbs(
+    name="olp",
+    help=_HELP,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    subcommand_metavar="VERB ...",
+)
+main = click.version_option(__version__, prog_name="olp")(main)

@@ -1,0 +1,153 @@
+"""What the verbs share: options, streams, where inputs come from, and when findings fail a run."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+from olp.exceptions import UsageError
+from olp.findings import Finding, Severity, worst
+
+STREAM = "-"
+FINDINGS_EXIT = 1
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+class Length(click.FloatRange):
+    """A finite number above zero."""
+
+    def __init__(self) -> None:
+        super().__init__(min=0.0, min_open=True)
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+def setup_options(function: F) -> F:
+    """-m and -j, which every verb that needs a machine takes."""
+    function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
+    return click.option("-m", "--machine", metavar="machine.toml", help="The machine file.")(function)
+
+
+def proof_options(function: F) -> F:
+    """What `correct` and `verify` have in common."""
+    for option in (
+        click.option(
+            "--fail-on",
+            type=click.Choice(["info", "warning", "error", "never"]),
+            default="error",
+            show_default=True,
+            help="Exit with 1 where a finding is at least this severe.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
+        click.option(
+            "--date",
+            type=click.DateTime(["%Y-%m-%d"]),
+            metavar="YYYY-MM-DD",
+            help="The day of the run, to be compared with valid_until of the calibration.",
+        ),
+        click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."),
+        click.option(
+            "--outside-box",
+            type=click.Choice(["refuse", "hold"]),
+            default="refuse",
+            show_default=True,
+            help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
+        ),
+        click.option(
+            "--tolerance-um",
+            type=Length(),
+            default=1.0,
+            show_default=True,
+            help="How far the corrected path may be from the nominal one, rounding apart.",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def needed(program: str | None, machine: str | None, job: str | None) -> tuple[str, str]:
+    """Program and machine file: the command line's, else the job's. Raises UsageError where none names them."""
+    if job is not None and (program is None or machine is None):
+        from olp.files.config import load_job
+
+        stated = load_job(job)
+        program = program if program is not None else stated.program
+        machine = machine if machine is not None else stated.machine
+    if program is None:
+        raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
+    return program, needed_machine(machine)
+
+
+def needed_machine(machine: str | None) -> str:
+    if machine is None:
+        raise UsageError("no machine file is given; name it with -m, or with the key machine of the job file (-j)")
+    return machine
+
+
+def source(name: str) -> str | bytes:
+    """A program for the library: its path, or the bytes of stdin for `-`."""
+    return click.get_binary_stream("stdin").read() if name == STREAM else name
+
+
+def shown(name: str) -> str:
+    """A program's name in messages."""
+    return "<stdin>" if name == STREAM else name
+
+
+def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) -> None:
+    """Raise before the work what the writer would raise after it."""
+    sources = [Path(name) for name in inputs if Path(name).exists()]
+    for name in targets:
+        path = Path(name)
+        if any(path.exists() and path.samefile(origin) for origin in sources):
+            raise UsageError("is an input of this call and is never overwritten; name another output", file=name)
+        if path.is_file() and not force:
+            raise UsageError("exists already; name another file, or overwrite it with --force", file=name)
+
+
+def talk(message: str) -> None:
+    """Say something to the person, on stderr."""
+    click.echo(_encodable(message, sys.stderr.encoding), err=True)
+
+
+def put(text: str | bytes, *, err: bool = False) -> None:
+    """Write a result to stdout (or stderr). A reader that has gone is no error: the run goes on without it."""
+    stream = click.get_binary_stream("stderr" if err else "stdout")
+    encoding = (sys.stderr if err else sys.stdout).encoding or "utf-8"
+    data = text if isinstance(text, bytes) else text.encode(encoding, "replace")
+    try:
+        stream.write(data)
+        stream.flush()
+    except BrokenPipeError:
+        if not err:
+            silence_stdout()
+
+
+def silence_stdout() -> None:
+    """Send what is still to be flushed nowhere, so that the interpreter does not complain at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+def exit_for(findings: Iterable[Finding], fail_on: str) -> None:
+    """End with exit code 1 where a finding is at or above `fail_on`."""
+    found = worst(findings)
+    if found is not None and fail_on != "never" and found >= Severity[fail_on.upper()]:
+        click.get_current_context().exit(FINDINGS_EXIT)
+
+
+def _encodable(text: str, encoding: str | None) -> str:
+    encoding = encoding or "utf-8"
+    return text.encode(encoding, "replace").decode(encoding)

@@ -1,0 +1,19 @@
+"""`olp schema`."""
+
+from __future__ import annotations
+
+import click
+
+from olp.cli.common import put
+
+
+@click.command("schema")
+@click.argument("kind", type=click.Choice(["machine", "calibration", "job"]))
+def command(kind: str) -> None:
+    """Print the JSON Schema of a machine, calibration or job file.
+
+    Editors complete and check TOML with it.
+    """
+    from olp.files.json_schema import json_schema_text
+
+    put(json_schema_text(kind))

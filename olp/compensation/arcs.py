@@ -1,0 +1,233 @@
+"""Arcs stay arcs: a circular or helical move is commanded as an arc wherever one fits the bent path.
+
+The corrected path of an arc is sampled; through its end points the circle that leaves the samples least is
+found by least squares; where it leaves them by more than the tolerance the piece is halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.invert import invert
+from olp.compensation.lines import Cuts, no_cuts, samples_needed
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array, Mask
+from olp.exceptions import CannotCompute
+from olp.toolpath import PLANES, Arcs, Flag, Toolpath
+
+Index = npt.NDArray[np.int64]
+
+#: a centre is moved by a millimetre only to gain a micrometre of fit
+_STIFFNESS = 1e-3
+_DEEPEST = 14
+_BATCH = 1 << 18
+_AXES = np.array(PLANES)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pieces:
+    """Pieces of arcs: index of the arc in `Arcs`, and the shares of its sweep where the piece begins and ends."""
+
+    arc: Index
+    begin: Array
+    end: Array
+
+    def __len__(self) -> int:
+        return len(self.arc)
+
+    def pick(self, which: npt.NDArray[np.generic]) -> Pieces:
+        return Pieces(self.arc[which], self.begin[which], self.end[which])
+
+
+def arc_points(start: Array, end: Array, arcs: Arcs, which: Index, share: Array) -> Array:
+    """(n, 3) nominal points of arcs at shares of their sweep; the radius and the third axis go linearly.
+
+    `start`, `end` are the end points of arc `which` for each row.
+    """
+    rows = np.arange(len(which))
+    axes = _AXES[arcs.plane[which]]
+    first, second, third = axes[:, 0], axes[:, 1], axes[:, 2]
+    centre = arcs.centre_mm[which]
+    c0, c1 = centre[rows, first], centre[rows, second]
+    s0, s1 = start[rows, first] - c0, start[rows, second] - c1
+    radius = np.hypot(s0, s1)
+    radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
+    angle = np.arctan2(s1, s0) + share * arcs.sweep_rad[which]
+    out = np.empty((len(which), 3))
+    out[rows, first] = c0 + radius * np.cos(angle)
+    out[rows, second] = c1 + radius * np.sin(angle)
+    out[rows, third] = start[rows, third] + share * (end[rows, third] - start[rows, third])
+    return out
+
+
+def subdivide_arcs(
+    path: Toolpath,
+    model: ErrorModel,
+    target: Array,
+    command: Array,
+    raw: Mask,
+    tolerance: float,
+    turning: Mask | None,
+) -> Cuts:
+    """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis has
+    lost motion (`turning`), also where that axis turns round."""
+    arcs = path.arcs
+    if not len(arcs):
+        return no_cuts()
+    untouched = np.uint8(Flag.PASS | Flag.WHOLE)
+    free = np.flatnonzero((path.flag[arcs.move] & untouched) == 0)
+    free = free[~raw[arcs.move[free]].any(axis=1)]
+    pieces = Pieces(free, np.zeros(len(free)), np.ones(len(free)))
+    if turning is not None:
+        pieces = _at_quadrants(path, pieces, turning)
+    tools = path.tool_mm()
+    done: list[Pieces] = []
+    for _ in range(_DEEPEST):
+        if not len(pieces):
+            break
+        good = np.ones(len(pieces), bool)
+        size = max(1, _BATCH // 64)
+        for a in range(0, len(pieces), size):
+            part = pieces.pick(np.arange(a, min(a + size, len(pieces))))
+            good[a : a + size] = fit_pieces(path, model, target, part, tools, tolerance) <= tolerance
+        done.append(pieces.pick(good))
+        bad = pieces.pick(~good)
+        middle = (bad.begin + bad.end) / 2
+        pieces = Pieces(
+            np.concatenate((bad.arc, bad.arc)),
+            np.concatenate((bad.begin, middle)),
+            np.concatenate((middle, bad.end)),
+        )
+    if len(pieces):
+        raise CannotCompute(
+            "an arc cannot be followed within the tolerance by any number of arcs; raise --tolerance-um",
+            line=int(path.line[arcs.move[pieces.arc[0]]]),
+        )
+    arc = np.concatenate([p.arc for p in done])
+    end = np.concatenate([p.end for p in done])
+    inner = end < 1.0
+    arc, end = arc[inner], end[inner]
+    starts, ends = _ends(path, target, arc)
+    return arcs.move[arc], end, arc_points(starts, ends, _shifted(arcs, path, target), arc, end)
+
+
+def _shifted(arcs: Arcs, path: Toolpath, target: Array) -> Arcs:
+    """The arcs where the part really lies: centres moved with their end points."""
+    shift = target[arcs.move] - path.end_mm[arcs.move]
+    return Arcs(arcs.move, arcs.centre_mm + shift, arcs.plane, arcs.sweep_rad)
+
+
+def _ends(path: Toolpath, target: Array, arc: Index) -> tuple[Array, Array]:
+    """Targets at the start and the end of arcs; the start lies in the frame of the arc's own move."""
+    move = path.arcs.move[arc]
+    shift = target[move] - path.end_mm[move]
+    start = np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm)) + shift
+    return start, target[move]
+
+
+def sampled(
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Commands (n, s, 3) along pieces, their shares of the piece (s,), and the nominal centres (n, 3)."""
+    arcs = _shifted(path.arcs, path, target)
+    start, end = _ends(path, target, pieces.arc)
+    axes = _AXES[arcs.plane[pieces.arc]]
+    rows = np.arange(len(pieces))
+    radius = np.hypot(*(start[rows, axes[:, i]] - arcs.centre_mm[pieces.arc][rows, axes[:, i]] for i in (0, 1)))
+    length = radius * np.abs(arcs.sweep_rad[pieces.arc]) * (pieces.end - pieces.begin)
+    delta = np.abs(end - start) * (pieces.end - pieces.begin)[:, None]
+    for i in (0, 1):
+        delta[rows, axes[:, i]] = np.minimum(length, 2 * radius)
+    move = arcs.move[pieces.arc]
+    tool = tools if tools.ndim == 1 else tools[move]
+    count = int(min(samples_needed(model, delta, tool, tolerance / 4).max(), 256))
+    share = np.linspace(0.0, 1.0, max(count, 12) + 1)
+    spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
+    which = np.repeat(np.arange(len(pieces)), len(share))
+    point = arc_points(start[which], end[which], arcs, pieces.arc[which], spread)
+    command, _ = invert(model, point, tool if tool.ndim == 1 else tool[which])
+    return command.reshape(len(pieces), len(share), 3), share, arcs.centre_mm[pieces.arc]
+
+
+def fit_pieces(
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
+) -> Array:
+    """(n,) how far the best arc leaves the bent path of each piece, in mm."""
+    command, share, centre = sampled(path, model, target, pieces, tools, tolerance)
+    plane = path.arcs.plane[pieces.arc]
+    _, departure = fit(command, share, centre, plane, command[:, 0], command[:, -1])
+    return departure
+
+
+def fit(
+    command: Array, share: Array, centre: Array, plane: npt.NDArray[np.int8], start: Array, end: Array
+) -> tuple[Array, Array]:
+    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples (n, s, 3) least, and how far that
+    is (n,). Least squares on the radial distance, with equal radii at both ends asked for strongly."""
+    rows = np.arange(len(command))
+    axes = _AXES[plane]
+    q0, q1 = (np.take_along_axis(command, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in (0, 1))
+    q2 = np.take_along_axis(command, axes[:, 2][:, None, None], axis=2)[:, :, 0]
+    s0, s1, s2 = (start[rows, axes[:, i]][:, None] for i in range(3))
+    e0, e1, e2 = (end[rows, axes[:, i]][:, None] for i in range(3))
+    x, y = centre[rows, axes[:, 0]][:, None], centre[rows, axes[:, 1]][:, None]
+    x_start, y_start = x, y
+    strong = 100.0
+    for _ in range(4):
+        rs = np.hypot(s0 - x, s1 - y)
+        us0, us1 = (s0 - x) / rs, (s1 - y) / rs
+        rq = np.hypot(q0 - x, q1 - y)
+        j0, j1 = us0 - (q0 - x) / rq, us1 - (q1 - y) / rq
+        f = rq - rs
+        re = np.hypot(e0 - x, e1 - y)
+        k0, k1 = strong * (us0 - (e0 - x) / re), strong * (us1 - (e1 - y) / re)
+        g = strong * (re - rs)
+        soft = _STIFFNESS * _STIFFNESS
+        n00 = (j0 * j0).sum(axis=1, keepdims=True) + k0 * k0 + soft
+        n11 = (j1 * j1).sum(axis=1, keepdims=True) + k1 * k1 + soft
+        n01 = (j0 * j1).sum(axis=1, keepdims=True) + k0 * k1
+        b0 = -((j0 * f).sum(axis=1, keepdims=True) + k0 * g + soft * (x - x_start))
+        b1 = -((j1 * f).sum(axis=1, keepdims=True) + k1 * g + soft * (y - y_start))
+        det = n00 * n11 - n01 * n01
+        x = x + (b0 * n11 - b1 * n01) / det
+        y = y + (b1 * n00 - b0 * n01) / det
+    rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
+    radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * share)
+    level = q2 - (s2 + (e2 - s2) * share)
+    out = centre.copy()
+    out[rows, axes[:, 0]], out[rows, axes[:, 1]] = x[:, 0], y[:, 0]
+    return out, np.hypot(radial, level).max(axis=1)
+
+
+def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask) -> Pieces:
+    """Cut arcs where an axis with lost motion turns round."""
+    arcs = path.arcs
+    rows = np.arange(len(pieces))
+    axes = _AXES[arcs.plane[pieces.arc]]
+    before = np.where(
+        (arcs.move[pieces.arc] > 0)[:, None], path.end_mm[np.maximum(arcs.move[pieces.arc] - 1, 0)], path.start_mm
+    )
+    centre = arcs.centre_mm[pieces.arc]
+    angle = np.arctan2(
+        before[rows, axes[:, 1]] - centre[rows, axes[:, 1]], before[rows, axes[:, 0]] - centre[rows, axes[:, 0]]
+    )
+    sweep = arcs.sweep_rad[pieces.arc]
+    arc, begin, end = [], [], []
+    for i in range(len(pieces)):
+        shares = {0.0, 1.0}
+        # the first axis turns at multiples of pi, the second half-way between
+        for which, phase in ((0, 0.0), (1, np.pi / 2)):
+            if not turning[axes[i, which]]:
+                continue
+            low, high = sorted((angle[i], angle[i] + sweep[i]))
+            k = np.arange(np.ceil((low - phase) / np.pi), np.floor((high - phase) / np.pi) + 1)
+            shares.update(((phase + k * np.pi - angle[i]) / sweep[i]).tolist())
+        edges = sorted(s for s in shares if s in (0.0, 1.0) or 1e-6 < s < 1 - 1e-6)
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            arc.append(pieces.arc[i])
+            begin.append(low)
+            end.append(high)
+    return Pieces(np.array(arc, np.int64), np.array(begin), np.array(end))

@@ -1,0 +1,232 @@
+"""Centre words of corrected arcs: solved again from the end points as they are written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.arcs import Pieces, fit, sampled
+from olp.errormodel.base import Array
+from olp.exceptions import ProgramError
+from olp.program.edits import Edits
+from olp.toolpath import PLANES, Flag, Kind
+
+if TYPE_CHECKING:
+    from olp.compensation.writer import Rows, Writer
+
+Index = npt.NDArray[np.int64]
+
+_AXES = np.array(PLANES)
+#: below this share of the radius the chord is too short to set the direction of its bisector
+_SHORT_CHORD = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class _Arc:
+    """One part of an arc as it will be written, positions in mm."""
+
+    row: int
+    line: int
+    start: Array
+    end: Array
+    centre: Array
+    sweep: float
+    plane: int
+
+
+def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
+    """Edits of I, J, K, R and P for the arc rows of a chunk, and whole blocks for their later parts."""
+    path = writer.path
+    kind = path.kind[rows.move]
+    arc_row = np.flatnonzero(
+        np.isin(kind, (Kind.ARC_CW, Kind.ARC_CCW))
+        & ((rows.flag & np.uint8(Flag.PASS)) == 0)
+        & ~writer.plan.take_up[rows.first : rows.first + len(rows.move)]
+    )
+    if not arc_row.size:
+        return []
+    out: list[Edits] = []
+    size = 4096
+    for a in range(0, len(arc_row), size):
+        for arc in _solve(writer, rows, arc_row[a : a + size]):
+            out += _head(writer, rows, arc) if rows.head[arc.row] else _tail(writer, rows, arc)
+    return [Edits.join(out)] if out else []
+
+
+def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
+    """Centres for rows, from the emitted end points and the bent path between them."""
+    path, plan = writer.path, writer.plan
+    move = rows.move[arc_row]
+    arc = np.searchsorted(path.arcs.move, move)
+    reach = plan.reach[rows.first + arc_row]
+    previous = np.where(
+        rows.move[np.maximum(arc_row - 1, 0)] == move, plan.reach[rows.first + np.maximum(arc_row - 1, 0)], 0.0
+    )
+    previous[arc_row == 0] = 0.0
+    pieces = Pieces(arc, previous, reach)
+    tools = path.tool_mm()
+    command, share, centre = sampled(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm)
+    start = np.where((arc_row > 0)[:, None], rows.emitted[np.maximum(arc_row - 1, 0)], rows.entry)
+    end = rows.emitted[arc_row]
+    plane = path.arcs.plane[arc]
+    if plan.play is not None:
+        # the drive leads the load by what the play state says
+        lead = end - command[:, -1]
+        command = command + lead[:, None, :]
+    centre, _ = fit(command, share, centre, plane, start, end)
+    sweep = path.arcs.sweep_rad[arc] * (reach - previous)
+    out = []
+    for i in range(len(arc_row)):
+        out.append(
+            _Arc(
+                int(arc_row[i]), int(path.line[move[i]]), start[i], end[i],
+                _on_bisector(start[i], end[i], centre[i], int(plane[i])), float(sweep[i]), int(plane[i]),
+            )
+        )  # fmt: skip
+    return out
+
+
+def _on_bisector(start: Array, end: Array, centre: Array, plane: int) -> Array:
+    """The centre moved along the chord until both radii are equal, where the chord is long enough to say so."""
+    first, second, _ = PLANES[plane]
+    chord = np.array([end[first] - start[first], end[second] - start[second]])
+    length = float(np.hypot(*chord))
+    radius = float(np.hypot(start[first] - centre[first], start[second] - centre[second]))
+    if length < _SHORT_CHORD * radius:
+        return centre
+    chord /= length
+    middle = np.array([start[first] + end[first], start[second] + end[second]]) / 2
+    along = float((np.array([centre[first], centre[second]]) - middle) @ chord)
+    out = centre.copy()
+    out[first] -= along * chord[0]
+    out[second] -= along * chord[1]
+    return out
+
+
+def _centre_words(writer: Writer, arc: _Arc, absolute: bool) -> list[tuple[int, int, int]]:
+    """(axis, mantissa, decimals) of both centre words; checks that rounding kept the arc what it is."""
+    frame = writer.path.frames[int(writer.path.frame[writer.plan.move[writer.row_offset + arc.row]])]
+    out = []
+    realised = arc.centre.copy()
+    for axis in PLANES[arc.plane][:2]:
+        base = frame.offset_mm[axis] if absolute else arc.start[axis]
+        decimals = writer.style.usual(axis, frame.unit_mm)
+        mantissa = round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
+        realised[axis] = base + mantissa / 10**decimals * frame.unit_mm
+        out.append((axis, mantissa, decimals))
+    _check_sweep(arc, realised)
+    return out
+
+
+def _check_sweep(arc: _Arc, centre: Array) -> None:
+    """A tiny arc must not turn into a whole circle, nor the other way round, by rounding."""
+    first, second, _ = PLANES[arc.plane]
+    a0 = np.arctan2(arc.start[second] - centre[second], arc.start[first] - centre[first])
+    a1 = np.arctan2(arc.end[second] - centre[second], arc.end[first] - centre[first])
+    turn = (a1 - a0 if arc.sweep > 0 else a0 - a1) % (2 * np.pi)
+    if turn < 1e-9:
+        turn = 2 * np.pi
+    wanted = abs(arc.sweep) % (2 * np.pi) or 2 * np.pi
+    if abs(turn - wanted) > 1.0 and abs(abs(arc.sweep) - turn) % (2 * np.pi) > 1.0:
+        raise ProgramError(
+            "an arc is so short that the last digit decides whether it is a whole circle; let the machine take more "
+            "digits (least_increment_mm), or write this arc as a line",
+            line=arc.line,
+        )
+
+
+def _head(writer: Writer, rows: Rows, arc: _Arc) -> list[Edits]:
+    """The part that keeps the block's own line: its centre words replaced, or inserted where omitted."""
+    program, words = writer.program, writer.words
+    move = int(rows.move[arc.row])
+    index = int(np.searchsorted(writer.path.arcs.move, move))
+    slots = program.arc_slots.word[index].tolist()
+    absolute = bool(program.arc_slots.absolute[index])
+    split = arc.row + 1 < len(rows.move) and rows.move[arc.row + 1] == move
+    out: list[Edits] = []
+    if split and slots[4] >= 0:
+        out.append(writer.one(int(words.number[slots[4]]), int(words.end[slots[4]]), 1, 0, b"", 0))
+    if slots[3] >= 0:
+        return out + _radius_word(writer, rows, arc, slots[3], split)
+    last = writer.style.last_word(arc.line)
+    present = [s for s in slots[:3] if s >= 0]
+    anchor = max(present) if present else last
+    space = b" " if int(writer.style.separators(np.array([anchor]), program)[0]) % 3 else b""
+    lower = int(writer.style.separators(np.array([anchor]), program)[0]) >= 3
+    for axis, mantissa, decimals in _centre_words(writer, arc, absolute):
+        slot = slots[axis]
+        if slot >= 0:
+            own = int(writer.style.decimals(np.array([slot]), axis)[0])
+            digits = max(own, writer.style.least(axis, writer.unit_of(move)))
+            exact = _mantissa(writer, arc, axis, digits, absolute, move)
+            if exact != int(words.mantissa[slot]) * 10 ** (digits - own):
+                out.append(writer.one(int(words.number[slot]), int(words.end[slot]), exact, digits, b"", 0))
+                writer.tally.changed_words += 1
+        elif mantissa != 0 and not absolute:
+            letter = b"ijk" if lower else b"IJK"
+            place = int(words.end[anchor])
+            out.append(writer.one(place, place, mantissa, decimals, space + letter[axis : axis + 1], 5 + axis))
+            writer.tally.inserted_words += 1
+    return out
+
+
+def _mantissa(writer: Writer, arc: _Arc, axis: int, decimals: int, absolute: bool, move: int) -> int:
+    frame = writer.path.frames[int(writer.path.frame[move])]
+    base = frame.offset_mm[axis] if absolute else arc.start[axis]
+    return round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
+
+
+def _radius_word(writer: Writer, rows: Rows, arc: _Arc, slot: int, split: bool) -> list[Edits]:
+    """R of the corrected arc; where R cannot say it well (near half circles), I, J, K in its place."""
+    words = writer.words
+    first, second, _ = PLANES[arc.plane]
+    unit = writer.unit_of(int(rows.move[arc.row]))
+    radius = float(np.hypot(arc.start[first] - arc.centre[first], arc.start[second] - arc.centre[second]))
+    half = float(np.hypot(arc.end[first] - arc.start[first], arc.end[second] - arc.start[second])) / 2
+    own = int(writer.style.decimals(np.array([slot]), first)[0])
+    decimals = max(own, writer.style.least(first, unit))
+    sign = -1 if abs(arc.sweep) > np.pi else 1
+    mantissa = sign * round(radius / unit * 10**decimals)
+    size = abs(mantissa) / 10**decimals * unit
+    place = (int(words.start[slot]), int(words.end[slot]))
+    if size > half:
+        # how far rounding R moves the centre along the bisector
+        moved = abs(np.sqrt(size * size - half * half) - np.sqrt(max(radius * radius - half * half, 0.0)))
+        if moved < 0.5 * 10.0**-decimals * unit + 0.1 * writer.tolerance_mm:
+            if mantissa == int(words.mantissa[slot]) * 10 ** (decimals - own):
+                return []
+            writer.tally.changed_words += 1
+            return [writer.one(int(words.number[slot]), place[1], mantissa, decimals, b"", 0)]
+    out = []
+    for i, (axis, value, digits) in enumerate(_centre_words(writer, arc, absolute=False)):
+        prefix = (b" " if i else b"") + b"IJK"[axis : axis + 1]
+        out.append(writer.one(place[0] if not i else place[1], place[1], value, digits, prefix, i))
+        writer.tally.changed_words += 1
+    return out
+
+
+def _tail(writer: Writer, rows: Rows, arc: _Arc) -> list[Edits]:
+    """A later part: a block of its own with both end points, the third axis where it moves, and the centre."""
+    move = int(rows.move[arc.row])
+    place = int(writer.program.line_end[arc.line - 1])
+    index = int(np.searchsorted(writer.path.arcs.move, move))
+    absolute = bool(writer.program.arc_slots.absolute[index])
+    order = rows.serial(arc.row)
+    lead = writer.block_start(arc.line)
+    after_take_up = bool(writer.plan.take_up[rows.first + arc.row - 1]) if arc.row else False
+    if after_take_up:
+        lead += b"G2 " if writer.path.kind[move] == Kind.ARC_CW else b"G3 "
+    first, second, third = PLANES[arc.plane]
+    out = []
+    for axis in sorted((first, second, third)):
+        if axis == third and not rows.write[arc.row, axis]:
+            continue
+        mantissa, decimals = rows.number(writer, arc.row, axis)
+        out.append(writer.one(place, place, mantissa, decimals, lead + b"XYZ"[axis : axis + 1], order + axis))
+        lead = b" "
+    for i, (axis, mantissa, decimals) in enumerate(_centre_words(writer, arc, absolute)):
+        out.append(writer.one(place, place, mantissa, decimals, b" " + b"IJK"[axis : axis + 1], order + 3 + i))
+    return out

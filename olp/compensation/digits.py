@@ -1,0 +1,129 @@
+"""Commands to decimal words: which digits are written, which omitted words have to be inserted.
+
+One axis at a time, over consecutive rows. In G90 a written word is the command rounded to its own digits,
+and an omitted one is inserted only when the rounded command changes. In G91 words are differences of
+rounded positions on one grid, so that nothing drifts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+_POW10 = 10.0 ** np.arange(19)
+_INT10 = 10 ** np.arange(19, dtype=np.int64)
+#: relative slack when a command is compared with half a digit
+_SLACK = 1 + 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisRows:
+    """One axis of consecutive rows. `command` (n,) mm, NaN where unknown; `nominal` what the program says;
+    `word` the number as written in `decimals` digits (`given` where there is one, `raw` where it stays).
+    `offset` mm and `unit` mm lead from words to positions; `reset` rows make the axis unknown or take
+    `nominal` as a position of the machine."""
+
+    command: Array
+    nominal: Array
+    given: Mask
+    raw: Mask
+    reset: Mask
+    word: Index
+    decimals: npt.NDArray[np.int8]
+    offset: Array | float
+    unit: Array | float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Digits:
+    """`emitted` (n,) positions as written, mm; `mantissa`, `decimals` of words; `write`: the word changes or is new."""
+
+    emitted: Array
+    mantissa: Index
+    decimals: npt.NDArray[np.int8]
+    write: Mask
+
+
+def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
+    """G90: `before` is the position as written on entry, `least` the fewest decimals, `usual` those of an
+    inserted word."""
+    count = len(rows.command)
+    order = np.arange(count)
+    fix = rows.given & ~rows.raw
+    decimals = np.where(rows.given, np.maximum(rows.decimals, least), usual)
+    scale = _POW10[decimals]
+    with np.errstate(invalid="ignore"):
+        wanted = np.rint((rows.command - rows.offset) / rows.unit * scale)
+        unknown = np.isnan(wanted)
+        mantissa = np.where(unknown, 0, wanted).astype(np.int64)
+        written = np.where(unknown, np.nan, mantissa / scale * rows.unit + rows.offset)
+    sets = rows.given | rows.reset
+    emitted = np.where(fix, written, rows.nominal)
+    # an omitted axis holds until its rounded command changes
+    source = np.maximum.accumulate(np.where(sets, order, -1))
+    anchor = np.where(source >= 0, emitted[source], before)
+    free = ~sets & ~rows.raw & ~unknown
+    half = 0.5 * rows.unit / scale * _SLACK
+    with np.errstate(invalid="ignore"):
+        leaves = free & (np.abs(rows.command - anchor) > half)
+    started = np.maximum.accumulate(np.where(leaves, order, -1)) > source
+    moves = free & started
+    emitted = np.where(moves, written, emitted)
+    last = np.maximum.accumulate(np.where(sets | moves, order, -1))
+    emitted = np.where(last >= 0, emitted[last], before)
+    previous = np.concatenate(([before], emitted[:-1]))
+    with np.errstate(invalid="ignore"):
+        insert = moves & ~(np.abs(emitted - previous) < 1e-9)
+    same = rows.word * _INT10[np.maximum(decimals - rows.decimals, 0)] == mantissa
+    return Digits(emitted, mantissa, decimals.astype(np.int8), (fix & ~same) | insert)
+
+
+def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
+    """G91: words are differences of positions rounded to `grid` decimals from `before` on."""
+    count = len(rows.command)
+    unit = float(np.max(rows.unit))
+    decimals = np.full(count, grid, np.int8)
+    own = rows.word * _INT10[np.maximum(grid - rows.decimals, 0)]
+    with np.errstate(invalid="ignore"):
+        place = np.rint((rows.command - before) / unit * _POW10[grid])
+    known = ~np.isnan(place) & ~rows.raw
+    if not known.all():
+        return _incremental_raw(rows, before, unit, grid, place, own, known)
+    steps = place.astype(np.int64)
+    mantissa = np.diff(steps, prepend=0)
+    write = np.where(rows.given, mantissa != own, mantissa != 0)
+    return Digits(before + steps / _POW10[grid] * unit, mantissa, decimals, write)
+
+
+def _incremental_raw(
+    rows: AxisRows, before: float, unit: float, grid: int, place: Array, own: Index, known: Mask
+) -> Digits:
+    """The same one by one, where some rows keep their words or have no known position."""
+    count = len(rows.command)
+    emitted = np.zeros(count)
+    mantissa = np.zeros(count, np.int64)
+    write = np.zeros(count, bool)
+    at, base, steps = before, before, 0
+    for i in range(count):
+        if known[i] and at == at:
+            if base != base:
+                base, steps = at, 0
+            new = round((rows.command[i] - base) / unit * 10.0**grid)
+            mantissa[i] = new - steps
+            write[i] = mantissa[i] != own[i] if rows.given[i] else mantissa[i] != 0
+            steps = new
+            at = base + steps / 10.0**grid * unit
+        else:
+            if rows.reset[i]:
+                at = float(rows.nominal[i])
+            elif rows.given[i]:
+                at += float(rows.word[i]) / 10.0 ** int(rows.decimals[i]) * unit
+            base = float("nan")
+        emitted[i] = at
+    return Digits(emitted, mantissa, np.full(count, grid, np.int8), write)

@@ -1,0 +1,52 @@
+"""The inverse of an error model: the command c with c + e(c) = target."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array
+from olp.exceptions import NotInvertible
+
+#: A command is good when its error differs from the one it was made with by less than this.
+TOLERANCE_MM = 1e-9
+_ITERATIONS = 30
+#: Points at a time: the columns of one block stay in the second-level cache.
+BLOCK = 1 << 14
+
+
+def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> tuple[Array, Array]:
+    """Commands (n, 3) and the errors (n, 3) that they meet, by fixed-point iteration c <- target - e(c).
+
+    Converges while the error grows slower than the position (its Lipschitz constant is about 1e-3 on a bad
+    machine). A component whose error is not finite, because an axis that it depends on is unknown, keeps its
+    target. Raises NotInvertible where 1e-9 mm is not reached.
+    """
+    command = np.empty_like(target_mm)
+    error = np.empty_like(target_mm)
+    for a in range(0, len(target_mm), BLOCK):
+        part = slice(a, a + BLOCK)
+        tool = tool_mm if tool_mm.ndim == 1 else tool_mm[part]
+        state = None if play is None else play[part]
+        target = target_mm[part]
+        guess = target
+        previous = None
+        for _ in range(_ITERATIONS):
+            e = model.error(guess, tool, state)
+            unknown = np.isnan(e)
+            if unknown.any():
+                e[unknown] = 0.0
+            if previous is not None:
+                change = np.abs(e - previous).max(initial=0.0)
+                if change < TOLERANCE_MM:
+                    break
+            guess = target - e
+            previous = e
+        else:
+            raise NotInvertible(
+                f"the error model cannot be inverted to {TOLERANCE_MM:g} mm: its errors grow as fast as the "
+                f"position (the last step was {change:.3g} mm)"
+            )
+        command[part] = guess
+        error[part] = e
+    return command, error

@@ -1,0 +1,165 @@
+"""Subdivision of straight moves: the fewest chords whose actual path stays at the nominal line.
+
+Between two corrected points the tip follows the line plus what the error departs from its own chord.
+Only the part across the line counts: along it the tip is early or late, but on the path. Moves that the
+model's bound clears are never sampled; the others are sampled finely, and cut greedily, each chord as
+long as it can be.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array, Mask
+from olp.toolpath import Toolpath
+
+Index = npt.NDArray[np.int64]
+Cuts = tuple[Index, Array, Array]
+
+#: between two samples the error bends by less than this share of the tolerance
+_SAMPLE_SHARE = 0.006
+_MOST_SAMPLES = 1 << 18
+_BATCH = 1 << 20
+
+
+def no_cuts() -> Cuts:
+    return np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3))
+
+
+def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask, tolerance: float) -> Cuts:
+    """Cuts (move, share, target) of the moves that are `free` to be split, so that no chord leaves its line by
+    more than `tolerance` mm."""
+    tools = path.tool_mm()
+    found: list[Cuts] = []
+    block = 1 << 16
+    for a in range(0, len(path), block):
+        b = min(a + block, len(path))
+        start = np.empty((b - a, 3))
+        start[1:] = target[a : b - 1]
+        start[0] = target[a - 1] if a else np.array(path.start_mm)
+        delta = target[a:b] - start
+        bound = model.chord_bound(np.nan_to_num(delta), tools if tools.ndim == 1 else tools[a:b])
+        long = np.flatnonzero(free[a:b] & (bound > tolerance) & np.isfinite(delta).all(axis=1))
+        if not long.size:
+            continue
+        tool = np.broadcast_to(tools, (len(path), 3))[a:b][long] if tools.ndim == 2 else tools
+        found.append(_cut(model, a + long, start[long], delta[long], tool, tolerance))
+    if not found:
+        return no_cuts()
+    return (
+        np.concatenate([f[0] for f in found]),
+        np.concatenate([f[1] for f in found]),
+        np.concatenate([f[2] for f in found]),
+    )
+
+
+def samples_needed(model: ErrorModel, delta: Array, tool: Array, share_mm: float) -> Index:
+    """How many equal steps each move needs for the error to bend by less than `share_mm` within one."""
+    count = np.full(len(delta), 8, np.int64)
+    todo = np.arange(len(delta))
+    while todo.size:
+        part_tool = tool if tool.ndim == 1 else tool[todo]
+        bends = model.chord_bound(delta[todo] / count[todo, None], part_tool) > share_mm
+        todo = todo[bends & (count[todo] < _MOST_SAMPLES)]
+        count[todo] *= 2
+    return count
+
+
+def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, tolerance: float) -> Cuts:
+    count = samples_needed(model, delta, tool, _SAMPLE_SHARE * tolerance)
+    parts: list[Cuts] = []
+    at = 0
+    totals = np.cumsum(count + 1)
+    while at < len(move):
+        stop = max(int(np.searchsorted(totals, (totals[at - 1] if at else 0) + _BATCH)), at + 1)
+        pick = slice(at, stop)
+        parts.append(
+            _cut_batch(
+                model, move[pick], start[pick], delta[pick], tool if tool.ndim == 1 else tool[pick], count[pick],
+                tolerance,
+            )
+        )  # fmt: skip
+        at = stop
+    return (
+        np.concatenate([p[0] for p in parts]),
+        np.concatenate([p[1] for p in parts]),
+        np.concatenate([p[2] for p in parts]),
+    )
+
+
+def _cut_batch(
+    model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, count: Index, tolerance: float
+) -> Cuts:
+    first = np.concatenate(([0], np.cumsum(count + 1)[:-1]))
+    owner = np.repeat(np.arange(len(move)), count + 1)
+    share = (np.arange(len(owner)) - first[owner]) / count[owner]
+    point = start[owner] + share[:, None] * delta[owner]
+    tools = tool if tool.ndim == 1 else tool[owner]
+    error = model.error(point, tools)
+    error = model.error(point - error, tools)
+    length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
+    along = (error * delta[owner]).sum(axis=1) / length2[owner]
+    across = error - along[:, None] * delta[owner]
+    cut_move, cut_share = [], []
+    begin = np.zeros(len(move), np.int64)
+    active = np.arange(len(move))
+    stride = count.copy()
+    while active.size:
+        reach = _longest(across, first[active], begin[active], count[active], stride[active], tolerance)
+        stride[active] = np.maximum(reach - begin[active], 1)
+        begin[active] = reach
+        going = reach < count[active]
+        active = active[going]
+        cut_move.append(active)
+        cut_share.append(begin[active])
+    owner = np.concatenate(cut_move)
+    node = np.concatenate(cut_share)
+    return move[owner], node / count[owner], point[first[owner] + node]
+
+
+def _longest(across: Array, first: Index, begin: Index, last: Index, stride: Index, tolerance: float) -> Index:
+    """For each move the farthest sample that one chord from `begin` reaches: gallop, then bisect."""
+    good = begin + 1
+    bad = last + 1
+    trial = np.minimum(begin + np.maximum(stride, 1), last)
+    todo = np.arange(len(first))
+    galloping = np.ones(len(first), bool)
+    while todo.size:
+        fits = _fits(across, first[todo] + begin[todo], trial[todo] - begin[todo], tolerance)
+        yes, no = todo[fits], todo[~fits]
+        good[yes] = np.maximum(good[yes], trial[yes])
+        bad[no] = np.minimum(bad[no], trial[no])
+        galloping[no] = False
+        todo = todo[(bad[todo] - good[todo] > 1) & (good[todo] < last[todo])]
+        jump = good[todo] + np.maximum(good[todo] - begin[todo], 1)
+        middle = (good[todo] + np.minimum(bad[todo], last[todo] + 1)) // 2
+        trial[todo] = np.where(galloping[todo], np.minimum(jump, last[todo]), np.maximum(middle, good[todo] + 1))
+        trial[todo] = np.minimum(trial[todo], np.minimum(bad[todo] - 1, last[todo]))
+        ended = trial[todo] <= good[todo]
+        todo = todo[~ended]
+    return np.minimum(good, last)
+
+
+def _fits(across: Array, start: Index, steps: Index, tolerance: float) -> Mask:
+    """Whether the samples between start and start + steps stay within tolerance of their chord."""
+    fits = np.ones(len(start), bool)
+    wide = np.flatnonzero(steps > 1)
+    limit = 1 << 21
+    at = 0
+    totals = np.cumsum(steps[wide] - 1)
+    while at < len(wide):
+        stop = max(int(np.searchsorted(totals, (totals[at - 1] if at else 0) + limit)), at + 1)
+        rows = wide[at:stop]
+        inner = steps[rows] - 1
+        offset = np.concatenate(([0], np.cumsum(inner)[:-1]))
+        owner = np.repeat(np.arange(len(rows)), inner)
+        k = np.arange(len(owner)) - offset[owner] + 1
+        a, b = across[start[rows]], across[start[rows] + steps[rows]]
+        u = (k / steps[rows][owner])[:, None]
+        departure = across[start[rows][owner] + k] - (a[owner] + u * (b - a)[owner])
+        size = np.sqrt((departure * departure).sum(axis=1))
+        fits[rows] = np.maximum.reduceat(size, offset) <= tolerance
+        at = stop
+    return fits

@@ -1,0 +1,112 @@
+"""How a program writes its words: digits, spacing, case. Inserted words follow it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.machine import Vector
+from olp.program.program import Program
+from olp.toolpath import Flag
+
+_MOST_DECIMALS = 9
+_SPACE = (b"", b" ", b"\t")
+
+
+def fewest_decimals(increment_mm: float, unit_mm: float, inch_decimals: int) -> int:
+    """Decimals that a least increment needs: 0.001 mm needs 3, and in inch what the control takes for it."""
+    metric = max(0, math.ceil(-math.log10(increment_mm) - 1e-9))
+    return metric if unit_mm == 1.0 else metric + inch_decimals - 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Style:
+    """Observed once a program."""
+
+    program: Program
+    increments_mm: Vector
+    common: tuple[int, int, int]
+    finest: tuple[int, int, int]
+    leading_zero: bool
+    spaced: int
+    bare_decimals: tuple[int, int, int]
+
+    @staticmethod
+    def of(program: Program, increments_mm: Vector) -> Style:
+        words, path = program.words, program.toolpath
+        assert words is not None
+        common, finest = [], []
+        leading_zero = True
+        counting = (path.flag & np.uint8(Flag.INCREMENTAL)) != 0
+        text = np.frombuffer(program.data, np.uint8)
+        for axis in range(3):
+            slot = program.slot[:, axis]
+            used = words.decimals[slot[slot >= 0]]
+            common.append(int(np.bincount(used).argmax()) if used.size else 0)
+            steps = slot[counting]
+            steps = steps[steps >= 0]
+            finest.append(int(words.decimals[steps].max(initial=0)))
+            first = text[words.number[slot[slot >= 0]]]
+            if (first == 46).any():
+                leading_zero = False
+        index = np.arange(1, min(len(words.start), 4000))
+        inner = index[words.number[index - 1] >= 0]
+        inner = inner[~np.isin(inner, words.first_word[:4001])]
+        spaced = int(inner.size == 0 or np.mean(text[words.start[inner] - 1] == 32) >= 0.5)
+        bare = [3 if step >= 0.0005 else 4 for step in increments_mm]
+        return Style(
+            program, increments_mm, (common[0], common[1], common[2]), (finest[0], finest[1], finest[2]), leading_zero,
+            spaced, (bare[0], bare[1], bare[2]),
+        )  # fmt: skip
+
+    def decimals(self, slot: npt.NDArray[np.int32] | npt.NDArray[np.int64], axis: int) -> npt.NDArray[np.int64]:
+        """Digits behind the point of words, counting the hidden ones of numbers in least increments."""
+        words = self.program.words
+        assert words is not None
+        out = words.decimals[slot].astype(np.int64)
+        if self.program.profile.increments_without_point and not self.program.calculator:
+            out = np.where(words.pointed[slot], out, self.bare_decimals[axis])
+        return out
+
+    def least(self, axis: int, unit_mm: float) -> int:
+        return fewest_decimals(self.increments_mm[axis], unit_mm, self.program.profile.inch_decimals)
+
+    def usual(self, axis: int, unit_mm: float) -> int:
+        """Digits of an inserted word."""
+        return min(max(self.least(axis, unit_mm), self.common[axis]), _MOST_DECIMALS)
+
+    def grid(self, axis: int, unit_mm: float) -> int:
+        """Digits of words in G91: all on one grid, as fine as the finest of them."""
+        return min(max(self.least(axis, unit_mm), self.finest[axis]), _MOST_DECIMALS)
+
+    def word(self, line: int, letter: str) -> int | None:
+        """Index of the first word with a letter in a line."""
+        words = self.program.words
+        assert words is not None
+        return next((i for i in words.of_line(line) if words.letter[i] == ord(letter)), None)
+
+    def last_word(self, line: int) -> int:
+        words = self.program.words
+        assert words is not None
+        return int(words.first_word[line]) - 1
+
+    def separators(self, word: npt.NDArray[np.int32], program: Program) -> npt.NDArray[np.int64]:
+        """Style number of each word: what stands before it, and its case."""
+        words = program.words
+        assert words is not None
+        text = np.frombuffer(program.data, np.uint8)
+        start = words.start[word]
+        before = text[np.maximum(start - 1, 0)]
+        space = np.where(before == 32, 1, np.where(before == 9, 2, 0))
+        opens = np.isin(word, words.first_word)
+        space = np.where(opens, self.spaced, space)
+        lower = (text[start] & 32) != 0
+        return space + 3 * lower.astype(np.int64)
+
+    def separator(self, which: int, axis: int) -> bytes:
+        """Text before an inserted number: space and letter."""
+        letter = b"xyz" if which >= 3 else b"XYZ"
+        return _SPACE[which % 3] + letter[axis : axis + 1]

@@ -1,0 +1,203 @@
+"""Findings: what a person should know about a run, as data with stable codes.
+
+One table holds every code, so that the report, `--select`, `--fail-on` and `olp explain` agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Severity(IntEnum):
+    """Ordered, so that `--fail-on warning` is a comparison."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A code with its title, its usual severity, why it matters and what to do."""
+
+    code: str
+    title: str
+    severity: Severity
+    why: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One finding; `line` counts from 1 in the program, `lines` are all lines concerned (the first few)."""
+
+    code: str
+    message: str
+    line: int | None = None
+    lines: tuple[int, ...] = ()
+    count: int = 1
+
+    @property
+    def severity(self) -> Severity:
+        return RULES[self.code].severity
+
+    def as_dict(self) -> dict[str, object]:
+        return {
+            "code": self.code,
+            "severity": self.severity.name.lower(),
+            "message": self.message,
+            "line": self.line,
+            "lines": list(self.lines),
+            "count": self.count,
+        }
+
+
+_TABLE = (
+    Rule(
+        "OLP101",
+        "above tolerance",
+        Severity.ERROR,
+        "The written program, read back and run through the error model, leaves the nominal path by more than the "
+        "tolerance plus what rounding to the last digit explains.",
+        "Raise --tolerance-um, let the machine take more digits (least_increment_mm), or look at the listed blocks.",
+    ),
+    Rule(
+        "OLP102",
+        "moves passed uncorrected",
+        Severity.WARNING,
+        "These moves were written as they were: the error there depends on an axis that has not been commanded yet, "
+        "or the control moves by itself (G53, G28, G30), or the section is switched off.",
+        "Give start_mm in the job file, or command all axes in the first rapid.",
+    ),
+    Rule(
+        "OLP103",
+        "lost motion unknown",
+        Severity.INFO,
+        "Until an axis has moved by its lost motion in one direction, nobody knows on which flank it rests.",
+        "Approach the first point from a known side; the spread is at most half the lost motion.",
+    ),
+    Rule(
+        "OLP104",
+        "block moves another axis",
+        Severity.INFO,
+        "A block that also moves a rotary or other axis is corrected at its end only and never split; the other "
+        "axis' words are carried untouched.",
+        "Split the block in the source where the path between its ends matters.",
+    ),
+    Rule(
+        "OLP105",
+        "canned cycle corrected per hole",
+        Severity.WARNING,
+        "A canned cycle moves straight along the tool axis, so it can be exact at one depth only; here the rest of "
+        "the stroke leaves the nominal path by more than the tolerance.",
+        "Write the cycles out as plain moves with --expand-cycles.",
+    ),
+    Rule(
+        "OLP106",
+        "orientation not corrected",
+        Severity.INFO,
+        "A machine with three linear axes cannot turn its tool; the angular errors of the axes remain in the "
+        "orientation of the tool.",
+        "Nothing in the program can mend it; the largest angle is in the report.",
+    ),
+    Rule(
+        "OLP201",
+        "path mode without tolerance",
+        Severity.WARNING,
+        "In G64 without P the control rounds corners as far as its acceleration asks for, which can be a millimetre.",
+        "Use G64 P<tolerance> Q0, or G61 where exact stops are affordable.",
+    ),
+    Rule(
+        "OLP202",
+        "path tolerance larger than the correction",
+        Severity.WARNING,
+        "The control may leave the programmed path by more than the whole correction, which then is lost.",
+        "Use a path tolerance well below the correction.",
+    ),
+    Rule(
+        "OLP203",
+        "path mode merges blocks",
+        Severity.WARNING,
+        "G64 P without Q0 lets the control merge short blocks and spend the whole tolerance on smooth paths.",
+        "Add Q0 to keep P as a bound at corners only.",
+    ),
+    Rule(
+        "OLP301",
+        "units assumed",
+        Severity.INFO,
+        "The program states neither G20 nor G21; millimetres were assumed.",
+        "State G21 (or G20) at the start of the program.",
+    ),
+    Rule(
+        "OLP302",
+        "numbers without decimal point",
+        Severity.INFO,
+        "On this control a length without a decimal point counts least increments: X100 is 0.1 mm.",
+        "If the control is set to calculator-type input, state decimal_point = \"calculator\" in the machine file.",
+    ),
+    Rule(
+        "OLP303",
+        "touch-off assumed",
+        Severity.INFO,
+        "The work offset is taken as touched off on the raw machine, so the touched point keeps its place.",
+        "State set_by = \"true\" where the part was located by other means.",
+    ),
+    Rule(
+        "OLP304",
+        "block delete",
+        Severity.INFO,
+        "Blocks under `/` were taken as executed; the program was proved with them left out too.",
+        "Nothing.",
+    ),
+    Rule(
+        "OLP305",
+        "contour taken as tool path",
+        Severity.WARNING,
+        "Under G41/G42 the control offsets the contour by the tool radius; the correction was computed on the contour.",
+        "Program the tool path where the radius is large against the change of the error.",
+    ),
+    Rule(
+        "OLP306",
+        "cutting at an uncorrected place",
+        Severity.WARNING,
+        "A feed move starts where a rapid ended uncorrected, so its beginning leaves the nominal path.",
+        "Command all axes in rapids first, or give start_mm in the job file.",
+    ),
+    Rule(
+        "OLP401",
+        "calibration expired",
+        Severity.WARNING,
+        "The date given is later than valid_until of the calibration.",
+        "Measure the machine again.",
+    ),
+    Rule(
+        "OLP402",
+        "outside travel",
+        Severity.ERROR,
+        "A corrected command leaves the travel of an axis, so the control will stop with a limit alarm.",
+        "Move the part, or leave the section out with (olp off).",
+    ),
+    Rule(
+        "OLP403",
+        "held at the face of the calibrated box",
+        Severity.WARNING,
+        "Commands outside the calibrated box were corrected with the error at its face (--outside-box hold).",
+        "Measure the machine over the whole working volume.",
+    ),
+    Rule(
+        "OLP404",
+        "compensated by the control",
+        Severity.INFO,
+        "These errors are left to the control, which corrects them already.",
+        "Nothing, as long as the control's tables stay active.",
+    ),
+)
+
+RULES = {rule.code: rule for rule in _TABLE}
+
+
+def worst(findings: Iterable[Finding]) -> Severity | None:
+    """The highest severity among findings, None where there are none."""
+    return max((finding.severity for finding in findings), default=None)

@@ -1,0 +1,305 @@
+"""The report of a run for people (`to_text`) and for programs (`to_json`).
+
+A report is a mapping in the form "olp-report-1" whose keys end in their units. What is absent is left out.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import math
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from olp.findings import RULES
+
+WIDTH = 100
+#: Lines of the program that a finding lists by number.
+MAX_LINES = 8
+MAX_SOURCES = 24
+MAX_WORST = 10
+
+Report = Mapping[str, Any]
+
+
+def to_json(report: Report) -> bytes:
+    """UTF-8 JSON with sorted keys; numbers that are not finite become null, dates ISO 8601."""
+    return (json.dumps(_plain(report), indent=2, sort_keys=True, allow_nan=False) + "\n").encode()
+
+
+def to_text(report: Report) -> str:
+    """Plain text of at most 100 columns, with nothing but ASCII in its own words and tables."""
+    sections = (
+        _heads(report),
+        _verdict(report),
+        _deviation(report),
+        _budget(report),
+        _moves(report),
+        _sources(report),
+        _worst(report),
+        _findings(report.get("findings") or ()),
+        _sentences("What this proves", report.get("proves") or ()),
+        _sentences("What it does not prove", report.get("does_not_prove") or ()),
+    )
+    return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> Iterator[str]:
+    """Lines of a table; the first `left` columns are aligned to the left, the others to the right."""
+    body = [list(header), *(list(row) for row in rows)]
+    widths = [max(len(row[column]) for row in body) for column in range(len(header))]
+    for row in body:
+        cells = (
+            cell.ljust(width) if column < left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield ("  " + "  ".join(cells)).rstrip()
+
+
+def pairs(values: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Lines of `name  value`, aligned and wrapped; empty values are left out."""
+    kept = [(name, value) for name, value in values if value]
+    width = max((len(name) for name, _ in kept), default=0) + 2
+    for name, value in kept:
+        yield from textwrap.wrap(
+            value, WIDTH, initial_indent=name.ljust(width), subsequent_indent=" " * width
+        ) or [name]
+
+
+def number(value: object, digits: int = 2) -> str:
+    """A number for a table: fixed point, a dash where there is none, and never a nonzero shown as 0."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "-"
+    smallest = 0.5 * 10.0**-digits
+    if 0.0 < abs(value) < smallest:
+        return f"{'>-' if value < 0 else '<'}{10.0**-digits:.{digits}f}"
+    return f"{value:.{digits}f}"
+
+
+def printable(text: str) -> str:
+    """Text of a program in one line, without what a terminal would act on."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def shortened(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 2] + ".."
+
+
+def _plain(value: Any) -> Any:
+    """Only what JSON knows; arrays and their scalars have `tolist`."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple | set | frozenset):
+        items = sorted(value, key=str) if isinstance(value, set | frozenset) else value
+        return [_plain(item) for item in items]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, datetime.date):
+        return value.isoformat()
+    return value
+
+
+def _part(report: Report, *keys: str) -> Report:
+    """A nested mapping, empty where it is absent."""
+    for key in keys:
+        report = report.get(key) or {}
+    return report
+
+
+def _heads(report: Report) -> Iterator[str]:
+    program, machine = _part(report, "program"), _part(report, "machine")
+    calibration, digits = _part(report, "calibration"), _part(report, "digits")
+    yield from pairs(
+        [
+            (
+                "Program",
+                _joined(
+                    program.get("name"),
+                    _counted(program.get("lines"), "line"),
+                    _counted(program.get("moves"), "move"),
+                    program.get("dialect"),
+                ),
+            ),
+            (
+                "Machine",
+                _joined(
+                    machine.get("name"),
+                    _prefixed("chain", machine.get("chain")),
+                    _prefixed("control", machine.get("controller")),
+                ),
+            ),
+            (
+                "Calibration",
+                _joined(
+                    calibration.get("model"),
+                    _prefixed("measured", calibration.get("measured")),
+                    _prefixed("valid until", calibration.get("valid_until")),
+                    _degrees(calibration.get("temperature_degC")),
+                ),
+            ),
+            ("Written with", _joined(*(f"{count} decimals in {unit}" for unit, count in digits.items()))),
+        ]
+    )
+
+
+def _joined(*values: object) -> str:
+    return ", ".join(printable(str(value)) for value in values if value not in (None, ""))
+
+
+def _counted(value: object, noun: str) -> str:
+    return "" if value is None else f"{value} {noun}{'' if value == 1 else 's'}"
+
+
+def _prefixed(word: str, value: object) -> str:
+    return "" if value is None else f"{word} {value}"
+
+
+def _degrees(value: object) -> str:
+    return f"at {value:g} degC" if isinstance(value, int | float) else ""
+
+
+def _verdict(report: Report) -> Iterator[str]:
+    tolerance = report.get("tolerance_um")
+    largest = _largest(_part(report, "deviation", "after"))
+    if tolerance is None or largest is None:
+        return
+    above = any(finding.get("code") == "OLP101" for finding in report.get("findings") or ())
+    verdict = "ABOVE TOLERANCE" if above else "Within tolerance"
+    yield from textwrap.wrap(
+        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one; the tolerance is "
+        f"{tolerance:g} um, and rounding to the last digit comes on top.",
+        WIDTH,
+    )
+
+
+def _largest(deviation: Report) -> float | None:
+    values = [_part(deviation, where).get("max_um") for where in ("waypoints", "between")]
+    return max((value for value in values if isinstance(value, int | float)), default=None)
+
+
+def _deviation(report: Report) -> Iterator[str]:
+    deviation = _part(report, "deviation")
+    sides = [side for side in ("before", "after") if deviation.get(side)]
+    places = [("at waypoints", "waypoints"), ("between waypoints", "between")]
+    rows = [
+        [title]
+        + [number(_part(deviation, side, key).get(name)) for side in sides for name in ("max_um", "rms_um")]
+        for title, key in places
+        if any(_part(deviation, side, key) for side in sides)
+    ]
+    if rows:
+        yield "Deviation from the nominal path in um"
+        yield from table(["", *(f"{side} {name}" for side in sides for name in ("max", "rms"))], rows)
+
+
+def _budget(report: Report) -> Iterator[str]:
+    budget = _part(report, "budget_um")
+    titles = {
+        "model_and_chords": "model and chords, under the tolerance",
+        "rounding": "rounding to the last digit",
+        "lost_motion_unknown": "lost motion not yet taken up",
+    }
+    # What a later version adds shows under its own key.
+    names = [*titles, *(key for key in sorted(budget) if key not in titles and not _is_mapping(budget[key]))]
+    rows = [[titles.get(name, name.replace("_", " ")), number(budget[name])] for name in names if name in budget]
+    if rows:
+        yield "What is left after correction, largest in um"
+        yield from table(["", "max"], rows)
+    orientation = report.get("orientation_urad") or budget.get("orientation_urad")
+    if _is_mapping(orientation):
+        yield (
+            f"  Orientation of the tool, which three linear axes cannot correct: {number(orientation.get('max'), 1)} "
+            f"urad max, {number(orientation.get('rms'), 1)} rms"
+        )
+
+
+def _is_mapping(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _moves(report: Report) -> Iterator[str]:
+    moves = _part(report, "moves")
+    if not moves:
+        return
+    of = ", ".join(
+        f"{moves[key]} {title}"
+        for key, title in (
+            ("corrected", "corrected"),
+            ("approximated", "approximated"),
+            ("passed", "passed uncorrected"),
+        )
+        if key in moves
+    )
+    changes = ", ".join(
+        f"{moves[key]} {title}"
+        for key, title in (
+            ("split", "moves split"),
+            ("inserted_blocks", "blocks inserted"),
+            ("changed_words", "words changed"),
+            ("inserted_words", "words inserted"),
+        )
+        if key in moves
+    )
+    total = f"{moves['total']} in all: " if "total" in moves else ""
+    yield from pairs([("Moves", total + of), ("Changes", changes)])
+
+
+def _sources(report: Report) -> Iterator[str]:
+    sources = report.get("sources") or ()
+    if not sources:
+        return
+    yield "Error before correction by source in um, largest first"
+    rows = [[s.get("name", ""), number(s.get("max_um")), number(s.get("rms_um"))] for s in sources[:MAX_SOURCES]]
+    yield from table(["", "max", "rms"], rows)
+    if len(sources) > MAX_SOURCES:
+        yield f"  and {len(sources) - MAX_SOURCES} smaller ones"
+
+
+def _worst(report: Report) -> Iterator[str]:
+    blocks = report.get("worst") or ()
+    if not blocks:
+        return
+    yield "Worst blocks in um"
+    rows = [
+        [str(b.get("line", "")), number(b.get("before_um")), number(b.get("after_um"))] for b in blocks[:MAX_WORST]
+    ]
+    lines = list(table(["line", "before", "after"], rows, left=0))
+    room = WIDTH - max(map(len, lines)) - 2
+    yield lines[0] + "  text"
+    for line, block in zip(lines[1:], blocks, strict=False):
+        yield f"{line}  {shortened(printable(str(block.get('text', ''))), room)}".rstrip()
+
+
+def _findings(findings: Sequence[Report]) -> Iterator[str]:
+    if not findings:
+        return
+    yield f"Findings ({len(findings)}), explained by olp explain CODE"
+    order = {"error": 0, "warning": 1, "info": 2}
+    for finding in sorted(findings, key=lambda f: order.get(str(f.get("severity")), 3)):
+        code = str(finding.get("code", ""))
+        title = RULES[code].title if code in RULES else ""
+        yield f"  {code}  {finding.get('severity', '')}: {title}{_place(finding)}"
+        yield from textwrap.wrap(
+            printable(str(finding.get("message", ""))), WIDTH, initial_indent=" " * 10, subsequent_indent=" " * 10
+        )
+
+
+def _place(finding: Report) -> str:
+    lines = list(finding.get("lines") or ())
+    if not lines and finding.get("line") is not None:
+        lines = [finding["line"]]
+    count = finding.get("count", 1)
+    shown = ", ".join(str(line) for line in lines[:MAX_LINES])
+    more = ", ..." if len(lines) > MAX_LINES or count > len(lines) > 0 else ""
+    place = f", line{'s' if len(lines) > 1 else ''} {shown}{more}" if lines else ""
+    return place + (f" ({count} in all)" if count > 1 else "")
+
+
+def _sentences(title: str, sentences: Sequence[str]) -> Iterator[str]:
+    if sentences:
+        yield title
+    for sentence in sentences:
+        yield from textwrap.wrap(sentence, WIDTH, initial_indent="  - ", subsequent_indent="    ")
