@@ -37,10 +37,6 @@ class Flag(IntFlag):
     CONTROL = 128  #: made by the control itself, without words: axes become unknown (M6, G28, after a probe)
 
 
-#: Plane number to (first, second, third) axis, right-handed: G17, G18, G19.
-PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
-
-
 @dataclass(frozen=True, slots=True)
 class Frame:
     """How words became axis positions for a stretch of moves, and which tool was in the spindle.

@@ -154,8 +154,9 @@ def _judge(tmp_path: Path, program: str) -> list[tuple[object, ...]]:
     path.write_text(program)
     command = [RS274 or "rs274", "-g", str(path)]
     # rs274 keeps a tool map in the home folder, which two of them must not share.
+    home = {"HOME": str(tmp_path)}
     done = subprocess.run(
-        command, capture_output=True, text=True, timeout=60, cwd=tmp_path, env={"HOME": str(tmp_path)}, check=False
+        command, capture_output=True, text=True, timeout=60, cwd=tmp_path, env=home, check=False
     )
     assert done.returncode == 0, done.stderr
     calls: list[tuple[object, ...]] = []

@@ -140,7 +140,10 @@ def test_hand_written_case(name: str) -> None:
 def test_cycles_written_out(seed: int) -> None:
     """Series of cycles with sticky words, other motion between them, both units, three planes."""
     rng = random.Random(seed)
-    number = lambda low, high: f"{rng.uniform(low, high):.3f}"  # noqa: E731
+
+    def number(low: float, high: float) -> str:
+        return f"{rng.uniform(low, high):.3f}"
+
     plane = rng.choice([17, 18, 19])
     tool = "ZYX"[plane - 17]
     sides = [letter for letter in "XYZ" if letter != tool]

@@ -105,6 +105,11 @@ def shown(name: str) -> str:
     return "<stdin>" if name == STREAM else name
 
 
+def files_of(*names: str | None) -> list[str]:
+    """The names that are files: given, and not `-`."""
+    return [name for name in names if name is not None and name != STREAM]
+
+
 def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) -> None:
     """Raise before the work what the writer would raise after it."""
     sources = [Path(name) for name in inputs if Path(name).exists()]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import datetime
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from olp.cli.common import (
     STREAM,
     exit_for,
+    files_of,
     needed,
     proof_options,
     put,
@@ -21,6 +24,9 @@ from olp.cli.common import (
 )
 from olp.cli.progress import progress
 from olp.exceptions import ProgramError, UsageError
+
+if TYPE_CHECKING:
+    from olp.api import Correction
 
 
 @click.command("correct")
@@ -61,12 +67,12 @@ def command(
     """
     program, machine = needed(program, machine, job)
     output = output or _default_output(program)
-    if output == STREAM and as_json:
-        raise UsageError("stdout can take the program or the JSON report; name a file with -o or --report")
-    if as_json and show_diff:
-        raise UsageError("stdout can take the diff or the JSON report; use one of --diff and --json")
-    targets = [name for name in (output, report_file) if name not in (None, STREAM)]
-    inputs = [name for name in (program, machine, job) if name not in (None, STREAM)]
+    as_json = as_json or report_file == STREAM
+    if as_json and (output == STREAM or show_diff):
+        raise UsageError(
+            "JSON on stdout goes with neither -o - nor --diff; write the report to a file with --report"
+        )
+    inputs, targets = files_of(program, machine, job), files_of(output, report_file)
     refuse_early(targets, inputs, force=force)
 
     from olp import api, report
@@ -80,7 +86,7 @@ def command(
                 machine,
                 job,
                 tolerance_um=tolerance_um,
-                outside_box=outside_box,
+                outside_box="hold" if outside_box == "hold" else "refuse",
                 flatten=flatten,
                 expand_cycles=expand_cycles,
                 contour=contour,
@@ -90,21 +96,41 @@ def command(
             )
         except ProgramError as error:
             raise error.in_file(shown(program)) from None
-    as_bytes = {Path(name): data for name, data in ((output, result.data),) if name != STREAM}
-    if report_file is not None and report_file != STREAM:
-        as_bytes[Path(report_file)] = report.to_json(result.report)
-    write_files(as_bytes, force=force, inputs=inputs)
 
-    to_stderr = output == STREAM
-    if to_stderr:
+    written = {Path(name): result.data for name in files_of(output)}
+    written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
+    write_files(written, force=force, inputs=inputs)
+    on_stderr = output == STREAM
+    if on_stderr:
         put(result.data)
     if show_diff:
-        put(_diff(given, result, machine, job, err=to_stderr), err=to_stderr)
-    if as_json or report_file == STREAM:
+        put(_diff(given, result, machine, job, on_stderr), err=on_stderr)
+    if as_json:
         put(report.to_json(result.report))
     elif not quiet:
-        put(report.to_text(result.report), err=to_stderr)
+        put(report.to_text(result.report), err=on_stderr)
     if not quiet:
-        for path in as_bytes:
+        for path in written:
             talk(f"wrote {path}")
     exit_for(result.findings, fail_on)
+
+
+def _default_output(program: str) -> str:
+    path = Path(program)
+    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
+
+
+def _diff(given: str | bytes, result: Correction, machine: str, job: str | None, on_stderr: bool) -> str:
+    from olp.cli.diff import render
+    from olp.files.config import load_setup
+    from olp.files.write import read_bytes
+    from olp.program.profiles import PROFILES
+
+    described = load_setup(machine, job).machine
+    profile = PROFILES.get(described.controller)
+    return render(
+        given if isinstance(given, bytes) else read_bytes(given),
+        result.data,
+        increments_mm=described.least_increment_mm if profile and profile.increments_without_point else None,
+        colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
+    )

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from olp.report import printable, shortened
 from olp.units import AXES
 
 #: A coordinate that moved further, in units of the program, is another point.
@@ -18,69 +19,72 @@ NEAR = 1.0
 AHEAD = 1000
 ASTRAY = 40
 #: Comparisons a line before texts that have little in common are set side by side as they come.
-EFFORT = 200
+EFFORT = 50
 
 MAX_COLUMN = 42
+_RED, _GREEN, _DIM, _PLAIN = "\x1b[31m", "\x1b[32m", "\x1b[2m", "\x1b[0m"
 _TOKEN = re.compile(r"(\([^)]*\)|;.*)|([A-Z])\s*([-+]?[\d.]+|[^\sA-Z(;]*)")
-#: Words that a correction may change or add.
-_GEOMETRY = frozenset("XYZIJKRFP")
+_END = re.compile(r"\r\n|\n|\r")
+#: Words that hold lengths, and words besides them that a correction may change or add.
+_LENGTHS = frozenset("XYZIJKR")
+_FREE = frozenset("FP")
+_NONE: frozenset[str] = frozenset()
+_AXIS_OF = {"X": 0, "Y": 1, "Z": 2, "I": 0, "J": 1, "K": 2}
 _UNIT_UM = {"20": 25400.0, "21": 1000.0, "70": 25400.0, "71": 1000.0}
 #: After these no coordinate of an earlier line holds: moves of the control and changes of frame.
 _FORGET = frozenset(("28", "30", "92", "53", "52", "43", "49", *(str(code) for code in range(54, 60))))
 #: Coordinates here are no positions of axes.
-_NO_MOVE = frozenset(("4", "04", "10"))
+_NO_MOVE = frozenset(("4", "10"))
 
 Pair = tuple[int | None, int | None]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Line:
-    """A line's text, its coordinates by letter, and all words that a correction leaves alone."""
+    """A line's text, its lengths by letter, and all words that a correction leaves alone."""
 
     text: str
-    axes: dict[str, str]
-    rest: tuple[str, ...]
-    extra: frozenset[str]
+    lengths: dict[str, str]
+    rest: list[str]
 
     @classmethod
     def of(cls, text: str) -> Line:
-        axes: dict[str, str] = {}
-        rest = []
+        lengths: dict[str, str] = {}
+        rest: list[str] = []
         for comment, letter, number in _TOKEN.findall(text.upper()):
-            if letter in AXES and letter:
-                axes[letter] = number
-            elif letter not in _GEOMETRY or not letter:
+            if letter in _LENGTHS:
+                lengths[letter] = number
+            elif letter not in _FREE:
                 rest.append(comment or letter + number)
-        return cls(text, axes, tuple(rest), frozenset(rest))
+        return cls(text, lengths, rest)
 
     def g_codes(self) -> frozenset[str]:
-        return frozenset(word[1:].lstrip("0") or "0" for word in self.extra if word[0] == "G")
+        if not self.rest:
+            return _NONE
+        return frozenset(word[1:].lstrip("0") or "0" for word in self.rest if word[0] == "G")
 
 
 def _lines(data: bytes) -> list[Line]:
-    return [Line.of(text) for text in data.decode("latin-1").splitlines()]
+    return [Line.of(text) for text in _END.split(data.decode("latin-1"))]
 
 
 def _same(nominal: Line, corrected: Line) -> bool:
-    """Whether one is the other, but for its coordinates. Words at the start of a split block stay on its first
-    part, so its last part may have fewer of them."""
+    """Whether one is the other, but for its lengths. Words at the start of a split block stay on its first
+    part, so its last part may have fewer of them; it also leaves out an axis that stands still."""
     if nominal.text == corrected.text:
         return True
-    if not nominal.axes:
+    shared = [letter for letter in AXES if letter in nominal.lengths]
+    if not shared:
         return bool(nominal.rest) and nominal.rest == corrected.rest
-    if not corrected.extra <= nominal.extra:
-        return False
-    for letter, number in nominal.axes.items():
-        other = corrected.axes.get(letter)
-        if other is None:
-            return False
+    shared = [letter for letter in shared if letter in corrected.lengths]
+    for letter in shared:
+        number, other = nominal.lengths[letter], corrected.lengths[letter]
+        if number == other:
+            continue
         before, after = _value(number), _value(other)
-        if before is None or after is None:
-            if number != other:
-                return False
-        elif abs(after - before) > NEAR:
+        if before is None or after is None or abs(after - before) > NEAR:
             return False
-    return True
+    return bool(shared) and all(word in nominal.rest for word in corrected.rest)
 
 
 def _value(number: str) -> float | None:
@@ -130,8 +134,62 @@ def _partner(nominal: list[Line], corrected: list[Line], i: int, j: int) -> tupl
     return 1, 1, spent
 
 
+def render(
+    before: bytes,
+    after: bytes,
+    *,
+    increments_mm: tuple[float, float, float] | None = None,
+    colour: bool = False,
+) -> str:
+    """The changed lines as text: line of the nominal program, nominal, corrected, change of each axis in um.
+
+    `increments_mm` are the least increments of a control that counts them in numbers without a point.
+    """
+    nominal, corrected = _lines(before), _lines(after)
+    rows: list[tuple[str, str, str, str]] = []
+    counts = {"changed": 0, "inserted": 0, "left out": 0}
+    modal = _Modal(increments_mm)
+    for i, j in align(nominal, corrected):
+        if i is None:
+            if j is not None:
+                counts["inserted"] += 1
+                rows.append(("+", "", corrected[j].text, ""))
+            continue
+        modal.begin(nominal[i])
+        if j is None:
+            counts["left out"] += 1
+            rows.append((f"- {i + 1}", nominal[i].text, "", ""))
+        elif nominal[i].text != corrected[j].text:
+            counts["changed"] += 1
+            deltas = "  ".join(modal.deltas(nominal[i], corrected[j]))
+            rows.append((str(i + 1), nominal[i].text, corrected[j].text, deltas))
+        modal.end(nominal[i])
+    total = ", ".join(f"{count} {what}" for what, count in counts.items())
+    return "".join(_table(rows, colour)) + f"lines: {total}\n"
+
+
+def _table(rows: list[tuple[str, str, str, str]], colour: bool) -> Iterator[str]:
+    if not rows:
+        return
+    number = max(4, max(len(row[0]) for row in rows))
+    left, right = (min(MAX_COLUMN, max(9, max(len(row[k]) for row in rows))) for k in (1, 2))
+    red, green, dim, plain = (_RED, _GREEN, _DIM, _PLAIN) if colour else ("", "", "", "")
+    yield f"{'line':>{number}}  {'nominal':{left}}  {'corrected':{right}}  change in um\n"
+    for mark, nominal, corrected, deltas in rows:
+        nominal = shortened(printable(nominal), left).ljust(left)
+        corrected = shortened(printable(corrected), right)
+        if deltas:
+            corrected = corrected.ljust(right)
+        tail = f"  {deltas}" if deltas else ""
+        if colour:
+            tint = red if mark[0] == "-" else dim
+            yield f"{mark:>{number}}  {tint}{nominal}{plain}  {green}{corrected}{plain}{tail}\n"
+        else:
+            yield f"{mark:>{number}}  {nominal}  {corrected}{tail}".rstrip() + "\n"
+
+
 @dataclass(slots=True)
-class _Reader:
+class _Modal:
     """The few modal states that a change in um needs."""
 
     increments_mm: tuple[float, float, float] | None
@@ -139,30 +197,36 @@ class _Reader:
     incremental: bool = False
     last: dict[str, float] = field(default_factory=dict)
 
-    def read(self, line: Line) -> None:
+    def begin(self, line: Line) -> None:
+        """Units and distance mode hold from the start of the line that sets them."""
         codes = line.g_codes()
+        if not codes:
+            return
         for code in codes & _UNIT_UM.keys():
             self.unit_um = _UNIT_UM[code]
         self.incremental = "91" in codes or (self.incremental and "90" not in codes)
 
     def deltas(self, nominal: Line, corrected: Line) -> Iterator[str]:
-        for letter, text in corrected.axes.items():
+        for letter, text in corrected.lengths.items():
             after = self._um(letter, text)
-            if letter in nominal.axes:
-                if nominal.axes[letter] == text:
+            if letter in nominal.lengths:
+                if nominal.lengths[letter] == text:
                     continue
-                before = self._um(letter, nominal.axes[letter])
+                before = self._um(letter, nominal.lengths[letter])
             else:
-                before = 0.0 if self.incremental else self.last.get(letter)
+                before = 0.0 if self.incremental and letter in AXES else self.last.get(letter)
             yield f"{letter}{after - before:+.1f}" if None not in (before, after) else f"{letter} new"
 
-    def move(self, line: Line) -> None:
+    def end(self, line: Line) -> None:
+        """What is known of the axes behind a nominal line."""
         codes = line.g_codes()
         if codes & _FORGET:
             self.last.clear()
         elif not codes & _NO_MOVE:
-            for letter, text in line.axes.items():
-                value = self._um(letter, text)
+            for letter in AXES:
+                if letter not in line.lengths:
+                    continue
+                value = self._um(letter, line.lengths[letter])
                 if value is None or self.incremental:
                     self.last.pop(letter, None)
                 else:
@@ -173,5 +237,5 @@ class _Reader:
         if value is None:
             return None
         if self.increments_mm is not None and "." not in text:
-            return value * self.increments_mm[AXES.index(letter)] * 1000.0
+            return value * self.increments_mm[_AXIS_OF.get(letter, 0)] * 1000.0
         return value * self.unit_um

@@ -12,11 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.invert import invert
-from olp.compensation.lines import Cuts, no_cuts, samples_needed
+from olp.compensation.lines import Cuts, no_cuts
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
+from olp.errormodel.sampling import steps_needed
 from olp.exceptions import CannotCompute
-from olp.toolpath import PLANES, Arcs, Flag, Toolpath
+from olp.geometry import PLANES, arc_points
+from olp.toolpath import Arcs, Flag, Toolpath
 
 Index = npt.NDArray[np.int64]
 
@@ -42,25 +44,9 @@ class Pieces:
         return Pieces(self.arc[which], self.begin[which], self.end[which])
 
 
-def arc_points(start: Array, end: Array, arcs: Arcs, which: Index, share: Array) -> Array:
-    """(n, 3) nominal points of arcs at shares of their sweep; the radius and the third axis go linearly.
-
-    `start`, `end` are the end points of arc `which` for each row.
-    """
-    rows = np.arange(len(which))
-    axes = _AXES[arcs.plane[which]]
-    first, second, third = axes[:, 0], axes[:, 1], axes[:, 2]
-    centre = arcs.centre_mm[which]
-    c0, c1 = centre[rows, first], centre[rows, second]
-    s0, s1 = start[rows, first] - c0, start[rows, second] - c1
-    radius = np.hypot(s0, s1)
-    radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
-    angle = np.arctan2(s1, s0) + share * arcs.sweep_rad[which]
-    out = np.empty((len(which), 3))
-    out[rows, first] = c0 + radius * np.cos(angle)
-    out[rows, second] = c1 + radius * np.sin(angle)
-    out[rows, third] = start[rows, third] + share * (end[rows, third] - start[rows, third])
-    return out
+def _points(start: Array, end: Array, arcs: Arcs, which: Index, share: Array) -> Array:
+    """(n, 3) points of arcs `which` at shares of their sweep."""
+    return arc_points(start, end, arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which], share)
 
 
 def subdivide_arcs(
@@ -111,7 +97,7 @@ def subdivide_arcs(
     inner = end < 1.0
     arc, end = arc[inner], end[inner]
     starts, ends = _ends(path, target, arc)
-    return arcs.move[arc], end, arc_points(starts, ends, _shifted(arcs, path, target), arc, end)
+    return arcs.move[arc], end, _points(starts, ends, _shifted(arcs, path, target), arc, end)
 
 
 def _shifted(arcs: Arcs, path: Toolpath, target: Array) -> Arcs:
@@ -143,11 +129,11 @@ def sampled(
         delta[rows, axes[:, i]] = np.minimum(length, 2 * radius)
     move = arcs.move[pieces.arc]
     tool = tools if tools.ndim == 1 else tools[move]
-    count = int(min(samples_needed(model, delta, tool, tolerance / 4).max(), 256))
+    count = int(steps_needed(model, delta, tool, tolerance / 4, at_most=256).max())
     share = np.linspace(0.0, 1.0, max(count, 12) + 1)
     spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
     which = np.repeat(np.arange(len(pieces)), len(share))
-    point = arc_points(start[which], end[which], arcs, pieces.arc[which], spread)
+    point = _points(start[which], end[which], arcs, pieces.arc[which], spread)
     command, _ = invert(model, point, tool if tool.ndim == 1 else tool[which])
     return command.reshape(len(pieces), len(share), 3), share, arcs.centre_mm[pieces.arc]
 

@@ -12,7 +12,8 @@ from olp.compensation.arcs import Pieces, fit, sampled
 from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
 from olp.program.edits import Edits
-from olp.toolpath import PLANES, Flag, Kind
+from olp.geometry import PLANES
+from olp.toolpath import Flag, Kind
 
 if TYPE_CHECKING:
     from olp.compensation.writer import Rows, Writer
@@ -29,6 +30,7 @@ class _Arc:
     """One part of an arc as it will be written, positions in mm."""
 
     row: int
+    move: int
     line: int
     start: Array
     end: Array
@@ -82,7 +84,7 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
     for i in range(len(arc_row)):
         out.append(
             _Arc(
-                int(arc_row[i]), int(path.line[move[i]]), start[i], end[i],
+                int(arc_row[i]), int(move[i]), int(path.line[move[i]]), start[i], end[i],
                 _on_bisector(start[i], end[i], centre[i], int(plane[i])), float(sweep[i]), int(plane[i]),
             )
         )  # fmt: skip
@@ -108,7 +110,7 @@ def _on_bisector(start: Array, end: Array, centre: Array, plane: int) -> Array:
 
 def _centre_words(writer: Writer, arc: _Arc, absolute: bool) -> list[tuple[int, int, int]]:
     """(axis, mantissa, decimals) of both centre words; checks that rounding kept the arc what it is."""
-    frame = writer.path.frames[int(writer.path.frame[writer.plan.move[writer.row_offset + arc.row]])]
+    frame = writer.frame_of(arc.move)
     out = []
     realised = arc.centre.copy()
     for axis in PLANES[arc.plane][:2]:
@@ -160,7 +162,7 @@ def _head(writer: Writer, rows: Rows, arc: _Arc) -> list[Edits]:
         slot = slots[axis]
         if slot >= 0:
             own = int(writer.style.decimals(np.array([slot]), axis)[0])
-            digits = max(own, writer.style.least(axis, writer.unit_of(move)))
+            digits = max(own, writer.style.least(axis, writer.frame_of(move).unit_mm))
             exact = _mantissa(writer, arc, axis, digits, absolute, move)
             if exact != int(words.mantissa[slot]) * 10 ** (digits - own):
                 out.append(writer.one(int(words.number[slot]), int(words.end[slot]), exact, digits, b"", 0))
@@ -174,7 +176,7 @@ def _head(writer: Writer, rows: Rows, arc: _Arc) -> list[Edits]:
 
 
 def _mantissa(writer: Writer, arc: _Arc, axis: int, decimals: int, absolute: bool, move: int) -> int:
-    frame = writer.path.frames[int(writer.path.frame[move])]
+    frame = writer.frame_of(move)
     base = frame.offset_mm[axis] if absolute else arc.start[axis]
     return round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
 
@@ -183,7 +185,7 @@ def _radius_word(writer: Writer, rows: Rows, arc: _Arc, slot: int, split: bool) 
     """R of the corrected arc; where R cannot say it well (near half circles), I, J, K in its place."""
     words = writer.words
     first, second, _ = PLANES[arc.plane]
-    unit = writer.unit_of(int(rows.move[arc.row]))
+    unit = writer.frame_of(arc.move).unit_mm
     radius = float(np.hypot(arc.start[first] - arc.centre[first], arc.start[second] - arc.centre[second]))
     half = float(np.hypot(arc.end[first] - arc.start[first], arc.end[second] - arc.start[second])) / 2
     own = int(writer.style.decimals(np.array([slot]), first)[0])

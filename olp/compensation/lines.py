@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
+from olp.errormodel.sampling import steps_needed
 from olp.toolpath import Toolpath
 
 Index = npt.NDArray[np.int64]
@@ -20,7 +21,6 @@ Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance
 _SAMPLE_SHARE = 0.006
-_MOST_SAMPLES = 1 << 18
 _BATCH = 1 << 20
 
 
@@ -55,20 +55,8 @@ def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask
     )
 
 
-def samples_needed(model: ErrorModel, delta: Array, tool: Array, share_mm: float) -> Index:
-    """How many equal steps each move needs for the error to bend by less than `share_mm` within one."""
-    count = np.full(len(delta), 8, np.int64)
-    todo = np.arange(len(delta))
-    while todo.size:
-        part_tool = tool if tool.ndim == 1 else tool[todo]
-        bends = model.chord_bound(delta[todo] / count[todo, None], part_tool) > share_mm
-        todo = todo[bends & (count[todo] < _MOST_SAMPLES)]
-        count[todo] *= 2
-    return count
-
-
 def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, tolerance: float) -> Cuts:
-    count = samples_needed(model, delta, tool, _SAMPLE_SHARE * tolerance)
+    count = steps_needed(model, delta, tool, _SAMPLE_SHARE * tolerance, at_least=8)
     parts: list[Cuts] = []
     at = 0
     totals = np.cumsum(count + 1)

@@ -14,14 +14,15 @@ import numpy.typing as npt
 from olp.compensation.arcwords import arc_edits
 from olp.compensation.digits import AxisRows, Digits, absolute, incremental
 from olp.compensation.holes import HolePlan, hole_edits
-from olp.compensation.plan import Plan
+from olp.compensation.plan import Plan, targets
 from olp.compensation.style import Style
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.exceptions import ProgramError
+from olp.machine import Vector
 from olp.program.edits import BARE, Edits, Prefixes, splice
 from olp.program.program import Program
-from olp.toolpath import Flag, Kind
+from olp.toolpath import Flag, Frame, Kind
 
 Index = npt.NDArray[np.int64]
 
@@ -45,43 +46,65 @@ class Writer:
     """One writing of one program. `text()` gives the corrected bytes; `parts` then holds, per move of the
     nominal path, how many moves the corrected text has for it."""
 
-    def __init__(self, program: Program, plan: Plan, model: ErrorModel, tolerance_mm: float, stamp: bytes) -> None:
+    def __init__(
+        self,
+        program: Program,
+        plan: Plan,
+        model: ErrorModel,
+        *,
+        tolerance_mm: float,
+        increments_mm: Vector,
+        stamp: bytes = b"",
+    ) -> None:
         assert program.words is not None
         self.program, self.plan, self.model = program, plan, model
         self.words = program.words
         self.tolerance_mm = tolerance_mm
         self.stamp = stamp
-        self.style = Style.of(program)
+        self.style = Style.of(program, increments_mm)
         self.prefixes = Prefixes()
         self.tally = Tally()
         self.path = program.toolpath
+        self.targets = targets(self.path, plan.shift_mm)
         self.emitted = [float(v) for v in self.path.start_mm]
         self.parts = np.zeros(len(self.path), np.int32)
         self.holes = HolePlan.of(program, plan, model, tolerance_mm)
+        self.hole_of = {m: i for i, hole in enumerate(program.holes) for m in range(hole.first, hole.last)}
+        self.series, self.initial = -1, 0.0
+        self.sticky: dict[str, float] = {}
         self.next_capture = 0
         self.frames_offset = np.array([f.offset_mm for f in self.path.frames]).reshape(-1, 3)
         self.frames_unit = np.array([f.unit_mm for f in self.path.frames])
-        self.commands: list[Array] = []
+        self.changed = False
 
     def text(self) -> bytes:
+        """The corrected text; the program's own bytes where nothing changes."""
         source = np.frombuffer(self.program.data, np.uint8)
-        out: list[bytes] = [self.stamp]
+        out: list[bytes] = []
         at = 0
         for first, last in self._spans():
             edits = self._edits(first, last)
             to = len(source) if last == len(self.plan) else self._line_start_of_row(last)
-            out.append(
-                splice(source[at:to], at, Edits.join(edits), self.prefixes, leading_zero=self.style.leading_zero)
-                .tobytes() if edits else source[at:to].tobytes()
-            )  # fmt: skip
+            if edits:
+                joined = Edits.join(edits)
+                text = splice(source[at:to], at, joined, self.prefixes, leading_zero=self.style.leading_zero)
+                out.append(text.tobytes())
+                self.changed = True
+            else:
+                out.append(self.program.data[at:to])
             at = to
-        out.append(source[at:].tobytes())
-        return b"".join(self._with_stamp(out))
+        out.append(self.program.data[at:])
+        if self.changed and self.stamp:
+            out[0] = stamped(out[0], self.stamp, self.program.eol(1))
+        return b"".join(out)
 
-    def _with_stamp(self, out: list[bytes]) -> list[bytes]:
-        """The stamp goes in front, but behind a tape mark at the start."""
-        first = out[1] if len(out) > 1 else b""
-        return [*_place_stamp(first, self.stamp), *out[2:]] if self.stamp else out[1:]
+    def frame_of(self, move: int) -> Frame:
+        return self.path.frames[int(self.path.frame[move])]
+
+    def block_start(self, line: int) -> bytes:
+        """What stands before the first word of a block inserted after a line."""
+        deleted = self.program.text(line).lstrip().startswith("/")
+        return self.program.eol(line) + (b"/" if deleted else b"")
 
     def _line_start_of_row(self, row: int) -> int:
         return int(self.program.line_start[self.path.line[self.plan.move[row]] - 1])
@@ -104,7 +127,7 @@ class Writer:
         plan, path = self.plan, self.path
         move = plan.move[first:last]
         flag = path.flag[move]
-        rows = _Rows(
+        rows = Rows(
             first=first,
             move=move,
             head=np.concatenate(([True], move[1:] != move[:-1])) if len(move) else np.zeros(0, bool),
@@ -116,6 +139,7 @@ class Writer:
             decimals=np.zeros((last - first, 3), np.int8),
         )
         edits: list[Edits] = []
+        self._mark_take_ups(rows)
         breaks = self._breaks(rows)
         for a, b in zip(breaks[:-1], breaks[1:], strict=True):
             if flag[a] & _BYPASS & np.uint8(Flag.CYCLE):
@@ -129,7 +153,16 @@ class Writer:
         self.emitted = [float(v) for v in rows.emitted[-1]]
         return [e for e in edits if len(e)]
 
-    def _breaks(self, rows: _Rows) -> list[int]:
+    def _mark_take_ups(self, rows: Rows) -> None:
+        """An arc's first part keeps the block's own line, so lost motion is taken up in a block before it."""
+        take_up = self.plan.take_up[rows.first : rows.first + len(rows.move)]
+        arc = np.isin(self.path.kind[rows.move], (Kind.ARC_CW, Kind.ARC_CCW))
+        rows.before = take_up & arc & rows.head
+        at = np.flatnonzero(rows.before)
+        rows.head[at] = False
+        rows.head[at + 1] = True
+
+    def _breaks(self, rows: Rows) -> list[int]:
         """Where the way of counting changes: G90 and G91, units inside G91, canned cycles."""
         count = len(rows.move)
         key = (rows.flag & np.uint8(Flag.INCREMENTAL | Flag.CYCLE)).astype(np.int64)
@@ -141,7 +174,7 @@ class Writer:
         changes = np.flatnonzero(key[1:] != key[:-1]) + 1
         return [0, *changes.tolist(), count]
 
-    def _digits(self, rows: _Rows, a: int, b: int) -> None:
+    def _digits(self, rows: Rows, a: int, b: int) -> None:
         """Digits of rows a..b, which all count the same way."""
         plan, path, words = self.plan, self.path, self.words
         part = slice(rows.first + a, rows.first + b)
@@ -199,7 +232,7 @@ class Writer:
             parts.append(digits)
         return Digits(*(np.concatenate([getattr(p, n) for p in parts]) for n in Digits.__slots__))
 
-    def _after_block_delete(self, rows: _Rows) -> None:
+    def _after_block_delete(self, rows: Rows) -> None:
         """The first block after `/` blocks must not rely on a word that was inserted in them."""
         deleted = (rows.flag & np.uint8(Flag.DELETED)) != 0
         if not deleted.any():
@@ -220,12 +253,12 @@ class Writer:
                     continue
                 self._force(rows, row, axis)
 
-    def _nominal_moved(self, rows: _Rows, begin: int, row: int, axis: int) -> bool:
+    def _nominal_moved(self, rows: Rows, begin: int, row: int, axis: int) -> bool:
         end = self.path.end_mm
         before = end[rows.move[begin], axis] if begin >= 0 else self.path.start_mm[axis]
         return not abs(end[rows.move[row - 1], axis] - before) < 1e-9
 
-    def _force(self, rows: _Rows, row: int, axis: int) -> None:
+    def _force(self, rows: Rows, row: int, axis: int) -> None:
         frame = int(self.path.frame[rows.move[row]])
         unit, offset = float(self.frames_unit[frame]), float(self.frames_offset[frame, axis])
         decimals = self.style.usual(axis, unit)
@@ -235,7 +268,7 @@ class Writer:
 
     # -- edits -------------------------------------------------------------------------------------
 
-    def _word_edits(self, rows: _Rows) -> list[Edits]:
+    def _word_edits(self, rows: Rows) -> list[Edits]:
         """Replaced and inserted axis words of the blocks that are there, and inserted blocks."""
         program, words = self.program, self.words
         out: list[Edits] = []
@@ -270,7 +303,7 @@ class Writer:
         self.parts[rows.move[0] : rows.move[-1] + 1] += counts.astype(np.int32)
         return out
 
-    def _insertions(self, rows: _Rows, row: Index, slot: npt.NDArray[np.int32], missing: Mask) -> list[Edits]:
+    def _insertions(self, rows: Rows, row: Index, slot: npt.NDArray[np.int32], missing: Mask) -> list[Edits]:
         """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
         words = self.words
         ends = np.where(slot >= 0, words.end[slot], -1)
@@ -298,49 +331,86 @@ class Writer:
                 self.tally.inserted_words += count
         return out
 
-    def _blocks(self, rows: _Rows, tails: Index) -> list[Edits]:
+    def _blocks(self, rows: Rows, tails: Index) -> list[Edits]:
         """New blocks for the later parts of subdivided moves; plain words, modal codes hold."""
-        program = self.program
         line_no = self.path.line[rows.move[tails]]
-        place = program.line_end[line_no - 1].astype(np.int64)
         arc = np.isin(self.path.kind[rows.move[tails]], (Kind.ARC_CW, Kind.ARC_CCW))
-        eols = {line: self._block_start(line, rows) for line in np.unique(line_no).tolist()}
+        straight = ~arc | self.plan.take_up[rows.first + tails]
+        before = rows.before[tails]
+        place = np.where(before, self.program.line_start[line_no - 1], self.program.line_end[line_no - 1]).astype(np.int64)
+        lead = self._leads(rows, tails, line_no, arc & straight, before)
+        write = rows.write[tails]
+        first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
         out: list[Edits] = []
-        first_axis = np.where(rows.write[tails].any(axis=1), rows.write[tails].argmax(axis=1), -1)
-        serial = np.arange(len(tails), dtype=np.int64)
-        lead = np.array([eols[line] for line in line_no.tolist()], np.int64)
         for axis in range(3):
-            chosen = np.flatnonzero(rows.write[tails, axis] & ~arc)
+            chosen = np.flatnonzero(write[:, axis] & straight)
+            letter = b"XYZ"[axis : axis + 1]
             begins = first_axis[chosen] == axis
-            word = self.prefixes(b" " + b"XYZ"[axis : axis + 1])
-            starts = {
-                int(p): self.prefixes(self.prefixes.table[int(p)] + b"XYZ"[axis : axis + 1])
-                for p in np.unique(lead[chosen[begins]])
-            }
-            prefix = np.full(len(chosen), word, np.int32)
+            prefix = np.full(len(chosen), self.prefixes(b" " + letter), np.int32)
+            starts = {int(p): self.prefixes(self.prefixes.table[int(p)] + letter) for p in np.unique(lead[chosen[begins]])}
             prefix[begins] = [starts[int(p)] for p in lead[chosen[begins]]]
+            row = tails[chosen]
             out.append(
                 Edits(
-                    place[chosen], place[chosen], rows.mantissa[tails[chosen], axis],
-                    rows.decimals[tails[chosen], axis], prefix, (serial[chosen] * 8 + 16 + axis).astype(np.int32),
+                    place[chosen], place[chosen], rows.mantissa[row, axis], rows.decimals[row, axis], prefix,
+                    (row * 8 + 16 + axis).astype(np.int32),
                 )
             )  # fmt: skip
-        empty = (first_axis < 0) & ~arc
-        if empty.any():
-            # a part whose rounded end is where it began needs no block
-            np.subtract.at(self.parts, rows.move[tails[empty]], 1)
+        empty = (first_axis < 0) & straight
+        # a part whose rounded end is where it began needs no block
+        np.subtract.at(self.parts, rows.move[tails[empty]], 1)
+        for i in np.flatnonzero(before & ~empty).tolist():
+            at, row = int(place[i]), int(tails[i])
+            self._check_take_up(rows, row)
+            out.append(self.one(at, at, BARE, 0, self._feed_of(int(line_no[i])) + self.program.eol(int(line_no[i])), row * 8 + 20))
+            out += self._arc_word(rows, row + 1)
         self.tally.inserted_blocks += int((~empty).sum())
-        out += self._inverse_time(rows, tails, serial)
-        out += self._end_words(rows, tails, place)
+        out += self._inverse_time(rows, tails)
+        out += self._end_words(rows, tails[~before])
         self.tally.split_moves += len(np.unique(rows.move[tails]))
         return out
 
-    def _block_start(self, line: int, rows: _Rows) -> int:
-        start = self.program.eol(line)
-        text = self.program.text(line).lstrip()
-        return self.prefixes(start + (b"/" if text.startswith("/") else b""))
+    def _leads(self, rows: Rows, tails: Index, line_no: Index, turning: Mask, before: Mask) -> Index:
+        """Prefix of the first word of each inserted block: line end, `/` and, to take up lost motion at an arc, G1."""
+        lead = np.zeros(len(tails), np.int64)
+        for line in np.unique(line_no).tolist():
+            start = self.block_start(line)
+            deleted = start[len(self.program.eol(line)) :]
+            mine = line_no == line
+            lead[mine] = self.prefixes(start)
+            lead[mine & turning] = self.prefixes(start + b"G1 ")
+            lead[mine & before] = self.prefixes(deleted + b"G1 ")
+        return lead
 
-    def _inverse_time(self, rows: _Rows, tails: Index, serial: Index) -> list[Edits]:
+    def _check_take_up(self, rows: Rows, row: int) -> None:
+        if rows.flag[row] & np.uint8(Flag.INVERSE_TIME):
+            raise ProgramError(
+                "an arc in G93 needs a step that takes up lost motion before it, which has no time of its own; "
+                "program the arc in G94",
+                line=int(self.path.line[rows.move[row]]),
+            )
+
+    def _feed_of(self, line: int) -> bytes:
+        """The F word of a block, for the block that is put before it."""
+        index = self.style.word(line, "F")
+        if index is None:
+            return b""
+        return b" " + self.program.data[int(self.words.start[index]) : int(self.words.end[index])]
+
+    def _arc_word(self, rows: Rows, row: int) -> list[Edits]:
+        """G2 or G3 for an arc block that relied on the modal code which the block before it changed."""
+        move = int(rows.move[row])
+        line = int(self.path.line[move])
+        code = 2 if self.path.kind[move] == Kind.ARC_CW else 3
+        index = self.words.of_line(line)
+        if any(self.words.letter[i] == 71 and self.words.mantissa[i] == code and not self.words.decimals[i] for i in index):
+            return []
+        slot = self.program.slot[move]
+        first = [int(self.words.start[s]) for s in slot if s >= 0] or [int(self.words.start[i]) for i in index]
+        at = min(first)
+        return [self.one(at, at, BARE, 0, b"G%d " % code, 0)]
+
+    def _inverse_time(self, rows: Rows, tails: Index) -> list[Edits]:
         """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
         timed = np.flatnonzero((rows.flag[tails] & np.uint8(Flag.INVERSE_TIME)) != 0)
         out = []
@@ -363,11 +433,11 @@ class Writer:
                     start, end, prefix, order = int(self.words.number[index]), int(self.words.end[index]), b"", 0
                 else:
                     start = end = place
-                    prefix, order = b" F", int(serial[np.searchsorted(tails, row)]) * 8 + 16 + 5
+                    prefix, order = b" F", rows.serial(row) + 5
                 out.append(self.one(start, end, int(feeds[i]), decimals, prefix, order))
         return out
 
-    def _end_words(self, rows: _Rows, tails: Index, place: Index) -> list[Edits]:
+    def _end_words(self, rows: Rows, tails: Index) -> list[Edits]:
         """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last."""
         out = []
         for move in np.unique(rows.move[tails]).tolist():
@@ -385,7 +455,7 @@ class Writer:
                 out.append(self.one(at, at, BARE, 0, b" " + self.program.data[start:end], 2**30 + k))
         return out
 
-    def _captures(self, rows: _Rows) -> list[Edits]:
+    def _captures(self, rows: Rows) -> list[Edits]:
         """Words that store the present position (G92, G10 L20) move with the correction of that position."""
         out = []
         captures = self.program.captures
@@ -414,7 +484,7 @@ class Writer:
                 self.tally.changed_words += 1
         return out
 
-    def _hole(self, rows: _Rows, a: int, b: int) -> list[Edits]:
+    def _hole(self, rows: Rows, a: int, b: int) -> list[Edits]:
         return hole_edits(self, rows, a, b)
 
     def one(self, start: int, end: int, mantissa: int, decimals: int, prefix: bytes, order: int) -> Edits:
@@ -426,7 +496,7 @@ class Writer:
 
 
 @dataclass(slots=True, eq=False)
-class _Rows:
+class Rows:
     """Rows of the plan on their way into text. `head` marks the row that keeps its block's own line."""
 
     first: int
@@ -438,6 +508,19 @@ class _Rows:
     write: Mask
     mantissa: Index
     decimals: npt.NDArray[np.int8]
+    before: Mask = field(default_factory=lambda: np.zeros(0, bool))
+
+    def serial(self, row: int) -> int:
+        """Order of a row's words among insertions at one place."""
+        return row * 8 + 16
+
+    def number(self, writer: Writer, row: int, axis: int) -> tuple[int, int]:
+        """Mantissa and decimals that say where the axis is after the row, whether or not it changes."""
+        if self.write[row, axis] or self.flag[row] & np.uint8(Flag.INCREMENTAL):
+            return int(self.mantissa[row, axis]), int(self.decimals[row, axis])
+        frame = writer.frame_of(int(self.move[row]))
+        decimals = writer.style.usual(axis, frame.unit_mm)
+        return round((self.emitted[row, axis] - frame.offset_mm[axis]) / frame.unit_mm * 10**decimals), decimals
 
     def put(self, a: int, b: int, axis: int, digits: Digits) -> None:
         self.emitted[a:b, axis] = digits.emitted
@@ -446,5 +529,16 @@ class _Rows:
         self.decimals[a:b, axis] = digits.decimals
 
 
-def _place_stamp(first: bytes, stamp: bytes) -> list[bytes]:
-    return [stamp, first]
+def stamped(text: bytes, stamp: bytes, eol: bytes) -> bytes:
+    """The text with the stamp as a line of its own in front, behind a tape mark and a program number."""
+    at = 3 if text[:3] == b"\xef\xbb\xbf" else 0
+    if text[at : at + 1] == b"%":
+        at = _line_after(text, at)
+        if text[at : at + 1] in b"Oo:" and text[at : at + 1]:
+            at = _line_after(text, at)
+    return text[:at] + stamp + eol + text[at:]
+
+
+def _line_after(text: bytes, at: int) -> int:
+    end = text.find(b"\n", at)
+    return len(text) if end < 0 else end + 1

@@ -69,7 +69,9 @@ def flatten(
     dialect = _DIALECTS.get(profile)
     if dialect is None:
         raise UsageError(f"profile {profile!r} cannot be flattened; expected one of {', '.join(_DIALECTS)}")
-    writer = _Flattener(dialect, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
+    writer = _Flattener(
+        dialect, expand_cycles=expand_cycles, exact_stop=profile == "linuxcnc", peck_clearance=peck_clearance
+    )
     main = Unit(data, dialect, file)
     visit = writer.block
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
@@ -103,11 +105,14 @@ def number_text(value: float, letter: str, dialect: Dialect, exact: bool = False
 class _Flattener:
     """Writes the blocks that a walk visits and follows the state of the control."""
 
-    def __init__(self, dialect: Dialect, *, expand_cycles: bool, peck_clearance: float | None) -> None:
+    def __init__(
+        self, dialect: Dialect, *, expand_cycles: bool, exact_stop: bool, peck_clearance: float | None
+    ) -> None:
         self.dialect: Dialect = dialect
         self.state = State(dialect)
         self.variables = Variables(self.state)
         self.expand_cycles = expand_cycles
+        self.exact_stop = exact_stop
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
         self._out: list[tuple[bytes, bytes]] = []
@@ -216,7 +221,7 @@ class _Flattener:
         self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float | None, ...]]
     ) -> None:
         """Blocks of a cycle. LinuxCNC stops exactly at every corner of a cycle, whatever the path mode is."""
-        exact = self.dialect == "linuxcnc" and self.state.path != "G61"
+        exact = self.exact_stop and self.state.path != "G61"
         lines: list[str] = []
         at = list(before[2])
         spindle = self.state.spindle

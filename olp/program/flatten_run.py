@@ -110,7 +110,7 @@ class Walk:
             if self._true(flow):
                 self.write(line, frame, frozenset())
             return False
-        if flow.keyword not in ("sub", "endsub", "call", "return") and line.comments:
+        if flow.keyword != "sub" and line.comments:
             self.write(line, frame, frozenset())
         handler: Callable[[Flow, Frame, int], None] = getattr(self, "_do_" + flow.keyword.replace("-", "_"))
         handler(flow, frame, index)

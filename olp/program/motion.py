@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from olp.exceptions import ProgramError
 from olp.program.lexer import WordChunk
-from olp.toolpath import PLANES
+from olp.geometry import PLANES
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

@@ -83,6 +83,7 @@ class Program:
     holes: tuple[Hole, ...] = ()
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
+    calculator: bool = False
 
     @property
     def lines(self) -> int:

@@ -21,7 +21,8 @@ from olp.program.motion import Array, Blocks, Index, Mask, arc_geometry, fill, g
 from olp.program.profiles import CUTTER_COMPENSATION, CYCLES, PROBES, Act, Profile
 from olp.program.program import ArcSlots, Hole, Program, Words
 from olp.program.state import NAN, Effect, State, Word
-from olp.toolpath import PLANES, Arcs, Flag, Frame, Kind, Toolpath
+from olp.geometry import PLANES
+from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 
 _SWITCH = re.compile(rb"[(;][ \t]*olp[ \t]+(off|on)\b", re.IGNORECASE)
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)

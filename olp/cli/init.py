@@ -1,0 +1,77 @@
+"""`olp init`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from olp.cli.common import talk
+from olp.exceptions import OlpError, UsageError
+
+#: A small machine, to be replaced by the travel of the real one.
+TRAVEL_MM = {"X": (0.0, 500.0), "Y": (0.0, 400.0), "Z": (-300.0, 0.0)}
+
+Travel = tuple[tuple[str, float, float], ...]
+
+
+@click.command("init")
+@click.argument("folder", metavar="DIR")
+@click.option("--name", help="Name of the machine. Default: the folder's name.")
+@click.option("--chain", default="FXYZ", show_default=True, help="Axes from workpiece to tool, F the frame.")
+@click.option("--controller", help="Dialect of the control, such as linuxcnc, fanuc, haas or grbl.")
+@click.option(
+    "--travel",
+    type=(click.Choice("XYZ"), float, float),
+    multiple=True,
+    metavar="AXIS MIN MAX",
+    help="Travel of an axis in mm, such as --travel X 0 2000; once an axis.",
+)
+@click.option("--from-linuxcnc", "ini", metavar="INI", help="Take the machine from a LinuxCNC configuration.")
+@click.option("--force", is_flag=True, help="Overwrite files in DIR.")
+def command(
+    folder: str,
+    name: str | None,
+    chain: str,
+    controller: str | None,
+    travel: Travel,
+    ini: str | None,
+    force: bool,
+) -> None:
+    """Write the first files of a new machine into DIR: machine, calibration of zeros, curves, job."""
+    from dataclasses import replace
+
+    from olp.files import starter
+    from olp.files.write import write_files
+
+    notes: tuple[str, ...] = ()
+    if ini is not None:
+        if travel or controller:
+            raise UsageError("--from-linuxcnc states travel and control itself; leave out --travel and --controller")
+        imported = starter.from_linuxcnc(ini, chain)
+        machine, notes = imported.machine, imported.notes
+        machine = replace(machine, name=name) if name else machine
+    else:
+        limits = TRAVEL_MM | {axis: (low, high) for axis, low, high in travel}
+        machine = starter.starter_machine(
+            name or Path(folder).resolve().name or "machine", chain, limits, controller or "linuxcnc"
+        )
+    texts = starter.starter_set(machine)
+    if notes:
+        texts["machine.toml"] = starter.machine_toml(machine, notes)
+    _make_folder(Path(folder))
+    files = {Path(folder) / file: text.encode() for file, text in texts.items()}
+    write_files(files, force=force)
+    for path in files:
+        talk(f"wrote {path}")
+    for note in notes:
+        talk(f"note: {note}")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise UsageError("is a file; name a folder", file=str(folder)) from None
+    except OSError as error:
+        raise OlpError(f"cannot be made ({error.strerror})", file=str(folder)) from error

@@ -1,0 +1,225 @@
+"""How far the tip is from the nominal path: at the way-points and between them.
+
+The actual path of a program is its commands plus the error model, sampled so finely that the model cannot
+hide anything between two samples. It is held against the nominal path move by move: `groups` tells
+which moves of the program belong to which nominal move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel import ErrorModel, play_states
+from olp.errormodel.base import Array, Mask
+from olp.errormodel.sampling import steps_needed
+from olp.geometry import arc_distance, arc_points, segment_distance
+from olp.toolpath import Flag, Kind, Toolpath
+
+Index = npt.NDArray[np.int64]
+
+_BLOCK = 1 << 16
+_AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: samples of an arc move at the least
+_ARC_STEPS = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deviation:
+    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way (ends included), `bend` the
+    part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts."""
+
+    waypoint: Array
+    path: Array
+    bend: Array
+    judged: Mask
+
+    def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
+        """Largest and rms in um, at way-points of all judged moves and along those that are `cutting`."""
+        at = self.waypoint[self.judged & np.isfinite(self.waypoint)]
+        along = self.path[self.judged & cutting & np.isfinite(self.path)]
+        return {"waypoints": _figures(at), "between": _figures(along)}
+
+
+def _figures(values: Array) -> dict[str, float]:
+    if not len(values):
+        return {"max_um": 0.0, "rms_um": 0.0}
+    return {"max_um": float(values.max()) * 1e3, "rms_um": float(np.sqrt(np.mean(values * values))) * 1e3}
+
+
+def cutting_moves(path: Toolpath) -> Mask:
+    """(n,) moves on which the whole path counts and not its end alone: feed moves, not of canned cycles."""
+    return np.asarray((path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0), bool)
+
+
+def measure(
+    nominal: Toolpath,
+    target_mm: Array,
+    path: Toolpath,
+    groups: Index,
+    model: ErrorModel,
+    bend_mm: float,
+    exempt: Mask | None = None,
+) -> Deviation:
+    """Hold the actual path of `path` against the nominal one.
+
+    `target_mm` (n, 3) are the nominal way-points where the part really lies; `groups` (n,) is the index of the
+    last move of `path` that belongs to each nominal move. `exempt` moves pass uncorrected and are not judged.
+    """
+    count = len(nominal)
+    waypoint = np.full(count, np.nan)
+    worst = np.full(count, np.nan)
+    bend = np.zeros(count)
+    judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
+    if exempt is not None:
+        judged &= ~exempt
+    tracer = _Tracer(nominal, target_mm, path, groups, model, bend_mm)
+    for a in range(0, count, _BLOCK):
+        b = min(a + _BLOCK, count)
+        tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
+    return Deviation(waypoint, worst, bend, judged)
+
+
+class _Tracer:
+    """Goes through the nominal moves in blocks, carrying the play of the axes."""
+
+    def __init__(
+        self, nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, bend: float
+    ) -> None:
+        self.nominal, self.target, self.path, self.groups = nominal, target, path, groups
+        self.model, self.bend = model, bend
+        self.play: Array | None = None
+        self.has_play = model.lost_motion_mm(np.array(model.box_mm).mean(axis=1)[None]) is not None
+        self.shift = nominal.end_mm
+        self.nominal_arc = _arc_index(nominal)
+        self.path_arc = _arc_index(path)
+
+    def block(self, a: int, b: int, waypoint: Array, worst: Array, bend: Array) -> None:
+        """Fill the columns of nominal moves a..b."""
+        first = int(self.groups[a - 1]) + 1 if a else 0
+        last = int(self.groups[b - 1]) + 1
+        path = self.path
+        start, end = path.starts_mm(first, last), path.end_mm[first:last]
+        owner = np.searchsorted(self.groups[a:b], np.arange(first, last))
+        tool = path.tool_mm(first, last)
+        delta = end - start
+        steps = np.ones(last - first, np.int64)
+        known = np.isfinite(delta).all(axis=1)
+        cut = known & (path.kind[first:last] != Kind.RAPID)
+        if cut.any():
+            which = np.flatnonzero(cut)
+            steps[which] = steps_needed(
+                self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend, at_most=1 << 12
+            )
+        arc = self.path_arc[first:last] if self.path_arc is not None else np.full(last - first, -1)
+        steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
+        if arc.max(initial=-1) >= 0:
+            self._arc_steps(arc, known, steps, start, end, tool)
+        part = np.repeat(np.arange(last - first), steps)
+        offset = np.cumsum(steps) - steps
+        share = (np.arange(len(part)) - offset[part] + 1) / steps[part]
+        if len(part) == last - first:
+            point = end
+        else:
+            point = start[part] + share[:, None] * delta[part]
+            point[offset + steps - 1] = end
+            curved = np.flatnonzero(arc[part] >= 0)
+            curved = curved[(share[curved] < 1) & known[part[curved]]]
+            if curved.size:
+                arcs, which = path.arcs, arc[part[curved]]
+                point[curved] = arc_points(
+                    start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
+                    arcs.sweep_rad[which], share[curved],
+                )  # fmt: skip
+        actual = self._actual(point, tool if tool.ndim == 1 else tool[part])
+        self._distances(a, b, first, owner, part, share, offset + steps - 1, actual, waypoint, worst, bend)
+
+    def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, end: Array, tool: Array) -> None:
+        rows = np.flatnonzero((arc >= 0) & known)
+        arcs = self.path.arcs
+        centre = arcs.centre_mm[arc[rows]]
+        radius = np.sqrt(((start[rows] - centre) ** 2).sum(axis=1))
+        reach = np.minimum(radius * np.abs(arcs.sweep_rad[arc[rows]]), 2 * radius)
+        delta = np.repeat(reach[:, None], 3, axis=1)
+        part = tool if tool.ndim == 1 else tool[rows]
+        steps[rows] = np.maximum(
+            steps[rows], steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10)
+        )
+
+    def _actual(self, point: Array, tool: Array) -> Array:
+        play = None
+        if self.has_play:
+            width = self.model.lost_motion_mm(point)
+            assert width is not None
+            play = play_states(point, width, self.play)
+            self.play = play[-1] if len(play) else self.play
+        return point + self.model.error(point, tool, play)
+
+    def _distances(
+        self,
+        a: int,
+        b: int,
+        first: int,
+        owner: Index,
+        part: Index,
+        share: Array,
+        ends: Index,
+        actual: Array,
+        waypoint: Array,
+        worst: Array,
+        bend: Array,
+    ) -> None:
+        nominal, target = self.nominal, self.target
+        goal = target[a:b]
+        begin = np.empty_like(goal)
+        begin[1:] = nominal.end_mm[a : b - 1]
+        begin[0] = nominal.end_mm[a - 1] if a else np.array(nominal.start_mm)
+        begin += goal - nominal.end_mm[a:b]
+        group_end = ends[self.groups[a:b] - first]
+        away = actual[group_end] - goal
+        waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        of = owner[part]
+        one = len(of) == b - a and len(of) == of[-1] + 1
+        distance = segment_distance(actual, begin if one else begin[of], goal if one else goal[of])
+        arc = self.nominal_arc[a:b] if self.nominal_arc is not None else None
+        if arc is not None and arc.max(initial=-1) >= 0:
+            rows = np.flatnonzero(arc[of] >= 0)
+            which = arc[of[rows]]
+            arcs = nominal.arcs
+            shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
+            distance[rows] = arc_distance(
+                actual[rows], begin[of[rows]], goal[of[rows]], arcs.centre_mm[which] + shift, arcs.plane[which],
+                arcs.sweep_rad[which], self._near(owner, part, share, rows, of),
+            )  # fmt: skip
+        np.fmax.at(worst, of, distance) if not one else np.copyto(worst, distance)
+        if len(part) > len(ends):
+            inner = np.flatnonzero(share < 1.0)
+            straight = inner if arc is None else inner[arc[of[inner]] < 0]
+            self._bend(actual, part, share, ends, straight, bend, of)
+
+    def _near(self, owner: Index, part: Index, share: Array, rows: Index, of: Index) -> Array:
+        """Roughly where on its nominal move each sample lies: parts of a split move taken as of equal length."""
+        counts = np.bincount(owner)
+        offset = np.cumsum(counts) - counts
+        place = part[rows] - offset[of[rows]] + share[rows]
+        return np.asarray(place / counts[of[rows]], float)
+
+    def _bend(
+        self, actual: Array, part: Index, share: Array, ends: Index, inner: Index, bend: Array, of: Index
+    ) -> None:
+        """How far the samples leave the chord between the actual ends of their part."""
+        begin = np.where(part[inner] > 0, ends[np.maximum(part[inner] - 1, 0)], -1)
+        inner, begin = inner[begin >= 0], begin[begin >= 0]
+        departure = segment_distance(actual[inner], actual[begin], actual[ends[part[inner]]])
+        np.fmax.at(bend, of[inner], departure)
+
+
+def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:
+    """(n,) index into the arcs of each move, -1 where it is none."""
+    if not len(path.arcs):
+        return None
+    out = np.full(len(path), -1, np.int64)
+    out[path.arcs.move] = np.arange(len(path.arcs))
+    return out

@@ -1,0 +1,65 @@
+"""Points of circular and helical moves, and distances to straight and circular paths. Rows (n, 3), mm."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
+
+#: Plane number to (first, second, third) axis, right-handed: G17, G18, G19.
+PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
+_AXES = np.array(PLANES)
+
+
+def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array) -> Array:
+    """(n, 3) points at shares (n,) of arcs from `start` to `end` about `centre`.
+
+    Where the radii at both ends differ the radius goes linearly with the angle, as LinuxCNC interpolates; the
+    third axis goes linearly too.
+    """
+    rows = np.arange(len(start))
+    first, second, third = (_AXES[plane][:, i] for i in range(3))
+    c0, c1 = centre[rows, first], centre[rows, second]
+    s0, s1 = start[rows, first] - c0, start[rows, second] - c1
+    radius = np.hypot(s0, s1)
+    radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
+    angle = np.arctan2(s1, s0) + share * sweep
+    out = np.empty((len(start), 3))
+    out[rows, first] = c0 + radius * np.cos(angle)
+    out[rows, second] = c1 + radius * np.sin(angle)
+    out[rows, third] = start[rows, third] + share * (end[rows, third] - start[rows, third])
+    return out
+
+
+def segment_distance(point: Array, start: Array, end: Array) -> Array:
+    """(n,) distances of points from segments; a segment without length is a point."""
+    along = end - start
+    length2 = np.einsum("ij,ij->i", along, along)
+    away = point - start
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.einsum("ij,ij->i", away, along) / length2
+    share = np.clip(np.where(length2 > 0, share, 0.0), 0.0, 1.0)
+    away -= share[:, None] * along
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", away, away)), float)
+
+
+def arc_distance(
+    point: Array, start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, near: Array
+) -> Array:
+    """(n,) distances of points from arcs, across the path, for points that lie near share `near` of it."""
+    rows = np.arange(len(point))
+    first, second, third = (_AXES[plane][:, i] for i in range(3))
+    c0, c1 = centre[rows, first], centre[rows, second]
+    s0, s1 = start[rows, first] - c0, start[rows, second] - c1
+    p0, p1 = point[rows, first] - c0, point[rows, second] - c1
+    angle = np.arctan2(p1, p0) - np.arctan2(s1, s0)
+    # the turn on which the point lies is the one that `near` says
+    guess = near * sweep
+    angle = angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi))
+    share = np.clip(angle / sweep, 0.0, 1.0)
+    radius = np.hypot(s0, s1)
+    radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
+    level = start[rows, third] + share * (end[rows, third] - start[rows, third])
+    return np.asarray(np.hypot(np.hypot(p0, p1) - radius, point[rows, third] - level), float)
