@@ -1,3 +1,66 @@
-"""`olp` pre-distorts programs of Cartesian machines with the machine's calibrated error model."""
+"""`olp` pre-distorts programs of Cartesian machines with the machine's calibrated error model.
+
+    import olp
+    result = olp.correct("part.nc", "machine.toml")
+    Path("part.corrected.nc").write_bytes(result.data)
+
+Names are loaded when they are first used, so that `import olp` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from olp.api import Correction as Correction
+    from olp.api import Simulation as Simulation
+    from olp.api import Verification as Verification
+    from olp.api import correct as correct
+    from olp.api import error_at as error_at
+    from olp.api import flatten as flatten
+    from olp.api import inspect as inspect
+    from olp.api import simulate as simulate
+    from olp.api import verify as verify
+    from olp.exceptions import CannotCompute as CannotCompute
+    from olp.exceptions import ConfigError as ConfigError
+    from olp.exceptions import InputError as InputError
+    from olp.exceptions import OlpError as OlpError
+    from olp.exceptions import ProgramError as ProgramError
+    from olp.files.config import load_setup as load_setup
+    from olp.findings import Finding as Finding
+
+_HOME = {
+    "Correction": "olp.api",
+    "Simulation": "olp.api",
+    "Verification": "olp.api",
+    "correct": "olp.api",
+    "error_at": "olp.api",
+    "flatten": "olp.api",
+    "inspect": "olp.api",
+    "simulate": "olp.api",
+    "verify": "olp.api",
+    "CannotCompute": "olp.exceptions",
+    "ConfigError": "olp.exceptions",
+    "InputError": "olp.exceptions",
+    "OlpError": "olp.exceptions",
+    "ProgramError": "olp.exceptions",
+    "Finding": "olp.findings",
+    "load_setup": "olp.files.config",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'olp' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -75,14 +75,14 @@ def measure(
     judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
     if exempt is not None:
         judged &= ~exempt
-    tracer = _Tracer(nominal, target_mm, path, groups, model, bend_mm)
+    tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     for a in range(0, count, _BLOCK):
         b = min(a + _BLOCK, count)
         tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
     return Deviation(waypoint, worst, bend, judged)
 
 
-class _Tracer:
+class Tracer:
     """Goes through the nominal moves in blocks, carrying the play of the axes."""
 
     def __init__(
@@ -92,9 +92,44 @@ class _Tracer:
         self.model, self.bend = model, bend
         self.play: Array | None = None
         self.has_play = model.lost_motion_mm(np.array(model.box_mm).mean(axis=1)[None]) is not None
-        self.shift = nominal.end_mm
         self.nominal_arc = _arc_index(nominal)
         self.path_arc = _arc_index(path)
+
+    @staticmethod
+    def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Array, Index]:
+        """Commands (m, 3) along a path every `step_mm`, where the tip really is (m, 3), and the move of each (m,)."""
+        tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
+        start, end, tool = path.starts_mm(), path.end_mm, path.tool_mm()
+        length = np.nan_to_num(np.sqrt(((end - start) ** 2).sum(axis=1)))
+        arc = tracer.path_arc if tracer.path_arc is not None else np.full(len(path), -1)
+        rows = np.flatnonzero(arc >= 0)
+        if rows.size:
+            radius = np.sqrt(((start[rows] - path.arcs.centre_mm) ** 2).sum(axis=1))
+            length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
+        steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
+        point, part, _ = tracer.points(start, end, arc, steps, np.isfinite(length))
+        return point, tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
+
+    def points(
+        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask
+    ) -> tuple[Array, Index, Array]:
+        """Sample moves at equal steps: positions, the move of each sample, and its share of the move."""
+        part = np.repeat(np.arange(len(steps)), steps)
+        offset = np.cumsum(steps) - steps
+        share = (np.arange(len(part)) - offset[part] + 1) / steps[part]
+        if len(part) == len(steps):
+            return end, part, share
+        point = start[part] + share[:, None] * (end - start)[part]
+        point[offset + steps - 1] = end
+        curved = np.flatnonzero(arc[part] >= 0)
+        curved = curved[(share[curved] < 1) & known[part[curved]]]
+        if curved.size:
+            arcs, which = self.path.arcs, arc[part[curved]]
+            point[curved] = arc_points(
+                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which],
+                share[curved],
+            )  # fmt: skip
+        return point, part, share
 
     def block(self, a: int, b: int, waypoint: Array, worst: Array, bend: Array) -> None:
         """Fill the columns of nominal moves a..b."""
@@ -117,24 +152,9 @@ class _Tracer:
         steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
         if arc.max(initial=-1) >= 0:
             self._arc_steps(arc, known, steps, start, end, tool)
-        part = np.repeat(np.arange(last - first), steps)
-        offset = np.cumsum(steps) - steps
-        share = (np.arange(len(part)) - offset[part] + 1) / steps[part]
-        if len(part) == last - first:
-            point = end
-        else:
-            point = start[part] + share[:, None] * delta[part]
-            point[offset + steps - 1] = end
-            curved = np.flatnonzero(arc[part] >= 0)
-            curved = curved[(share[curved] < 1) & known[part[curved]]]
-            if curved.size:
-                arcs, which = path.arcs, arc[part[curved]]
-                point[curved] = arc_points(
-                    start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
-                    arcs.sweep_rad[which], share[curved],
-                )  # fmt: skip
-        actual = self._actual(point, tool if tool.ndim == 1 else tool[part])
-        self._distances(a, b, first, owner, part, share, offset + steps - 1, actual, waypoint, worst, bend)
+        point, part, share = self.points(start, end, arc, steps, known)
+        actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
+        self._distances(a, b, first, owner, part, share, np.cumsum(steps) - 1, actual, waypoint, worst, bend)
 
     def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, end: Array, tool: Array) -> None:
         rows = np.flatnonzero((arc >= 0) & known)
@@ -148,7 +168,8 @@ class _Tracer:
             steps[rows], steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10)
         )
 
-    def _actual(self, point: Array, tool: Array) -> Array:
+    def actual(self, point: Array, tool: Array) -> Array:
+        """Where the tip really is; carries the play of the axes from call to call."""
         play = None
         if self.has_play:
             width = self.model.lost_motion_mm(point)

@@ -38,7 +38,7 @@ def to_text(report: Report) -> str:
         _moves(report),
         _sources(report),
         _worst(report),
-        _findings(report.get("findings") or ()),
+        findings_text(report.get("findings") or ()),
         _sentences("What this proves", report.get("proves") or ()),
         _sentences("What it does not prove", report.get("does_not_prove") or ()),
     )
@@ -169,8 +169,8 @@ def _verdict(report: Report) -> Iterator[str]:
     above = any(finding.get("code") == "OLP101" for finding in report.get("findings") or ())
     verdict = "ABOVE TOLERANCE" if above else "Within tolerance"
     yield from textwrap.wrap(
-        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one; the tolerance is "
-        f"{tolerance:g} um, and rounding to the last digit comes on top.",
+        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one; the tolerance "
+        f"is {tolerance:g} um, plus what rounding to the last digit explains.",
         WIDTH,
     )
 
@@ -203,21 +203,18 @@ def _budget(report: Report) -> Iterator[str]:
         "lost_motion_unknown": "lost motion not yet taken up",
     }
     # What a later version adds shows under its own key.
-    names = [*titles, *(key for key in sorted(budget) if key not in titles and not _is_mapping(budget[key]))]
-    rows = [[titles.get(name, name.replace("_", " ")), number(budget[name])] for name in names if name in budget]
+    others = (key for key in sorted(budget) if key not in titles and not isinstance(budget[key], Mapping))
+    names = (name for name in (*titles, *others) if name in budget)
+    rows = [[titles.get(name, name.replace("_", " ")), number(budget[name])] for name in names]
     if rows:
         yield "What is left after correction, largest in um"
         yield from table(["", "max"], rows)
-    orientation = report.get("orientation_urad") or budget.get("orientation_urad")
-    if _is_mapping(orientation):
+    angle = _part(budget, "orientation_urad")
+    if angle:
         yield (
-            f"  Orientation of the tool, which three linear axes cannot correct: {number(orientation.get('max'), 1)} "
-            f"urad max, {number(orientation.get('rms'), 1)} rms"
+            "  Orientation of the tool, which three linear axes cannot correct: "
+            f"{number(angle.get('max'), 1)} urad max, {number(angle.get('rms'), 1)} rms"
         )
-
-
-def _is_mapping(value: object) -> bool:
-    return isinstance(value, Mapping)
 
 
 def _moves(report: Report) -> Iterator[str]:
@@ -252,7 +249,10 @@ def _sources(report: Report) -> Iterator[str]:
     if not sources:
         return
     yield "Error before correction by source in um, largest first"
-    rows = [[s.get("name", ""), number(s.get("max_um")), number(s.get("rms_um"))] for s in sources[:MAX_SOURCES]]
+    rows = (
+        [source.get("name", ""), number(source.get("max_um")), number(source.get("rms_um"))]
+        for source in sources[:MAX_SOURCES]
+    )
     yield from table(["", "max", "rms"], rows)
     if len(sources) > MAX_SOURCES:
         yield f"  and {len(sources) - MAX_SOURCES} smaller ones"
@@ -263,9 +263,10 @@ def _worst(report: Report) -> Iterator[str]:
     if not blocks:
         return
     yield "Worst blocks in um"
-    rows = [
-        [str(b.get("line", "")), number(b.get("before_um")), number(b.get("after_um"))] for b in blocks[:MAX_WORST]
-    ]
+    rows = (
+        [str(block.get("line", "")), number(block.get("before_um")), number(block.get("after_um"))]
+        for block in blocks[:MAX_WORST]
+    )
     lines = list(table(["line", "before", "after"], rows, left=0))
     room = WIDTH - max(map(len, lines)) - 2
     yield lines[0] + "  text"
@@ -273,7 +274,8 @@ def _worst(report: Report) -> Iterator[str]:
         yield f"{line}  {shortened(printable(str(block.get('text', ''))), room)}".rstrip()
 
 
-def _findings(findings: Sequence[Report]) -> Iterator[str]:
+def findings_text(findings: Sequence[Report]) -> Iterator[str]:
+    """Lines on findings in the form of `Finding.as_dict`, the most severe first."""
     if not findings:
         return
     yield f"Findings ({len(findings)}), explained by olp explain CODE"
@@ -282,9 +284,8 @@ def _findings(findings: Sequence[Report]) -> Iterator[str]:
         code = str(finding.get("code", ""))
         title = RULES[code].title if code in RULES else ""
         yield f"  {code}  {finding.get('severity', '')}: {title}{_place(finding)}"
-        yield from textwrap.wrap(
-            printable(str(finding.get("message", ""))), WIDTH, initial_indent=" " * 10, subsequent_indent=" " * 10
-        )
+        message = printable(str(finding.get("message", "")))
+        yield from textwrap.wrap(message, WIDTH, initial_indent=" " * 10, subsequent_indent=" " * 10)
 
 
 def _place(finding: Report) -> str:

@@ -41,7 +41,7 @@ class Flag(IntFlag):
 class Frame:
     """How words became axis positions for a stretch of moves, and which tool was in the spindle.
 
-    Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and active tool length).
+    Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length `length_mm`).
     `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the touch-off
     of the work offset on the raw machine, None where it was located by other means; `tool_touched`
     likewise for the length of the active tool.
@@ -49,6 +49,7 @@ class Frame:
 
     unit_mm: float = 1.0
     offset_mm: Vector = ZERO
+    length_mm: Vector = ZERO
     tool_mm: Vector = ZERO
     tool: int | None = None
     work_offset: str = ""

@@ -7,17 +7,17 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import click
 
-from olp.exceptions import UsageError
+from olp.exceptions import OlpError, UsageError
 from olp.findings import Finding, Severity, worst
 
 STREAM = "-"
 FINDINGS_EXIT = 1
 
-F = TypeVar("F", bound=Callable[..., object])
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Length(click.FloatRange):
@@ -26,7 +26,7 @@ class Length(click.FloatRange):
     def __init__(self) -> None:
         super().__init__(min=0.0, min_open=True)
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number.", param, ctx)
@@ -77,7 +77,7 @@ def proof_options(function: F) -> F:
 
 
 def needed(program: str | None, machine: str | None, job: str | None) -> tuple[str, str]:
-    """Program and machine file: the command line's, else the job's. Raises UsageError where none names them."""
+    """Program and machine file: the command line's, else the job's. Raises UsageError."""
     if job is not None and (program is None or machine is None):
         from olp.files.config import load_job
 
@@ -91,13 +91,15 @@ def needed(program: str | None, machine: str | None, job: str | None) -> tuple[s
 
 def needed_machine(machine: str | None) -> str:
     if machine is None:
-        raise UsageError("no machine file is given; name it with -m, or with the key machine of the job file (-j)")
+        raise UsageError(
+            "no machine file is given; name it with -m, or set the key machine of the job file (-j)"
+        )
     return machine
 
 
 def source(name: str) -> str | bytes:
     """A program for the library: its path, or the bytes of stdin for `-`."""
-    return click.get_binary_stream("stdin").read() if name == STREAM else name
+    return sys.stdin.buffer.read() if name == STREAM else name
 
 
 def shown(name: str) -> str:
@@ -116,7 +118,8 @@ def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) 
     for name in targets:
         path = Path(name)
         if any(path.exists() and path.samefile(origin) for origin in sources):
-            raise UsageError("is an input of this call and is never overwritten; name another output", file=name)
+            what = "is an input of this call and is never overwritten; name another output"
+            raise UsageError(what, file=name)
         if path.is_file() and not force:
             raise UsageError("exists already; name another file, or overwrite it with --force", file=name)
 
@@ -127,16 +130,18 @@ def talk(message: str) -> None:
 
 
 def put(text: str | bytes, *, err: bool = False) -> None:
-    """Write a result to stdout (or stderr). A reader that has gone is no error: the run goes on without it."""
-    stream = click.get_binary_stream("stderr" if err else "stdout")
-    encoding = (sys.stderr if err else sys.stdout).encoding or "utf-8"
-    data = text if isinstance(text, bytes) else text.encode(encoding, "replace")
+    """Write a result to stdout or stderr. A reader that has gone is no error: the run goes on without it."""
+    stream = sys.stderr if err else sys.stdout
+    data = text if isinstance(text, bytes) else text.encode(stream.encoding or "utf-8", "replace")
     try:
-        stream.write(data)
         stream.flush()
+        stream.buffer.write(data)
+        stream.buffer.flush()
     except BrokenPipeError:
         if not err:
             silence_stdout()
+    except OSError as error:
+        raise OlpError(f"cannot be written ({error.strerror})", file="<stdout>") from error
 
 
 def silence_stdout() -> None:

@@ -118,7 +118,7 @@ def align(nominal: list[Line], corrected: list[Line]) -> Iterator[Pair]:
 
 
 def _partner(nominal: list[Line], corrected: list[Line], i: int, j: int) -> tuple[int, int, int]:
-    """How many lines of each text to pass until both agree again, fewest first, and what it took to find out."""
+    """How many lines of each text to pass until both agree again, fewest first, and the effort spent."""
     spent = 0
     for total in range(1, ASTRAY):
         for skipped in range(total + 1):
@@ -215,7 +215,10 @@ class _Modal:
                 before = self._um(letter, nominal.lengths[letter])
             else:
                 before = 0.0 if self.incremental and letter in AXES else self.last.get(letter)
-            yield f"{letter}{after - before:+.1f}" if None not in (before, after) else f"{letter} new"
+            if before is None or after is None:
+                yield f"{letter} new"
+            else:
+                yield f"{letter}{after - before:+.1f}"
 
     def end(self, line: Line) -> None:
         """What is known of the axes behind a nominal line."""

@@ -43,9 +43,7 @@ def _severity(rule: Rule) -> str:
 def _text(rule: Rule) -> str:
     parts = [f"{rule.code} {rule.title} ({_severity(rule)})"]
     for title, sentence in (("Why it matters", rule.why), ("What to do", rule.remedy)):
-        parts.append(
-            f"{title}:\n" + textwrap.fill(sentence, 96, initial_indent="  ", subsequent_indent="  ")
-        )
+        parts.append(f"{title}:\n" + textwrap.fill(sentence, 96, initial_indent="  ", subsequent_indent="  "))
     return "\n\n".join(parts) + "\n"
 
 

@@ -47,10 +47,12 @@ def command(
     notes: tuple[str, ...] = ()
     if ini is not None:
         if travel or controller:
-            raise UsageError("--from-linuxcnc states travel and control itself; leave out --travel and --controller")
+            raise UsageError("--from-linuxcnc states travel and control; leave out --travel and --controller")
         imported = starter.from_linuxcnc(ini, chain)
-        machine, notes = imported.machine, imported.notes
-        machine = replace(machine, name=name) if name else machine
+        notes = imported.notes
+        machine = replace(
+            imported.machine, name=name or imported.machine.name, calibration="calibration.toml"
+        )
     else:
         limits = TRAVEL_MM | {axis: (low, high) for axis, low, high in travel}
         machine = starter.starter_machine(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.invert import invert
+from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
@@ -134,7 +134,7 @@ def sampled(
     spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
     which = np.repeat(np.arange(len(pieces)), len(share))
     point = _points(start[which], end[which], arcs, pieces.arc[which], spread)
-    command, _ = invert(model, point, tool if tool.ndim == 1 else tool[which])
+    command = bent(model, point, tool if tool.ndim == 1 else tool[which])
     return command.reshape(len(pieces), len(share), 3), share, arcs.centre_mm[pieces.arc]
 
 

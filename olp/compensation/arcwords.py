@@ -11,7 +11,7 @@ import numpy.typing as npt
 from olp.compensation.arcs import Pieces, fit, sampled
 from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
-from olp.program.edits import Edits
+from olp.program.edits import EditList, Edits
 from olp.geometry import PLANES
 from olp.toolpath import Flag, Kind
 
@@ -50,12 +50,12 @@ def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     )
     if not arc_row.size:
         return []
-    out: list[Edits] = []
+    edits = EditList(writer.prefixes)
     size = 4096
     for a in range(0, len(arc_row), size):
         for arc in _solve(writer, rows, arc_row[a : a + size]):
-            out += _head(writer, rows, arc) if rows.head[arc.row] else _tail(writer, rows, arc)
-    return [Edits.join(out)] if out else []
+            (_head if rows.head[arc.row] else _tail)(writer, rows, arc, edits)
+    return [edits.done()]
 
 
 def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
@@ -108,14 +108,14 @@ def _on_bisector(start: Array, end: Array, centre: Array, plane: int) -> Array:
     return out
 
 
-def _centre_words(writer: Writer, arc: _Arc, absolute: bool) -> list[tuple[int, int, int]]:
-    """(axis, mantissa, decimals) of both centre words; checks that rounding kept the arc what it is."""
+def _centre_words(writer: Writer, arc: _Arc, absolute: bool, own: dict[int, int]) -> list[tuple[int, int, int]]:
+    """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own` words."""
     frame = writer.frame_of(arc.move)
     out = []
     realised = arc.centre.copy()
     for axis in PLANES[arc.plane][:2]:
         base = frame.offset_mm[axis] if absolute else arc.start[axis]
-        decimals = writer.style.usual(axis, frame.unit_mm)
+        decimals = max(writer.style.centre(axis, frame.unit_mm), own.get(axis, 0))
         mantissa = round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
         realised[axis] = base + mantissa / 10**decimals * frame.unit_mm
         out.append((axis, mantissa, decimals))
@@ -140,95 +140,78 @@ def _check_sweep(arc: _Arc, centre: Array) -> None:
         )
 
 
-def _head(writer: Writer, rows: Rows, arc: _Arc) -> list[Edits]:
+def _head(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
     """The part that keeps the block's own line: its centre words replaced, or inserted where omitted."""
-    program, words = writer.program, writer.words
-    move = int(rows.move[arc.row])
-    index = int(np.searchsorted(writer.path.arcs.move, move))
+    program, words, style = writer.program, writer.words, writer.style
+    index = int(np.searchsorted(writer.path.arcs.move, arc.move))
     slots = program.arc_slots.word[index].tolist()
     absolute = bool(program.arc_slots.absolute[index])
-    split = arc.row + 1 < len(rows.move) and rows.move[arc.row + 1] == move
-    out: list[Edits] = []
+    split = arc.row + 1 < len(rows.move) and rows.move[arc.row + 1] == arc.move
     if split and slots[4] >= 0:
-        out.append(writer.one(int(words.number[slots[4]]), int(words.end[slots[4]]), 1, 0, b"", 0))
+        edits.add(int(words.number[slots[4]]), int(words.end[slots[4]]), 1, 0)
     if slots[3] >= 0:
-        return out + _radius_word(writer, rows, arc, slots[3], split)
-    last = writer.style.last_word(arc.line)
-    present = [s for s in slots[:3] if s >= 0]
-    anchor = max(present) if present else last
-    space = b" " if int(writer.style.separators(np.array([anchor]), program)[0]) % 3 else b""
-    lower = int(writer.style.separators(np.array([anchor]), program)[0]) >= 3
-    for axis, mantissa, decimals in _centre_words(writer, arc, absolute):
+        _radius_word(writer, arc, slots[3], edits)
+        return
+    own = {axis: style.decimals_of(slots[axis], axis) for axis in range(3) if slots[axis] >= 0}
+    for axis, mantissa, decimals in _centre_words(writer, arc, absolute, own):
         slot = slots[axis]
         if slot >= 0:
-            own = int(writer.style.decimals(np.array([slot]), axis)[0])
-            digits = max(own, writer.style.least(axis, writer.frame_of(move).unit_mm))
-            exact = _mantissa(writer, arc, axis, digits, absolute, move)
-            if exact != int(words.mantissa[slot]) * 10 ** (digits - own):
-                out.append(writer.one(int(words.number[slot]), int(words.end[slot]), exact, digits, b"", 0))
+            if mantissa != int(words.mantissa[slot]) * 10 ** (decimals - own[axis]):
+                edits.add(int(words.number[slot]), int(words.end[slot]), mantissa, decimals)
                 writer.tally.changed_words += 1
-        elif mantissa != 0 and not absolute:
-            letter = b"ijk" if lower else b"IJK"
+        elif abs(mantissa) > 10 ** (decimals - style.usual(axis, writer.frame_of(arc.move).unit_mm)) // 2:
+            present = [s for s in slots[:3] if s >= 0]
+            anchor = max(present) if present else style.last_word(arc.line)
             place = int(words.end[anchor])
-            out.append(writer.one(place, place, mantissa, decimals, space + letter[axis : axis + 1], 5 + axis))
+            prefix = style.lead(anchor) + style.cased(anchor, b"IJK"[axis : axis + 1])
+            edits.add(place, place, mantissa, decimals, prefix, 5 + axis)
             writer.tally.inserted_words += 1
-    return out
 
 
-def _mantissa(writer: Writer, arc: _Arc, axis: int, decimals: int, absolute: bool, move: int) -> int:
-    frame = writer.frame_of(move)
-    base = frame.offset_mm[axis] if absolute else arc.start[axis]
-    return round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
-
-
-def _radius_word(writer: Writer, rows: Rows, arc: _Arc, slot: int, split: bool) -> list[Edits]:
+def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
     """R of the corrected arc; where R cannot say it well (near half circles), I, J, K in its place."""
-    words = writer.words
+    words, style = writer.words, writer.style
     first, second, _ = PLANES[arc.plane]
     unit = writer.frame_of(arc.move).unit_mm
     radius = float(np.hypot(arc.start[first] - arc.centre[first], arc.start[second] - arc.centre[second]))
     half = float(np.hypot(arc.end[first] - arc.start[first], arc.end[second] - arc.start[second])) / 2
-    own = int(writer.style.decimals(np.array([slot]), first)[0])
-    decimals = max(own, writer.style.least(first, unit))
+    own = style.decimals_of(slot, first)
+    decimals = max(own, style.centre(first, unit))
     sign = -1 if abs(arc.sweep) > np.pi else 1
     mantissa = sign * round(radius / unit * 10**decimals)
     size = abs(mantissa) / 10**decimals * unit
-    place = (int(words.start[slot]), int(words.end[slot]))
+    start, end = int(words.start[slot]), int(words.end[slot])
+    writer.tally.changed_words += 1
     if size > half:
         # how far rounding R moves the centre along the bisector
         moved = abs(np.sqrt(size * size - half * half) - np.sqrt(max(radius * radius - half * half, 0.0)))
         if moved < 0.5 * 10.0**-decimals * unit + 0.1 * writer.tolerance_mm:
             if mantissa == int(words.mantissa[slot]) * 10 ** (decimals - own):
-                return []
-            writer.tally.changed_words += 1
-            return [writer.one(int(words.number[slot]), place[1], mantissa, decimals, b"", 0)]
-    out = []
-    for i, (axis, value, digits) in enumerate(_centre_words(writer, arc, absolute=False)):
-        prefix = (b" " if i else b"") + b"IJK"[axis : axis + 1]
-        out.append(writer.one(place[0] if not i else place[1], place[1], value, digits, prefix, i))
-        writer.tally.changed_words += 1
-    return out
+                writer.tally.changed_words -= 1
+            else:
+                edits.add(int(words.number[slot]), end, mantissa, decimals)
+            return
+    letters = style.cased(slot, b"IJK")
+    (a, first_value, first_digits), (b, second_value, second_digits) = _centre_words(writer, arc, False, {})
+    edits.add(start, end, first_value, first_digits, letters[a : a + 1], 0)
+    edits.add(end, end, second_value, second_digits, style.lead(slot) + letters[b : b + 1], 1)
 
 
-def _tail(writer: Writer, rows: Rows, arc: _Arc) -> list[Edits]:
+def _tail(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
     """A later part: a block of its own with both end points, the third axis where it moves, and the centre."""
-    move = int(rows.move[arc.row])
     place = int(writer.program.line_end[arc.line - 1])
-    index = int(np.searchsorted(writer.path.arcs.move, move))
+    index = int(np.searchsorted(writer.path.arcs.move, arc.move))
     absolute = bool(writer.program.arc_slots.absolute[index])
     order = rows.serial(arc.row)
     lead = writer.block_start(arc.line)
-    after_take_up = bool(writer.plan.take_up[rows.first + arc.row - 1]) if arc.row else False
-    if after_take_up:
-        lead += b"G2 " if writer.path.kind[move] == Kind.ARC_CW else b"G3 "
-    first, second, third = PLANES[arc.plane]
-    out = []
-    for axis in sorted((first, second, third)):
+    if arc.row and writer.plan.take_up[rows.first + arc.row - 1]:
+        lead += b"G2 " if writer.path.kind[arc.move] == Kind.ARC_CW else b"G3 "
+    third = PLANES[arc.plane][2]
+    for axis in range(3):
         if axis == third and not rows.write[arc.row, axis]:
             continue
         mantissa, decimals = rows.number(writer, arc.row, axis)
-        out.append(writer.one(place, place, mantissa, decimals, lead + b"XYZ"[axis : axis + 1], order + axis))
+        edits.add(place, place, mantissa, decimals, lead + b"XYZ"[axis : axis + 1], order + axis)
         lead = b" "
-    for i, (axis, mantissa, decimals) in enumerate(_centre_words(writer, arc, absolute)):
-        out.append(writer.one(place, place, mantissa, decimals, b" " + b"IJK"[axis : axis + 1], order + 3 + i))
-    return out
+    for i, (axis, mantissa, decimals) in enumerate(_centre_words(writer, arc, absolute, {})):
+        edits.add(place, place, mantissa, decimals, b" " + b"IJK"[axis : axis + 1], order + 3 + i)

@@ -20,8 +20,9 @@ Index = npt.NDArray[np.int64]
 Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance
-_SAMPLE_SHARE = 0.006
+_SAMPLE_SHARE = 0.01
 _BATCH = 1 << 20
+_FEW, _ALL = 24, 1 << 30
 
 
 def no_cuts() -> Cuts:
@@ -95,7 +96,12 @@ def _cut_batch(
     active = np.arange(len(move))
     stride = count.copy()
     while active.size:
-        reach = _longest(across, first[active], begin[active], count[active], stride[active], tolerance)
+        where = (first[active], begin[active], count[active], stride[active])
+        reach = _longest(across, *where, tolerance, _FEW)
+        # the search looks at few samples of a long chord; what it found is tested at all of them
+        wrong = np.flatnonzero(~_fits(across, where[0] + where[1], reach - where[1], tolerance, _ALL))
+        if wrong.size:
+            reach[wrong] = _longest(across, *(w[wrong] for w in where), tolerance, _ALL)
         stride[active] = np.maximum(reach - begin[active], 1)
         begin[active] = reach
         going = reach < count[active]
@@ -107,7 +113,9 @@ def _cut_batch(
     return move[owner], node / count[owner], point[first[owner] + node]
 
 
-def _longest(across: Array, first: Index, begin: Index, last: Index, stride: Index, tolerance: float) -> Index:
+def _longest(
+    across: Array, first: Index, begin: Index, last: Index, stride: Index, tolerance: float, most: int
+) -> Index:
     """For each move the farthest sample that one chord from `begin` reaches: gallop, then bisect."""
     good = begin + 1
     bad = last + 1
@@ -115,7 +123,7 @@ def _longest(across: Array, first: Index, begin: Index, last: Index, stride: Ind
     todo = np.arange(len(first))
     galloping = np.ones(len(first), bool)
     while todo.size:
-        fits = _fits(across, first[todo] + begin[todo], trial[todo] - begin[todo], tolerance)
+        fits = _fits(across, first[todo] + begin[todo], trial[todo] - begin[todo], tolerance, most)
         yes, no = todo[fits], todo[~fits]
         good[yes] = np.maximum(good[yes], trial[yes])
         bad[no] = np.minimum(bad[no], trial[no])
@@ -130,20 +138,22 @@ def _longest(across: Array, first: Index, begin: Index, last: Index, stride: Ind
     return np.minimum(good, last)
 
 
-def _fits(across: Array, start: Index, steps: Index, tolerance: float) -> Mask:
-    """Whether the samples between start and start + steps stay within tolerance of their chord."""
+def _fits(across: Array, start: Index, steps: Index, tolerance: float, most: int) -> Mask:
+    """Whether the samples between start and start + steps, `most` of them at the most, stay within tolerance of
+    their chord."""
     fits = np.ones(len(start), bool)
     wide = np.flatnonzero(steps > 1)
     limit = 1 << 21
     at = 0
-    totals = np.cumsum(steps[wide] - 1)
+    looked = np.minimum(steps[wide] - 1, most)
+    totals = np.cumsum(looked)
     while at < len(wide):
         stop = max(int(np.searchsorted(totals, (totals[at - 1] if at else 0) + limit)), at + 1)
         rows = wide[at:stop]
-        inner = steps[rows] - 1
+        inner = looked[at:stop]
         offset = np.concatenate(([0], np.cumsum(inner)[:-1]))
         owner = np.repeat(np.arange(len(rows)), inner)
-        k = np.arange(len(owner)) - offset[owner] + 1
+        k = (np.arange(len(owner)) - offset[owner] + 1) * steps[rows][owner] // (inner + 1)[owner]
         a, b = across[start[rows]], across[start[rows] + steps[rows]]
         u = (k / steps[rows][owner])[:, None]
         departure = across[start[rows][owner] + k] - (a[owner] + u * (b - a)[owner])

@@ -71,6 +71,18 @@ class Style:
             out = np.where(words.pointed[slot], out, self.bare_decimals[axis])
         return out
 
+    def decimals_of(self, slot: int, axis: int) -> int:
+        """The same for one word."""
+        return int(self.decimals(np.array([slot]), axis)[0])
+
+    def lead(self, word: int) -> bytes:
+        """The space that stands before a word, or would."""
+        return _SPACE[int(self.separators(np.array([word]), self.program)[0]) % 3]
+
+    def cased(self, word: int, letters: bytes) -> bytes:
+        """Letters in the case of a word."""
+        return letters.lower() if int(self.separators(np.array([word]), self.program)[0]) >= 3 else letters
+
     def least(self, axis: int, unit_mm: float) -> int:
         return fewest_decimals(self.increments_mm[axis], unit_mm, self.program.profile.inch_decimals)
 
@@ -81,6 +93,11 @@ class Style:
     def grid(self, axis: int, unit_mm: float) -> int:
         """Digits of words in G91: all on one grid, as fine as the finest of them."""
         return min(max(self.least(axis, unit_mm), self.finest[axis]), _MOST_DECIMALS)
+
+    def centre(self, axis: int, unit_mm: float) -> int:
+        """Digits of a centre word: one more than positions where the control takes it, since the far side of an
+        arc moves by twice what its centre does."""
+        return min(self.usual(axis, unit_mm) + self.program.profile.free_digits, _MOST_DECIMALS)
 
     def word(self, line: int, letter: str) -> int | None:
         """Index of the first word with a letter in a line."""
@@ -93,7 +110,7 @@ class Style:
         assert words is not None
         return int(words.first_word[line]) - 1
 
-    def separators(self, word: npt.NDArray[np.int32], program: Program) -> npt.NDArray[np.int64]:
+    def separators(self, word: npt.NDArray[np.integer], program: Program) -> npt.NDArray[np.int64]:
         """Style number of each word: what stands before it, and its case."""
         words = program.words
         assert words is not None
@@ -101,7 +118,7 @@ class Style:
         start = words.start[word]
         before = text[np.maximum(start - 1, 0)]
         space = np.where(before == 32, 1, np.where(before == 9, 2, 0))
-        opens = np.isin(word, words.first_word)
+        opens = words.first_word[np.searchsorted(words.first_word, word)] == word
         space = np.where(opens, self.spaced, space)
         lower = (text[start] & 32) != 0
         return space + 3 * lower.astype(np.int64)

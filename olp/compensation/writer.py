@@ -297,9 +297,7 @@ class Writer:
         tails = np.flatnonzero(~rows.head & ((rows.flag & _BYPASS) == 0))
         if tails.size:
             out += self._blocks(rows, tails)
-        counts = np.bincount(
-            rows.move[(rows.flag & _BYPASS) == 0] - rows.move[0], minlength=int(rows.move[-1] - rows.move[0]) + 1
-        )
+        counts = np.bincount(rows.move - rows.move[0])
         self.parts[rows.move[0] : rows.move[-1] + 1] += counts.astype(np.int32)
         return out
 
@@ -372,15 +370,13 @@ class Writer:
 
     def _leads(self, rows: Rows, tails: Index, line_no: Index, turning: Mask, before: Mask) -> Index:
         """Prefix of the first word of each inserted block: line end, `/` and, to take up lost motion at an arc, G1."""
-        lead = np.zeros(len(tails), np.int64)
-        for line in np.unique(line_no).tolist():
+        lines, which = np.unique(line_no, return_inverse=True)
+        table = np.zeros((len(lines), 3), np.int64)
+        for i, line in enumerate(lines.tolist()):
             start = self.block_start(line)
             deleted = start[len(self.program.eol(line)) :]
-            mine = line_no == line
-            lead[mine] = self.prefixes(start)
-            lead[mine & turning] = self.prefixes(start + b"G1 ")
-            lead[mine & before] = self.prefixes(deleted + b"G1 ")
-        return lead
+            table[i] = (self.prefixes(start), self.prefixes(start + b"G1 "), self.prefixes(deleted + b"G1 "))
+        return np.asarray(table[which, np.where(before, 2, np.where(turning, 1, 0))], np.int64)
 
     def _check_take_up(self, rows: Rows, row: int) -> None:
         if rows.flag[row] & np.uint8(Flag.INVERSE_TIME):

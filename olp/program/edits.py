@@ -46,6 +46,25 @@ class Edits:
         return len(self.start)
 
 
+class EditList:
+    """Edits that are found one by one; `done` turns them into columns."""
+
+    def __init__(self, prefixes: Prefixes) -> None:
+        self._prefixes = prefixes
+        self._rows: list[tuple[int, int, int, int, int, int]] = []
+
+    def add(self, start: int, end: int, mantissa: int, decimals: int, prefix: bytes = b"", order: int = 0) -> None:
+        """Replace `start`..`end` by a prefix and a number (BARE: no number)."""
+        self._rows.append((start, end, mantissa, decimals, self._prefixes(prefix), order))
+
+    def done(self) -> Edits:
+        columns = np.array(self._rows, np.int64).reshape(-1, 6).T
+        start, end, mantissa, decimals, prefix, order = columns
+        return Edits(
+            start, end, mantissa, decimals.astype(np.int8), prefix.astype(np.int32), order.astype(np.int32)
+        )
+
+
 class Prefixes:
     """A table of the few byte strings that stand before inserted numbers."""
 

@@ -44,9 +44,23 @@ class Profile:
     path_mode: str
     #: decimals that the control takes in inch programs for a least increment of 0.001 mm
     inch_decimals: int
+    #: decimals that centre words may have beyond those of positions
+    free_digits: int
     #: canned cycles and G80 are a modal group of their own
     cycles_apart: bool
     comment: tuple[bytes, bytes] = (b"(", b")")
+
+    def support(self) -> list[dict[str, str]]:
+        """The support matrix, from the table that the interpreter uses: statement, what becomes of it, why."""
+        what = {Act.CARRY: "carried", Act.REFUSE: "refused", Act.EVENT: "read", Act.MOTION: "corrected"}
+        return [
+            {
+                "statement": f"G{code / 10:g}",
+                "support": what.get(act, "read"),
+                "why": self.refusals.get(code, "") if act is Act.REFUSE else "",
+            }
+            for code, act in sorted(self.codes.items())
+        ]
 
 
 _REFUSE = {
@@ -118,6 +132,7 @@ LINUXCNC = Profile(
     g52_is_g92=True,
     path_mode="G64 without tolerance, LinuxCNC's default",
     inch_decimals=5,
+    free_digits=1,
     cycles_apart=False,
 )
 GRBL = Profile(
@@ -136,6 +151,7 @@ GRBL = Profile(
     g52_is_g92=False,
     path_mode="junction deviation of the control ($11)",
     inch_decimals=5,
+    free_digits=1,
     cycles_apart=False,
 )
 _ISO_CARRY = {50, 51, 80, 90, 110, 150, 500, 501, 620, 630, 670, 690, 691, 131, 231, 250}
@@ -154,6 +170,7 @@ FANUC = Profile(
     g52_is_g92=False,
     path_mode="cutting mode G64 of the control, unless a smoothing mode is on",
     inch_decimals=4,
+    free_digits=0,
     cycles_apart=True,
 )
 HAAS = Profile(
@@ -172,6 +189,7 @@ HAAS = Profile(
     g52_is_g92=False,
     path_mode="the control's own smoothing (G187)",
     inch_decimals=4,
+    free_digits=0,
     cycles_apart=True,
 )
 

@@ -24,7 +24,7 @@ from olp.program.state import NAN, Effect, State, Word
 from olp.geometry import PLANES
 from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 
-_SWITCH = re.compile(rb"[(;][ \t]*olp[ \t]+(off|on)\b", re.IGNORECASE)
+_SWITCH = re.compile(rb"[(;][ \t]*olp (off|on)\b", re.IGNORECASE)
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
 #: motion code to kind of move; 255 where it is not plain motion, the last entry standing for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
@@ -125,7 +125,7 @@ class _Reader:
         self.ended = self.tape = False
         self.end_line = 0
         self.remarks: dict[str, tuple[int, str]] = {}
-        marked = b"olp" in data or b"OLP" in data
+        marked = b"olp o" in data or b"OLP O" in data
         switches = list(_SWITCH.finditer(data)) if marked else []
         self.switch_lines = [data.count(b"\n", 0, m.start()) for m in switches]
         self.switch_off = [m.group(1).lower() == b"off" for m in switches]

@@ -96,6 +96,8 @@ class State:
         state = State(setup, profile, [NAN if p is None else p for p in setup.job.start_mm])
         state.motion = None if profile.motion is None else profile.motion * 10
         state.offset_name = setup.machine.default_work_offset
+        # LinuxCNC starts in G99, ISO controls in G98
+        state.retract = 990 if profile.name == "linuxcnc" else 980
         state.spindle = setup.machine.default_tool
         if state.spindle is not None and setup.machine.length_active:
             state.length_tool = state.spindle
@@ -126,6 +128,7 @@ class State:
         frame = Frame(
             unit_mm=self.unit_mm,
             offset_mm=(x, y, z),
+            length_mm=self.length,
             tool_mm=self._lever(line),
             tool=self.spindle,
             work_offset=self.offset_name,

@@ -1,0 +1,235 @@
+"""What a person should know about a correction, as findings; and the tables of the report."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from olp.compensation.holes import HolePlan
+from olp.errormodel import Calibration, ErrorModel
+from olp.errormodel.base import Array, Mask
+from olp.findings import Finding
+from olp.machine import Setup
+from olp.program.program import Program
+from olp.proof import Proof
+from olp.toolpath import Flag, Kind, Toolpath
+
+_LISTED = 20
+_SAMPLED = 4096
+_WORST = 5
+
+
+def _finding(code: str, message: str, lines: Sequence[int] = (), count: int | None = None) -> Finding:
+    unique = sorted(set(lines))
+    return Finding(
+        code, message, unique[0] if unique else None, tuple(unique[:_LISTED]), len(unique) if count is None else count
+    )
+
+
+def lines_of(path: Toolpath, moves: Mask | Array) -> list[int]:
+    return [int(v) for v in np.unique(path.line[moves]).tolist()]
+
+
+def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[Finding]:
+    """What the program's text alone tells."""
+    out = []
+    path = program.toolpath
+    for name, line, _ in program.remarks:
+        if name == "unit":
+            out.append(_finding("OLP301", "neither G20 nor G21 stands before the first move; millimetres assumed", [line]))
+        elif name == "increments":
+            out.append(
+                _finding("OLP302", "lengths without a decimal point are read as least increments of the control", [line])
+            )
+    whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
+    if whole.any():
+        lines = lines_of(path, whole)
+        out.append(_finding("OLP104", f"{len(lines)} blocks move another axis too; corrected at their ends only", lines))
+    deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
+    if deleted.any():
+        lines = lines_of(path, deleted)
+        out.append(_finding("OLP304", f"{len(lines)} blocks stand under block delete; proved with and without", lines))
+    assumed = sorted({
+        f.work_offset for f in path.frames
+        if f.touched is not None and (o := setup.work_offset(f.work_offset)) is not None
+        and o.touched_at_mm == (None, None, None)
+    })  # fmt: skip
+    for name in assumed:
+        out.append(_finding("OLP303", f"{name} is taken as touched off on the raw machine at its own position"))
+    if contour:
+        out.append(_finding("OLP305", "contours under G41/G42 were taken as the path of the tool"))
+    if setup.machine.compensated_by_controller:
+        names = ", ".join(sorted(setup.machine.compensated_by_controller))
+        out.append(_finding("OLP404", f"the control corrects {names}; left to it"))
+    return out
+
+
+def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
+    """Does the control leave the path by more than it is corrected?"""
+    out = []
+    if program.profile.name != "linuxcnc":
+        return out
+    if not program.path_modes and len(program.toolpath):
+        out.append(_finding("OLP201", f"no path mode is stated: {program.profile.path_mode}", [int(program.toolpath.line[0])]))
+    bare = [m.line for m in program.path_modes if m.tolerance_mm is None]
+    if bare:
+        out.append(_finding("OLP201", "G64 without P lets the control round corners without bound", bare))
+    wide = [m for m in program.path_modes if m.tolerance_mm is not None and m.tolerance_mm > correction_mm > 0]
+    if wide:
+        worst = max(m.tolerance_mm or 0.0 for m in wide)
+        out.append(
+            _finding(
+                "OLP202",
+                f"{wide[0].name} lets the path leave by {worst * 1e3:.3g} um, more than the largest correction of "
+                f"{correction_mm * 1e3:.3g} um",
+                [m.line for m in wide],
+            )
+        )
+    merging = [m.line for m in program.path_modes if m.merges and (m.tolerance_mm or 0) > 0]
+    if merging:
+        out.append(_finding("OLP203", "G64 P without Q0 also merges short blocks within the tolerance", merging))
+    return out
+
+
+def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Finding]:
+    """What the proof found."""
+    out = []
+    path = proof.nominal
+    size = proof.size_mm()
+    above = size > proof.allowed_mm
+    if above.any():
+        worst = int(size.argmax())
+        out.append(
+            _finding(
+                "OLP101",
+                f"{int(above.sum())} moves end above tolerance{switch}: {size[worst] * 1e3:.2f} um at line "
+                f"{int(path.line[worst])}, allowed {proof.allowed_mm * 1e3:.2f} um",
+                lines_of(path, above),
+            )
+        )
+    untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
+    untouched[passed.astype(np.int64)] = True
+    if untouched.any():
+        lines = lines_of(path, untouched)
+        out.append(_finding("OLP102", f"{int(untouched.sum())} moves were written as they were", lines))
+    if proof.lean.any():
+        lines = lines_of(path, proof.lean)
+        out.append(_finding("OLP306", f"{len(lines)} feed moves start where a move ended uncorrected", lines))
+    return out
+
+
+def hole_findings(holes: HolePlan, tolerance_mm: float) -> list[Finding]:
+    """Cycles whose stroke cannot follow the error."""
+    leaning = [h.line for h, lean in zip(holes.holes, holes.lean_mm.tolist(), strict=True) if lean > tolerance_mm]
+    if not leaning:
+        return []
+    return [
+        _finding(
+            "OLP105",
+            f"{len(leaning)} holes lean by up to {holes.lean_mm.max() * 1e3:.2f} um between R and bottom",
+            leaning,
+        )
+    ]
+
+
+def state_findings(
+    path: Toolpath, command_mm: Array, model: ErrorModel, setup: Setup, *, held: bool, play: bool
+) -> list[Finding]:
+    """Travel, the face of the box, and unknown lost motion."""
+    out = []
+    with np.errstate(invalid="ignore"):
+        for i, name in enumerate("XYZ"):
+            low, high = setup.machine.axes[name].travel_mm
+            nominal_out = (path.end_mm[:, i] < low) | (path.end_mm[:, i] > high)
+            beyond = (command_mm[:, i] < low) | (command_mm[:, i] > high)
+            if (beyond & ~nominal_out).any():
+                lines = lines_of(path, beyond & ~nominal_out)
+                out.append(_finding("OLP402", f"{name} is commanded beyond its travel of {low:g} to {high:g} mm", lines))
+        if held:
+            box = model.box_mm
+            out_of = ((command_mm < box[:, 0]) | (command_mm > box[:, 1])).any(axis=1)
+            out_of &= (path.flag & np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)) == 0
+            if out_of.any():
+                lines = lines_of(path, out_of)
+                out.append(_finding("OLP403", f"{int(out_of.sum())} commands lie outside the calibrated box", lines))
+    if play:
+        out.append(_finding("OLP103", "the flank of an axis with lost motion is unknown until it has moved in one direction"))
+    return out
+
+
+def calibration_findings(calibration: Calibration, date: datetime.date | None) -> list[Finding]:
+    """Is the calibration still valid on the day given?"""
+    until = calibration.valid_until
+    if date is None or until is None or date <= until:
+        return []
+    return [_finding("OLP401", f"the calibration was valid until {until.isoformat()}, the job is of {date.isoformat()}")]
+
+
+def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
+    """Size of each source of error over the nominal path, largest first, from up to 4096 of its moves."""
+    known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))
+    if not len(known):
+        return []
+    pick = known[np.linspace(0, len(known) - 1, min(len(known), _SAMPLED)).astype(np.int64)]
+    tool = path.tool_mm()
+    out = []
+    for name, part in model.contributions(path.end_mm[pick], tool if tool.ndim == 1 else tool[pick]):
+        size = np.sqrt((part * part).sum(axis=1))
+        out.append(
+            {"name": name, "max_um": float(size.max()) * 1e3, "rms_um": float(np.sqrt(np.mean(size * size))) * 1e3}
+        )
+    return sorted(out, key=lambda row: -row["max_um"])
+
+
+def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
+    """Largest and rms angle of the tool that the machine cannot correct, in urad."""
+    known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))
+    if not len(known):
+        return {"max_urad": 0.0, "rms_urad": 0.0}
+    pick = known[np.linspace(0, len(known) - 1, min(len(known), _SAMPLED)).astype(np.int64)]
+    angle = np.sqrt((model.rotation(path.end_mm[pick]) ** 2).sum(axis=1)) * 1e6
+    return {"max_urad": float(angle.max()), "rms_urad": float(np.sqrt(np.mean(angle * angle)))}
+
+
+def worst_blocks(program: Program, proof: Proof) -> list[dict[str, Any]]:
+    """The blocks that stay farthest from the nominal path, with what they were before."""
+    size = proof.size_mm()
+    before = np.fmax(np.nan_to_num(proof.before.waypoint), np.nan_to_num(proof.before.path))
+    out: list[dict[str, Any]] = []
+    seen: set[int] = set()
+    for move in np.argsort(-size, kind="stable")[: 50 * _WORST].tolist():
+        line = int(program.toolpath.line[move])
+        if line in seen or size[move] == 0:
+            continue
+        seen.add(line)
+        out.append(
+            {
+                "line": line,
+                "text": program.text(line),
+                "before_um": float(before[move]) * 1e3,
+                "after_um": float(size[move]) * 1e3,
+            }
+        )
+        if len(out) == _WORST:
+            break
+    return out
+
+
+def tally_moves(path: Toolpath, passed: int, parts: Array) -> dict[str, int]:
+    """Every move is corrected, corrected approximately, or passed; the three add up to all."""
+    untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)) != 0
+    rough = ((path.flag & np.uint8(Flag.CYCLE | Flag.WHOLE)) != 0) | (path.kind == Kind.PROBE)
+    rough &= ~untouched
+    total = len(path)
+    skipped = int(untouched.sum()) + passed
+    return {
+        "total": total,
+        "corrected": total - skipped - int(rough.sum()),
+        "approximated": int(rough.sum()),
+        "passed": skipped,
+        "refused": 0,
+        "split": int((parts > 1).sum()),
+    }

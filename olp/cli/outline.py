@@ -1,0 +1,79 @@
+"""Any summary as text: scalars as pairs, equal records as a table, the rest under its name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from olp.report import findings_text, pairs, printable, table
+
+Summary = Mapping[str, Any]
+
+
+def outline(values: Summary) -> str:
+    """A summary whose keys end in their units, as text; what is empty is left out."""
+    findings = values.get("findings") or ()
+    parts = ["\n".join(_section("", {k: v for k, v in values.items() if k not in ("findings", "schema")}))]
+    if findings:
+        parts.append("\n".join(findings_text(findings)))
+    return "\n\n".join(part.strip("\n") for part in parts if part) + "\n"
+
+
+def _section(title: str, values: Summary) -> Iterator[str]:
+    plain = {key: item for key, item in values.items() if not _is_group(item)}
+    groups = {key: item for key, item in values.items() if _is_group(item) and item}
+    lines = list(pairs((_title(key), _text(item)) for key, item in plain.items()))
+    if title and lines:
+        yield title
+    yield from (("  " + line if title else line) for line in lines)
+    for key, item in groups.items():
+        name = f"{title}, {_title(key)}" if title else _title(key).capitalize()
+        yield ""
+        records = _records(item)
+        if records is None:
+            yield from _section(name, item)
+        else:
+            yield name
+            yield from _table(*records)
+
+
+def _is_group(value: object) -> bool:
+    return isinstance(value, Mapping) or (
+        isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value)
+    )
+
+
+def _records(value: Summary | Sequence[Summary]) -> tuple[list[str], list[Summary]] | None:
+    """Row names and rows of a list of records, or of a mapping of nothing but records."""
+    if not isinstance(value, Mapping):
+        names = [str(row.get("name", "")) for row in value]
+        return names, [{k: v for k, v in row.items() if k != "name"} for row in value]
+    rows = list(value.values())
+    if rows and all(isinstance(row, Mapping) and not any(map(_is_group, row.values())) for row in rows):
+        return [str(key) for key in value], rows
+    return None
+
+
+def _table(names: Sequence[str], rows: Sequence[Summary]) -> Iterator[str]:
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [
+        [printable(name), *(_text(row.get(key)) for key in keys)]
+        for name, row in zip(names, rows, strict=True)
+    ]
+    yield from table(["", *map(_title, keys)], cells)
+
+
+def _title(key: object) -> str:
+    return printable(str(key).replace("_", " "))
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.3f}".rstrip("0").rstrip(".") if abs(value) >= 5e-4 or value == 0 else f"{value:.1e}"
+    if isinstance(value, list | tuple | set | frozenset):
+        return ", ".join(map(_text, value))
+    return printable(str(value))

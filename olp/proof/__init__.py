@@ -1,0 +1,92 @@
+"""Proof by reading back: the written bytes are parsed again, run through the forward model and held against the
+nominal path, at and between the way-points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.compensation.plan import targets, zero_shifts
+from olp.deviation import Deviation, Index, cutting_moves, measure
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array, Mask
+from olp.exceptions import ProgramError
+from olp.proof.matching import match
+from olp.toolpath import Flag, Kind, Toolpath
+
+#: the proof samples so finely that the error bends by less than this share of the tolerance between samples
+_BEND_SHARE = 0.1
+#: half the diagonal of the last digit's cube
+ROUNDING_SHARE = 0.87
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proof:
+    """Deviations of the nominal program (`before`) and of the corrected one (`after`), per nominal move.
+
+    `digit_mm` is the coarsest last digit written. `allowed_mm` is tolerance plus rounding.
+    """
+
+    nominal: Toolpath
+    before: Deviation
+    after: Deviation
+    tolerance_mm: float
+    digit_mm: float
+    cutting: Mask
+    lean: Mask
+
+    @property
+    def allowed_mm(self) -> float:
+        return self.tolerance_mm + ROUNDING_SHARE * self.digit_mm
+
+    def size_mm(self) -> Array:
+        """(n,) the deviation that counts per nominal move: along the path of cutting moves, at the end of others;
+        0 where the move is not judged."""
+        counts = self.after.judged
+        at = np.where(counts, np.nan_to_num(self.after.waypoint), 0.0)
+        along = np.where(counts & self.cutting & ~self.lean, np.nan_to_num(self.after.path), 0.0)
+        return np.asarray(np.maximum(at, along), float)
+
+    @property
+    def holds(self) -> bool:
+        return bool(self.size_mm().max(initial=0.0) <= self.allowed_mm)
+
+
+def uncorrected_starts(path: Toolpath, passed: Mask) -> Mask:
+    """(n,) feed moves that begin where the move before ended uncorrected."""
+    loose = passed | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0)
+    before = np.concatenate(([False], loose[:-1]))
+    return np.asarray(before & (path.kind != Kind.RAPID), bool)
+
+
+def prove(
+    nominal: Toolpath,
+    corrected: Toolpath,
+    model: ErrorModel,
+    *,
+    tolerance_mm: float,
+    digit_mm: float,
+    passed: Index,
+    parts: Index | None = None,
+) -> Proof:
+    """Hold the corrected path against the nominal one. `passed` are nominal moves written uncorrected; `parts` (n,)
+    says how many corrected moves each nominal one became, and is found from the paths where it is not given."""
+    target = targets(nominal, zero_shifts(nominal.frames, model))
+    exempt = np.zeros(len(nominal), bool)
+    exempt[passed] = True
+    loose = uncorrected_starts(nominal, exempt)
+    groups = match(nominal, target, corrected, model) if parts is None else np.cumsum(parts) - 1
+    if len(groups) and int(groups[-1]) != len(corrected) - 1:
+        raise ProgramError(
+            f"the corrected program has {len(corrected)} moves where {int(groups[-1]) + 1} were expected; it was not "
+            "written"
+        )
+    after = measure(nominal, target, corrected, groups, model, tolerance_mm * _BEND_SHARE, exempt)
+    before = measure(nominal, target, nominal, np.arange(len(nominal)), model, 1e-3, exempt)
+    return Proof(nominal, before, after, tolerance_mm, digit_mm, cutting_moves(nominal), loose)
+
+
+def shared_digit_mm(decimals: tuple[int, int, int], unit_mm: Array) -> float:
+    """The coarsest last digit over axes and units, in mm."""
+    return float(max(10.0 ** -min(decimals) * unit for unit in unit_mm.tolist()) if len(unit_mm) else 0.0)

@@ -1,0 +1,58 @@
+"""Which moves of a corrected program belong to which move of the nominal one, from the two paths alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.deviation import Index
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array
+from olp.exceptions import ProgramError
+from olp.toolpath import Flag, Toolpath
+
+#: a way-point counts as reached within this; corrections are far smaller, and moves mostly longer
+GATE_MM = 0.05
+_BLOCK = 4096
+
+
+def match(nominal: Toolpath, target_mm: Array, path: Toolpath, model: ErrorModel) -> Index:
+    """(n,) index of the last move of `path` for each nominal move.
+
+    Way-points are looked for in order. Raises ProgramError where one is not reached: then the two programs are
+    not the same job.
+    """
+    count, extra = len(nominal), len(path) - len(nominal)
+    if extra < 0:
+        raise ProgramError(
+            f"the corrected program has {len(path)} moves, fewer than the {count} of the nominal one; it is not a "
+            "correction of it"
+        )
+    if extra == 0:
+        return np.arange(count)
+    actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm()))
+    free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
+    loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)
+    groups = np.zeros(count, np.int64)
+    i = j = 0
+    while i < count:
+        span = min(_BLOCK, count - i, len(path) - j)
+        away = np.abs(actual[j : j + span] - target_mm[i : i + span]).max(axis=1)
+        near = (away < GATE_MM) | loose[i : i + span]
+        run = span if near.all() else int(np.argmin(near))
+        groups[i : i + run] = np.arange(j, j + run)
+        i, j = i + run, j + run
+        if i < count and run < span:
+            ahead = np.abs(actual[j : j + extra + 1] - target_mm[i]).max(axis=1) < GATE_MM
+            if not ahead.any():
+                raise ProgramError(
+                    f"no move of the corrected program reaches the end of line {int(nominal.line[i])} within "
+                    f"{GATE_MM:g} mm; it is not a correction of this program for this machine",
+                    line=int(path.line[min(j, len(path) - 1)]),
+                )
+            skip = int(np.argmax(ahead))
+            extra -= skip
+            groups[i] = j + skip
+            i, j = i + 1, j + skip + 1
+        elif i < count and span == 0:
+            raise ProgramError("the corrected program ends before the nominal one", line=int(path.line[-1]))
+    return groups
