@@ -195,9 +195,8 @@ class Tracer:
         nominal, target = self.nominal, self.target
         goal = target[a:b]
         begin = np.empty_like(goal)
-        begin[1:] = nominal.end_mm[a : b - 1]
-        begin[0] = nominal.end_mm[a - 1] if a else np.array(nominal.start_mm)
-        begin += goal - nominal.end_mm[a:b]
+        begin[1:] = goal[:-1]
+        begin[0] = target[a - 1] if a else np.array(nominal.start_mm)
         group_end = ends[self.groups[a:b] - first]
         away = actual[group_end] - goal
         waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
@@ -211,7 +210,7 @@ class Tracer:
             arcs = nominal.arcs
             shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
             distance[rows] = arc_distance(
-                actual[rows], begin[of[rows]], goal[of[rows]], arcs.centre_mm[which] + shift, arcs.plane[which],
+                actual[rows], nominal.starts_mm(a, b)[of[rows]] + shift, goal[of[rows]], arcs.centre_mm[which] + shift, arcs.plane[which],
                 arcs.sweep_rad[which], self._near(owner, part, share, rows, of),
             )  # fmt: skip
         np.fmax.at(worst, of, distance) if not one else np.copyto(worst, distance)

@@ -1,20 +1,20 @@
 """What a correction changed, line by line, from the two texts: nominal, corrected, and the change in um.
 
-Lines are aligned by their words: a line that stands in both texts differs only in its coordinates, by less
-than NEAR. What has no such partner was inserted (`+`) or left out (`-`).
+A line of one text is the partner of a line of the other where both leave the axes at the same place, as far as
+words tell, and the corrected one says nothing besides that the nominal one does not say. A line without
+partner was inserted (`+`) or left out (`-`); of a split block the last part is the partner.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from olp.report import printable, shortened
 from olp.units import AXES
 
-#: A coordinate that moved further, in units of the program, is another point.
-NEAR = 1.0
 #: Insertions looked through for the partner of a line, and how far apart both texts may drift otherwise.
 AHEAD = 1000
 ASTRAY = 40
@@ -23,114 +23,143 @@ EFFORT = 50
 
 MAX_COLUMN = 42
 _RED, _GREEN, _DIM, _PLAIN = "\x1b[31m", "\x1b[32m", "\x1b[2m", "\x1b[0m"
-_TOKEN = re.compile(r"(\([^)]*\)|;.*)|([A-Z])\s*([-+]?[\d.]+|[^\sA-Z(;]*)")
+
 _END = re.compile(r"\r\n|\n|\r")
+_TOKEN = re.compile(r"(\([^)]*\)|;.*)|([A-Z])\s*([-+]?[\d.]+|[^\sA-Z(;]*)")
 #: Words that hold lengths, and words besides them that a correction may change or add.
 _LENGTHS = frozenset("XYZIJKR")
 _FREE = frozenset("FP")
-_NONE: frozenset[str] = frozenset()
-_AXIS_OF = {"X": 0, "Y": 1, "Z": 2, "I": 0, "J": 1, "K": 2}
+_AXIS_OF = {"X": 0, "Y": 1, "Z": 2, "I": 0, "J": 1, "K": 2, "R": 0}
 _UNIT_UM = {"20": 25400.0, "21": 1000.0, "70": 25400.0, "71": 1000.0}
-#: After these no coordinate of an earlier line holds: moves of the control and changes of frame.
-_FORGET = frozenset(("28", "30", "92", "53", "52", "43", "49", *(str(code) for code in range(54, 60))))
+#: Behind these no word of an earlier line holds: moves of the control, changes of frame, cycles.
+_FORGET = frozenset(
+    ("28", "30", "52", "53", "43", "44", "49", "76", "92.1", "92.2", "92.3")
+    + tuple(str(code) for code in (*range(54, 60), 73, 74, *range(81, 90)))
+)
 #: Coordinates here are no positions of axes.
 _NO_MOVE = frozenset(("4", "10"))
+_UNKNOWN = (math.nan, math.nan, math.nan)
 
+Increments = tuple[float, float, float]
+Place = tuple[float, float, float]
 Pair = tuple[int | None, int | None]
 
 
 @dataclass(slots=True)
 class Line:
-    """A line's text, its lengths by letter, and all words that a correction leaves alone."""
+    """A line's text, its lengths in um by letter, all words that a correction leaves alone, and the place in um
+    where its words leave the axes."""
 
     text: str
-    lengths: dict[str, str]
+    lengths: dict[str, float]
     rest: list[str]
+    place_um: Place = _UNKNOWN
 
-    @classmethod
-    def of(cls, text: str) -> Line:
-        lengths: dict[str, str] = {}
+
+class _Reader:
+    """Reads lines with the few modal states that lengths need."""
+
+    def __init__(self, increments_mm: Increments | None) -> None:
+        self._increments_mm = increments_mm
+        self._unit_um = 1000.0
+        self._incremental = False
+        self._place = _UNKNOWN
+
+    def read(self, data: bytes) -> list[Line]:
+        return [self._line(text) for text in _END.split(data.decode("latin-1"))]
+
+    def _line(self, text: str) -> Line:
+        words: list[tuple[str, str]] = []
         rest: list[str] = []
         for comment, letter, number in _TOKEN.findall(text.upper()):
             if letter in _LENGTHS:
-                lengths[letter] = number
+                words.append((letter, number))
             elif letter not in _FREE:
                 rest.append(comment or letter + number)
-        return cls(text, lengths, rest)
+        codes = [word[1:].lstrip("0") or "0" for word in rest if word[0] == "G"]
+        for code in codes:
+            self._unit_um = _UNIT_UM.get(code, self._unit_um)
+            self._incremental = code == "91" or (self._incremental and code != "90")
+        line = Line(text, {letter: self._um(letter, number) for letter, number in words}, rest)
+        if _NO_MOVE.isdisjoint(codes):
+            self._move(line, "92" in codes)
+        line.place_um = self._place
+        if not _FORGET.isdisjoint(codes):
+            self._place = _UNKNOWN
+        return line
 
-    def g_codes(self) -> frozenset[str]:
-        if not self.rest:
-            return _NONE
-        return frozenset(word[1:].lstrip("0") or "0" for word in self.rest if word[0] == "G")
+    def _move(self, line: Line, is_set: bool) -> None:
+        place = list(self._place)
+        for letter, value in line.lengths.items():
+            if letter in AXES:
+                axis = _AXIS_OF[letter]
+                place[axis] = place[axis] + value if self._incremental and not is_set else value
+        self._place = (place[0], place[1], place[2])
+
+    def _um(self, letter: str, number: str) -> float:
+        try:
+            value = float(number)
+        except ValueError:
+            return math.nan
+        if self._increments_mm is not None and "." not in number:
+            return value * self._increments_mm[_AXIS_OF[letter]] * 1000.0
+        return value * self._unit_um
 
 
-def _lines(data: bytes) -> list[Line]:
-    return [Line.of(text) for text in _END.split(data.decode("latin-1"))]
-
-
-def _same(nominal: Line, corrected: Line) -> bool:
-    """Whether one is the other, but for its lengths. Words at the start of a split block stay on its first
-    part, so its last part may have fewer of them; it also leaves out an axis that stands still."""
+def _same(nominal: Line, corrected: Line, near_um: float) -> bool:
     if nominal.text == corrected.text:
         return True
-    shared = [letter for letter in AXES if letter in nominal.lengths]
-    if not shared:
-        return bool(nominal.rest) and nominal.rest == corrected.rest
-    shared = [letter for letter in shared if letter in corrected.lengths]
-    for letter in shared:
-        number, other = nominal.lengths[letter], corrected.lengths[letter]
-        if number == other:
-            continue
-        before, after = _value(number), _value(other)
-        if before is None or after is None or abs(after - before) > NEAR:
+    if not (nominal.lengths and corrected.lengths):
+        return bool(nominal.rest) and nominal.rest == corrected.rest and not nominal.lengths
+    for here, there in zip(nominal.place_um, corrected.place_um, strict=True):
+        # An unknown place agrees with any other.
+        if abs(here - there) > near_um:
             return False
-    return bool(shared) and all(word in nominal.rest for word in corrected.rest)
+    return all(word in nominal.rest for word in corrected.rest)
 
 
-def _value(number: str) -> float | None:
-    try:
-        return float(number)
-    except ValueError:
-        return None
-
-
-def align(nominal: list[Line], corrected: list[Line]) -> Iterator[Pair]:
+def align(nominal: list[Line], corrected: list[Line], near_um: float) -> Iterator[Pair]:
     """Indices of partners in the order of the texts; None stands where a line has no partner."""
     i = j = 0
     effort = EFFORT * (len(nominal) + 100)
     while i < len(nominal) and j < len(corrected):
-        if _same(nominal[i], corrected[j]):
-            skipped, inserted = 0, 0
-        else:
-            skipped, inserted, spent = _partner(nominal, corrected, i, j) if effort > 0 else (1, 1, 0)
+        if not _same(nominal[i], corrected[j], near_um):
+            skipped, inserted, spent = (1, 1, 0)
+            if effort > 0:
+                skipped, inserted, spent = _partner(nominal, corrected, i, j, near_um)
             effort -= spent
-        if skipped == inserted:
-            yield from ((i + k, j + k) for k in range(skipped))
+            if skipped == inserted:
+                yield from ((i + k, j + k) for k in range(skipped))
+            else:
+                yield from ((i + k, None) for k in range(skipped))
+                yield from ((None, j + k) for k in range(inserted))
+            i, j = i + skipped, j + inserted
         else:
-            yield from ((i + k, None) for k in range(skipped))
-            yield from ((None, j + k) for k in range(inserted))
-        i, j = i + skipped, j + inserted
-        if i < len(nominal) and j < len(corrected) and _same(nominal[i], corrected[j]):
             yield i, j
             i, j = i + 1, j + 1
     yield from ((k, None) for k in range(i, len(nominal)))
     yield from ((None, k) for k in range(j, len(corrected)))
 
 
-def _partner(nominal: list[Line], corrected: list[Line], i: int, j: int) -> tuple[int, int, int]:
-    """How many lines of each text to pass until both agree again, fewest first, and the effort spent."""
+def _partner(
+    nominal: list[Line], corrected: list[Line], i: int, j: int, near_um: float
+) -> tuple[int, int, int]:
+    """How many lines of each text to pass until both agree again, fewest first, and the effort spent.
+
+    Insertions come first: a correction leaves no line out.
+    """
     spent = 0
+    for inserted in range(1, min(AHEAD, len(corrected) - j)):
+        spent += 1
+        if _same(nominal[i], corrected[j + inserted], near_um):
+            return 0, inserted, spent
     for total in range(1, ASTRAY):
-        for skipped in range(total + 1):
+        for skipped in range(1, total + 1):
             inserted = total - skipped
             if i + skipped < len(nominal) and j + inserted < len(corrected):
                 spent += 1
-                if _same(nominal[i + skipped], corrected[j + inserted]):
+                if _same(nominal[i + skipped], corrected[j + inserted], near_um):
                     return skipped, inserted, spent
-    for inserted in range(ASTRAY, min(AHEAD, len(corrected) - j)):
-        spent += 1
-        if _same(nominal[i], corrected[j + inserted]):
-            return 0, inserted, spent
     return 1, 1, spent
 
 
@@ -138,34 +167,47 @@ def render(
     before: bytes,
     after: bytes,
     *,
-    increments_mm: tuple[float, float, float] | None = None,
+    near_um: float = 1000.0,
+    increments_mm: Increments | None = None,
     colour: bool = False,
 ) -> str:
-    """The changed lines as text: line of the nominal program, nominal, corrected, change of each axis in um.
+    """The changed lines as text: line of the nominal program, nominal, corrected, change of each length in um.
 
-    `increments_mm` are the least increments of a control that counts them in numbers without a point.
+    The change of an axis is that of its position: corrected command minus nominal command. No correction is
+    larger than `near_um`. `increments_mm` are the least increments of a control that counts them in numbers
+    without a point.
     """
-    nominal, corrected = _lines(before), _lines(after)
+    nominal, corrected = _Reader(increments_mm).read(before), _Reader(increments_mm).read(after)
     rows: list[tuple[str, str, str, str]] = []
     counts = {"changed": 0, "inserted": 0, "left out": 0}
-    modal = _Modal(increments_mm)
-    for i, j in align(nominal, corrected):
+    for i, j in align(nominal, corrected, near_um):
         if i is None:
             if j is not None:
                 counts["inserted"] += 1
                 rows.append(("+", "", corrected[j].text, ""))
-            continue
-        modal.begin(nominal[i])
-        if j is None:
+        elif j is None:
             counts["left out"] += 1
             rows.append((f"- {i + 1}", nominal[i].text, "", ""))
         elif nominal[i].text != corrected[j].text:
             counts["changed"] += 1
-            deltas = "  ".join(modal.deltas(nominal[i], corrected[j]))
-            rows.append((str(i + 1), nominal[i].text, corrected[j].text, deltas))
-        modal.end(nominal[i])
+            changes = "  ".join(_changes(nominal[i], corrected[j]))
+            rows.append((str(i + 1), nominal[i].text, corrected[j].text, changes))
     total = ", ".join(f"{count} {what}" for what, count in counts.items())
     return "".join(_table(rows, colour)) + f"lines: {total}\n"
+
+
+def _changes(nominal: Line, corrected: Line) -> Iterator[str]:
+    for letter, value in corrected.lengths.items():
+        if letter in AXES:
+            axis = _AXIS_OF[letter]
+            change = corrected.place_um[axis] - nominal.place_um[axis]
+            if change == 0.0 and nominal.lengths.get(letter) == value:
+                continue
+        else:
+            change = value - nominal.lengths.get(letter, math.nan)
+            if change == 0.0:
+                continue
+        yield f"{letter} new" if math.isnan(change) else f"{letter}{change:+.1f}"
 
 
 def _table(rows: list[tuple[str, str, str, str]], colour: bool) -> Iterator[str]:
@@ -173,72 +215,15 @@ def _table(rows: list[tuple[str, str, str, str]], colour: bool) -> Iterator[str]
         return
     number = max(4, max(len(row[0]) for row in rows))
     left, right = (min(MAX_COLUMN, max(9, max(len(row[k]) for row in rows))) for k in (1, 2))
-    red, green, dim, plain = (_RED, _GREEN, _DIM, _PLAIN) if colour else ("", "", "", "")
     yield f"{'line':>{number}}  {'nominal':{left}}  {'corrected':{right}}  change in um\n"
-    for mark, nominal, corrected, deltas in rows:
+    for mark, nominal, corrected, changes in rows:
         nominal = shortened(printable(nominal), left).ljust(left)
         corrected = shortened(printable(corrected), right)
-        if deltas:
+        if changes:
             corrected = corrected.ljust(right)
-        tail = f"  {deltas}" if deltas else ""
+        tail = f"  {changes}" if changes else ""
         if colour:
-            tint = red if mark[0] == "-" else dim
-            yield f"{mark:>{number}}  {tint}{nominal}{plain}  {green}{corrected}{plain}{tail}\n"
+            tint = _RED if mark[0] == "-" else _DIM
+            yield f"{mark:>{number}}  {tint}{nominal}{_PLAIN}  {_GREEN}{corrected}{_PLAIN}{tail}\n"
         else:
             yield f"{mark:>{number}}  {nominal}  {corrected}{tail}".rstrip() + "\n"
-
-
-@dataclass(slots=True)
-class _Modal:
-    """The few modal states that a change in um needs."""
-
-    increments_mm: tuple[float, float, float] | None
-    unit_um: float = 1000.0
-    incremental: bool = False
-    last: dict[str, float] = field(default_factory=dict)
-
-    def begin(self, line: Line) -> None:
-        """Units and distance mode hold from the start of the line that sets them."""
-        codes = line.g_codes()
-        if not codes:
-            return
-        for code in codes & _UNIT_UM.keys():
-            self.unit_um = _UNIT_UM[code]
-        self.incremental = "91" in codes or (self.incremental and "90" not in codes)
-
-    def deltas(self, nominal: Line, corrected: Line) -> Iterator[str]:
-        for letter, text in corrected.lengths.items():
-            after = self._um(letter, text)
-            if letter in nominal.lengths:
-                if nominal.lengths[letter] == text:
-                    continue
-                before = self._um(letter, nominal.lengths[letter])
-            else:
-                before = 0.0 if self.incremental and letter in AXES else self.last.get(letter)
-            if before is None or after is None:
-                yield f"{letter} new"
-            else:
-                yield f"{letter}{after - before:+.1f}"
-
-    def end(self, line: Line) -> None:
-        """What is known of the axes behind a nominal line."""
-        codes = line.g_codes()
-        if codes & _FORGET:
-            self.last.clear()
-        elif not codes & _NO_MOVE:
-            for letter in AXES:
-                if letter not in line.lengths:
-                    continue
-                value = self._um(letter, line.lengths[letter])
-                if value is None or self.incremental:
-                    self.last.pop(letter, None)
-                else:
-                    self.last[letter] = value
-
-    def _um(self, letter: str, text: str) -> float | None:
-        value = _value(text)
-        if value is None:
-            return None
-        if self.increments_mm is not None and "." not in text:
-            return value * self.increments_mm[_AXIS_OF.get(letter, 0)] * 1000.0
-        return value * self.unit_um

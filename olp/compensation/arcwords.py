@@ -148,7 +148,7 @@ def _head(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
     absolute = bool(program.arc_slots.absolute[index])
     split = arc.row + 1 < len(rows.move) and rows.move[arc.row + 1] == arc.move
     if split and slots[4] >= 0:
-        edits.add(int(words.number[slots[4]]), int(words.end[slots[4]]), 1, 0)
+        edits.add(int(words.number[slots[4]]), int(words.end[slots[4]]), _turns(arc), 0)
     if slots[3] >= 0:
         _radius_word(writer, arc, slots[3], edits)
         return
@@ -166,6 +166,11 @@ def _head(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
             prefix = style.lead(anchor) + style.cased(anchor, b"IJK"[axis : axis + 1])
             edits.add(place, place, mantissa, decimals, prefix, 5 + axis)
             writer.tally.inserted_words += 1
+
+
+def _turns(arc: _Arc) -> int:
+    """The P word that an arc of this sweep needs."""
+    return int((abs(arc.sweep) - 1e-6) // (2 * np.pi)) + 1
 
 
 def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
@@ -215,3 +220,5 @@ def _tail(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
         lead = b" "
     for i, (axis, mantissa, decimals) in enumerate(_centre_words(writer, arc, absolute, {})):
         edits.add(place, place, mantissa, decimals, b" " + b"IJK"[axis : axis + 1], order + 3 + i)
+    if _turns(arc) > 1:
+        edits.add(place, place, _turns(arc), 0, b" P", order + 5)

@@ -98,6 +98,8 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
     kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
     free = np.isin(path.kind, kinds) & ((path.flag & _UNSPLIT) == 0) & ~raw.any(axis=1)
+    # behind a `/` block the start depends on the switch, so no cut can be right for both
+    free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
     cuts_line = subdivide_lines(path, model, target, free, chord)
     cuts_arc = subdivide_arcs(path, model, target, command, raw, chord, None if reversal is None else reversal.axes)
     rows = _expand(path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model)
@@ -129,13 +131,14 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, npt.NDArray[np.
             )
         raw[some] |= blind | unknown[some]
         passed = wanting
-    _hold_after_machine_moves(path, raw)
-    return raw, passed
+    held = _hold_after_machine_moves(path, raw)
+    return raw, np.union1d(passed, held)
 
 
-def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> None:
+def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> npt.NDArray[np.int64]:
     """An axis that G53 sent to a place of the machine stays there in the rapids that follow without a word of
-    it: a word inserted there could drive it against its limit switch."""
+    it: a word inserted there could drive it against its limit switch. Returns those rapids."""
+    held = []
     machine = np.flatnonzero(path.flag & np.uint8(Flag.MACHINE))
     for i in machine.tolist():
         before = path.end_mm[i - 1] if i else np.array(path.start_mm)
@@ -143,7 +146,9 @@ def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> None:
             j = i + 1
             while j < len(path) and path.kind[j] == Kind.RAPID and path.end_mm[j, axis] == path.end_mm[i, axis]:
                 raw[j, axis] = True
+                held.append(j)
                 j += 1
+    return np.array(sorted(set(held)), np.int64)
 
 
 def _vertices(path: Toolpath, model: ErrorModel, target: Array, raw: Mask) -> Array:

@@ -360,7 +360,7 @@ class Writer:
         for i in np.flatnonzero(before & ~empty).tolist():
             at, row = int(place[i]), int(tails[i])
             self._check_take_up(rows, row)
-            out.append(self.one(at, at, BARE, 0, self._feed_of(int(line_no[i])) + self.program.eol(int(line_no[i])), row * 8 + 20))
+            out.append(self.one(at, at, BARE, 0, self._feed_of(int(line_no[i])) + self.program.eol(int(line_no[i])), rows.serial(row) + 5))
             out += self._arc_word(rows, row + 1)
         self.tally.inserted_blocks += int((~empty).sum())
         out += self._inverse_time(rows, tails)
@@ -404,7 +404,7 @@ class Writer:
         slot = self.program.slot[move]
         first = [int(self.words.start[s]) for s in slot if s >= 0] or [int(self.words.start[i]) for i in index]
         at = min(first)
-        return [self.one(at, at, BARE, 0, b"G%d " % code, 0)]
+        return [self.one(at, at, BARE, 0, b"G%d " % code, rows.serial(row - 1) + 6)]
 
     def _inverse_time(self, rows: Rows, tails: Index) -> list[Edits]:
         """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
