@@ -156,7 +156,7 @@ def verify(
     digit = _digit_mm(second, loaded.setup)
     try:
         proof = prove(
-            first.toolpath, second.toolpath, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
+            first, second, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
             passed=rows.passed,
         )  # fmt: skip
     except OlpError as error:
@@ -318,9 +318,9 @@ def _correct(
     digit = _digit_mm(program, loaded.setup)
     nominal = replace(program, words=None)
     del program
-    corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False).toolpath
+    corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
     proof = prove(
-        path, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit, passed=rows.passed, parts=parts
+        nominal, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit, passed=rows.passed, parts=parts
     )
     _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
     corrections = _largest_correction(path, rows)
@@ -328,9 +328,7 @@ def _correct(
         *checks.calibration_findings(loaded.calibration, date),
         *checks.proof_findings(proof, rows.passed),
         *checks.hole_findings(holes, limits.tolerance_mm),
-        *checks.state_findings(
-            path, _ends(rows, len(path)), loaded.model, loaded.setup, held=hold, play=rows.play is not None
-        ),
+        *checks.state_findings(path, _ends(rows, len(path)), loaded.model, loaded.setup, held=hold),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
     )
@@ -355,10 +353,10 @@ def _prove_without_deleted(
         return
     options = Options(block_delete=True, contour=contour)
     line = int(path.line[deleted][0])
-    nominal = read(program.data, loaded.setup, loaded.profile, options, words=False).toolpath
-    corrected = read(text, loaded.setup, loaded.profile, options, words=False).toolpath
+    nominal = read(program.data, loaded.setup, loaded.profile, options, words=False)
+    corrected = read(text, loaded.setup, loaded.profile, options, words=False)
     try:
-        rows = plan(nominal, loaded.model, replace(limits, refuse_outside=False))
+        rows = plan(nominal.toolpath, loaded.model, replace(limits, refuse_outside=False))
         proof = prove(
             nominal, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit_mm, passed=rows.passed
         )

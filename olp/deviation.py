@@ -29,12 +29,14 @@ _ARC_STEPS = 16
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
     """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way (ends included), `bend` the
-    part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts."""
+    part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
+    `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known yet."""
 
     waypoint: Array
     path: Array
     bend: Array
     judged: Mask
+    flank: Array
 
     def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
         """Largest and rms in um, at way-points of all judged moves and along those that are `cutting`."""
@@ -75,11 +77,32 @@ def measure(
     judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
     if exempt is not None:
         judged &= ~exempt
+    flank = _unknown_flank(path, model)[groups]
+    judged &= ~(flank > bend_mm)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     for a in range(0, count, _BLOCK):
         b = min(a + _BLOCK, count)
         tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
-    return Deviation(waypoint, worst, bend, judged)
+    return Deviation(waypoint, worst, bend, judged, flank)
+
+
+def _unknown_flank(path: Toolpath, model: ErrorModel) -> Array:
+    """(n,) mm: what remains unknown of the play after each move. It shrinks as an axis has moved to and fro, and is
+    gone once that range is the lost motion."""
+    width = model.lost_motion_mm(path.end_mm)
+    out = np.zeros(len(path))
+    if width is None:
+        return out
+    for axis in np.flatnonzero((np.nan_to_num(width) > 0).any(axis=0)).tolist():
+        command, lost = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
+        resets = np.flatnonzero(np.isnan(command))
+        edges = [0, *(resets + 1).tolist(), len(command)]
+        for a, b in zip(edges[:-1], edges[1:], strict=True):
+            if b > a:
+                part = command[a:b]
+                reach = np.maximum.accumulate(part) - np.minimum.accumulate(part)
+                out[a:b] = np.hypot(out[a:b], np.maximum(lost[a:b] - np.nan_to_num(reach), 0.0) / 2)
+    return out
 
 
 class Tracer:
@@ -91,6 +114,7 @@ class Tracer:
         self.nominal, self.target, self.path, self.groups = nominal, target, path, groups
         self.model, self.bend = model, bend
         self.play: Array | None = None
+        self.last: Array | None = None
         self.has_play = model.lost_motion_mm(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.nominal_arc = _arc_index(nominal)
         self.path_arc = _arc_index(path)
@@ -171,11 +195,12 @@ class Tracer:
     def actual(self, point: Array, tool: Array) -> Array:
         """Where the tip really is; carries the play of the axes from call to call."""
         play = None
-        if self.has_play:
-            width = self.model.lost_motion_mm(point)
+        if self.has_play and len(point):
+            chain = point if self.last is None else np.concatenate((self.last, point))
+            width = self.model.lost_motion_mm(chain)
             assert width is not None
-            play = play_states(point, width, self.play)
-            self.play = play[-1] if len(play) else self.play
+            play = play_states(chain, width, self.play)[len(chain) - len(point) :]
+            self.last, self.play = point[-1:], play[-1]
         return point + self.model.error(point, tool, play)
 
     def _distances(

@@ -71,10 +71,10 @@ def number(value: object, digits: int = 2) -> str:
     """A number for a table: fixed point, a dash where there is none, and never a nonzero shown as 0."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return "-"
-    smallest = 0.5 * 10.0**-digits
-    if 0.0 < abs(value) < smallest:
+    text = f"{value + 0.0:.{digits}f}"
+    if value and not float(text):
         return f"{'>-' if value < 0 else '<'}{10.0**-digits:.{digits}f}"
-    return f"{value:.{digits}f}"
+    return text
 
 
 def printable(text: str) -> str:
@@ -162,22 +162,18 @@ def _degrees(value: object) -> str:
 
 
 def _verdict(report: Report) -> Iterator[str]:
-    tolerance = report.get("tolerance_um")
-    largest = _largest(_part(report, "deviation", "after"))
+    tolerance, deviation = report.get("tolerance_um"), _part(report, "deviation")
+    largest = deviation.get("path_max_um")
     if tolerance is None or largest is None:
         return
-    above = any(finding.get("code") == "OLP101" for finding in report.get("findings") or ())
-    verdict = "ABOVE TOLERANCE" if above else "Within tolerance"
+    allowed = deviation.get("allowed_um")
+    limit = "" if allowed is None else f"; with rounding to the last digit {number(allowed)} um are allowed"
+    verdict = "Within tolerance" if deviation.get("holds") else "ABOVE TOLERANCE"
     yield from textwrap.wrap(
-        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one; the tolerance "
-        f"is {tolerance:g} um, plus what rounding to the last digit explains.",
+        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one. "
+        f"The tolerance is {tolerance:g} um{limit}.",
         WIDTH,
     )
-
-
-def _largest(deviation: Report) -> float | None:
-    values = [_part(deviation, where).get("max_um") for where in ("waypoints", "between")]
-    return max((value for value in values if isinstance(value, int | float)), default=None)
 
 
 def _deviation(report: Report) -> Iterator[str]:
@@ -209,11 +205,11 @@ def _budget(report: Report) -> Iterator[str]:
     if rows:
         yield "What is left after correction, largest in um"
         yield from table(["", "max"], rows)
-    angle = _part(budget, "orientation_urad")
+    angle = _part(report, "orientation")
     if angle:
         yield (
             "  Orientation of the tool, which three linear axes cannot correct: "
-            f"{number(angle.get('max'), 1)} urad max, {number(angle.get('rms'), 1)} rms"
+            f"{number(angle.get('max_urad'), 1)} urad max, {number(angle.get('rms_urad'), 1)} rms"
         )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from test_cli import HEAVY, PROGRAMS, imported_by, run
+from test_cli import HEAVY, MACHINE, PROGRAMS, imported_by, run
 from test_report import REPORT
 
 from olp.cli import main
@@ -66,18 +66,22 @@ def test_the_default_output_stands_beside_the_program(mill: Path, library: Fake)
 
 def test_program_and_machine_may_come_from_the_job(mill: Path, library: Fake) -> None:
     assert run("correct", "-j", mill / "job.toml").exit_code == 0
-    program, machine, job = library.calls[0][0]
+    program, setup = library.calls[0][0]
     assert Path(program).samefile(mill / "small.nc")
-    assert Path(machine).samefile(mill / "machine.toml")
-    assert job == str(mill / "job.toml")
+    assert setup.machine.name == "mill-30-16"
     run("correct", "other.nc", "-j", mill / "job.toml", "-o", mill / "out.nc")
     assert library.calls[1][0][0] == "other.nc"
-    run("correct", mill / "small.nc", "-m", "other.toml", "-j", mill / "job.toml", "-o", mill / "out2.nc")
-    assert library.calls[2][0][1] == "other.toml"
+    other = mill / "other.toml"
+    other.write_text((mill / "machine.toml").read_text().replace("mill-30-16", "another"))
+    run("correct", mill / "small.nc", "-m", other, "-j", mill / "job.toml", "-o", mill / "out2.nc")
+    assert library.calls[2][0][1].machine.name == "another"
 
 
-@pytest.mark.parametrize("args", [["correct"], ["correct", "small.nc"], ["simulate"], ["verify", "a", "b"]])
-def test_what_is_missing_is_asked_for(args: list[str]) -> None:
+@pytest.mark.parametrize(
+    "args",
+    [["correct"], ["correct", "small.nc"], ["simulate"], ["verify", "a", "b"], ["correct", "-m", MACHINE]],
+)
+def test_what_is_missing_is_asked_for(args: list[str | Path]) -> None:
     result = run(*args)
     assert result.exit_code == 2
     assert result.stderr.startswith("olp: error: no ")
@@ -118,7 +122,9 @@ def test_nothing_is_overwritten_without_force(mill: Path, library: Fake) -> None
     assert json.loads(report.read_bytes())["schema"] == "olp-report-1"
 
 
-@pytest.mark.parametrize("name", ["small.nc", "machine.toml", "job.toml", "../mill/small.nc"])
+@pytest.mark.parametrize(
+    "name", ["small.nc", "machine.toml", "job.toml", "../mill/small.nc", "calibration.toml", "x.csv"]
+)
 def test_an_input_is_never_the_output(name: str, mill: Path, library: Fake) -> None:
     before = (mill / name).read_bytes()
     result = run("correct", "-j", mill / "job.toml", "-o", mill / name, "--force")
@@ -197,9 +203,9 @@ def test_verify_passes_both_texts_and_fails_on_findings(mill: Path, library: Fak
     result = run(*args, stdin=CORRECTED)
     assert result.exit_code == 0
     assert "Within tolerance" in result.stdout
-    nominal, corrected, machine, job = library.calls[0][0]
-    assert (nominal, corrected, job) == (str(mill / "small.nc"), CORRECTED, str(mill / "job.toml"))
-    assert Path(machine).samefile(mill / "machine.toml")
+    nominal, corrected, setup = library.calls[0][0]
+    assert (nominal, corrected) == (str(mill / "small.nc"), CORRECTED)
+    assert setup.machine.name == "mill-30-16"
     library.findings = (ABOVE,)
     failed = run(*args, "--json", stdin=CORRECTED)
     assert failed.exit_code == 1
@@ -207,48 +213,51 @@ def test_verify_passes_both_texts_and_fails_on_findings(mill: Path, library: Fak
     assert run("verify", "-", "-", "-m", "m.toml").exit_code == 2
 
 
-JOBS = ["haas-mill", "gantry-plate", "bridge-cmm"]
+JOB = PROGRAMS / "bridge-cmm" / "job.toml"
+PROGRAM = PROGRAMS / "bridge-cmm" / "housing.ngc"
 
 
-@pytest.mark.parametrize("name", JOBS)
-def test_a_real_program_goes_all_the_way(name: str, tmp_path: Path) -> None:
-    job, output, report = PROGRAMS / name / "job.toml", tmp_path / "out.nc", tmp_path / "report.json"
-    result = run("correct", "-j", job, "-o", output, "--report", report, "--diff")
+def test_a_real_program_goes_all_the_way(tmp_path: Path) -> None:
+    output, report = tmp_path / "out.ngc", tmp_path / "report.json"
+    result = run("correct", "-j", JOB, "-o", output, "--report", report, "--diff")
     assert result.exit_code == 0, result.output
     assert "Within tolerance" in result.stdout
-    assert "0 changed" not in result.stdout
+    assert ", 0 left out" in result.stdout
     stated = json.loads(report.read_bytes())
+    assert f"{stated['moves']['inserted_blocks'] + 1} inserted" in result.stdout, "the blocks and the stamp"
     after = stated["deviation"]["after"]["waypoints"]["max_um"]
     assert after < stated["deviation"]["before"]["waypoints"]["max_um"]
     assert str(tmp_path) not in report.read_text()
+    assert str(PROGRAMS) not in report.read_text()
 
-    (program,) = [
-        path
-        for path in job.parent.iterdir()
-        if path.stem in job.read_text() and path.suffix in (".nc", ".ngc")
-    ]
-    verified = run("verify", program, output, "-j", job, "--json")
+    verified = run("verify", PROGRAM, output, "-j", JOB, "--json")
     assert verified.exit_code == 0, verified.output
     assert json.loads(verified.stdout)["deviation"]["after"]["waypoints"]["max_um"] == pytest.approx(after)
-    again = run("correct", output, "-j", job, "-o", "-")
+    again = run("correct", output, "-j", JOB, "-o", "-")
     assert again.exit_code == 3
     assert again.stdout_bytes == b""
 
 
 def test_an_uncorrected_program_does_not_pass_for_a_corrected_one() -> None:
-    job = PROGRAMS / "haas-mill" / "job.toml"
-    program = PROGRAMS / "haas-mill" / "bracket.nc"
-    result = run("verify", program, program, "-j", job)
+    result = run("verify", PROGRAM, PROGRAM, "-j", JOB)
     assert result.exit_code == 1
     assert "OLP101" in result.stdout
+    assert "ABOVE TOLERANCE" in result.stdout
 
 
 def test_stdin_gives_the_bytes_that_the_file_gives(tmp_path: Path) -> None:
-    job, program = PROGRAMS / "haas-mill" / "job.toml", PROGRAMS / "haas-mill" / "bracket.nc"
-    assert run("correct", program, "-j", job, "-o", tmp_path / "out.nc", "-q").exit_code == 0
-    piped = run("correct", "-", "-j", job, "-q", stdin=program.read_bytes())
+    assert run("correct", PROGRAM, "-j", JOB, "-o", tmp_path / "out.ngc", "-q").exit_code == 0
+    piped = run("correct", "-", "-j", JOB, "-q", stdin=PROGRAM.read_bytes())
     assert piped.exit_code == 0
-    assert piped.stdout_bytes == (tmp_path / "out.nc").read_bytes()
+    assert piped.stdout_bytes == (tmp_path / "out.ngc").read_bytes()
+
+
+def test_an_expired_calibration_fails_only_where_warnings_do(tmp_path: Path) -> None:
+    args = ["correct", "-j", JOB, "-o", tmp_path / "out.ngc", "--force", "--date", "2099-01-01"]
+    result = run(*args)
+    assert result.exit_code == 0
+    assert "OLP401" in result.stdout
+    assert run(*args, "--fail-on", "warning").exit_code == 1
 
 
 def test_simulate_writes_a_path_with_its_frame(tmp_path: Path) -> None:
@@ -277,7 +286,6 @@ def test_inspect_of_a_program_and_of_a_point() -> None:
 
 
 def test_correct_imports_no_more_than_it_needs(tmp_path: Path) -> None:
-    job = PROGRAMS / "haas-mill" / "job.toml"
-    imported = imported_by("correct", "-j", str(job), "-o", str(tmp_path / "out.nc"))
+    imported = imported_by("correct", "-j", str(JOB), "-o", str(tmp_path / "out.ngc"))
     assert "numpy" in imported
     assert not imported & (HEAVY - {"numpy", "pydantic"})

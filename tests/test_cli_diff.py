@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from olp.cli.diff import Line, align, render
+from olp.cli.diff import _Reader, align, render
 
 LINES = st.lists(
     st.sampled_from(
@@ -21,9 +21,10 @@ LINES = st.lists(
 
 @given(before=LINES, after=LINES)
 def test_every_line_of_both_texts_shows_once_and_in_order(before: list[str], after: list[str]) -> None:
-    pairs = list(align([Line.of(text) for text in before], [Line.of(text) for text in after]))
-    assert [i for i, _ in pairs if i is not None] == list(range(len(before)))
-    assert [j for _, j in pairs if j is not None] == list(range(len(after)))
+    nominal, corrected = (_Reader(None).read("\n".join(lines).encode()) for lines in (before, after))
+    pairs = list(align(nominal, corrected, 1000.0))
+    assert [i for i, _ in pairs if i is not None] == list(range(len(nominal)))
+    assert [j for _, j in pairs if j is not None] == list(range(len(corrected)))
     assert all(i is not None or j is not None for i, j in pairs)
 
 
@@ -61,6 +62,14 @@ def test_parts_of_split_blocks_are_marked_as_inserted(points: list[int], splits:
     assert all("X+12.3" in row for row in changed)
 
 
+def test_the_parts_of_a_full_circle_belong_to_its_line() -> None:
+    nominal = b"G0 X5. Y4.\nG2 I-2.\nG3 I-2.\nG0 X9."
+    half = b" X1. Y4.001 I-2.001\nX5.002 Y4.001 I2.\n"
+    corrected = b"G0 X5.002 Y4.001\nG2" + half + b"G3" + half + b"G0 X9."
+    rows = render(nominal, corrected, near_um=10.0).split("\n")
+    assert [row.split()[0] for row in rows[1:-2]] == ["1", "+", "2", "+", "3"]
+
+
 def changes(nominal: str, corrected: str, **options: tuple[float, float, float]) -> list[str]:
     """The changes in um that the diff states, one entry a line."""
     rows = render(nominal.encode(), corrected.encode(), **options).split("\n")
@@ -74,11 +83,14 @@ def changes(nominal: str, corrected: str, **options: tuple[float, float, float])
         ("X1.", "X1.0123", "X+12.3"),
         ("G20 X1.", "G20 X1.001", "X+25.4"),
         ("G0 Y2.\nG1 X5.", "G0 Y2.\nG1 X5. Y2.0031", "Y+3.1"),
-        ("G91 G1 X5.", "G91 G1 X5. Y0.0031", "Y+3.1"),
         ("G1 X5.", "G1 X5. Y0.0031", "Y new"),
+        ("G81 X1. Z-5. R2.\nG80 X2.", "G81 X1. Z-5. R2.\nG80 X2.001 Z2.001", "X+1.0  Z new"),
+        ("G92 X3.\nX4.", "G92 X3.\nX4. Z1.", "Z new"),
+        ("G0 X1. Y1.\nG91 X1.\nX1.", "G0 X1. Y1.\nG91 X1.\nX1.001 Y0.002", "X+1.0  Y+2.0"),
         ("G0 Y2.\nG28 Y2.\nG1 X5.", "G0 Y2.\nG28 Y2.\nG1 X5. Y2.0031", "Y new"),
         ("G2 X5. I3. J0", "G2 X5. I3.002 J-0.001", "I+2.0  J-1.0"),
         ("X[#1]", "X5.001", "X new"),
+        ("G2 X5. I3.", "G2 X5. I-2.", ""),
         ("x1.5 (X9)", "x1.502 (X9)", "X+2.0"),
     ],
 )

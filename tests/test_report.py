@@ -46,13 +46,17 @@ REPORT: dict[str, Any] = {
             "between": {"max_um": 31.0, "rms_um": 12.0},
         },
         "after": {"waypoints": {"max_um": 0.061, "rms_um": 0.03}, "between": {"max_um": 0.87, "rms_um": 0.2}},
+        "path_max_um": 0.87,
+        "allowed_um": 1.087,
+        "holds": True,
     },
     "budget_um": {
         "model_and_chords": 0.85,
         "rounding": 0.06,
         "lost_motion_unknown": 0.0,
-        "orientation_urad": {"max": 22.5, "rms": 11.0},
     },
+    "orientation": {"max_urad": 22.5, "rms_urad": 11.0},
+    "largest_correction_um": 30.0,
     "sources": [
         {"name": "EXX", "max_um": 18.0, "rms_um": 7.0},
         {"name": "C0Y", "max_um": 4.0, "rms_um": 2.0},
@@ -76,8 +80,8 @@ def test_the_text_states_the_numbers_of_the_proof() -> None:
     assert "ab" * 32 not in text
 
 
-def test_the_verdict_follows_the_finding() -> None:
-    report = REPORT | {"findings": [Finding("OLP101", "2.5 um in line 17.", 17).as_dict()]}
+def test_the_verdict_is_that_of_the_proof() -> None:
+    report = REPORT | {"deviation": REPORT["deviation"] | {"holds": False}}
     assert "ABOVE TOLERANCE" in to_text(report)
     assert "Within tolerance" not in to_text(report)
 

@@ -6,13 +6,17 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from olp.exceptions import OlpError, UsageError
 from olp.findings import Finding, Severity, worst
+
+if TYPE_CHECKING:
+    from olp.machine import Setup
 
 STREAM = "-"
 FINDINGS_EXIT = 1
@@ -58,13 +62,6 @@ def proof_options(function: F) -> F:
         ),
         click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."),
         click.option(
-            "--outside-box",
-            type=click.Choice(["refuse", "hold"]),
-            default="refuse",
-            show_default=True,
-            help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
-        ),
-        click.option(
             "--tolerance-um",
             type=Length(),
             default=1.0,
@@ -76,35 +73,46 @@ def proof_options(function: F) -> F:
     return function
 
 
-def needed(program: str | None, machine: str | None, job: str | None) -> tuple[str, str]:
-    """Program and machine file: the command line's, else the job's. Raises UsageError."""
-    if job is not None and (program is None or machine is None):
-        from olp.files.config import load_job
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a call is about: the program (a path or `-`), machine and job, and every file that it reads."""
 
-        stated = load_job(job)
-        program = program if program is not None else stated.program
-        machine = machine if machine is not None else stated.machine
+    program: str
+    setup: Setup
+    inputs: tuple[str, ...]
+
+
+def given(program: str | None, machine: str | None, job: str | None) -> Given:
+    """Program and machine file: the command line's, else the job's. Raises UsageError, InputError."""
+    setup, inputs = machine_given(machine, job)
+    program = program if program is not None else setup.job.program
     if program is None:
         raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
-    return program, needed_machine(machine)
+    return Given(program, setup, (*files_of(program), *inputs))
 
 
-def needed_machine(machine: str | None) -> str:
-    if machine is None:
-        raise UsageError(
-            "no machine file is given; name it with -m, or set the key machine of the job file (-j)"
-        )
-    return machine
+def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
+    """Machine and job, and the files that describe them. Raises UsageError, InputError."""
+    import tomllib
+
+    from olp.files.config import beside, load_setup
+    from olp.files.write import read_bytes
+
+    setup = load_setup(machine, job)
+    inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
+    if setup.machine.calibration is not None:
+        try:
+            curves = tomllib.loads(read_bytes(setup.machine.calibration).decode("utf-8-sig")).get("curves")
+            inputs += files_of(*(beside(setup.machine.calibration, curve["file"]) for curve in curves or ()))
+        except (ValueError, TypeError, KeyError, AttributeError):
+            # The loader of calibrations says what is wrong with it.
+            pass
+    return setup, tuple(inputs)
 
 
 def source(name: str) -> str | bytes:
     """A program for the library: its path, or the bytes of stdin for `-`."""
     return sys.stdin.buffer.read() if name == STREAM else name
-
-
-def shown(name: str) -> str:
-    """A program's name in messages."""
-    return "<stdin>" if name == STREAM else name
 
 
 def files_of(*names: str | None) -> list[str]:

@@ -13,12 +13,11 @@ from olp.cli.common import (
     STREAM,
     exit_for,
     files_of,
-    needed,
+    given,
     proof_options,
     put,
     refuse_early,
     setup_options,
-    shown,
     source,
     talk,
 )
@@ -27,6 +26,10 @@ from olp.exceptions import ProgramError, UsageError
 
 if TYPE_CHECKING:
     from olp.api import Correction
+    from olp.machine import Machine
+
+#: What rounding adds to a correction, at most.
+LAST_DIGITS_UM = 10.0
 
 
 @click.command("correct")
@@ -34,6 +37,13 @@ if TYPE_CHECKING:
 @setup_options
 @click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
+@click.option(
+    "--outside-box",
+    type=click.Choice(["refuse", "hold"]),
+    default="refuse",
+    show_default=True,
+    help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
+)
 @click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
 @click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
@@ -65,26 +75,24 @@ def command(
     PROGRAM and the machine file may come from the job file; what the command line says wins. OUT is written
     also where the proof ends above the tolerance; the exit code is 1 then.
     """
-    program, machine = needed(program, machine, job)
-    output = output or _default_output(program)
+    call = given(program, machine, job)
+    output = output or _default_output(call.program)
     as_json = as_json or report_file == STREAM
     if as_json and (output == STREAM or show_diff):
         raise UsageError(
             "JSON on stdout goes with neither -o - nor --diff; write the report to a file with --report"
         )
-    inputs, targets = files_of(program, machine, job), files_of(output, report_file)
-    refuse_early(targets, inputs, force=force)
+    refuse_early(files_of(output, report_file), call.inputs, force=force)
 
     from olp import api, report
     from olp.files.write import write_files
 
-    given = source(program)
+    nominal = source(call.program)
     with progress(quiet) as show:
         try:
             result = api.correct(
-                given,
-                machine,
-                job,
+                nominal,
+                call.setup,
                 tolerance_um=tolerance_um,
                 outside_box="hold" if outside_box == "hold" else "refuse",
                 flatten=flatten,
@@ -95,16 +103,16 @@ def command(
                 progress=show,
             )
         except ProgramError as error:
-            raise error.in_file(shown(program)) from None
+            raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
     written = {Path(name): result.data for name in files_of(output)}
     written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
-    write_files(written, force=force, inputs=inputs)
+    write_files(written, force=force, inputs=call.inputs)
     on_stderr = output == STREAM
     if on_stderr:
         put(result.data)
     if show_diff:
-        put(_diff(given, result, machine, job, on_stderr), err=on_stderr)
+        put(_diff(nominal, result, call.setup.machine, on_stderr), err=on_stderr)
     if as_json:
         put(report.to_json(result.report))
     elif not quiet:
@@ -120,17 +128,17 @@ def _default_output(program: str) -> str:
     return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
 
 
-def _diff(given: str | bytes, result: Correction, machine: str, job: str | None, on_stderr: bool) -> str:
+def _diff(nominal: str | bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:
     from olp.cli.diff import render
-    from olp.files.config import load_setup
     from olp.files.write import read_bytes
     from olp.program.profiles import PROFILES
 
-    described = load_setup(machine, job).machine
-    profile = PROFILES.get(described.controller)
+    profile = PROFILES.get(machine.controller)
+    largest_um = float(result.report.get("largest_correction_um", 0.0))
     return render(
-        given if isinstance(given, bytes) else read_bytes(given),
+        nominal if isinstance(nominal, bytes) else read_bytes(nominal),
         result.data,
-        increments_mm=described.least_increment_mm if profile and profile.increments_without_point else None,
+        near_um=1.1 * largest_um + LAST_DIGITS_UM,
+        increments_mm=machine.least_increment_mm if profile and profile.increments_without_point else None,
         colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
     )

@@ -1,7 +1,7 @@
 """What a correction changed, line by line, from the two texts: nominal, corrected, and the change in um.
 
-A line of one text is the partner of a line of the other where both leave the axes at the same place, as far as
-words tell, and the corrected one says nothing besides that the nominal one does not say. A line without
+A line of one text is the partner of a line of the other where both leave the axes at the same place, as far
+as words tell, and the corrected one says nothing else that the nominal one does not say. A line without
 partner was inserted (`+`) or left out (`-`); of a split block the last part is the partner.
 """
 
@@ -33,8 +33,8 @@ _AXIS_OF = {"X": 0, "Y": 1, "Z": 2, "I": 0, "J": 1, "K": 2, "R": 0}
 _UNIT_UM = {"20": 25400.0, "21": 1000.0, "70": 25400.0, "71": 1000.0}
 #: Behind these no word of an earlier line holds: moves of the control, changes of frame, cycles.
 _FORGET = frozenset(
-    ("28", "30", "52", "53", "43", "44", "49", "76", "92.1", "92.2", "92.3")
-    + tuple(str(code) for code in (*range(54, 60), 73, 74, *range(81, 90)))
+    str(code)
+    for code in (28, 30, 43, 44, 49, 52, 53, *range(54, 60), 73, 74, 76, *range(81, 90), 92.1, 92.2, 92.3)
 )
 #: Coordinates here are no positions of axes.
 _NO_MOVE = frozenset(("4", "10"))
@@ -47,8 +47,8 @@ Pair = tuple[int | None, int | None]
 
 @dataclass(slots=True)
 class Line:
-    """A line's text, its lengths in um by letter, all words that a correction leaves alone, and the place in um
-    where its words leave the axes."""
+    """A line's text, its lengths in um by letter, the words that a correction leaves alone, and the place in
+    um where its words leave the axes."""
 
     text: str
     lengths: dict[str, float]
@@ -171,7 +171,7 @@ def render(
     increments_mm: Increments | None = None,
     colour: bool = False,
 ) -> str:
-    """The changed lines as text: line of the nominal program, nominal, corrected, change of each length in um.
+    """The changed lines as text: line in the nominal program, nominal, corrected, change of lengths in um.
 
     The change of an axis is that of its position: corrected command minus nominal command. No correction is
     larger than `near_um`. `increments_mm` are the least increments of a control that counts them in numbers
@@ -190,13 +190,13 @@ def render(
             rows.append((f"- {i + 1}", nominal[i].text, "", ""))
         elif nominal[i].text != corrected[j].text:
             counts["changed"] += 1
-            changes = "  ".join(_changes(nominal[i], corrected[j]))
+            changes = "  ".join(_changes(nominal[i], corrected[j], near_um))
             rows.append((str(i + 1), nominal[i].text, corrected[j].text, changes))
     total = ", ".join(f"{count} {what}" for what, count in counts.items())
     return "".join(_table(rows, colour)) + f"lines: {total}\n"
 
 
-def _changes(nominal: Line, corrected: Line) -> Iterator[str]:
+def _changes(nominal: Line, corrected: Line, near_um: float) -> Iterator[str]:
     for letter, value in corrected.lengths.items():
         if letter in AXES:
             axis = _AXIS_OF[letter]
@@ -205,7 +205,8 @@ def _changes(nominal: Line, corrected: Line) -> Iterator[str]:
                 continue
         else:
             change = value - nominal.lengths.get(letter, math.nan)
-            if change == 0.0:
+            # The last part of a split arc has its centre elsewhere, seen from its own start.
+            if change == 0.0 or not abs(change) <= near_um:
                 continue
         yield f"{letter} new" if math.isnan(change) else f"{letter}{change:+.1f}"
 

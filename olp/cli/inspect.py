@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +10,14 @@ import click
 
 from olp.cli.common import (
     files_of,
-    needed_machine,
+    machine_given,
     put,
     refuse_early,
     setup_options,
-    shown,
     source,
     talk,
 )
-from olp.exceptions import ProgramError, UsageError
+from olp.exceptions import UsageError
 
 if TYPE_CHECKING:
     from olp.errormodel import Calibration
@@ -51,82 +50,75 @@ def command(
 
     A file that ends in .toml is a machine file. --at and --plot ask the machine, not the program.
     """
+    ask_program = False
     if file is not None and Path(file).suffix.lower() == ".toml":
         if machine is not None:
             raise UsageError("the machine is given twice; name it once, as argument or with -m")
         file, machine = None, file
-    machine, file = _from_job(machine, file, job, ask_machine=at is not None or plot is not None)
+    elif file is None and machine is None:
+        ask_program = at is None and plot is None
+    setup, inputs = machine_given(machine, job)
+    if ask_program:
+        file = setup.job.program
     if tool is not None and at is None:
         raise UsageError("--tool belongs to --at; give the axis position with --at X Y Z")
     if plot is not None and Path(plot).suffix.lower() not in _FORMATS:
         raise UsageError(f"the plot {plot!r} ends in no known format; expected .svg or .png")
-    inputs = files_of(file, machine, job)
-    refuse_early(files_of(plot), inputs, force=force)
+    refuse_early(files_of(plot), (*inputs, *files_of(file)), force=force)
 
     if plot is not None:
-        _plot(machine, job, plot, inputs, force)
+        _plot(setup, plot, inputs, force)
     if at is not None:
         from olp import api
 
-        values = api.error_at(machine, at, tool, job)
+        values = shown = api.error_at(setup, at, tool)
     elif plot is not None:
         return
     elif file is None:
-        values = machine_summary(machine, job)
+        values = shown = machine_summary(setup)
     else:
         from olp import api
 
-        try:
-            values = api.inspect(source(file), machine, job)
-        except ProgramError as error:
-            raise error.in_file(shown(file)) from None
+        values = api.inspect(source(file), setup)
+        shown = values | {"support": _by_support(values.get("support") or ())}
     from olp.cli.outline import outline
     from olp.report import to_json
 
-    put(to_json(values) if as_json else outline(values))
+    put(to_json(values) if as_json else outline(shown))
 
 
-def _from_job(
-    machine: str | None, program: str | None, job: str | None, *, ask_machine: bool
-) -> tuple[str, str | None]:
-    """Machine and program; only a call that names neither and asks nothing takes the program of the job."""
-    if job is not None and machine is None:
-        from olp.files.config import load_job
-
-        stated = load_job(job)
-        machine = stated.machine
-        if program is None and not ask_machine:
-            program = stated.program
-    return needed_machine(machine), None if ask_machine else program
-
-
-def _plot(machine: str, job: str | None, name: str, inputs: Sequence[str], force: bool) -> None:
+def _plot(setup: Setup, name: str, inputs: Sequence[str], force: bool) -> None:
     from olp.files.write import write_bytes
     from olp.plots import calibration_curves
 
-    _, calibration = _load(machine, job)
-    data = calibration_curves(calibration, "png" if Path(name).suffix.lower() == ".png" else "svg")
+    data = calibration_curves(_calibration(setup), "png" if Path(name).suffix.lower() == ".png" else "svg")
     write_bytes(name, data, force=force, inputs=inputs)
     talk(f"wrote {name}")
 
 
-def _load(machine: str, job: str | None) -> tuple[Setup, Calibration]:
-    from olp.files.config import load_calibration, load_setup
+def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:
+    """The statements of a support matrix by what becomes of them; the JSON holds the reasons too."""
+    kinds = dict.fromkeys(row["support"] for row in matrix)
+    return {kind: " ".join(row["statement"] for row in matrix if row["support"] == kind) for kind in kinds}
 
-    setup = load_setup(machine, job)
-    if setup.machine.calibration is None:
-        raise UsageError("names no calibration; set the key calibration of the machine file", file=machine)
+
+def _calibration(setup: Setup) -> Calibration:
+    from olp.files.calibration import load_calibration
+
     path = setup.machine.calibration
-    return setup, load_calibration(path, setup.machine, setup.job.temperatures_degC)
+    if path is None:
+        raise UsageError(
+            f"machine {setup.machine.name!r} names no calibration; set the key calibration in its file"
+        )
+    return load_calibration(path, setup.machine, setup.job.temperatures_degC)
 
 
-def machine_summary(machine: str, job: str | None) -> dict[str, Any]:
+def machine_summary(setup: Setup) -> dict[str, Any]:
     """Axes, chain, calibration and the size of each of the 21 errors, with units in the keys."""
     from olp.machine import COMPONENTS, SQUARENESS
     from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 
-    setup, calibration = _load(machine, job)
-    described = setup.machine
+    calibration, described = _calibration(setup), setup.machine
     position, angular = (
         [_size(calibration, name, unit, scale) for name in COMPONENTS if name[1] in senses]
         for senses, unit, scale in (("XYZ", "um", UM_PER_MM), ("ABC", "urad", 1.0 / RAD_PER_URAD))

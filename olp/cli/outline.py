@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from olp.report import findings_text, pairs, printable, table
+from olp.units import AXES
 
 Summary = Mapping[str, Any]
 
@@ -56,11 +57,19 @@ def _records(value: Summary | Sequence[Summary]) -> tuple[list[str], list[Summar
 
 def _table(names: Sequence[str], rows: Sequence[Summary]) -> Iterator[str]:
     keys = list(dict.fromkeys(key for row in rows for key in row))
-    cells = [
-        [printable(name), *(_text(row.get(key)) for key in keys)]
-        for name, row in zip(names, rows, strict=True)
-    ]
-    yield from table(["", *map(_title, keys)], cells)
+    # Words to the left, numbers to the right.
+    keys.sort(key=lambda key: not any(isinstance(row.get(key), str) for row in rows))
+    words = sum(any(isinstance(row.get(key), str) for row in rows) for key in keys)
+    header, columns = [""], [[printable(name) for name in names]]
+    for key in keys:
+        values = [row.get(key) for row in rows]
+        if all(isinstance(value, list | tuple) and len(value) == len(AXES) for value in values):
+            header += [f"{_title(key)} {axis}" for axis in AXES]
+            columns += [[_text(value[axis]) for value in values if value] for axis in range(len(AXES))]
+        else:
+            header.append(_title(key))
+            columns.append([_text(value) for value in values])
+    yield from table(header, zip(*columns, strict=True), left=1 + words)
 
 
 def _title(key: object) -> str:
@@ -73,7 +82,9 @@ def _text(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.3f}".rstrip("0").rstrip(".") if abs(value) >= 5e-4 or value == 0 else f"{value:.1e}"
+        if 0.0 < abs(value) < 5e-4:
+            return f"{value:.1e}"
+        return f"{value:.3f}".rstrip("0").rstrip(".") if value else "0"
     if isinstance(value, list | tuple | set | frozenset):
         return ", ".join(map(_text, value))
     return printable(str(value))

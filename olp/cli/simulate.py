@@ -8,15 +8,13 @@ from olp.cli.common import (
     STREAM,
     Length,
     files_of,
-    needed,
+    given,
     put,
     refuse_early,
     setup_options,
-    shown,
     source,
     talk,
 )
-from olp.exceptions import ProgramError
 
 
 @click.command("simulate")
@@ -26,28 +24,31 @@ from olp.exceptions import ProgramError
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
+@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 def command(
-    program: str | None, machine: str | None, job: str | None, output: str, step_mm: float, force: bool
+    program: str | None,
+    machine: str | None,
+    job: str | None,
+    output: str,
+    step_mm: float,
+    contour: bool,
+    force: bool,
 ) -> None:
     """Write the path that the machine would really take, as CSV.
 
     The points are those of the tool tip, in the first work frame of the program.
     """
-    program, machine = needed(program, machine, job)
-    inputs = files_of(program, machine, job)
-    refuse_early(files_of(output), inputs, force=force)
+    call = given(program, machine, job)
+    refuse_early(files_of(output), call.inputs, force=force)
 
     from olp import api
     from olp.files.write import write_bytes
 
-    try:
-        result = api.simulate(source(program), machine, job, step_mm=step_mm)
-    except ProgramError as error:
-        raise error.in_file(shown(program)) from None
+    result = api.simulate(source(call.program), call.setup, step_mm=step_mm, contour=contour)
     data = result.to_csv()
     if output == STREAM:
         put(data)
         return
-    write_bytes(output, data, force=force, inputs=inputs)
+    write_bytes(output, data, force=force, inputs=call.inputs)
     talk(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")

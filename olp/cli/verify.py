@@ -9,14 +9,13 @@ import click
 from olp.cli.common import (
     STREAM,
     exit_for,
-    needed,
+    given,
     proof_options,
     put,
     setup_options,
-    shown,
     source,
 )
-from olp.exceptions import ProgramError, UsageError
+from olp.exceptions import UsageError
 
 
 @click.command("verify")
@@ -30,7 +29,6 @@ def command(
     machine: str | None,
     job: str | None,
     tolerance_um: float,
-    outside_box: str,
     contour: bool,
     date: datetime.datetime | None,
     as_json: bool,
@@ -43,22 +41,17 @@ def command(
     """
     if nominal == corrected == STREAM:
         raise UsageError("NOMINAL and CORRECTED cannot both come from stdin; name one of the files")
-    nominal, machine = needed(nominal, machine, job)
+    call = given(nominal, machine, job)
 
     from olp import api, report
 
-    try:
-        result = api.verify(
-            source(nominal),
-            source(corrected),
-            machine,
-            job,
-            tolerance_um=tolerance_um,
-            outside_box="hold" if outside_box == "hold" else "refuse",
-            contour=contour,
-            date=date.date() if date else None,
-        )
-    except ProgramError as error:
-        raise error.in_file(shown(STREAM)) from None
+    result = api.verify(
+        source(nominal),
+        source(corrected),
+        call.setup,
+        tolerance_um=tolerance_um,
+        contour=contour,
+        date=date.date() if date else None,
+    )
     put(report.to_json(result.report) if as_json else report.to_text(result.report))
     exit_for(result.findings, fail_on)

@@ -15,8 +15,7 @@ from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array
-from olp.exceptions import ProgramError
-from olp.program.edits import Edits
+from olp.program.edits import EditList, Edits
 from olp.program.program import Hole, Program
 from olp.geometry import PLANES
 from olp.toolpath import Flag
@@ -35,7 +34,7 @@ class HolePlan:
     lean_mm: Array
 
     @staticmethod
-    def of(program: Program, plan: Plan, model: ErrorModel, tolerance_mm: float) -> HolePlan:
+    def of(program: Program, plan: Plan, model: ErrorModel) -> HolePlan:
         path, holes = program.toolpath, program.holes
         count = len(holes)
         level, bottom = np.zeros((count, 3)), np.zeros((count, 3))
@@ -48,127 +47,149 @@ class HolePlan:
             tool[i], shift[i] = path.frames[frame].tool_mm, plan.shift_mm[frame]
         if not count:
             return HolePlan(holes, level, bottom, np.zeros(0))
-        c_level, _ = invert(model, level + shift, tool)
-        c_bottom, _ = invert(model, bottom + shift, tool)
+        level_play, bottom_play = _play(program, plan)
+        c_level, _ = invert(model, level + shift, tool, level_play)
+        c_bottom, _ = invert(model, bottom + shift, tool, bottom_play)
         lean = np.abs(c_level - c_bottom) / 2
         for i, hole in enumerate(holes):
             lean[i, PLANES[hole.plane][2]] = 0.0
             off = np.array([bool(path.flag[hole.first] & np.uint8(Flag.PASS))])
             if off[0]:
                 c_level[i], c_bottom[i] = level[i], bottom[i]
-            if hole.repeats > 1 and hole.incremental:
-                _check_repeats(program, plan, model, hole, c_bottom[i] - bottom[i], tolerance_mm)
         return HolePlan(holes, c_level, c_bottom, np.sqrt((lean * lean).sum(axis=1)))
 
 
-def _check_repeats(
-    program: Program, plan: Plan, model: ErrorModel, hole: Hole, correction: Array, tolerance_mm: float
-) -> None:
-    """Repeats of one block share its words, so they must need the same correction."""
+def _play(program: Program, plan: Plan) -> tuple[Array | None, Array | None]:
+    """(h, 3) play of the axes when a hole's R level and its bottom are reached."""
+    if plan.play is None:
+        return None, None
     path = program.toolpath
-    part = slice(hole.first, hole.last)
-    frame = path.frames[int(path.frame[hole.first])]
-    target = path.end_mm[part] + plan.shift_mm[int(path.frame[hole.first])]
-    command, _ = invert(model, target, np.array(frame.tool_mm))
-    spread = np.abs(command - path.end_mm[part] - correction).max()
-    if spread > tolerance_mm:
-        raise ProgramError(
-            f"a cycle with L{hole.repeats} makes holes that need different corrections ({spread * 1e3:.1f} um apart); "
-            "write the cycles out with --expand-cycles",
-            line=hole.line,
-        )
+    rows = np.zeros((2, len(program.holes)), np.int64)
+    for i, hole in enumerate(program.holes):
+        depth = path.end_mm[hole.first : hole.last, PLANES[hole.plane][2]]
+        level = np.flatnonzero(depth == hole.r_mm)
+        bottom = np.flatnonzero(depth == hole.z_mm)
+        moves = hole.first + (level[:1] if level.size else bottom[:1]), hole.first + bottom[-1:]
+        rows[:, i] = [int(np.searchsorted(plan.move, m[0])) if m.size else 0 for m in moves]
+    return plan.play[rows[0]], plan.play[rows[1]]
 
 
 def hole_edits(writer: Writer, rows: Rows, a: int, b: int) -> list[Edits]:
-    """Edits of the cycle block whose moves are rows a..b, and the positions after it."""
+    """Edits of the cycle block whose moves are rows a..b, and the positions after it.
+
+    Repeats of a block in G91 share its words but not their corrections: they are written out, one block a hole.
+    """
     plan = writer.holes
-    move = int(rows.move[a])
-    index = writer.hole_of[move]
+    edits = EditList(writer.prefixes)
+    index = writer.hole_of[int(rows.move[a])]
+    first = int(rows.move[a])
+    while index < len(plan.holes) and plan.holes[index].first <= int(rows.move[b - 1]):
+        hole = plan.holes[index]
+        _hole(writer, rows, index, a + hole.first - first, a + hole.last - first, edits)
+        index += 1
+    return [edits.done()]
+
+
+def _hole(writer: Writer, rows: Rows, index: int, a: int, b: int, edits: EditList) -> None:
+    plan = writer.holes
     hole = plan.holes[index]
+    if b <= a:
+        return
     first, second, third = PLANES[hole.plane]
-    frame = writer.frame_of(move)
+    frame = writer.frame_of(hole.first)
     before = rows.emitted[a - 1].copy() if a else rows.entry.copy()
+    if rows.flag[a] & np.uint8(Flag.PASS):
+        rows.emitted[a:b] = writer.path.end_mm[hole.last - 1]
+        return
     if writer.series != hole.series:
         writer.series, writer.initial = hole.series, float(before[third])
         writer.sticky = {}
+    out = _Words(writer, hole, edits)
     command = (plan.level_mm[index] + plan.bottom_mm[index]) / 2
     emitted = before.copy()
-    out: list[Edits] = []
-    anchor = max(hole.words[k] for k in hole.words if k in "XYZR") if set(hole.words) & set("XYZR") else None
-    if anchor is None:
-        anchor = max(hole.words.values())
     for axis in (first, second):
-        slot = hole.words.get("XYZ"[axis])
-        decimals = _decimals(writer, slot, axis, frame.unit_mm)
         base = before[axis] if hole.incremental else frame.offset_mm[axis]
+        slot = out.slot("XYZ"[axis])
+        decimals = _decimals(writer, slot, axis, frame.unit_mm)
         mantissa = round((command[axis] - base) / frame.unit_mm * 10**decimals)
-        place = base + mantissa / 10**decimals * frame.unit_mm
-        if hole.incremental and slot is not None and hole.repeats > 1:
-            # every repeat steps by the word, so it stays as it is, and the start carries the correction
-            place = before[axis] + hole.repeats * _word(writer, slot, axis) * frame.unit_mm
-        elif slot is not None:
-            out += _replace(writer, slot, axis, mantissa, decimals)
-        elif abs(command[axis] - before[axis]) > 0.5 * 10.0**-decimals * frame.unit_mm * (1 + 1e-9):
-            out.append(_insert(writer, anchor, "XYZ"[axis], mantissa, decimals, axis + 1))
-        else:
-            place = before[axis]
-        emitted[axis] = place
+        moved = abs(command[axis] - before[axis]) > 0.5 * 10.0**-decimals * frame.unit_mm * (1 + 1e-9)
+        if slot is not None or moved:
+            emitted[axis] = base + mantissa / 10**decimals * frame.unit_mm
+            out.put("XYZ"[axis], axis, mantissa, decimals)
     r_base = writer.initial if hole.incremental else frame.offset_mm[third]
-    r_place, r_edits = _depth(writer, hole, "R", plan.level_mm[index][third], r_base, third, anchor, frame.unit_mm, 8)
+    r_place = _depth(writer, out, "R", plan.level_mm[index][third], r_base, third, frame.unit_mm)
     z_base = r_place if hole.incremental else frame.offset_mm[third]
-    _, z_edits = _depth(
-        writer, hole, "XYZ"[third], plan.bottom_mm[index][third], z_base, third, anchor, frame.unit_mm, third + 1
-    )
-    out += r_edits + z_edits
+    _depth(writer, out, "XYZ"[third], plan.bottom_mm[index][third], z_base, third, frame.unit_mm)
+    out.finish()
     retract_to_r = abs(writer.path.end_mm[hole.last - 1, third] - hole.r_mm) < 1e-9
     emitted[third] = r_place if retract_to_r else max(writer.initial, r_place)
     rows.emitted[a:b] = emitted
-    return out
 
 
-def _depth(
-    writer: Writer, hole: Hole, letter: str, wanted: float, base: float, axis: int, anchor: int, unit: float, order: int
-) -> tuple[float, list[Edits]]:
-    """R or the depth word: replaced where given, inserted where the inherited value would be wrong."""
-    slot = hole.words.get(letter)
+class _Words:
+    """Where a hole's words go: into its block, or, for the later repeats in G91, into a block of their own."""
+
+    def __init__(self, writer: Writer, hole: Hole, edits: EditList) -> None:
+        self.writer, self.hole, self.edits = writer, hole, edits
+        self.own_block = hole.incremental and hole.repeat > 0
+        words = {k: v for k, v in hole.words.items() if k in "XYZR"} or hole.words
+        self.anchor = max(words.values())
+        self.new: list[tuple[str, int, int]] = []
+        counter = hole.words.get("L", hole.words.get("K") if writer.program.profile.name != "linuxcnc" else None)
+        if hole.incremental and hole.repeats > 1 and hole.repeat == 0 and counter is not None:
+            edits.add(int(writer.words.number[counter]), int(writer.words.end[counter]), 1, 0)
+
+    def slot(self, letter: str) -> int | None:
+        return None if self.own_block else self.hole.words.get(letter)
+
+    def put(self, letter: str, axis: int, mantissa: int, decimals: int) -> None:
+        """Replace the word, or insert it."""
+        slot = self.slot(letter)
+        if slot is None:
+            self.new.append((letter, mantissa, decimals))
+            return
+        words = self.writer.words
+        own = self.writer.style.decimals_of(slot, axis)
+        if int(words.mantissa[slot]) * 10 ** (decimals - own) != mantissa:
+            self.edits.add(int(words.number[slot]), int(words.end[slot]), mantissa, decimals)
+            self.writer.tally.changed_words += 1
+
+    def finish(self) -> None:
+        writer, style = self.writer, self.writer.style
+        if not self.own_block:
+            place = int(writer.words.end[self.anchor])
+            for i, (letter, mantissa, decimals) in enumerate(self.new):
+                text = style.lead(self.anchor) + style.cased(self.anchor, letter.encode())
+                self.edits.add(place, place, mantissa, decimals, text, i + 1)
+                writer.tally.inserted_words += 1
+            return
+        place = int(writer.program.line_end[self.hole.line - 1])
+        lead = writer.block_start(self.hole.line)
+        if not self.new:
+            # a repeat without any step makes the same hole again
+            self.new = [("X", 0, 0)]
+        for i, (letter, mantissa, decimals) in enumerate(self.new):
+            self.edits.add(place, place, mantissa, decimals, lead + letter.encode(), self.hole.repeat * 8 + 16 + i)
+            lead = b" "
+        writer.tally.inserted_blocks += 1
+
+
+def _depth(writer: Writer, out: _Words, letter: str, wanted: float, base: float, axis: int, unit: float) -> float:
+    """R or the depth word: replaced where given, inserted where the inherited value would be wrong. Returns where
+    the axis then is."""
+    slot = out.slot(letter)
     decimals = _decimals(writer, slot, axis, unit)
     mantissa = round((wanted - base) / unit * 10**decimals)
-    edits: list[Edits] = []
     held = writer.sticky.get(letter)
-    if slot is not None:
-        edits = _replace(writer, slot, axis, mantissa, decimals)
-        if not edits:
-            mantissa = round(_word(writer, slot, axis) * 10**decimals)
-    elif held is not None and abs(wanted - base - held * unit) <= 0.5 * 10.0**-decimals * unit * (1 + 1e-9):
-        return base + held * unit, []
-    else:
-        edits = [_insert(writer, anchor, letter, mantissa, decimals, order)]
+    if slot is None and held is not None:
+        if abs(wanted - base - held * unit) <= 0.5 * 10.0**-decimals * unit * (1 + 1e-9):
+            return base + held * unit
+    out.put(letter, axis, mantissa, decimals)
     writer.sticky[letter] = mantissa / 10**decimals
-    return base + mantissa / 10**decimals * unit, edits
+    return base + mantissa / 10**decimals * unit
 
 
 def _decimals(writer: Writer, slot: int | None, axis: int, unit: float) -> int:
     if slot is None:
         return writer.style.usual(axis, unit)
-    own = int(writer.style.decimals(np.array([slot]), axis)[0])
-    return max(own, writer.style.least(axis, unit))
-
-
-def _word(writer: Writer, slot: int, axis: int) -> float:
-    return float(writer.words.mantissa[slot]) / 10.0 ** int(writer.style.decimals(np.array([slot]), axis)[0])
-
-
-def _replace(writer: Writer, slot: int, axis: int, mantissa: int, decimals: int) -> list[Edits]:
-    own = int(writer.style.decimals(np.array([slot]), axis)[0])
-    if int(writer.words.mantissa[slot]) * 10 ** (decimals - own) == mantissa:
-        return []
-    writer.tally.changed_words += 1
-    return [writer.one(int(writer.words.number[slot]), int(writer.words.end[slot]), mantissa, decimals, b"", 0)]
-
-
-def _insert(writer: Writer, anchor: int, letter: str, mantissa: int, decimals: int, order: int) -> Edits:
-    style = int(writer.style.separators(np.array([anchor]), writer.program)[0])
-    text = (b"", b" ", b"\t")[style % 3] + (letter.lower() if style >= 3 else letter).encode()
-    place = int(writer.words.end[anchor])
-    writer.tally.inserted_words += 1
-    return writer.one(place, place, mantissa, decimals, text, order)
+    return max(writer.style.decimals_of(slot, axis), writer.style.least(axis, unit))

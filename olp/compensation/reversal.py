@@ -15,7 +15,7 @@ import numpy as np
 from olp.compensation.invert import invert
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
-from olp.toolpath import Kind, Toolpath
+from olp.toolpath import Flag, Kind, Toolpath
 
 if TYPE_CHECKING:
     from olp.compensation.plan import Plan
@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reversal:
-    """`axes` (3,) with lost motion worth the trouble; `band_mm` an axis may stay behind rather than turn."""
+    """`axes` (3,) with lost motion worth the trouble; `band_mm` an axis may stay behind rather than turn;
+    `lost_mm` (3,) the largest lost motion of each."""
 
     axes: Mask
     band_mm: float
+    lost_mm: Array
 
     @staticmethod
     def of(model: ErrorModel, band_mm: float) -> Reversal | None:
@@ -36,7 +38,7 @@ class Reversal:
         if lost is None:
             return None
         axes = np.abs(lost).max(axis=0) / 2 > band_mm
-        return Reversal(axes, band_mm) if axes.any() else None
+        return Reversal(axes, band_mm, lost.max(axis=0)) if axes.any() else None
 
 
 def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal) -> Plan:
@@ -44,39 +46,39 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     a row that only takes it up comes first."""
     # without play a command is where the load has to be; the load's turns are the axis' turns
     play = np.zeros((len(rows), 3))
-    load = np.where(rows.raw, rows.target_mm, rows.command_mm)
+    wanted = np.where(rows.raw, rows.target_mm, rows.command_mm)
+    load = wanted.copy()
     for axis in np.flatnonzero(reversal.axes).tolist():
-        play[:, axis], load[:, axis] = _follow(load[:, axis], reversal.band_mm)
+        play[:, axis], load[:, axis] = _follow(wanted[:, axis], reversal.band_mm, max(float(reversal.lost_mm[axis]), 0.0))
     tools = path.tool_mm()
     tool = tools if tools.ndim == 1 else tools[rows.move]
-    mean, _ = invert(model, np.nan_to_num(rows.target_mm), tool)
     # a held axis aims at where its load stays, not at where it should be
-    held = np.nan_to_num(load - np.where(rows.raw, rows.target_mm, rows.command_mm))
+    held = np.nan_to_num(load - wanted)
     command, _ = invert(model, rows.target_mm + held, tool, play)
     command[rows.raw] = rows.command_mm[rows.raw]
-    del mean
-    result = replace(rows, command_mm=command, play=play)
-    return _take_up(path, model, result, tool, held)
+    return _take_up(path, model, replace(rows, command_mm=command, play=play), tool, held)
 
 
-def _follow(position: Array, band: float) -> tuple[Array, Array]:
-    """Play state and load position of one axis: it follows in its direction, and turns only beyond the band."""
-    state, at = 0.0, float("nan")
+def _follow(position: Array, band: float, lost: float) -> tuple[Array, Array]:
+    """Play state and load position of one axis: it follows in its direction, and turns only beyond the band. At
+    the start nobody knows the flank; it is known once the axis has moved by its lost motion in one direction."""
+    state = 0.0
+    at = low = high = float("nan")
     states, loads = [], []
     for wanted in position.tolist():
-        if wanted != wanted:
+        if wanted != wanted or at != at:
             state = 0.0
-        elif at != at:
+            at = low = high = wanted
+        elif state == 0.0:
+            at, low, high = wanted, min(low, wanted), max(high, wanted)
+            if wanted - low > lost + band:
+                state = 1.0
+            elif high - wanted > lost + band:
+                state = -1.0
+        elif (wanted - at) * state > 0:
             at = wanted
-        else:
-            step = wanted - at
-            if step * state > 0 or (state == 0.0 and step == 0.0):
-                at = wanted
-            elif step > band or step < -band:
-                state = 1.0 if step > 0 else -1.0
-                at = wanted
-        if wanted != wanted:
-            at = wanted
+        elif abs(wanted - at) > band:
+            state, at = -state, wanted
         states.append(state)
         loads.append(at)
     return np.array(states), np.array(loads)
@@ -87,7 +89,7 @@ def _take_up(path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: A
     assert rows.play is not None
     change = np.zeros(len(rows), bool)
     change[1:] = ((rows.play[1:] != rows.play[:-1]) & ~rows.raw[1:] & ~np.isnan(rows.command_mm[:-1])).any(axis=1)
-    change &= path.kind[rows.move] != Kind.RAPID
+    change &= (path.kind[rows.move] != Kind.RAPID) & ((path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0)
     where = np.flatnonzero(change)
     if not where.size:
         return rows

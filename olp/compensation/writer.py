@@ -68,7 +68,7 @@ class Writer:
         self.targets = targets(self.path, plan.shift_mm)
         self.emitted = [float(v) for v in self.path.start_mm]
         self.parts = np.zeros(len(self.path), np.int32)
-        self.holes = HolePlan.of(program, plan, model, tolerance_mm)
+        self.holes = HolePlan.of(program, plan, model)
         self.hole_of = {m: i for i, hole in enumerate(program.holes) for m in range(hole.first, hole.last)}
         self.series, self.initial = -1, 0.0
         self.sticky: dict[str, float] = {}

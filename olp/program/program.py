@@ -45,10 +45,11 @@ class ArcSlots:
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """One block of a canned cycle: its moves `first`..`last` of the toolpath and its words by letter.
+    """One hole of a canned cycle: its moves `first`..`last` of the toolpath and its block's words by letter.
 
     `x_mm`, `y_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
-    `series` counts contiguous cycles; a block of one series inherits R and Z of the one before.
+    `series` counts contiguous cycles; a block of one series inherits R and Z of the one before. `repeat` counts
+    the `repeats` holes of one block from 0.
     """
 
     line: int
@@ -61,6 +62,7 @@ class Hole:
     z_mm: float
     initial_mm: float
     incremental: bool
+    repeat: int
     repeats: int
     series: int
     code: int

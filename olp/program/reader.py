@@ -558,8 +558,8 @@ class _Reader:
                 line=line,
             )
         start = (state.position[0], state.position[1], state.position[2])
-        begin = self.moves
-        for _ in range(times):
+        flag = Flag.CYCLE | (Flag.DELETED if chunk.deleted[at] else Flag(0)) | self._switched(line)
+        for repeat in range(times):
             try:
                 strokes = hole_moves(
                     code, start=start, xy=(place[0], place[1]), r=r, z=z, q=self.sticky.get("Q"),
@@ -570,7 +570,7 @@ class _Reader:
                 raise ProgramError(error.message, line=line) from None
             moving = [s for s in strokes if s.kind in ("rapid", "feed")]
             count = len(moving)
-            flag = Flag.CYCLE | (Flag.DELETED if chunk.deleted[at] else Flag(0))
+            begin = self.moves
             self._put_moves(
                 np.array([Kind.RAPID if s.kind == "rapid" else Kind.LINE for s in moving], np.uint8),
                 np.full(count, flag, np.uint8),
@@ -579,26 +579,22 @@ class _Reader:
                 np.array([s.point for s in moving], float).reshape(count, 3),
                 np.full((count, 3), -1),
             )
+            self.holes.append(
+                Hole(
+                    line=line, first=begin, last=self.moves,
+                    words={letter: context.base + i for letter, i in words.items()}, plane=plane,
+                    place_mm=(place[0], place[1]), r_mm=r, z_mm=z, initial_mm=self.series_initial,
+                    incremental=incremental, repeat=repeat, repeats=times, series=int(self.series), code=code,
+                )
+            )  # fmt: skip
             start = moving[-1].point if moving else start
             place = [place[0] + step[0], place[1] + step[1]]
         state.position[:] = list(start)
-        self.holes.append(
-            Hole(
-                line=line,
-                first=begin,
-                last=self.moves,
-                words={letter: context.base + i for letter, i in words.items()},
-                plane=plane,
-                place_mm=(place[0] - step[0], place[1] - step[1]),
-                r_mm=r,
-                z_mm=z,
-                initial_mm=self.series_initial,
-                incremental=incremental,
-                repeats=times,
-                series=int(self.series),
-                code=code,
-            )
-        )
+
+    def _switched(self, line: int) -> Flag:
+        """PASS in a section that `(olp off)` exempts."""
+        k = int(np.searchsorted(self.switch_lines, line - 1, "right"))
+        return Flag.PASS if k and self.switch_off[k - 1] else Flag(0)
 
     def _control_move(self, line: int, chunk: WordChunk, at: int) -> None:
         """A move of the control's own: some axes are unknown after it."""

@@ -12,6 +12,7 @@ from olp.deviation import Deviation, Index, cutting_moves, measure
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.exceptions import ProgramError
+from olp.program.program import Program
 from olp.proof.matching import match
 from olp.toolpath import Flag, Kind, Toolpath
 
@@ -61,8 +62,8 @@ def uncorrected_starts(path: Toolpath, passed: Mask) -> Mask:
 
 
 def prove(
-    nominal: Toolpath,
-    corrected: Toolpath,
+    nominal: Program,
+    corrected: Program,
     model: ErrorModel,
     *,
     tolerance_mm: float,
@@ -72,19 +73,30 @@ def prove(
 ) -> Proof:
     """Hold the corrected path against the nominal one. `passed` are nominal moves written uncorrected; `parts` (n,)
     says how many corrected moves each nominal one became, and is found from the paths where it is not given."""
-    target = targets(nominal, zero_shifts(nominal.frames, model))
-    exempt = np.zeros(len(nominal), bool)
+    path, written = nominal.toolpath, corrected.toolpath
+    target = targets(path, zero_shifts(path.frames, model))
+    exempt = np.zeros(len(path), bool)
     exempt[passed] = True
-    loose = uncorrected_starts(nominal, exempt)
-    groups = match(nominal, target, corrected, model) if parts is None else np.cumsum(parts) - 1
-    if len(groups) and int(groups[-1]) != len(corrected) - 1:
+    loose = uncorrected_starts(path, exempt)
+    groups = match(nominal, target, corrected, model) if parts is None else np.cumsum(_with_pecks(nominal, corrected, parts)) - 1
+    if len(groups) and int(groups[-1]) != len(written) - 1:
         raise ProgramError(
-            f"the corrected program has {len(corrected)} moves where {int(groups[-1]) + 1} were expected; it was not "
+            f"the corrected program has {len(written)} moves where {int(groups[-1]) + 1} were expected; it was not "
             "written"
         )
-    after = measure(nominal, target, corrected, groups, model, tolerance_mm * _BEND_SHARE, exempt)
-    before = measure(nominal, target, nominal, np.arange(len(nominal)), model, 1e-3, exempt)
-    return Proof(nominal, before, after, tolerance_mm, digit_mm, cutting_moves(nominal), loose)
+    after = measure(path, target, written, groups, model, tolerance_mm * _BEND_SHARE, exempt)
+    before = measure(path, target, path, np.arange(len(path)), model, 1e-3, exempt)
+    return Proof(path, before, after, tolerance_mm, digit_mm, cutting_moves(path), loose)
+
+
+def _with_pecks(nominal: Program, corrected: Program, parts: Index) -> Index:
+    """A corrected depth may take one peck more or less; the last stroke of a hole answers for the difference."""
+    parts = parts.copy()
+    for mine, other in zip(nominal.holes, corrected.holes, strict=True):
+        more = (other.last - other.first) - (mine.last - mine.first)
+        parts[mine.last - 1] += max(more, 0)
+        parts[mine.last + min(more, 0) - 1 : mine.last - 1] -= 1 if more < 0 else 0
+    return parts
 
 
 def shared_digit_mm(decimals: tuple[int, int, int], unit_mm: Array) -> float:

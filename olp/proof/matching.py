@@ -8,19 +8,21 @@ from olp.deviation import Index
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
-from olp.toolpath import Flag, Toolpath
+from olp.program.program import Program
+from olp.toolpath import Flag
 
 #: a way-point counts as reached within this; corrections are far smaller, and moves mostly longer
 GATE_MM = 0.05
 _BLOCK = 4096
 
 
-def match(nominal: Toolpath, target_mm: Array, path: Toolpath, model: ErrorModel) -> Index:
-    """(n,) index of the last move of `path` for each nominal move.
+def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel) -> Index:
+    """(n,) index of the last move of `corrected` for each move of `program`, whose way-points are `target_mm`.
 
     Way-points are looked for in order. Raises ProgramError where one is not reached: then the two programs are
     not the same job.
     """
+    nominal, path = program.toolpath, corrected.toolpath
     count, extra = len(nominal), len(path) - len(nominal)
     if extra < 0:
         raise ProgramError(
