@@ -23,7 +23,7 @@ Index = npt.NDArray[np.int64]
 _BLOCK = 1 << 16
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 #: samples of an arc move at the least
-_ARC_STEPS = 16
+_ARC_STEPS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -118,6 +118,9 @@ def test_nothing_is_overwritten_without_force(mill: Path, library: Fake) -> None
     assert library.calls == [], "refused before the work"
     assert report.read_bytes() == b"kept"
     assert not output.exists()
+    nowhere = run("correct", "-j", mill / "job.toml", "-o", mill / "none" / "out.nc")
+    assert (nowhere.exit_code, library.calls) == (2, [])
+    assert "there is no folder" in nowhere.stderr
     assert run(*args, "--force").exit_code == 0
     assert json.loads(report.read_bytes())["schema"] == "olp-report-1"
 

@@ -11,6 +11,7 @@ import pytest
 import olp
 
 ROOT = Path(__file__).resolve().parents[1]
+RUN = "from olp.cli import main\ntry: main({!r})\nexcept SystemExit as end: assert end.code == 0, end.code"
 LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "inspect", "error_at", "flatten", "load_setup"),
@@ -52,7 +53,7 @@ def test_a_name_that_is_not_there() -> None:
     ("import olp", ("numpy", "pydantic", "click", "rich", *LARGE)),
     ("import olp; olp.OlpError", ("numpy", "pydantic", "click", "rich", *LARGE)),
     ("import olp.cli", ("numpy", "pydantic", "rich", *LARGE)),
-    ("from olp.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass", ("numpy", "pydantic", "rich", *LARGE)),
+    (RUN.format(["--help"]), ("numpy", "pydantic", "rich", *LARGE)),
     ("import olp; olp.correct", LARGE),
 ])  # fmt: skip
 def test_imports_stay_light(code: str, free_of: tuple[str, ...]) -> None:
@@ -65,6 +66,5 @@ def test_the_probe_sees_what_is_loaded() -> None:
 
 def test_a_correction_needs_no_large_library(tmp_path: Path) -> None:
     words = ["correct", "-j", "programs/bridge-cmm/job.toml", "-o", str(tmp_path / "out.ngc"), "--force"]
-    code = f"from olp.cli import main\ntry: main({words!r})\nexcept SystemExit as end: assert end.code == 0, end.code"
-    assert loaded_by(code, *LARGE) == set()
+    assert loaded_by(RUN.format(words), *LARGE) == set()
     assert (tmp_path / "out.ngc").stat().st_size > 0

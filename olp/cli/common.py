@@ -125,6 +125,8 @@ def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) 
     sources = [Path(name) for name in inputs if Path(name).exists()]
     for name in targets:
         path = Path(name)
+        if not path.parent.is_dir():
+            raise UsageError(f"there is no folder {str(path.parent)!r}; create it first", file=name)
         if any(path.exists() and path.samefile(origin) for origin in sources):
             what = "is an input of this call and is never overwritten; name another output"
             raise UsageError(what, file=name)

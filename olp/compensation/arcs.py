@@ -74,19 +74,16 @@ def subdivide_arcs(
     for _ in range(_DEEPEST):
         if not len(pieces):
             break
-        good = np.ones(len(pieces), bool)
         size = max(1, _BATCH // 64)
-        for a in range(0, len(pieces), size):
-            part = pieces.pick(np.arange(a, min(a + size, len(pieces))))
-            good[a : a + size] = fit_pieces(path, model, target, part, tools, tolerance) <= tolerance
+        departure = np.concatenate([
+            fit_pieces(path, model, target, pieces.pick(np.arange(a, min(a + size, len(pieces)))), tools, tolerance)
+            for a in range(0, len(pieces), size)
+        ])  # fmt: skip
+        good = departure <= tolerance
         done.append(pieces.pick(good))
-        bad = pieces.pick(~good)
-        middle = (bad.begin + bad.end) / 2
-        pieces = Pieces(
-            np.concatenate((bad.arc, bad.arc)),
-            np.concatenate((bad.begin, middle)),
-            np.concatenate((middle, bad.end)),
-        )
+        # what an arc cannot follow goes with about the third power of its length
+        count = np.clip(np.ceil((departure[~good] / tolerance) ** (1 / 3) * 1.05), 2, 16).astype(np.int64)
+        pieces = _divided(pieces.pick(~good), count)
     if len(pieces):
         raise CannotCompute(
             "an arc cannot be followed within the tolerance by any number of arcs; raise --tolerance-um",
@@ -98,6 +95,17 @@ def subdivide_arcs(
     arc, end = arc[inner], end[inner]
     starts, ends = _ends(path, target, arc)
     return arcs.move[arc], end, _points(starts, ends, _shifted(arcs, path, target), arc, end)
+
+
+def _divided(pieces: Pieces, count: Index) -> Pieces:
+    """Each piece in `count` equal ones."""
+    which = np.repeat(np.arange(len(pieces)), count)
+    k = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    step = (pieces.end - pieces.begin) / count
+    begin = pieces.begin[which] + k * step[which]
+    last = k == count[which] - 1
+    end = np.where(last, pieces.end[which], pieces.begin[which] + (k + 1) * step[which])
+    return Pieces(pieces.arc[which], begin, end)
 
 
 def _shifted(arcs: Arcs, path: Toolpath, target: Array) -> Arcs:

@@ -79,32 +79,32 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
         lead = end - command[:, -1]
         command = command + lead[:, None, :]
     centre, _ = fit(command, share, centre, plane, start, end)
+    centre = _on_bisector(start, end, centre, plane)
     sweep = path.arcs.sweep_rad[arc] * (reach - previous)
-    out = []
-    for i in range(len(arc_row)):
-        out.append(
-            _Arc(
-                int(arc_row[i]), int(move[i]), int(path.line[move[i]]), start[i], end[i],
-                _on_bisector(start[i], end[i], centre[i], int(plane[i])), float(sweep[i]), int(plane[i]),
-            )
-        )  # fmt: skip
-    return out
+    _check_sweep(start, end, centre, sweep, plane, path.line[move])
+    lines, sweeps, planes = path.line[move].tolist(), sweep.tolist(), plane.tolist()
+    return [
+        _Arc(row, which, lines[i], start[i], end[i], centre[i], sweeps[i], planes[i])
+        for i, (row, which) in enumerate(zip(arc_row.tolist(), move.tolist(), strict=True))
+    ]
 
 
-def _on_bisector(start: Array, end: Array, centre: Array, plane: int) -> Array:
-    """The centre moved along the chord until both radii are equal, where the chord is long enough to say so."""
-    first, second, _ = PLANES[plane]
-    chord = np.array([end[first] - start[first], end[second] - start[second]])
-    length = float(np.hypot(*chord))
-    radius = float(np.hypot(start[first] - centre[first], start[second] - centre[second]))
-    if length < _SHORT_CHORD * radius:
-        return centre
-    chord /= length
-    middle = np.array([start[first] + end[first], start[second] + end[second]]) / 2
-    along = float((np.array([centre[first], centre[second]]) - middle) @ chord)
+def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8]) -> Array:
+    """Centres moved along their chords until both radii are equal, where a chord is long enough to say so."""
+    rows = np.arange(len(start))
+    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
+    d0, d1 = end[rows, first] - start[rows, first], end[rows, second] - start[rows, second]
+    length = np.hypot(d0, d1)
+    radius = np.hypot(start[rows, first] - centre[rows, first], start[rows, second] - centre[rows, second])
+    long = length > _SHORT_CHORD * radius
+    safe = np.where(long, length, 1.0)
+    d0, d1 = d0 / safe, d1 / safe
+    away0 = centre[rows, first] - (start[rows, first] + end[rows, first]) / 2
+    away1 = centre[rows, second] - (start[rows, second] + end[rows, second]) / 2
+    along = np.where(long, away0 * d0 + away1 * d1, 0.0)
     out = centre.copy()
-    out[first] -= along * chord[0]
-    out[second] -= along * chord[1]
+    out[rows, first] -= along * d0
+    out[rows, second] -= along * d1
     return out
 
 
@@ -112,31 +112,34 @@ def _centre_words(writer: Writer, arc: _Arc, absolute: bool, own: dict[int, int]
     """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own` words."""
     frame = writer.frame_of(arc.move)
     out = []
-    realised = arc.centre.copy()
     for axis in PLANES[arc.plane][:2]:
         base = frame.offset_mm[axis] if absolute else arc.start[axis]
         decimals = max(writer.style.centre(axis, frame.unit_mm), own.get(axis, 0))
         mantissa = round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
-        realised[axis] = base + mantissa / 10**decimals * frame.unit_mm
         out.append((axis, mantissa, decimals))
-    _check_sweep(arc, realised)
     return out
 
 
-def _check_sweep(arc: _Arc, centre: Array) -> None:
+def _check_sweep(
+    start: Array, end: Array, centre: Array, sweep: Array, plane: npt.NDArray[np.int8], line: npt.NDArray[np.int32]
+) -> None:
     """A tiny arc must not turn into a whole circle, nor the other way round, by rounding."""
-    first, second, _ = PLANES[arc.plane]
-    a0 = np.arctan2(arc.start[second] - centre[second], arc.start[first] - centre[first])
-    a1 = np.arctan2(arc.end[second] - centre[second], arc.end[first] - centre[first])
-    turn = (a1 - a0 if arc.sweep > 0 else a0 - a1) % (2 * np.pi)
-    if turn < 1e-9:
-        turn = 2 * np.pi
-    wanted = abs(arc.sweep) % (2 * np.pi) or 2 * np.pi
-    if abs(turn - wanted) > 1.0 and abs(abs(arc.sweep) - turn) % (2 * np.pi) > 1.0:
+    rows = np.arange(len(start))
+    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
+    a0 = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
+    a1 = np.arctan2(end[rows, second] - centre[rows, second], end[rows, first] - centre[rows, first])
+    turn = np.where(sweep > 0, a1 - a0, a0 - a1) % (2 * np.pi)
+    turn[turn < 1e-9] = 2 * np.pi
+    off = np.abs(np.abs(sweep) - turn)
+    off = np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
+    whole = np.abs(sweep) > np.pi
+    bad = np.flatnonzero((off > 1.0) | ((np.abs(sweep) < 2 * np.pi + 1e-9) & (whole != (turn > np.pi)) & (off < 0.5) & (
+        np.minimum(np.abs(sweep), turn) < 0.1)))  # fmt: skip
+    if bad.size:
         raise ProgramError(
             "an arc is so short that the last digit decides whether it is a whole circle; let the machine take more "
             "digits (least_increment_mm), or write this arc as a line",
-            line=arc.line,
+            line=int(line[bad[0]]),
         )
 
 

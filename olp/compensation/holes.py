@@ -48,8 +48,8 @@ class HolePlan:
         if not count:
             return HolePlan(holes, level, bottom, np.zeros(0))
         level_play, bottom_play = _play(program, plan)
-        c_level, _ = invert(model, level + shift, tool, level_play)
-        c_bottom, _ = invert(model, bottom + shift, tool, bottom_play)
+        c_level = invert(model, level + shift, tool, level_play)
+        c_bottom = invert(model, bottom + shift, tool, bottom_play)
         lean = np.abs(c_level - c_bottom) / 2
         for i, hole in enumerate(holes):
             lean[i, PLANES[hole.plane][2]] = 0.0

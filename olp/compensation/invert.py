@@ -15,15 +15,14 @@ _ITERATIONS = 30
 BLOCK = 1 << 14
 
 
-def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> tuple[Array, Array]:
-    """Commands (n, 3) and the errors (n, 3) that they meet, by fixed-point iteration c <- target - e(c).
+def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+    """Commands (n, 3) that bring the tip to the targets, by fixed-point iteration c <- target - e(c).
 
     Converges while the error grows slower than the position (its Lipschitz constant is about 1e-3 on a bad
     machine). A component whose error is not finite, because an axis that it depends on is unknown, keeps its
     target. Raises NotInvertible where 1e-9 mm is not reached.
     """
-    command = np.empty_like(target_mm)
-    error = np.empty_like(target_mm)
+    command = np.zeros_like(target_mm)
     for a in range(0, len(target_mm), BLOCK):
         part = slice(a, a + BLOCK)
         tool = tool_mm if tool_mm.ndim == 1 else tool_mm[part]
@@ -48,8 +47,7 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
                 f"position (the last step was {change:.3g} mm)"
             )
         command[part] = guess
-        error[part] = e
-    return command, error
+    return command
 
 
 def bent(model: ErrorModel, target_mm: Array, tool_mm: Array) -> Array:

@@ -152,7 +152,7 @@ def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> npt.NDArray[np.int64
 
 
 def _vertices(path: Toolpath, model: ErrorModel, target: Array, raw: Mask) -> Array:
-    command, _ = invert(model, target, path.tool_mm())
+    command = invert(model, target, path.tool_mm())
     if raw.any():
         command[raw] = path.end_mm[raw]
     return command
@@ -186,7 +186,7 @@ def _expand(
     is_cut = np.ones(len(move), bool)
     is_cut[last] = False
     tool = path.tool_mm()
-    cut_command, _ = invert(model, point, tool if tool.ndim == 1 else tool[where])
+    cut_command = invert(model, point, tool if tool.ndim == 1 else tool[where])
     out_target = np.empty((len(move), 3))
     out_target[last], out_target[is_cut] = target, point
     out_command = np.empty((len(move), 3))

@@ -54,7 +54,7 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     tool = tools if tools.ndim == 1 else tools[rows.move]
     # a held axis aims at where its load stays, not at where it should be
     held = np.nan_to_num(load - wanted)
-    command, _ = invert(model, rows.target_mm + held, tool, play)
+    command = invert(model, rows.target_mm + held, tool, play)
     command[rows.raw] = rows.command_mm[rows.raw]
     return _take_up(path, model, replace(rows, command_mm=command, play=play), tool, held)
 
@@ -95,7 +95,7 @@ def _take_up(path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: A
         return rows
     part_tool = tool if tool.ndim == 1 else tool[where]
     target = rows.target_mm[where - 1] + held[where - 1]
-    turned, _ = invert(model, target, part_tool, rows.play[where])
+    turned = invert(model, target, part_tool, rows.play[where])
     raw = rows.raw[where]
     turned[raw] = rows.command_mm[where - 1][raw]
     reach = np.where(rows.move[where] == rows.move[where - 1], rows.reach[where - 1], 0.0)

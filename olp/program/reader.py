@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from olp.exceptions import ProgramError
 from olp.machine import Setup
+from olp.program.columns import Columns
 from olp.program.cycles import hole_moves, levels
 from olp.program.lexer import WordChunk, chunks
 from olp.program.motion import Array, Blocks, Index, Mask, arc_geometry, fill, gather, modal, values
@@ -116,7 +117,7 @@ class _Reader:
             self.act[list(CUTTER_COMPENSATION)] = Act.CARRY
         self.m_event = np.ones(10_001, bool)
         self.m_event[[m * 10 for m in profile.harmless_m]] = False
-        self.columns: dict[str, list[npt.NDArray[np.generic]]] = {}
+        self.columns = Columns(len(data) // 3)
         self.moves = self.arcs = self.word_count = 0
         self.holes: list[Hole] = []
         self.series = self.series_initial = 0.0
@@ -621,19 +622,16 @@ class _Reader:
 
     # -- columns -----------------------------------------------------------------------------------
 
-    def _put(self, name: str, column: npt.ArrayLike, kind: npt.DTypeLike) -> None:
-        self.columns.setdefault(name, []).append(np.asarray(column, kind))
-
     def _put_words(self, chunk: WordChunk) -> None:
-        self._put("line_start", chunk.line_start, np.int32)
-        self._put("line_end", chunk.line_end, np.int32)
+        self.columns.put("line_start", chunk.line_start, np.int32)
+        self.columns.put("line_end", chunk.line_end, np.int32)
         if self.keep_words:
             for name in ("letter", "mantissa", "decimals", "pointed"):
                 column = getattr(chunk, name)
-                self._put(name, column, column.dtype)
+                self.columns.put(name, column, column.dtype)
             for name in ("start", "number", "end"):
-                self._put("word_" + name, getattr(chunk, name), np.int32)
-            self._put("first_word", chunk.first_word[:-1] + self.word_count, np.int32)
+                self.columns.put("word_" + name, getattr(chunk, name), np.int32)
+            self.columns.put("first_word", chunk.first_word[:-1] + self.word_count, np.int32)
         self.word_count += len(chunk.letter)
 
     def _put_moves(
@@ -645,70 +643,64 @@ class _Reader:
         end: Array,
         slot: npt.ArrayLike,
     ) -> None:
-        self._put("kind", kind, np.uint8)
-        self._put("flag", flag, np.uint8)
-        self._put("line", line, np.int32)
-        self._put("frame", frame, np.int32)
-        self._put("end", end, np.float64)
+        self.columns.put("kind", kind, np.uint8)
+        self.columns.put("flag", flag, np.uint8)
+        self.columns.put("line", line, np.int32)
+        self.columns.put("frame", frame, np.int32)
+        self.columns.put("end", end, np.float64)
         if self.keep_words:
-            self._put("slot", slot, np.int32)
+            self.columns.put("slot", slot, np.int32)
         self.moves += len(kind)
 
     def _put_arcs(
         self, move: Index, centre: Array, plane: Index, sweep: Array, words: Index, absolute: Mask
     ) -> None:
-        self._put("arc_move", move, np.int64)
-        self._put("arc_centre", centre, np.float64)
-        self._put("arc_plane", plane, np.int8)
-        self._put("arc_sweep", sweep, np.float64)
-        self._put("arc_words", words, np.int32)
-        self._put("arc_absolute", absolute, np.bool_)
-
-    def _take(self, name: str, kind: npt.DTypeLike, *width: int) -> npt.NDArray[np.generic]:
-        parts = self.columns.pop(name, [])
-        out = np.concatenate(parts) if parts else np.zeros((0, *width), kind)
-        out.setflags(write=False)
-        return out
+        self.columns.put("arc_move", move, np.int64)
+        self.columns.put("arc_centre", centre, np.float64)
+        self.columns.put("arc_plane", plane, np.int8)
+        self.columns.put("arc_sweep", sweep, np.float64)
+        self.columns.put("arc_words", words, np.int32)
+        self.columns.put("arc_absolute", absolute, np.bool_)
 
     def _program(self) -> Program:
         arcs = Arcs(
-            self._take("arc_move", np.int64),
-            self._take("arc_centre", np.float64, 3),
-            self._take("arc_plane", np.int8),
-            self._take("arc_sweep", np.float64),
+            self.columns.take("arc_move", np.int64),
+            self.columns.take("arc_centre", np.float64, 3),
+            self.columns.take("arc_plane", np.int8),
+            self.columns.take("arc_sweep", np.float64),
         )
         path = Toolpath(
-            kind=self._take("kind", np.uint8),
-            flag=self._take("flag", np.uint8),
-            line=self._take("line", np.int32),
-            frame=self._take("frame", np.int32),
-            end_mm=self._take("end", np.float64, 3),
+            kind=self.columns.take("kind", np.uint8),
+            flag=self.columns.take("flag", np.uint8),
+            line=self.columns.take("line", np.int32),
+            frame=self.columns.take("frame", np.int32),
+            end_mm=self.columns.take("end", np.float64, 3),
             frames=tuple(self.state.frames),
             arcs=arcs,
             start_mm=self.start,
         )
         words = None
         if self.keep_words:
-            self._put("first_word", [self.word_count], np.int32)
+            self.columns.put("first_word", [self.word_count], np.int32)
             words = Words(
-                self._take("letter", np.uint8),
-                self._take("mantissa", np.int64),
-                self._take("decimals", np.int8),
-                self._take("pointed", np.bool_),
-                self._take("word_start", np.int32),
-                self._take("word_number", np.int32),
-                self._take("word_end", np.int32),
-                self._take("first_word", np.int32),
+                self.columns.take("letter", np.uint8),
+                self.columns.take("mantissa", np.int64),
+                self.columns.take("decimals", np.int8),
+                self.columns.take("pointed", np.bool_),
+                self.columns.take("word_start", np.int32),
+                self.columns.take("word_number", np.int32),
+                self.columns.take("word_end", np.int32),
+                self.columns.take("first_word", np.int32),
             )
         return Program(
             data=self.data,
             profile=self.profile,
             toolpath=path,
             words=words,
-            slot=self._take("slot", np.int32, 3),
-            arc_slots=ArcSlots(self._take("arc_words", np.int32, 5), self._take("arc_absolute", np.bool_)),
-            line_start=self._take("line_start", np.int32),
-            line_end=self._take("line_end", np.int32),
+            slot=self.columns.take("slot", np.int32, 3),
+            arc_slots=ArcSlots(self.columns.take("arc_words", np.int32, 5), self.columns.take("arc_absolute", np.bool_)),
+            line_start=self.columns.take("line_start", np.int32),
+            line_end=self.columns.take("line_end", np.int32),
             captures=tuple(self.state.captures),
             path_modes=tuple(self.state.path_modes),
             holes=tuple(self.holes),
