@@ -303,7 +303,8 @@ def _correct(
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
     tell("correct", 0.2)
-    limits = Limits(tolerance_um * MM_PER_UM, split_rapids=rapids, refuse_outside=not hold)
+    digit = _digit_mm(program, loaded.setup)
+    limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
     writer = Writer(
@@ -315,7 +316,6 @@ def _correct(
     del writer
     tell("prove", 0.7)
     path = program.toolpath
-    digit = _digit_mm(program, loaded.setup)
     nominal = replace(program, words=None)
     del program
     corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)

@@ -77,7 +77,9 @@ def measure(
     judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
     if exempt is not None:
         judged &= ~exempt
-    flank = _unknown_flank(path, model)[groups]
+    flank = _unknown_flank(path, model)
+    # a move counts from where its flank is known
+    flank = np.maximum(flank[groups], np.concatenate((flank[:1], flank[groups[:-1]])) if count else flank)
     judged &= ~(flank > bend_mm)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     for a in range(0, count, _BLOCK):

@@ -61,5 +61,20 @@ def arc_distance(
     share = np.clip(angle / sweep, 0.0, 1.0)
     radius = np.hypot(s0, s1)
     radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
-    level = start[rows, third] + share * (end[rows, third] - start[rows, third])
-    return np.asarray(np.hypot(np.hypot(p0, p1) - radius, point[rows, third] - level), float)
+    lead = (end[rows, third] - start[rows, third]) / sweep
+    level = point[rows, third] - start[rows, third] - share * lead * sweep
+    # across a helix, which rises by `lead` per radian, a difference in level counts by the cosine of its pitch
+    return np.asarray(np.hypot(np.hypot(p0, p1) - radius, level * radius / np.hypot(radius, lead)), float)
+
+
+def arc_directions(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array) -> Array:
+    """(n, 3) sign of each axis' motion at shares (n,) of arcs."""
+    rows = np.arange(len(start))
+    first, second, third = (_AXES[plane][:, i] for i in range(3))
+    angle = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
+    angle = angle + share * sweep
+    out = np.zeros((len(start), 3))
+    out[rows, first] = -np.sin(angle) * np.sign(sweep)
+    out[rows, second] = np.cos(angle) * np.sign(sweep)
+    out[rows, third] = end[rows, third] - start[rows, third]
+    return np.asarray(np.sign(np.where(np.abs(out) < 1e-9, 0.0, out)), float)

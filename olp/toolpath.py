@@ -106,6 +106,8 @@ class Toolpath:
 
     def per_frame(self, values: list[Vector], first: int = 0, last: int | None = None) -> Array:
         """One vector a frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
+        if not values:
+            return np.zeros(3)
         table = np.array(values, float).reshape(len(values), 3)
         if len(values) == 1 or (table == table[0]).all():
             return table[0]

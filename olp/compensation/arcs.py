@@ -17,7 +17,7 @@ from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.sampling import steps_needed
 from olp.exceptions import CannotCompute
-from olp.geometry import PLANES, arc_points
+from olp.geometry import PLANES, arc_directions, arc_points
 from olp.toolpath import Arcs, Flag, Toolpath
 
 Index = npt.NDArray[np.int64]
@@ -25,6 +25,8 @@ Index = npt.NDArray[np.int64]
 #: a centre is moved by a millimetre only to gain a micrometre of fit
 _STIFFNESS = 1e-3
 _DEEPEST = 14
+#: arcs beyond this sweep are not held to equal radii at both ends
+WIDE = 0.95 * np.pi
 _BATCH = 1 << 18
 _AXES = np.array(PLANES)
 
@@ -53,7 +55,6 @@ def subdivide_arcs(
     path: Toolpath,
     model: ErrorModel,
     target: Array,
-    command: Array,
     raw: Mask,
     tolerance: float,
     turning: Mask | None,
@@ -122,10 +123,23 @@ def _ends(path: Toolpath, target: Array, arc: Index) -> tuple[Array, Array]:
     return start, target[move]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Bend:
+    """How pieces of arcs are bent: nominal `point` and `command` (n, s, 3) at shares (s,) of the piece, nominal
+    `centre` (n, 3), `mismatch` (n,) of the nominal radii at both ends, `rigid` (n,): shifted, not bent."""
+
+    point: Array
+    command: Array
+    share: Array
+    centre: Array
+    mismatch: Array
+    rigid: Mask
+
+
 def sampled(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
-) -> tuple[Array, Array, Array]:
-    """Commands (n, s, 3) along pieces, their shares of the piece (s,), and the nominal centres (n, 3)."""
+) -> Bend:
+    """Sample pieces so finely that nothing of the error is missed."""
     arcs = _shifted(path.arcs, path, target)
     start, end = _ends(path, target, pieces.arc)
     axes = _AXES[arcs.plane[pieces.arc]]
@@ -142,44 +156,71 @@ def sampled(
     spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
     which = np.repeat(np.arange(len(pieces)), len(share))
     point = _points(start[which], end[which], arcs, pieces.arc[which], spread)
-    command = bent(model, point, tool if tool.ndim == 1 else tool[which])
-    return command.reshape(len(pieces), len(share), 3), share, arcs.centre_mm[pieces.arc]
+    play = None
+    if model.lost_motion_mm(point[:1]) is not None:
+        play = arc_directions(
+            start[which], end[which], arcs.centre_mm[pieces.arc[which]], arcs.plane[pieces.arc[which]],
+            arcs.sweep_rad[pieces.arc[which]], spread,
+        )  # fmt: skip
+        play = _inside(play.reshape(len(pieces), len(share), 3)).reshape(-1, 3)
+    command = bent(model, point, tool if tool.ndim == 1 else tool[which], play)
+    shape = (len(pieces), len(share), 3)
+    point, command = point.reshape(shape), command.reshape(shape)
+    centre = arcs.centre_mm[pieces.arc]
+    away = command - point
+    r0, r1 = (
+        np.hypot(*(point[rows, k, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))) for k in (0, -1)
+    )
+    return Bend(point, command, share, centre, r1 - r0, np.abs(away - away[:, :1]).max(axis=(1, 2)) < 1e-9)
+
+
+def _inside(play: Array) -> Array:
+    """Directions (n, s, 3) of pieces between turns: at its ends a piece takes those of its inside."""
+    play[:, 0], play[:, -1] = play[:, 1], play[:, -2]
+    return play
 
 
 def fit_pieces(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
 ) -> Array:
     """(n,) how far the best arc leaves the bent path of each piece, in mm."""
-    command, share, centre = sampled(path, model, target, pieces, tools, tolerance)
+    bend = sampled(path, model, target, pieces, tools, tolerance)
+    sweep = path.arcs.sweep_rad[pieces.arc] * (pieces.end - pieces.begin)
     plane = path.arcs.plane[pieces.arc]
-    _, departure = fit(command, share, centre, plane, command[:, 0], command[:, -1])
+    _, departure = fit(bend, plane, bend.command[:, 0], bend.command[:, -1], sweep)
+    departure[bend.rigid] = 0.0
     return departure
 
 
 def fit(
-    command: Array, share: Array, centre: Array, plane: npt.NDArray[np.int8], start: Array, end: Array
+    bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array
 ) -> tuple[Array, Array]:
-    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples (n, s, 3) least, and how far that
-    is (n,). Least squares on the radial distance, with equal radii at both ends asked for strongly."""
+    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples least, and how far that is (n,).
+
+    Least squares on the radial distance; the radius goes linearly from one end to the other. The nominal
+    difference of the radii (mostly none) is asked for strongly, but not where the short chord of more than half a
+    circle would swing its far side.
+    """
+    command, share = bend.command, bend.share
     rows = np.arange(len(command))
     axes = _AXES[plane]
-    q0, q1 = (np.take_along_axis(command, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in (0, 1))
-    q2 = np.take_along_axis(command, axes[:, 2][:, None, None], axis=2)[:, :, 0]
+    q0, q1, q2 = (np.take_along_axis(command, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in range(3))
     s0, s1, s2 = (start[rows, axes[:, i]][:, None] for i in range(3))
     e0, e1, e2 = (end[rows, axes[:, i]][:, None] for i in range(3))
-    x, y = centre[rows, axes[:, 0]][:, None], centre[rows, axes[:, 1]][:, None]
+    out = bend.centre + (command[:, 0] - bend.point[:, 0] + command[:, -1] - bend.point[:, -1]) / 2
+    x, y = out[rows, axes[:, 0]][:, None], out[rows, axes[:, 1]][:, None]
     x_start, y_start = x, y
-    strong = 100.0
+    strong = np.where(np.abs(sweep) > WIDE, 1.0, 100.0)[:, None]
+    mismatch = bend.mismatch[:, None]
+    soft = _STIFFNESS * _STIFFNESS
     for _ in range(4):
-        rs = np.hypot(s0 - x, s1 - y)
-        us0, us1 = (s0 - x) / rs, (s1 - y) / rs
-        rq = np.hypot(q0 - x, q1 - y)
-        j0, j1 = us0 - (q0 - x) / rq, us1 - (q1 - y) / rq
-        f = rq - rs
-        re = np.hypot(e0 - x, e1 - y)
-        k0, k1 = strong * (us0 - (e0 - x) / re), strong * (us1 - (e1 - y) / re)
-        g = strong * (re - rs)
-        soft = _STIFFNESS * _STIFFNESS
+        rs, re, rq = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y), np.hypot(q0 - x, q1 - y)
+        us0, us1, ue0, ue1 = (s0 - x) / rs, (s1 - y) / rs, (e0 - x) / re, (e1 - y) / re
+        f = rq - rs - (re - rs) * share
+        j0 = us0 + (ue0 - us0) * share - (q0 - x) / rq
+        j1 = us1 + (ue1 - us1) * share - (q1 - y) / rq
+        g = strong * (re - rs - mismatch)
+        k0, k1 = strong * (us0 - ue0), strong * (us1 - ue1)
         n00 = (j0 * j0).sum(axis=1, keepdims=True) + k0 * k0 + soft
         n11 = (j1 * j1).sum(axis=1, keepdims=True) + k1 * k1 + soft
         n01 = (j0 * j1).sum(axis=1, keepdims=True) + k0 * k1
@@ -188,10 +229,11 @@ def fit(
         det = n00 * n11 - n01 * n01
         x = x + (b0 * n11 - b1 * n01) / det
         y = y + (b1 * n00 - b0 * n01) / det
+    x, y = np.where(bend.rigid[:, None], x_start, x), np.where(bend.rigid[:, None], y_start, y)
     rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
     radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * share)
-    level = q2 - (s2 + (e2 - s2) * share)
-    out = centre.copy()
+    lead = (e2 - s2) / sweep[:, None]
+    level = (q2 - (s2 + (e2 - s2) * share)) * rs / np.hypot(rs, lead)
     out[rows, axes[:, 0]], out[rows, axes[:, 1]] = x[:, 0], y[:, 0]
     return out, np.hypot(radial, level).max(axis=1)
 

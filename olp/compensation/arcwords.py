@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.arcs import Pieces, fit, sampled
-from olp.errormodel.base import Array
+from olp.compensation.arcs import WIDE, Pieces, fit, sampled
+from olp.errormodel.base import Array, Mask
 from olp.exceptions import ProgramError
 from olp.program.edits import EditList, Edits
 from olp.geometry import PLANES
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 Index = npt.NDArray[np.int64]
 
 _AXES = np.array(PLANES)
-#: below this share of the radius the chord is too short to set the direction of its bisector
-_SHORT_CHORD = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,33 +68,35 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
     previous[arc_row == 0] = 0.0
     pieces = Pieces(arc, previous, reach)
     tools = path.tool_mm()
-    command, share, centre = sampled(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm)
+    bend = sampled(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm)
     start = np.where((arc_row > 0)[:, None], rows.emitted[np.maximum(arc_row - 1, 0)], rows.entry)
     end = rows.emitted[arc_row]
     plane = path.arcs.plane[arc]
-    if plan.play is not None:
-        # the drive leads the load by what the play state says
-        lead = end - command[:, -1]
-        command = command + lead[:, None, :]
-    centre, _ = fit(command, share, centre, plane, start, end)
-    centre = _on_bisector(start, end, centre, plane)
     sweep = path.arcs.sweep_rad[arc] * (reach - previous)
+    centre, _ = fit(bend, plane, start, end, sweep)
+    equal = (np.abs(sweep) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
+    centre = _on_bisector(start, end, centre, plane, equal)
+    # an arc that is only shifted keeps its words
+    shift = bend.command[:, 0] - bend.point[:, 0]
+    kept = bend.rigid & (np.abs(start - bend.point[:, 0] - shift).max(axis=1) < 1e-7)
+    kept &= (np.abs(end - bend.point[:, -1] - shift).max(axis=1) < 1e-7) & rows.head[arc_row]
+    kept &= (reach == 1.0) & ~writer.program.arc_slots.absolute[arc]
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
     lines, sweeps, planes = path.line[move].tolist(), sweep.tolist(), plane.tolist()
     return [
         _Arc(row, which, lines[i], start[i], end[i], centre[i], sweeps[i], planes[i])
         for i, (row, which) in enumerate(zip(arc_row.tolist(), move.tolist(), strict=True))
+        if not kept[i]
     ]
 
 
-def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8]) -> Array:
-    """Centres moved along their chords until both radii are equal, where a chord is long enough to say so."""
+def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8], short: Mask) -> Array:
+    """Centres moved along their chords until both radii are equal, for arcs `short` of half a circle."""
     rows = np.arange(len(start))
     first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
     d0, d1 = end[rows, first] - start[rows, first], end[rows, second] - start[rows, second]
     length = np.hypot(d0, d1)
-    radius = np.hypot(start[rows, first] - centre[rows, first], start[rows, second] - centre[rows, second])
-    long = length > _SHORT_CHORD * radius
+    long = short & (length > 0)
     safe = np.where(long, length, 1.0)
     d0, d1 = d0 / safe, d1 / safe
     away0 = centre[rows, first] - (start[rows, first] + end[rows, first]) / 2
@@ -155,14 +155,15 @@ def _head(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
     if slots[3] >= 0:
         _radius_word(writer, arc, slots[3], edits)
         return
-    own = {axis: style.decimals_of(slots[axis], axis) for axis in range(3) if slots[axis] >= 0}
+    unit = writer.frame_of(arc.move).unit_mm
+    own = {axis: style.decimals_of(slots[axis], axis, unit) for axis in range(3) if slots[axis] >= 0}
     for axis, mantissa, decimals in _centre_words(writer, arc, absolute, own):
         slot = slots[axis]
         if slot >= 0:
             if mantissa != int(words.mantissa[slot]) * 10 ** (decimals - own[axis]):
                 edits.add(int(words.number[slot]), int(words.end[slot]), mantissa, decimals)
                 writer.tally.changed_words += 1
-        elif abs(mantissa) > 10 ** (decimals - style.usual(axis, writer.frame_of(arc.move).unit_mm)) // 2:
+        elif abs(mantissa) > 10 ** (decimals - style.usual(axis, unit)) // 2:
             present = [s for s in slots[:3] if s >= 0]
             anchor = max(present) if present else style.last_word(arc.line)
             place = int(words.end[anchor])
@@ -183,7 +184,7 @@ def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
     unit = writer.frame_of(arc.move).unit_mm
     radius = float(np.hypot(arc.start[first] - arc.centre[first], arc.start[second] - arc.centre[second]))
     half = float(np.hypot(arc.end[first] - arc.start[first], arc.end[second] - arc.start[second])) / 2
-    own = style.decimals_of(slot, first)
+    own = style.decimals_of(slot, first, unit)
     decimals = max(own, style.centre(first, unit))
     sign = -1 if abs(arc.sweep) > np.pi else 1
     mantissa = sign * round(radius / unit * 10**decimals)

@@ -131,6 +131,7 @@ class _Words:
 
     def __init__(self, writer: Writer, hole: Hole, edits: EditList) -> None:
         self.writer, self.hole, self.edits = writer, hole, edits
+        self.unit = writer.frame_of(hole.first).unit_mm
         self.own_block = hole.incremental and hole.repeat > 0
         words = {k: v for k, v in hole.words.items() if k in "XYZR"} or hole.words
         self.anchor = max(words.values())
@@ -149,7 +150,7 @@ class _Words:
             self.new.append((letter, mantissa, decimals))
             return
         words = self.writer.words
-        own = self.writer.style.decimals_of(slot, axis)
+        own = self.writer.style.decimals_of(slot, axis, self.unit)
         if int(words.mantissa[slot]) * 10 ** (decimals - own) != mantissa:
             self.edits.add(int(words.number[slot]), int(words.end[slot]), mantissa, decimals)
             self.writer.tally.changed_words += 1
@@ -192,4 +193,4 @@ def _depth(writer: Writer, out: _Words, letter: str, wanted: float, base: float,
 def _decimals(writer: Writer, slot: int | None, axis: int, unit: float) -> int:
     if slot is None:
         return writer.style.usual(axis, unit)
-    return max(writer.style.decimals_of(slot, axis), writer.style.least(axis, unit))
+    return max(writer.style.decimals_of(slot, axis, unit), writer.style.least(axis, unit))

@@ -50,7 +50,7 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
     return command
 
 
-def bent(model: ErrorModel, target_mm: Array, tool_mm: Array) -> Array:
+def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
     """Commands for samples between way-points, where the second order of the error is enough (e'^2 e < 1e-7 mm)."""
-    guess = target_mm - model.error(target_mm, tool_mm)
-    return np.asarray(target_mm - model.error(guess, tool_mm), float)
+    guess = target_mm - model.error(target_mm, tool_mm, play)
+    return np.asarray(target_mm - model.error(guess, tool_mm, play), float)

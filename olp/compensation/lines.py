@@ -86,8 +86,9 @@ def _cut_batch(
     share = (np.arange(len(owner)) - first[owner]) / count[owner]
     point = start[owner] + share[:, None] * delta[owner]
     tools = tool if tool.ndim == 1 else tool[owner]
-    error = model.error(point, tools)
-    error = model.error(point - error, tools)
+    play = np.sign(delta)[owner] if model.lost_motion_mm(point[:1]) is not None else None
+    error = model.error(point, tools, play)
+    error = model.error(point - error, tools, play)
     length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
     along = (error * delta[owner]).sum(axis=1) / length2[owner]
     across = error - along[:, None] * delta[owner]

@@ -24,6 +24,8 @@ from olp.units import MM_PER_UM
 
 #: share of the tolerance that chords may use; the rest is for the search's own steps
 CHORD_SHARE = 0.95
+#: an arc through rounded ends with a rounded centre strays by about this much more of the last digit than a line
+ARC_DIGIT_SHARE = 0.6
 #: share that an axis with lost motion may stay behind instead of turning round
 DEAD_BAND_SHARE = 0.25
 
@@ -33,10 +35,11 @@ _UNSPLIT = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the plan must keep: tolerance of model and chords in mm, whether rapids are subdivided too, and
-    whether commands outside the calibrated box are refused."""
+    """What the plan must keep: tolerance of model and chords and the last digit written, in mm; whether rapids are
+    subdivided too, and whether commands outside the calibrated box are refused."""
 
     tolerance_mm: float
+    digit_mm: float = 0.0
     split_rapids: bool = False
     refuse_outside: bool = True
 
@@ -101,7 +104,8 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     # behind a `/` block the start depends on the switch, so no cut can be right for both
     free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
     cuts_line = subdivide_lines(path, model, target, free, chord)
-    cuts_arc = subdivide_arcs(path, model, target, command, raw, chord, None if reversal is None else reversal.axes)
+    chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
+    cuts_arc = subdivide_arcs(path, model, target, raw, chord_arc, None if reversal is None else reversal.axes)
     rows = _expand(path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model)
     if reversal is not None:
         rows = carry_play(path, model, rows, reversal)

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from olp.compensation.plan import Plan
 
 
+_NO_TOOL = np.zeros(3)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Reversal:
     """`axes` (3,) with lost motion worth the trouble; `band_mm` an axis may stay behind rather than turn;
@@ -32,63 +35,86 @@ class Reversal:
 
     @staticmethod
     def of(model: ErrorModel, band_mm: float) -> Reversal | None:
-        box = model.box_mm
-        probe = np.column_stack([np.linspace(low, high, 257) for low, high in box])
+        probe = np.column_stack([np.linspace(low, high, 257) for low, high in model.box_mm])
         lost = model.lost_motion_mm(probe)
         if lost is None:
             return None
-        axes = np.abs(lost).max(axis=0) / 2 > band_mm
+        axes = np.zeros(3, bool)
+        for axis in range(3):
+            # what the direction of an axis changes, in any component of the error
+            ahead = np.zeros((len(probe), 3))
+            ahead[:, axis] = 1.0
+            change = model.error(probe, _NO_TOOL, ahead) - model.error(probe, _NO_TOOL, -ahead)
+            axes[axis] = np.abs(change).max() / 2 > band_mm
         return Reversal(axes, band_mm, lost.max(axis=0)) if axes.any() else None
 
 
 def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal) -> Plan:
     """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed move,
     a row that only takes it up comes first."""
-    # without play a command is where the load has to be; the load's turns are the axis' turns
-    play = np.zeros((len(rows), 3))
+    # without play a command is where the load has to be
     wanted = np.where(rows.raw, rows.target_mm, rows.command_mm)
+    lost = model.lost_motion_mm(wanted)
+    assert lost is not None
+    play = np.zeros((len(rows), 3))
+    turns = np.zeros((len(rows), 3), bool)
     load = wanted.copy()
     for axis in np.flatnonzero(reversal.axes).tolist():
-        play[:, axis], load[:, axis] = _follow(wanted[:, axis], reversal.band_mm, max(float(reversal.lost_mm[axis]), 0.0))
+        play[:, axis], load[:, axis], turns[:, axis] = _follow(
+            wanted[:, axis], np.nan_to_num(lost[:, axis]), reversal.band_mm
+        )
     tools = path.tool_mm()
     tool = tools if tools.ndim == 1 else tools[rows.move]
     # a held axis aims at where its load stays, not at where it should be
     held = np.nan_to_num(load - wanted)
     command = invert(model, rows.target_mm + held, tool, play)
     command[rows.raw] = rows.command_mm[rows.raw]
-    return _take_up(path, model, replace(rows, command_mm=command, play=play), tool, held)
+    return _take_up(path, model, replace(rows, command_mm=command, play=play), tool, held, turns.any(axis=1))
 
 
-def _follow(position: Array, band: float, lost: float) -> tuple[Array, Array]:
-    """Play state and load position of one axis: it follows in its direction, and turns only beyond the band. At
-    the start nobody knows the flank; it is known once the axis has moved by its lost motion in one direction."""
-    state = 0.0
+def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Mask]:
+    """Play (n,) of one axis that has to bring its load to `position` with lost motion `lost`, where the load then
+    is, and the rows before which the drive has to turn.
+
+    The play is known as an interval of the lag, in which its middle is taken: at the start it is anything between
+    the two flanks, and each motion narrows it. The axis turns only when it would be off by more than the band.
+    """
+    plays, loads, turns = [], [], []
     at = low = high = float("nan")
-    states, loads = [], []
-    for wanted in position.tolist():
+    for wanted, width in zip(position.tolist(), lost.tolist(), strict=True):
+        half = max(width, 0.0) / 2
+        turn = False
         if wanted != wanted or at != at:
-            state = 0.0
-            at = low = high = wanted
-        elif state == 0.0:
-            at, low, high = wanted, min(low, wanted), max(high, wanted)
-            if wanted - low > lost + band:
-                state = 1.0
-            elif high - wanted > lost + band:
-                state = -1.0
-        elif (wanted - at) * state > 0:
-            at = wanted
-        elif abs(wanted - at) > band:
-            state, at = -state, wanted
-        states.append(state)
+            at, low, high = wanted, -1.0, 1.0
+        elif wanted != at:
+            sign = 1.0 if wanted > at else -1.0
+            step = abs(wanted - at)
+            # play that has to be taken up before the middle of the load moves, and until it is known
+            first = 1.0 - (high if sign > 0 else -low)
+            last = 1.0 - (low if sign > 0 else -high)
+            turn = first > 1e-9
+            if turn and step <= band:
+                turn = False
+            else:
+                at = wanted
+                if half == 0.0 or step >= half * (last - first) / 2:
+                    low = high = sign
+                else:
+                    # while the interval narrows the middle of the load goes half as far as the drive
+                    rest = last - first - 2 * step / half
+                    low, high = (1.0 - rest, 1.0) if sign > 0 else (-1.0, -1.0 + rest)
+        plays.append((low + high) / 2)
         loads.append(at)
-    return np.array(states), np.array(loads)
+        turns.append(turn)
+    return np.array(plays), np.array(loads), np.array(turns)
 
 
-def _take_up(path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: Array) -> Plan:
+def _take_up(path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask) -> Plan:
     """Insert rows that turn the drive round before the load moves, in feed moves whose axis changes flank."""
     assert rows.play is not None
-    change = np.zeros(len(rows), bool)
-    change[1:] = ((rows.play[1:] != rows.play[:-1]) & ~rows.raw[1:] & ~np.isnan(rows.command_mm[:-1])).any(axis=1)
+    change = turns & ~rows.raw.any(axis=1)
+    change[0] = False
+    change[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
     change &= (path.kind[rows.move] != Kind.RAPID) & ((path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0)
     where = np.flatnonzero(change)
     if not where.size:

@@ -15,6 +15,8 @@ from olp.toolpath import Flag
 _MOST_DECIMALS = 9
 _SPACE = (b"", b" ", b"\t")
 
+Slots = npt.NDArray[np.int32] | npt.NDArray[np.int64]
+
 
 def fewest_decimals(increment_mm: float, unit_mm: float, inch_decimals: int) -> int:
     """Decimals that a least increment needs: 0.001 mm needs 3, and in inch what the control takes for it."""
@@ -62,18 +64,19 @@ class Style:
             spaced, (bare[0], bare[1], bare[2]),
         )  # fmt: skip
 
-    def decimals(self, slot: npt.NDArray[np.int32] | npt.NDArray[np.int64], axis: int) -> npt.NDArray[np.int64]:
+    def decimals(self, slot: Slots, axis: int, unit_mm: float | npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
         """Digits behind the point of words, counting the hidden ones of numbers in least increments."""
         words = self.program.words
         assert words is not None
         out = words.decimals[slot].astype(np.int64)
         if self.program.profile.increments_without_point and not self.program.calculator:
-            out = np.where(words.pointed[slot], out, self.bare_decimals[axis])
+            hidden = self.bare_decimals[axis] + (np.asarray(unit_mm) != 1.0)
+            out = np.where(words.pointed[slot], out, hidden)
         return out
 
-    def decimals_of(self, slot: int, axis: int) -> int:
+    def decimals_of(self, slot: int, axis: int, unit_mm: float) -> int:
         """The same for one word."""
-        return int(self.decimals(np.array([slot]), axis)[0])
+        return int(self.decimals(np.array([slot]), axis, unit_mm)[0])
 
     def lead(self, word: int) -> bytes:
         """The space that stands before a word, or would."""

@@ -198,7 +198,7 @@ class Writer:
                 raw=plan.raw[part, axis],
                 reset=control & np.isnan(nominal[:, axis]),
                 word=np.where(given, words.mantissa[slot], 0),
-                decimals=np.where(given, self.style.decimals(slot, axis), 0).astype(np.int8),
+                decimals=np.where(given, self.style.decimals(slot, axis, unit), 0).astype(np.int8),
                 offset=offset,
                 unit=unit,
             )
@@ -402,8 +402,8 @@ class Writer:
         if any(self.words.letter[i] == 71 and self.words.mantissa[i] == code and not self.words.decimals[i] for i in index):
             return []
         slot = self.program.slot[move]
-        first = [int(self.words.start[s]) for s in slot if s >= 0] or [int(self.words.start[i]) for i in index]
-        at = min(first)
+        first = [int(self.words.start[s]) for s in slot if s >= 0]
+        at = min(first or [int(self.words.start[i]) for i in index if self.words.letter[i] != ord("N")])
         return [self.one(at, at, BARE, 0, b"G%d " % code, rows.serial(row - 1) + 6)]
 
     def _inverse_time(self, rows: Rows, tails: Index) -> list[Edits]:
@@ -466,10 +466,9 @@ class Writer:
             emitted = rows.emitted[row, capture.axis] if row >= 0 else rows.entry[capture.axis]
             delta = 0.0 if nominal is None else (emitted - nominal) / capture.unit_mm
             grid = self.style.grid(capture.axis, capture.unit_mm)
-            digits = max(grid, int(self.style.decimals(np.array([capture.word]), capture.axis)[0]))
-            own = int(self.words.mantissa[capture.word]) * 10 ** (
-                digits - int(self.style.decimals(np.array([capture.word]), capture.axis)[0])
-            )
+            written = self.style.decimals_of(capture.word, capture.axis, capture.unit_mm)
+            digits = max(grid, written)
+            own = int(self.words.mantissa[capture.word]) * 10 ** (digits - written)
             new = own + round(delta * 10**digits)
             if new != own:
                 out.append(

@@ -37,9 +37,9 @@ class Edits:
     def join(parts: list[Edits]) -> Edits:
         """All edits in the order of the text."""
         columns = [np.concatenate([getattr(p, name) for p in parts]) for name in Edits.__slots__]
-        start, order = columns[0], columns[5]
-        # each part is sorted by itself, which a merge sort turns to account
-        index = np.lexsort((order, start)) if len(parts) > 1 else np.arange(len(start))
+        start, end, order = columns[0], columns[1], columns[5]
+        # what is inserted at a place stands before what is replaced there
+        index = np.lexsort((order, end > start, start))
         return Edits(*(column[index] for column in columns))
 
     def __len__(self) -> int:

@@ -55,10 +55,10 @@ class Proof:
 
 
 def uncorrected_starts(path: Toolpath, passed: Mask) -> Mask:
-    """(n,) feed moves that begin where the move before ended uncorrected."""
-    loose = passed | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0)
+    """(n,) feed moves that begin where the move before ended uncorrected, or a canned cycle left the tool."""
+    loose = passed | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
     before = np.concatenate(([False], loose[:-1]))
-    return np.asarray(before & (path.kind != Kind.RAPID), bool)
+    return np.asarray(before & (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0), bool)
 
 
 def prove(
