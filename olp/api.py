@@ -100,6 +100,7 @@ def correct(
     outside_box: Literal["refuse", "hold"] = "refuse",
     flatten: bool = False,
     expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     contour: bool = False,
     split_rapids: bool = False,
     date: datetime.date | None = None,
@@ -109,14 +110,15 @@ def correct(
 
     `program` is a path or the bytes of the text, `machine` the machine file or a Setup. The corrected text is in
     the program's own dialect; only coordinate words differ, and inserted words and blocks. With `flatten` loops,
-    subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out. Raises
+    subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out; on controls
+    that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck. Raises
     InputError (ProgramError with its line, ConfigError, OutsideBox) and CannotCompute.
     """
     data, name = _source(program)
     try:
         return _correct(
             data, name, _load(machine, job, outside_box), tolerance_um=tolerance_um, hold=outside_box == "hold",
-            unroll=flatten, expand=expand_cycles, contour=contour, rapids=split_rapids, date=date,
+            unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm, contour=contour, rapids=split_rapids, date=date,
             tell=progress or _silent,
         )  # fmt: skip
     except OlpError as error:
@@ -286,6 +288,7 @@ def _correct(
     hold: bool,
     unroll: bool,
     expand: bool,
+    clearance: float | None,
     contour: bool,
     rapids: bool,
     date: datetime.date | None,
@@ -299,7 +302,7 @@ def _correct(
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
     if unroll or expand:
-        data = _unrolled(data, name, loaded.profile, expand)
+        data = _unrolled(data, name, loaded.profile, expand, clearance)
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
     tell("correct", 0.2)
@@ -444,7 +447,7 @@ def _stamp(loaded: _Job) -> bytes:
     return before + f"olp-corrected {loaded.digest[:12]} olp {__version__}".encode() + after
 
 
-def _unrolled(data: bytes, name: str, profile: Profile, expand: bool) -> bytes:
+def _unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
     from olp.program.flatten import flatten as unroll
 
     folder = Path(name).parent if name else None
@@ -458,7 +461,9 @@ def _unrolled(data: bytes, name: str, profile: Profile, expand: bool) -> bytes:
                 return read_bytes(candidate)
         return None
 
-    return unroll(data, profile=profile.name, subprograms=beside, expand_cycles=expand)
+    return unroll(
+        data, profile=profile.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
+    )
 
 
 def _source(program: PathLike | bytes) -> tuple[bytes, str]:

@@ -110,6 +110,8 @@ def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Fin
                 lines_of(path, above),
             )
         )
+    if not proof.after.judged.any():
+        out.append(_finding("OLP107", "no move of this program could be judged"))
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
     untouched[passed.astype(np.int64)] = True
     if untouched.any():

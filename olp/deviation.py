@@ -238,7 +238,7 @@ class Tracer:
             shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
             distance[rows] = arc_distance(
                 actual[rows], nominal.starts_mm(a, b)[of[rows]] + shift, goal[of[rows]], arcs.centre_mm[which] + shift, arcs.plane[which],
-                arcs.sweep_rad[which], self._near(owner, part, share, rows, of),
+                arcs.sweep_rad[which], self._near(owner, first, part, share, rows, of),
             )  # fmt: skip
         np.fmax.at(worst, of, distance) if not one else np.copyto(worst, distance)
         if len(part) > len(ends):
@@ -246,12 +246,17 @@ class Tracer:
             straight = inner if arc is None else inner[arc[of[inner]] < 0]
             self._bend(actual, part, share, ends, straight, bend, of)
 
-    def _near(self, owner: Index, part: Index, share: Array, rows: Index, of: Index) -> Array:
-        """Roughly where on its nominal move each sample lies: parts of a split move taken as of equal length."""
-        counts = np.bincount(owner)
-        offset = np.cumsum(counts) - counts
-        place = part[rows] - offset[of[rows]] + share[rows]
-        return np.asarray(place / counts[of[rows]], float)
+    def _near(self, owner: Index, first: int, part: Index, share: Array, rows: Index, of: Index) -> Array:
+        """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
+        turn = np.zeros(len(owner))
+        if self.path_arc is not None:
+            arc = self.path_arc[first : first + len(owner)]
+            turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
+        total = np.bincount(owner, turn)
+        before = np.cumsum(turn) - turn
+        begin = np.cumsum(total) - total
+        place = before[part[rows]] - begin[of[rows]] + share[rows] * turn[part[rows]]
+        return np.asarray(place / np.maximum(total[of[rows]], 1e-12), float)
 
     def _bend(
         self, actual: Array, part: Index, share: Array, ends: Index, inner: Index, bend: Array, of: Index

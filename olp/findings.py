@@ -103,6 +103,13 @@ _TABLE = (
         "Nothing in the program can mend it; the largest angle is in the report.",
     ),
     Rule(
+        "OLP107",
+        "nothing to prove",
+        Severity.WARNING,
+        "No move of the program was corrected at a known position, so the proof says nothing.",
+        "Look whether this is the program that you meant; command all axes, or give start_mm in the job file.",
+    ),
+    Rule(
         "OLP201",
         "path mode without tolerance",
         Severity.WARNING,

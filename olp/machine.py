@@ -79,7 +79,11 @@ class Tool:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A machine file: chain, limits, offsets, tools and what its control already corrects."""
+    """A machine file: chain, limits, offsets, tools and what its control already corrects.
+
+    `decimal_point` tells what a length without a decimal point means to a control that makes a difference
+    (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator.
+    """
 
     name: str
     chain: str
@@ -92,6 +96,7 @@ class Machine:
     default_tool: int | None = None
     default_work_offset: str = "G54"
     length_active: bool = False
+    decimal_point: Literal["increment", "calculator"] = "increment"
 
     @property
     def least_increment_mm(self) -> Vector:

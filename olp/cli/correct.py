@@ -11,6 +11,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    Length,
     exit_for,
     files_of,
     given,
@@ -46,6 +47,11 @@ LAST_DIGITS_UM = 10.0
 )
 @click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
 @click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
+@click.option(
+    "--peck-clearance-mm",
+    type=Length(),
+    help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; for --expand-cycles.",
+)
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
@@ -64,6 +70,7 @@ def command(
     fail_on: str,
     flatten: bool,
     expand_cycles: bool,
+    peck_clearance_mm: float | None,
     split_rapids: bool,
     report_file: str | None,
     show_diff: bool,
@@ -97,6 +104,7 @@ def command(
                 outside_box="hold" if outside_box == "hold" else "refuse",
                 flatten=flatten,
                 expand_cycles=expand_cycles,
+                peck_clearance_mm=peck_clearance_mm,
                 contour=contour,
                 split_rapids=split_rapids,
                 date=date.date() if date else None,

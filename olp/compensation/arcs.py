@@ -231,9 +231,12 @@ def fit(
         y = y + (b1 * n00 - b0 * n01) / det
     x, y = np.where(bend.rigid[:, None], x_start, x), np.where(bend.rigid[:, None], y_start, y)
     rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
-    radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * share)
-    lead = (e2 - s2) / sweep[:, None]
-    level = (q2 - (s2 + (e2 - s2) * share)) * rs / np.hypot(rs, lead)
+    # the control counts the angle about the new centre
+    angle = np.arctan2(q1 - y, q0 - x) - np.arctan2(s1 - y, s0 - x)
+    turn = sweep[:, None]
+    reached = (angle + 2 * np.pi * np.rint((share * turn - angle) / (2 * np.pi))) / turn
+    radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * reached)
+    level = (q2 - (s2 + (e2 - s2) * reached)) * rs / np.hypot(rs, (e2 - s2) / turn)
     out[rows, axes[:, 0]], out[rows, axes[:, 1]] = x[:, 0], y[:, 0]
     return out, np.hypot(radial, level).max(axis=1)
 

@@ -78,9 +78,9 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
     centre = _on_bisector(start, end, centre, plane, equal)
     # an arc that is only shifted keeps its words
     shift = bend.command[:, 0] - bend.point[:, 0]
-    kept = bend.rigid & (np.abs(start - bend.point[:, 0] - shift).max(axis=1) < 1e-7)
-    kept &= (np.abs(end - bend.point[:, -1] - shift).max(axis=1) < 1e-7) & rows.head[arc_row]
-    kept &= (reach == 1.0) & ~writer.program.arc_slots.absolute[arc]
+    alike = np.abs(start - bend.point[:, 0] - end + bend.point[:, -1]).max(axis=1) < 1e-7
+    kept = bend.rigid & alike & rows.head[arc_row] & (reach == 1.0)
+    kept &= ~writer.program.arc_slots.absolute[arc] | (np.abs(shift).max(axis=1) < 1e-9)
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
     lines, sweeps, planes = path.line[move].tolist(), sweep.tolist(), plane.tolist()
     return [
@@ -192,9 +192,14 @@ def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
     start, end = int(words.start[slot]), int(words.end[slot])
     writer.tally.changed_words += 1
     if size > half:
-        # how far rounding R moves the centre along the bisector
-        moved = abs(np.sqrt(size * size - half * half) - np.sqrt(max(radius * radius - half * half, 0.0)))
-        if moved < 0.5 * 10.0**-decimals * unit + 0.1 * writer.tolerance_mm:
+        # how far R as written puts the centre from where it should be
+        dx, dy = arc.end[first] - arc.start[first], arc.end[second] - arc.start[second]
+        lean = (1.0 if (arc.sweep > 0) == (sign > 0) else -1.0) * np.sqrt(size * size - half * half) / (2 * half)
+        off = np.hypot(
+            arc.start[first] + dx / 2 - lean * dy - arc.centre[first],
+            arc.start[second] + dy / 2 + lean * dx - arc.centre[second],
+        )
+        if off < 0.5 * 10.0**-decimals * unit + 0.1 * writer.tolerance_mm:
             if mantissa == int(words.mantissa[slot]) * 10 ** (decimals - own):
                 writer.tally.changed_words -= 1
             else:

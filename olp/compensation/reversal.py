@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 _NO_TOOL = np.zeros(3)
+_PASSES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,25 +52,43 @@ class Reversal:
 
 def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal) -> Plan:
     """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed move,
-    a row that only takes it up comes first."""
-    # without play a command is where the load has to be
-    wanted = np.where(rows.raw, rows.target_mm, rows.command_mm)
-    lost = model.lost_motion_mm(wanted)
-    assert lost is not None
-    play = np.zeros((len(rows), 3))
-    turns = np.zeros((len(rows), 3), bool)
-    load = wanted.copy()
-    for axis in np.flatnonzero(reversal.axes).tolist():
-        play[:, axis], load[:, axis], turns[:, axis] = _follow(
-            wanted[:, axis], np.nan_to_num(lost[:, axis]), reversal.band_mm
-        )
+    a row that only takes it up comes first.
+
+    Where one axis turns the straightness of another may jump with it, and that one turns too: the states are gone
+    through until they agree.
+    """
     tools = path.tool_mm()
     tool = tools if tools.ndim == 1 else tools[rows.move]
-    # a held axis aims at where its load stays, not at where it should be
-    held = np.nan_to_num(load - wanted)
-    command = invert(model, rows.target_mm + held, tool, play)
-    command[rows.raw] = rows.command_mm[rows.raw]
-    return _take_up(path, model, replace(rows, command_mm=command, play=play), tool, held, turns.any(axis=1))
+    play = np.zeros((len(rows), 3))
+    turns = np.zeros((len(rows), 3), bool)
+    command, held = rows.command_mm, np.zeros((len(rows), 3))
+    for _ in range(_PASSES):
+        lost = model.lost_motion_mm(command)
+        assert lost is not None
+        lost = np.maximum(np.nan_to_num(lost), 0.0)
+        # where the load is: the command without its lead, and without the hold of the pass before
+        wanted = np.where(rows.raw, rows.target_mm, command - lost / 2 * play - held)
+        before = play.copy()
+        for axis in np.flatnonzero(reversal.axes).tolist():
+            play[:, axis], load, turns[:, axis] = _follow(wanted[:, axis], lost[:, axis], reversal.band_mm)
+            # a held axis aims at where its load stays, not at where it should be
+            held[:, axis] = np.nan_to_num(load - wanted[:, axis])
+        command = invert(model, rows.target_mm + held, tool, play)
+        command[rows.raw] = rows.command_mm[rows.raw]
+        if np.abs(play - before).max(initial=0.0) < 1e-3:
+            break
+    rows = replace(rows, command_mm=command, play=play)
+    turns &= _may_turn(path, rows)[:, None]
+    return _take_up(model, rows, tool, held, turns) if turns.any() else rows
+
+
+def _may_turn(path: Toolpath, rows: Plan) -> Mask:
+    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place."""
+    may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
+    may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
+    may[0] = False
+    may[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
+    return np.asarray(may, bool)
 
 
 def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Mask]:
@@ -109,22 +128,18 @@ def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Ma
     return np.array(plays), np.array(loads), np.array(turns)
 
 
-def _take_up(path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask) -> Plan:
-    """Insert rows that turn the drive round before the load moves, in feed moves whose axis changes flank."""
+def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask) -> Plan:
+    """Insert rows that turn the drive round before the load moves."""
     assert rows.play is not None
-    change = turns & ~rows.raw.any(axis=1)
-    change[0] = False
-    change[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
-    change &= (path.kind[rows.move] != Kind.RAPID) & ((path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0)
-    where = np.flatnonzero(change)
-    if not where.size:
-        return rows
-    part_tool = tool if tool.ndim == 1 else tool[where]
-    target = rows.target_mm[where - 1] + held[where - 1]
-    turned = invert(model, target, part_tool, rows.play[where])
-    raw = rows.raw[where]
-    turned[raw] = rows.command_mm[where - 1][raw]
-    reach = np.where(rows.move[where] == rows.move[where - 1], rows.reach[where - 1], 0.0)
+    where = np.flatnonzero(turns.any(axis=1))
+    target = rows.target_mm[where - 1]
+    play = rows.play[where]
+    command = invert(model, target + held[where - 1], tool if tool.ndim == 1 else tool[where], play)
+    # an axis that does not turn must not back out of its flank here
+    step = command - rows.command_mm[where - 1]
+    stay = ~turns[where] & (step * play < 0)
+    command[stay] = rows.command_mm[where - 1][stay]
+    same = rows.move[where] == rows.move[where - 1]
 
     def insert(column: Array, new: Array) -> Array:
         return np.insert(column, where, new, axis=0)
@@ -132,10 +147,10 @@ def _take_up(path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: A
     return replace(
         rows,
         move=insert(rows.move, rows.move[where]),
-        target_mm=insert(rows.target_mm, rows.target_mm[where - 1]),
-        command_mm=insert(rows.command_mm, turned),
-        raw=insert(rows.raw, raw),
-        reach=insert(rows.reach, reach),
+        target_mm=insert(rows.target_mm, target),
+        command_mm=insert(rows.command_mm, command),
+        raw=insert(rows.raw, rows.raw[where]),
+        reach=insert(rows.reach, np.where(same, rows.reach[where - 1], 0.0)),
         take_up=insert(rows.take_up, np.ones(len(where), bool)),
-        play=insert(rows.play, rows.play[where]),
+        play=insert(rows.play, play),
     )

@@ -69,7 +69,7 @@ class Style:
         words = self.program.words
         assert words is not None
         out = words.decimals[slot].astype(np.int64)
-        if self.program.profile.increments_without_point and not self.program.calculator:
+        if not self.program.calculator:
             hidden = self.bare_decimals[axis] + (np.asarray(unit_mm) != 1.0)
             out = np.where(words.pointed[slot], out, hidden)
         return out

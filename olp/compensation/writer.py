@@ -157,10 +157,13 @@ class Writer:
         """An arc's first part keeps the block's own line, so lost motion is taken up in a block before it."""
         take_up = self.plan.take_up[rows.first : rows.first + len(rows.move)]
         arc = np.isin(self.path.kind[rows.move], (Kind.ARC_CW, Kind.ARC_CCW))
-        rows.before = take_up & arc & rows.head
-        at = np.flatnonzero(rows.before)
-        rows.head[at] = False
-        rows.head[at + 1] = True
+        rows.before = np.zeros(len(rows.move), bool)
+        at = np.flatnonzero(take_up & arc & rows.head)
+        while at.size:
+            rows.before[at] = True
+            rows.head[at] = False
+            rows.head[at + 1] = True
+            at = at[take_up[at + 1]] + 1
 
     def _breaks(self, rows: Rows) -> list[int]:
         """Where the way of counting changes: G90 and G91, units inside G91, canned cycles."""
@@ -361,7 +364,8 @@ class Writer:
             at, row = int(place[i]), int(tails[i])
             self._check_take_up(rows, row)
             out.append(self.one(at, at, BARE, 0, self._feed_of(int(line_no[i])) + self.program.eol(int(line_no[i])), rows.serial(row) + 5))
-            out += self._arc_word(rows, row + 1)
+            if rows.head[row + 1]:
+                out += self._arc_word(rows, row + 1)
         self.tally.inserted_blocks += int((~empty).sum())
         out += self._inverse_time(rows, tails)
         out += self._end_words(rows, tails[~before])
@@ -529,8 +533,8 @@ def stamped(text: bytes, stamp: bytes, eol: bytes) -> bytes:
     at = 3 if text[:3] == b"\xef\xbb\xbf" else 0
     if text[at : at + 1] == b"%":
         at = _line_after(text, at)
-        if text[at : at + 1] in b"Oo:" and text[at : at + 1]:
-            at = _line_after(text, at)
+    if text[at : at + 1] and text[at : at + 1] in b"Oo:":
+        at = _line_after(text, at)
     return text[:at] + stamp + eol + text[at:]
 
 

@@ -79,6 +79,7 @@ def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
         name=file.name,
         chain=file.chain,
         controller=file.controller,
+        decimal_point=file.decimal_point,
         axes=axes,
         calibration=beside(path, file.calibration),
         compensated_by_controller=file.compensated_by_controller,

@@ -163,6 +163,11 @@ class MachineFile(Table):
     chain: Chain = Field(
         description='the order of axes from workpiece to tool with F for the frame, such as "FXYZ"'
     )
+    decimal_point: Literal["increment", "calculator"] = Field(
+        default="increment",
+        description="what a length without a decimal point means to a Fanuc or Haas control: X100 is 100 least "
+        "increments, or 100 units as on a pocket calculator",
+    )
     controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
     calibration: Text | None = Field(
         default=None, description="the path of the calibration file, relative to this file"

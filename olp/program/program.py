@@ -70,7 +70,8 @@ class Hole:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted."""
+    """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without a
+    decimal point are whole units."""
 
     data: bytes
     profile: Profile
@@ -85,7 +86,7 @@ class Program:
     holes: tuple[Hole, ...] = ()
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
-    calculator: bool = False
+    calculator: bool = True
 
     @property
     def lines(self) -> int:

@@ -93,8 +93,8 @@ class _Rows:
     resolved: int = 0
 
 
-#: Events whose axis words are not motion: G4 G10 G52 G92 G43.1
-_CLAIMS = (40, 100, 520, 920, 921, 922, 923, 431)
+#: Events whose axis words are not motion: G10 G52 G92 G43.1
+_CLAIMS = (100, 520, 920, 921, 922, 923, 431)
 #: Events that need the present position
 _POSITION = (100, 280, 300, 530, 920)
 
@@ -184,7 +184,8 @@ class _Reader:
         event[line[m[self.m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
         event[line[(letter == 84) & usable]] = True
         consumed = ~active
-        consumed[line_of[(act == Act.EVENT) & np.isin(code, _CLAIMS)]] = True
+        claims = (*_CLAIMS, 40) if self.profile.cycles_apart else _CLAIMS
+        consumed[line_of[(act == Act.EVENT) & np.isin(code, claims)]] = True
         self._stretches(context, gather(chunk, context.motion, consumed), event)
         tail = last - 1
         state.plane, state.distance = int(context.plane[tail]), int(context.distance[tail])
@@ -448,7 +449,7 @@ class _Reader:
 
     def _scaled(self, context: _Context) -> Array:
         """Numbers as written, in program units: without a decimal point they count increments on some controls."""
-        if not self.profile.increments_without_point:
+        if not self.state.bare_increments:
             return context.value
         bare = np.flatnonzero(~context.chunk.pointed & _LENGTHS[context.chunk.letter])
         if not bare.size:
@@ -706,6 +707,7 @@ class _Reader:
             holes=tuple(self.holes),
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=self.end_line,
+            calculator=not self.state.bare_increments,
         )
 
 

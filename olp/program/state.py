@@ -209,9 +209,14 @@ class State:
 
     def word_scale(self, letter: str, pointed: bool) -> float:
         """mm per unit of the number as written."""
-        if pointed or not self.profile.increments_without_point:
+        if pointed or not self.bare_increments:
             return self.unit_mm
         return self.increment(letter) * self.unit_mm
+
+    @property
+    def bare_increments(self) -> bool:
+        """Whether a length without a decimal point counts least increments."""
+        return self.profile.increments_without_point and self.setup.machine.decimal_point == "increment"
 
     def increment(self, letter: str) -> float:
         """Least increment in program units: 0.001 mm goes with 0.0001 inch (IS-B), 0.0001 mm with 0.00001 inch."""
@@ -261,7 +266,7 @@ class State:
         effect: Effect,
     ) -> Effect:
         if code == 40:
-            return replace(effect, consumed=True)
+            return self._dwell(line, by_letter)
         if code in (200, 210):
             self.unit_mm = MM_PER_INCH if code == 200 else 1.0
             self.unit_stated = True
@@ -287,6 +292,14 @@ class State:
             self._shift(code, line, axis_words, moves)
             return replace(effect, consumed=True)
         return effect
+
+    def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
+        """G4: ISO controls take its time from X, too; RS-274 from P alone, so that axis words still move."""
+        if not self.profile.cycles_apart:
+            return Effect()
+        if any(a in by_letter for a in "YZ") or any(w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()):
+            raise ProgramError("a dwell and a motion stand in one block; give the dwell a block of its own", line=line)
+        return Effect(consumed=True)
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code == 490:

@@ -1,0 +1,136 @@
+"""What the acceptance tests share: small machines, a judge that tells passes over one place apart, a plain reader.
+
+The judge is `judge` alone; nothing here asks olp how good its own output is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from judge import linuxcnc
+from judge.linuxcnc import DWELL, KINDS, CanonMoves
+from judge.model import JudgeModel
+from judge.path import Deviation, _Curves, _forget, _measure, actual, match, shifts
+
+CUTTING = ("feed", "arc", "probe")
+TOLERANCE_UM = 1.0
+#: half the diagonal of a cube of one digit
+ROUNDING = 0.87
+#: mm of extra distance per mm of path, so that passes over one place are told apart
+_LIFT = 0.05
+
+_AXIS = "[axes.{}]\ntravel_mm = [-1000.0, 2000.0]\nleast_increment_mm = {}\nvelocity_mm_s = 500.0\n"
+_AXIS += "acceleration_mm_s2 = 2000.0\njerk_mm_s3 = 20000.0\n"
+_STAMP = re.compile(rb"(?m)^.*olp-corrected [0-9a-f]{12}.*\n")
+
+
+def machine(
+    folder: Path,
+    calibration: str = "",
+    curves: Mapping[str, str] | None = None,
+    *,
+    chain: str = "FXYZ",
+    controller: str = "linuxcnc",
+    keys: str = "",
+    tables: str = "",
+    job: str | None = None,
+    increment_mm: float = 0.001,
+) -> Path:
+    """A machine with 3 m of travel and box all around, from the text that matters; returns machine.toml."""
+    folder.mkdir(parents=True, exist_ok=True)
+    axes = "".join(_AXIS.format(a, increment_mm) for a in "XYZ")
+    (folder / "machine.toml").write_text(
+        f'schema = "olp-machine-1"\nname = "m"\nchain = "{chain}"\ncontroller = "{controller}"\n'
+        f'calibration = "calibration.toml"\n{keys}\n{axes}{tables}\n'
+    )
+    if "datum_mm" not in calibration:
+        calibration = "datum_mm = [0.0, 0.0, 0.0]\n" + calibration
+    box = "[[-1000.0, 2000.0], [-1000.0, 2000.0], [-1000.0, 2000.0]]"
+    (folder / "calibration.toml").write_text(
+        'schema = "olp-calibration-1"\nmachine = "m"\nmeasured = 2026-01-15\nvalid_until = 2099-01-01\n'
+        f'sign = "actual-minus-commanded"\nmodel = "rigid-body"\nbox_mm = {box}\ntemperature_degC = 20.0\n{calibration}\n'
+    )
+    for name, text in (curves or {}).items():
+        (folder / name).write_text(text)
+    if job is not None:
+        (folder / "job.toml").write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{job}\n')
+    return folder / "machine.toml"
+
+
+TRUE_ZERO = '[work_offsets.G54]\nset_by = "true"\n'
+
+
+def unstamped(text: bytes) -> bytes:
+    """A corrected text without its stamp line."""
+    return _STAMP.sub(b"", text, count=1)
+
+
+def words(text: bytes, letter: str) -> list[float]:
+    """Numbers behind one letter, comments left out."""
+    plain = re.sub(rb"\([^)\n]*\)|;[^\n]*", b"", text)
+    pattern = (letter + r"\s*([+-]?\d*\.?\d+|[+-]?\d+\.)").encode()
+    return [float(value) for value in re.findall(pattern, plain, re.IGNORECASE)]
+
+
+def points(text: bytes, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """(n, 3) work coordinates after each block with X, Y or Z of plain text in one frame; knows G90 and G91 only."""
+    at, relative, out = list(start), False, []
+    plain = re.sub(rb"\([^)\n]*\)|;[^\n]*", b"", text).upper()
+    for block in plain.splitlines():
+        if b"G91" in block:
+            relative = True
+        elif b"G90" in block:
+            relative = False
+        found = re.findall(rb"([XYZ])\s*([+-]?\d*\.?\d+|[+-]?\d+\.)", block)
+        for letter, number in found:
+            axis = b"XYZ".index(letter)
+            at[axis] = float(number) + (at[axis] if relative else 0.0)
+        if found:
+            out.append(list(at))
+    return np.array(out).reshape(-1, 3)
+
+
+def judged(
+    nominal: bytes,
+    corrected: bytes,
+    folder: Path,
+    *,
+    kinds: tuple[str, ...] = CUTTING,
+    spacing_mm: float = 1.0,
+    skip_lines: tuple[int, ...] = (),
+    interpreter: Mapping[str, Any] | None = None,
+) -> Deviation:
+    """As `judge.path.judge_programs`, with the length along the path in the matching.
+
+    Full circles end where they begin; without the length, blocks inserted there could be given to the wrong one.
+    """
+    setup = dict(interpreter or {})
+    model = JudgeModel(folder)
+    moves, own = (
+        _forget(m.pick(m.kind != DWELL))
+        for m in (linuxcnc.interpret(text, folder, **setup) for text in (nominal, corrected))
+    )
+    shift = shifts(moves, model)
+    passed = np.isin(moves.line, list(skip_lines))
+    real = actual(own, model, spacing_mm)
+    groups = match(real.points[real.dense.last] + _lift(own), moves.axis + shift + _lift(moves))
+    after = _measure(real, groups, moves, shift, passed, kinds)
+    before = _measure(actual(moves, model, spacing_mm), np.arange(len(moves)), moves, shift, passed, kinds)
+    return Deviation(after, before, moves.line, groups)
+
+
+def _lift(moves: CanonMoves) -> np.ndarray:
+    return np.outer(_LIFT * np.cumsum(_Curves.of(moves).lengths()), (0.0, 0.0, 1.0))
+
+
+def allowed_um(text: bytes) -> float:
+    """The bar for a program written with digits of 0.001 mm or 0.00001 in."""
+    digit_um = 0.254 if b"G20" in text.upper() else 1.0
+    return TOLERANCE_UM + ROUNDING * digit_um
+
+
+ALL_KINDS = KINDS
