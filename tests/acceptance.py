@@ -5,16 +5,18 @@ The judge is `judge` alone; nothing here asks olp how good its own output is.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from judge import linuxcnc
-from judge.linuxcnc import DWELL, KINDS, CanonMoves
+from judge.linuxcnc import DWELL, CanonMoves
 from judge.model import JudgeModel
-from judge.path import Deviation, _Curves, _forget, _measure, actual, match, shifts
+from judge.path import ActualPath, Deviation, _Curves, _forget, _measure, actual, match, shifts
 
 CUTTING = ("feed", "arc", "probe")
 TOLERANCE_UM = 1.0
@@ -116,11 +118,24 @@ def judged(
     )
     shift = shifts(moves, model)
     passed = np.isin(moves.line, list(skip_lines))
-    real = actual(own, model, spacing_mm)
+    real = _sure_of_play(actual(own, model, spacing_mm), model)
     groups = match(real.points[real.dense.last] + _lift(own), moves.axis + shift + _lift(moves))
     after = _measure(real, groups, moves, shift, passed, kinds)
-    before = _measure(actual(moves, model, spacing_mm), np.arange(len(moves)), moves, shift, passed, kinds)
+    before = _measure(_sure_of_play(actual(moves, model, spacing_mm), model), np.arange(len(moves)), moves, shift, passed, kinds)
     return Deviation(after, before, moves.line, groups)
+
+
+def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
+    """A tool change may move the axes: their play is unknown until they have moved by it once more."""
+    tool, dense = real.dense.moves.tool[real.dense.move], real.dense.points
+    sure = real.sure.copy()
+    edges = [*(np.flatnonzero(np.diff(tool)) + 1).tolist(), len(tool)]
+    for axis in np.flatnonzero(model.has_play).tolist():
+        lost = model.lost_motion_mm(axis, np.clip(dense[:, axis], *model.box[axis]))
+        for a, b in itertools.pairwise(edges):
+            moved = np.maximum.accumulate(dense[a:b, axis]) - np.minimum.accumulate(dense[a:b, axis])
+            sure[a:b] &= moved >= lost[a:b]
+    return replace(real, sure=sure)
 
 
 def _lift(moves: CanonMoves) -> np.ndarray:
@@ -132,5 +147,3 @@ def allowed_um(text: bytes) -> float:
     digit_um = 0.254 if b"G20" in text.upper() else 1.0
     return TOLERANCE_UM + ROUNDING * digit_um
 
-
-ALL_KINDS = KINDS

@@ -95,7 +95,7 @@ def test_options_reach_the_library(mill: Path, library: Fake) -> None:
     assert passed.pop("date").isoformat() == "2027-01-31"
     assert passed == {
         "tolerance_um": 2.5, "outside_box": "hold", "flatten": True, "expand_cycles": True, "contour": True,
-        "split_rapids": True, "progress": None,
+        "split_rapids": True, "peck_clearance_mm": None, "progress": None,
     }  # fmt: skip
     run("correct", "-j", mill / "job.toml", "--force")
     assert library.calls[1][1]["date"] is None, "no run reads the clock"

@@ -21,8 +21,8 @@ from olp.exceptions import OlpError
 
 DIALECTS = ("linuxcnc", "grbl", "fanuc", "haas")
 ALPHABET = "GXYZIJKRFMTNSPQHLDO%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!"
-#: the search for commands stops at 1e-9 mm, and two models differ in the last bits
-SLACK_MM = 1e-7
+#: 1 nm, within which the two independent models agree
+SLACK_MM = 1e-6
 HALF_DIGIT = 0.5e-3 + SLACK_MM
 TOOL = np.array([0.0, 0.0, -120.0])
 #: what a control may find wrong with an arc, in mm: the strictest of them (grbl) takes 0.005

@@ -123,7 +123,7 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, npt.NDArray[np.
     some = np.flatnonzero(unknown.any(axis=1))
     if some.size:
         blind = (unknown[some][:, None, :] & model.depends_on[None]).any(axis=2)
-        wanting = some[(blind & ~unknown[some]).any(axis=1) & ~raw[some].any(axis=1)]
+        wanting = some[blind.any(axis=1) & ~raw[some].any(axis=1)]
         cutting = wanting[path.kind[wanting] != Kind.RAPID]
         if cutting.size:
             i = int(cutting[0])

@@ -1,7 +1,8 @@
 """Draws the picture of the README: python programs/make/picture.py viewer/pictures/gantry-plate.png
 
-The nominal path is that of the same machine without errors. Where the real machine leaves it, with the program as
-it was and with the corrected one, comes from `olp.simulate`.
+The nominal path is that of the same machine without errors. Where the real machine leaves it, with the
+program as it was and with the corrected one, comes from `olp.simulate`;
+distances are to the nearest point of the path.
 """
 
 from __future__ import annotations
@@ -88,7 +89,8 @@ def main(target: str) -> None:
     tolerance = corrected.report["tolerance_um"]
     size.axhline(tolerance, color="0.2", linewidth=0.8, linestyle="--")
     size.text(1.005, tolerance, "tolerance", transform=size.get_yaxis_transform(), va="center", fontsize=8)
-    size.set(xlabel="path in the material, in m", ylabel="beside the nominal\npath, in um", ylim=(1e-2, 100.0), xlim=(0.0, length[-1]))
+    size.set(xlabel="path in the material, in m", ylabel="beside the nominal\npath, in um")
+    size.set(xlim=(0.0, length[-1]), ylim=(1e-2, 100.0))
     size.grid(color="0.9", linewidth=0.5)
     figure.savefig(target, dpi=110, metadata={"Software": None})
 
