@@ -210,7 +210,9 @@ def worst_blocks(program: Program, proof: Proof) -> list[dict[str, Any]]:
     before = np.fmax(np.nan_to_num(proof.before.waypoint), np.nan_to_num(proof.before.path))
     out: list[dict[str, Any]] = []
     seen: set[int] = set()
-    for move in np.argsort(-size, kind="stable")[: 50 * _WORST].tolist():
+    few = min(50 * _WORST, len(size))
+    top = np.argpartition(size, len(size) - few)[len(size) - few :] if few else np.zeros(0, np.int64)
+    for move in top[np.lexsort((top, -size[top]))].tolist():
         line = int(program.toolpath.line[move])
         if line in seen or size[move] == 0:
             continue

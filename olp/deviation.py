@@ -20,7 +20,7 @@ from olp.toolpath import Flag, Kind, Toolpath
 
 Index = npt.NDArray[np.int64]
 
-_BLOCK = 1 << 16
+_BLOCK = 1 << 15
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 #: samples of an arc move at the least
 _ARC_STEPS = 8

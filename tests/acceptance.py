@@ -127,14 +127,17 @@ def judged(
 
 def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
     """A tool change may move the axes: their play is unknown until they have moved by it once more."""
-    tool, dense = real.dense.moves.tool[real.dense.move], real.dense.points
+    dense, known = real.dense, real.dense.moves.known
+    before = np.vstack([np.full((1, 3), real.dense.moves.start_known), known[:-1]])
+    settled = (known & before)[dense.move] | (known[dense.move] & dense.last[:, None])
+    edges = [0, *(np.flatnonzero(np.diff(dense.moves.tool[dense.move])) + 1).tolist(), len(dense.move)]
     sure = real.sure.copy()
-    edges = [*(np.flatnonzero(np.diff(tool)) + 1).tolist(), len(tool)]
     for axis in np.flatnonzero(model.has_play).tolist():
-        lost = model.lost_motion_mm(axis, np.clip(dense[:, axis], *model.box[axis]))
+        place = np.where(settled[:, axis], dense.points[:, axis], np.nan)
+        lost = model.lost_motion_mm(axis, np.clip(dense.points[:, axis], *model.box[axis]))
         for a, b in itertools.pairwise(edges):
-            moved = np.maximum.accumulate(dense[a:b, axis]) - np.minimum.accumulate(dense[a:b, axis])
-            sure[a:b] &= moved >= lost[a:b]
+            moved = np.fmax.accumulate(place[a:b]) - np.fmin.accumulate(place[a:b])
+            sure[a:b] &= np.nan_to_num(moved) >= lost[a:b]
     return replace(real, sure=sure)
 
 

@@ -6,6 +6,7 @@ found by least squares; where it leaves them by more than the tolerance the piec
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,7 @@ _STIFFNESS = 1e-3
 _DEEPEST = 14
 #: arcs beyond this sweep are not held to equal radii at both ends
 WIDE = 0.95 * np.pi
-_BATCH = 1 << 18
+_BATCH = 1 << 16
 _AXES = np.array(PLANES)
 
 
@@ -75,11 +76,9 @@ def subdivide_arcs(
     for _ in range(_DEEPEST):
         if not len(pieces):
             break
-        size = max(1, _BATCH // 64)
-        departure = np.concatenate([
-            fit_pieces(path, model, target, pieces.pick(np.arange(a, min(a + size, len(pieces)))), tools, tolerance)
-            for a in range(0, len(pieces), size)
-        ])  # fmt: skip
+        departure = np.zeros(len(pieces))
+        for part, count in sample_groups(path, model, target, pieces, tools, tolerance):
+            departure[part] = fit_pieces(path, model, target, pieces.pick(part), tools, count)
         good = departure <= tolerance
         done.append(pieces.pick(good))
         # what an arc cannot follow goes with about the third power of its length
@@ -136,23 +135,40 @@ class Bend:
     rigid: Mask
 
 
-def sampled(
+def sample_groups(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
+) -> Iterator[tuple[Index, int]]:
+    """Pieces (indices) that need the same number of samples, in batches, so that nothing of the error is missed."""
+    arcs = path.arcs
+    start, end = _ends(path, target, pieces.arc)
+    axes = _AXES[arcs.plane[pieces.arc]]
+    rows = np.arange(len(pieces))
+    centre = arcs.centre_mm[pieces.arc]
+    radius = np.hypot(*(path.end_mm[arcs.move[pieces.arc]][rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1)))
+    share = pieces.end - pieces.begin
+    delta = np.abs(end - start) * share[:, None]
+    for i in (0, 1):
+        delta[rows, axes[:, i]] = np.minimum(radius * np.abs(arcs.sweep_rad[pieces.arc]) * share, 2 * radius)
+    tool = tools if tools.ndim == 1 else tools[arcs.move[pieces.arc]]
+    count = steps_needed(model, delta, tool, tolerance / 4, at_least=8, at_most=256)
+    for steps in np.unique(count).tolist():
+        group = np.flatnonzero(count == steps)
+        size = max(1, _BATCH // steps)
+        for a in range(0, len(group), size):
+            yield group[a : a + size], steps
+
+
+def sampled(
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, count: int
 ) -> Bend:
-    """Sample pieces so finely that nothing of the error is missed."""
+    """Sample pieces at `count` equal steps."""
     arcs = _shifted(path.arcs, path, target)
     start, end = _ends(path, target, pieces.arc)
     axes = _AXES[arcs.plane[pieces.arc]]
     rows = np.arange(len(pieces))
-    radius = np.hypot(*(start[rows, axes[:, i]] - arcs.centre_mm[pieces.arc][rows, axes[:, i]] for i in (0, 1)))
-    length = radius * np.abs(arcs.sweep_rad[pieces.arc]) * (pieces.end - pieces.begin)
-    delta = np.abs(end - start) * (pieces.end - pieces.begin)[:, None]
-    for i in (0, 1):
-        delta[rows, axes[:, i]] = np.minimum(length, 2 * radius)
     move = arcs.move[pieces.arc]
     tool = tools if tools.ndim == 1 else tools[move]
-    count = int(steps_needed(model, delta, tool, tolerance / 4, at_most=256).max())
-    share = np.linspace(0.0, 1.0, max(count, 12) + 1)
+    share = np.linspace(0.0, 1.0, count + 1)
     spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
     which = np.repeat(np.arange(len(pieces)), len(share))
     point = _points(start[which], end[which], arcs, pieces.arc[which], spread)
@@ -181,10 +197,10 @@ def _inside(play: Array) -> Array:
 
 
 def fit_pieces(
-    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, count: int
 ) -> Array:
-    """(n,) how far the best arc leaves the bent path of each piece, in mm."""
-    bend = sampled(path, model, target, pieces, tools, tolerance)
+    """(n,) how far the best arc leaves the bent path of each piece, in mm, looked at in `count` steps."""
+    bend = sampled(path, model, target, pieces, tools, count)
     sweep = path.arcs.sweep_rad[pieces.arc] * (pieces.end - pieces.begin)
     plane = path.arcs.plane[pieces.arc]
     _, departure = fit(bend, plane, bend.command[:, 0], bend.command[:, -1], sweep)

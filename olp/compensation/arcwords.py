@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.arcs import WIDE, Pieces, fit, sampled
+from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
 from olp.errormodel.base import Array, Mask
 from olp.exceptions import ProgramError
 from olp.program.edits import EditList, Edits
@@ -49,10 +49,8 @@ def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     if not arc_row.size:
         return []
     edits = EditList(writer.prefixes)
-    size = 4096
-    for a in range(0, len(arc_row), size):
-        for arc in _solve(writer, rows, arc_row[a : a + size]):
-            (_head if rows.head[arc.row] else _tail)(writer, rows, arc, edits)
+    for arc in _solve(writer, rows, arc_row):
+        (_head if rows.head[arc.row] else _tail)(writer, rows, arc, edits)
     return [edits.done()]
 
 
@@ -62,30 +60,32 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
     move = rows.move[arc_row]
     arc = np.searchsorted(path.arcs.move, move)
     reach = plan.reach[rows.first + arc_row]
-    previous = np.where(
-        rows.move[np.maximum(arc_row - 1, 0)] == move, plan.reach[rows.first + np.maximum(arc_row - 1, 0)], 0.0
-    )
-    previous[arc_row == 0] = 0.0
-    pieces = Pieces(arc, previous, reach)
-    tools = path.tool_mm()
-    bend = sampled(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm)
-    start = np.where((arc_row > 0)[:, None], rows.emitted[np.maximum(arc_row - 1, 0)], rows.entry)
+    before = np.maximum(arc_row - 1, 0)
+    begin = np.where((rows.move[before] == move) & (arc_row > 0), plan.reach[rows.first + before], 0.0)
+    pieces = Pieces(arc, begin, reach)
+    start = np.where((arc_row > 0)[:, None], rows.emitted[before], rows.entry)
     end = rows.emitted[arc_row]
     plane = path.arcs.plane[arc]
-    sweep = path.arcs.sweep_rad[arc] * (reach - previous)
-    centre, _ = fit(bend, plane, start, end, sweep)
-    equal = (np.abs(sweep) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
-    centre = _on_bisector(start, end, centre, plane, equal)
-    # an arc that is only shifted keeps its words
-    shift = bend.command[:, 0] - bend.point[:, 0]
-    alike = np.abs(start - bend.point[:, 0] - end + bend.point[:, -1]).max(axis=1) < 1e-7
-    kept = bend.rigid & alike & rows.head[arc_row] & (reach == 1.0)
-    kept &= ~writer.program.arc_slots.absolute[arc] | (np.abs(shift).max(axis=1) < 1e-9)
+    sweep = path.arcs.sweep_rad[arc] * (reach - begin)
+    centre = np.zeros((len(arc_row), 3))
+    kept = np.zeros(len(arc_row), bool)
+    tools = path.tool_mm()
+    for part, count in sample_groups(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm):
+        bend = sampled(path, writer.model, writer.targets, pieces.pick(part), tools, count)
+        best, _ = fit(bend, plane[part], start[part], end[part], sweep[part])
+        equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
+        centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
+        # an arc that is only shifted keeps its words
+        shift = bend.command[:, 0] - bend.point[:, 0]
+        alike = np.abs(start[part] - bend.point[:, 0] - end[part] + bend.point[:, -1]).max(axis=1) < 1e-7
+        absolute = writer.program.arc_slots.absolute[arc[part]]
+        kept[part] = bend.rigid & alike & (~absolute | (np.abs(shift).max(axis=1) < 1e-9))
+    kept &= rows.head[arc_row] & (reach == 1.0)
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
-    lines, sweeps, planes = path.line[move].tolist(), sweep.tolist(), plane.tolist()
+    lines, sweeps, planes, moves = path.line[move].tolist(), sweep.tolist(), plane.tolist(), move.tolist()
     return [
-        _Arc(row, which, lines[i], start[i], end[i], centre[i], sweeps[i], planes[i])
-        for i, (row, which) in enumerate(zip(arc_row.tolist(), move.tolist(), strict=True))
+        _Arc(row, moves[i], lines[i], start[i], end[i], centre[i], sweeps[i], planes[i])
+        for i, row in enumerate(arc_row.tolist())
         if not kept[i]
     ]
 

@@ -57,7 +57,9 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     order = np.arange(count)
     fix = rows.given & ~rows.raw
     decimals = np.where(rows.given, np.maximum(rows.decimals, least), usual)
-    scale = _POW10[decimals]
+    # one number of digits all through is the common case, and the cheap one
+    same_all = count > 0 and bool((decimals == decimals[0]).all())
+    scale = _POW10[decimals[:1]] if same_all else _POW10[decimals]
     with np.errstate(invalid="ignore"):
         wanted = np.rint((rows.command - rows.offset) / rows.unit * scale)
         unknown = np.isnan(wanted)
@@ -80,7 +82,7 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     previous = np.concatenate(([before], emitted[:-1]))
     with np.errstate(invalid="ignore"):
         insert = moves & ~(np.abs(emitted - previous) < 1e-9)
-    same = rows.word * _INT10[np.maximum(decimals - rows.decimals, 0)] == mantissa
+    same = rows.word * _INT10[decimals - np.minimum(rows.decimals, decimals)] == mantissa
     return Digits(emitted, mantissa, decimals.astype(np.int8), (fix & ~same) | insert)
 
 

@@ -11,6 +11,8 @@ from olp.exceptions import NotInvertible
 #: A command is good when its error differs from the one it was made with by less than this.
 TOLERANCE_MM = 1e-9
 _ITERATIONS = 30
+#: errors up to this grow by less than a part in a thousand of themselves over their own length
+_SMALL_MM = 0.15
 #: Points at a time: the columns of one block stay in the second-level cache.
 BLOCK = 1 << 14
 
@@ -51,6 +53,9 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
 
 
 def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-    """Commands for samples between way-points, where the second order of the error is enough (e'^2 e < 1e-7 mm)."""
-    guess = target_mm - model.error(target_mm, tool_mm, play)
-    return np.asarray(target_mm - model.error(guess, tool_mm, play), float)
+    """Commands for samples between way-points: one step of the iteration where errors are small (then it is right
+    to a few nanometres), two elsewhere."""
+    error = model.error(target_mm, tool_mm, play)
+    if np.abs(error).max(initial=0.0) > _SMALL_MM:
+        error = model.error(target_mm - error, tool_mm, play)
+    return np.asarray(target_mm - error, float)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.invert import bent
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.sampling import steps_needed
@@ -20,9 +21,11 @@ Index = npt.NDArray[np.int64]
 Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance
-_SAMPLE_SHARE = 0.01
+_SAMPLE_SHARE = 0.03
+#: chords may end at this many places between two samples, where the error is as good as straight
+_FINE = 4
 _BATCH = 1 << 20
-_FEW, _ALL = 24, 1 << 30
+_FEW, _ALL = 16, 1 << 30
 
 
 def no_cuts() -> Cuts:
@@ -87,11 +90,12 @@ def _cut_batch(
     point = start[owner] + share[:, None] * delta[owner]
     tools = tool if tool.ndim == 1 else tool[owner]
     play = np.sign(delta)[owner] if model.lost_motion_mm(point[:1]) is not None else None
-    error = model.error(point, tools, play)
-    error = model.error(point - error, tools, play)
+    error = point - bent(model, point, tools, play)
     length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
     along = (error * delta[owner]).sum(axis=1) / length2[owner]
-    across = error - along[:, None] * delta[owner]
+    across = _finer(error - along[:, None] * delta[owner], first, count)
+    count = count * _FINE
+    first = np.concatenate(([0], np.cumsum(count + 1)[:-1]))
     cut_move, cut_share = [], []
     begin = np.zeros(len(move), np.int64)
     active = np.arange(len(move))
@@ -111,7 +115,25 @@ def _cut_batch(
         cut_share.append(begin[active])
     owner = np.concatenate(cut_move)
     node = np.concatenate(cut_share)
-    return move[owner], node / count[owner], point[first[owner] + node]
+    share = node / count[owner]
+    return move[owner], share, start[owner] + share[:, None] * delta[owner]
+
+
+def _finer(across: Array, first: Index, count: Index) -> Array:
+    """Samples with linear ones between them, move by move."""
+    inner = np.ones(len(across), bool)
+    inner[first + count] = False
+    at = np.flatnonzero(inner)
+    step = across[at + 1] - across[at]
+    fine = np.arange(_FINE) / _FINE
+    between = across[at][:, None, :] + fine[:, None] * step[:, None, :]
+    out = np.zeros((len(at) * _FINE + len(first), 3))
+    last = np.cumsum(count * _FINE + 1) - 1
+    keep = np.ones(len(out), bool)
+    keep[last] = False
+    out[keep] = between.reshape(-1, 3)
+    out[last] = across[first + count]
+    return out
 
 
 def _longest(
@@ -146,7 +168,8 @@ def _fits(across: Array, start: Index, steps: Index, tolerance: float, most: int
     wide = np.flatnonzero(steps > 1)
     limit = 1 << 21
     at = 0
-    looked = np.minimum(steps[wide] - 1, most)
+    # between two samples of the model the error is taken as straight, so its own samples are enough
+    looked = np.minimum(steps[wide] - 1, np.minimum(np.maximum(steps[wide] // _FINE, _FEW), most))
     totals = np.cumsum(looked)
     while at < len(wide):
         stop = max(int(np.searchsorted(totals, (totals[at - 1] if at else 0) + limit)), at + 1)

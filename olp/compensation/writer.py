@@ -26,7 +26,7 @@ from olp.toolpath import Flag, Frame, Kind
 
 Index = npt.NDArray[np.int64]
 
-CHUNK = 1 << 16
+CHUNK = 1 << 15
 _END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
 
