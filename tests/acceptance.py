@@ -1,4 +1,4 @@
-"""What the acceptance tests share: small machines, a judge that tells passes over one place apart, a plain reader.
+"""What the acceptance tests share: small machines, a judge that tells near passes apart, a plain reader.
 
 The judge is `judge` alone; nothing here asks olp how good its own output is.
 """
@@ -54,7 +54,8 @@ def machine(
     box = "[[-1000.0, 2000.0], [-1000.0, 2000.0], [-1000.0, 2000.0]]"
     (folder / "calibration.toml").write_text(
         'schema = "olp-calibration-1"\nmachine = "m"\nmeasured = 2026-01-15\nvalid_until = 2099-01-01\n'
-        f'sign = "actual-minus-commanded"\nmodel = "rigid-body"\nbox_mm = {box}\ntemperature_degC = 20.0\n{calibration}\n'
+        f'sign = "actual-minus-commanded"\nmodel = "rigid-body"\nbox_mm = {box}\n'
+        f"temperature_degC = 20.0\n{calibration}\n"
     )
     for name, text in (curves or {}).items():
         (folder / name).write_text(text)
@@ -79,7 +80,7 @@ def words(text: bytes, letter: str) -> list[float]:
 
 
 def points(text: bytes, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
-    """(n, 3) work coordinates after each block with X, Y or Z of plain text in one frame; knows G90 and G91 only."""
+    """(n, 3) work coordinates after each block with X, Y or Z, in one frame; knows G90 and G91 only."""
     at, relative, out = list(start), False, []
     plain = re.sub(rb"\([^)\n]*\)|;[^\n]*", b"", text).upper()
     for block in plain.splitlines():
@@ -108,7 +109,7 @@ def judged(
 ) -> Deviation:
     """As `judge.path.judge_programs`, with the length along the path in the matching.
 
-    Full circles end where they begin; without the length, blocks inserted there could be given to the wrong one.
+    Full circles end where they begin; without the length, blocks inserted there could go to the wrong one.
     """
     setup = dict(interpreter or {})
     model = JudgeModel(folder)
@@ -121,12 +122,22 @@ def judged(
     real = _sure_of_play(actual(own, model, spacing_mm), model)
     groups = match(real.points[real.dense.last] + _lift(own), moves.axis + shift + _lift(moves))
     after = _measure(real, groups, moves, shift, passed, kinds)
-    before = _measure(_sure_of_play(actual(moves, model, spacing_mm), model), np.arange(len(moves)), moves, shift, passed, kinds)
+    before = _measure(
+        _sure_of_play(actual(moves, model, spacing_mm), model),
+        np.arange(len(moves)),
+        moves,
+        shift,
+        passed,
+        kinds,
+    )
     return Deviation(after, before, moves.line, groups)
 
 
 def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
-    """A tool change may move the axes: their play is unknown until they have moved by it once more."""
+    """A tool change may move the axes: their play is unknown until they have moved by it once more.
+
+    No command is right for all of a move that begins with an unknown play; for its end one is.
+    """
     dense, known = real.dense, real.dense.moves.known
     before = np.vstack([np.full((1, 3), real.dense.moves.start_known), known[:-1]])
     settled = (known & before)[dense.move] | (known[dense.move] & dense.last[:, None])
@@ -138,7 +149,10 @@ def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
         for a, b in itertools.pairwise(edges):
             moved = np.fmax.accumulate(place[a:b]) - np.fmin.accumulate(place[a:b])
             sure[a:b] &= np.nan_to_num(moved) >= lost[a:b]
-    return replace(real, sure=sure)
+    at_begin = np.concatenate([[True], sure[:-1]])
+    first = np.concatenate([[True], np.diff(dense.move) != 0])
+    begun = at_begin[np.flatnonzero(first)][np.cumsum(first) - 1]
+    return replace(real, sure=sure & (begun | dense.last))
 
 
 def _lift(moves: CanonMoves) -> np.ndarray:
@@ -149,4 +163,3 @@ def allowed_um(text: bytes) -> float:
     """The bar for a program written with digits of 0.001 mm or 0.00001 in."""
     digit_um = 0.254 if b"G20" in text.upper() else 1.0
     return TOLERANCE_UM + ROUNDING * digit_um
-

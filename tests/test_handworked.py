@@ -1,4 +1,4 @@
-"""Cases worked out by hand, through `olp.correct` on programs: zero setting, lost motion, levers, start state."""
+"""Cases worked out by hand, as programs: zero setting, lost motion, levers, start state."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEP = "X_mm,EXX_um\n-1000,10\n150,10\n160,25\n2000,25\n"
 CURVE_X = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
 SQUARE = "[squareness]\nC0Y_urad = 100.0\n"
 HEAD = b"G21 G90 G54\n"
-FINE = {"increment_mm": 0.0001}
+FINE_MM = 0.0001
 
 
 def corrected(path: Path, body: bytes, **options: object) -> bytes:
@@ -36,7 +36,9 @@ def refused_line(path: Path, body: bytes) -> int | None:
 
 
 @pytest.mark.parametrize(("set_by", "expected"), [("touch", (0.0, 99.985)), ("true", (-0.01, 99.975))])
-def test_a_touched_off_point_keeps_its_place(tmp_path: Path, set_by: str, expected: tuple[float, float]) -> None:
+def test_a_touched_off_point_keeps_its_place(
+    tmp_path: Path, set_by: str, expected: tuple[float, float]
+) -> None:
     frame = f'[work_offsets.G54]\nX_mm = 100.0\nset_by = "{set_by}"\n'
     path = machine(tmp_path, CURVE_X, {"x.csv": STEP}, tables=frame)
     text = corrected(path, b"G0 X0. Y0. Z0.\nG0 X100.\n")
@@ -54,7 +56,7 @@ def test_the_length_of_the_touch_tool_counts(tmp_path: Path) -> None:
     """EZZ grows by 10 um over 100 mm: touched with a tool of 50 mm, the axis stood 50 mm higher."""
     frame = "[work_offsets.G54]\nZ_mm = 100.0\ntouch_tool = 1\n[tools.1]\nZ_mm = 50.0\n"
     curve = {"z.csv": "Z_mm,EZZ_um\n-1000,-100\n2000,200\n"}
-    path = machine(tmp_path, CURVE_X.replace("x.csv", "z.csv"), curve, tables=frame, **FINE)
+    path = machine(tmp_path, CURVE_X.replace("x.csv", "z.csv"), curve, tables=frame, increment_mm=FINE_MM)
     # axis 100 has 10 um, the touch at axis 150 has 15 um: command = -(10 - 15) um, less 1e-4 of itself
     assert words(corrected(path, b"G0 X0 Y0 Z0.\n"), "Z") == [pytest.approx(0.005, abs=1e-4)]
 
@@ -76,7 +78,12 @@ def test_yaw_of_a_moving_table(tmp_path: Path, reference: str, expected: tuple[f
     tool = "[tools.1]\ngauge_to_tip_mm = [0.0, 130.0, -243.5]\n[job_defaults]\ntool = 1\n"
     curve = {"y.csv": "Y_mm,ECY_urad\n-1000,10\n2000,10\n"}
     path = machine(
-        tmp_path, CURVE_X.replace("x.csv", "y.csv") + reference, curve, chain="YFXZ", tables=TRUE_ZERO + tool, **FINE
+        tmp_path,
+        CURVE_X.replace("x.csv", "y.csv") + reference,
+        curve,
+        chain="YFXZ",
+        tables=TRUE_ZERO + tool,
+        increment_mm=FINE_MM,
     )
     (end,) = points(corrected(path, b"G0 X400. Y300. Z200.\n"))
     assert end - (400, 300, 200) == pytest.approx((*expected, 0.0), abs=0.51e-4)
@@ -97,7 +104,7 @@ def test_temperatures_of_scale_and_workpiece(tmp_path: Path) -> None:
     calibration = CURVE_X + "[thermal]\nX_scale_um_m_K = 11.5\nworkpiece_um_m_K = 12.0\n"
     job = "[temperatures_degC]\nX_scale = 25.0\nworkpiece = 25.0\n"
     curve = {"x.csv": "X_mm,EXX_um\n-1000,-30\n2000,60\n"}
-    path = machine(tmp_path, calibration, curve, tables=TRUE_ZERO, job=job, **FINE)
+    path = machine(tmp_path, calibration, curve, tables=TRUE_ZERO, job=job, increment_mm=FINE_MM)
     file = path.with_name("calibration.toml")
     file.write_text(file.read_text().replace("temperature_degC = 20.0", "temperature_degC = 22.0"))
     assert words(corrected(path, b"G0 X1000. Y0. Z0.\n"), "X") == [pytest.approx(999.9955, abs=1e-9)]
@@ -115,7 +122,7 @@ def test_each_side_of_the_play_gets_half(tmp_path: Path) -> None:
 
 def test_within_the_play_the_tip_arrives_all_the_same(tmp_path: Path) -> None:
     """The way-points of the hand case, behind a run-up: the tip ends on each of them within the dead band."""
-    path = machine(tmp_path, PLAY, tables=TRUE_ZERO, **FINE)
+    path = machine(tmp_path, PLAY, tables=TRUE_ZERO, increment_mm=FINE_MM)
     nominal = np.array([0.0, 10.0, 10.002, 9.999, 9.9, 9.9005, 12.0])
     body = "G0 X-5. Y0. Z0.\nG1 F100 " + "\n".join(f"X{x}" for x in nominal) + "\n"
     command = np.vstack([np.zeros(3), points(corrected(path, body.encode()))])
@@ -169,7 +176,9 @@ def test_the_job_may_say_where_the_axes_are(tmp_path: Path) -> None:
 def test_axes_are_unknown_after_the_control_moved_them(square: Path, away: bytes) -> None:
     body = b"G0 X0. Y100. Z5.\n" + away
     assert refused_line(square, body + b"G91 G1 Y1. F100\n") == 4
-    assert corrected(square, body + b"G0 X0. Y50. Z5.\nG1 X5. F9\n").endswith(b"G0 X0.005 Y50. Z5.\nG1 X5.005 F9\n")
+    assert corrected(square, body + b"G0 X0. Y50. Z5.\nG1 X5. F9\n").endswith(
+        b"G0 X0.005 Y50. Z5.\nG1 X5.005 F9\n"
+    )
 
 
 def test_g28_forgets_only_the_axes_it_moves(square: Path) -> None:
@@ -269,13 +278,17 @@ def test_the_control_is_left_what_it_corrects(
     tmp_path: Path, compensated: str, active: str, expected: float
 ) -> None:
     keys = f"compensated_by_controller = {compensated}"
-    path = machine(tmp_path, f"active_during_measurement = {active}\n" + TWO, SHIFT, keys=keys, tables=TRUE_ZERO)
+    path = machine(
+        tmp_path, f"active_during_measurement = {active}\n" + TWO, SHIFT, keys=keys, tables=TRUE_ZERO
+    )
     assert words(corrected(path, b"G0 X0. Y100. Z0.\n"), "X") == [pytest.approx(expected, abs=1e-9)]
 
 
 def test_an_error_is_measured_with_the_control_or_left_to_it_not_both(tmp_path: Path) -> None:
     keys = 'compensated_by_controller = ["EXX"]'
-    path = machine(tmp_path, 'active_during_measurement = ["EXX"]\n' + TWO, SHIFT, keys=keys, tables=TRUE_ZERO)
+    path = machine(
+        tmp_path, 'active_during_measurement = ["EXX"]\n' + TWO, SHIFT, keys=keys, tables=TRUE_ZERO
+    )
     with pytest.raises(ConfigError, match="EXX"):
         corrected(path, b"G0 X0. Y100. Z0.\n")
 
@@ -286,7 +299,9 @@ def test_a_control_that_corrects_all_is_refused(tmp_path: Path) -> None:
         corrected(path, b"G0 X0. Y100. Z0.\n")
 
 
-@pytest.mark.parametrize("body", [b"T7 M6\nG0 X0. Y0. Z0.\n", b"G55\nG0 X0. Y0. Z0.\n", b"G43 H7\nG0 X0. Y0. Z0.\n"])
+@pytest.mark.parametrize(
+    "body", [b"T7 M6\nG0 X0. Y0. Z0.\n", b"G55\nG0 X0. Y0. Z0.\n", b"G43 H7\nG0 X0. Y0. Z0.\n"]
+)
 def test_what_the_files_do_not_define_is_refused_with_its_line(square: Path, body: bytes) -> None:
     assert refused_line(square, body) in (2, 3)
 

@@ -28,8 +28,8 @@ TOOL = np.array([0.0, 0.0, -120.0])
 #: what a control may find wrong with an arc, in mm: the strictest of them (grbl) takes 0.005
 RADIUS_MM = 0.005
 #: statements that are no coordinates to correct: local offsets, increments
-PLAIN = ("lines", "short", "rapid", "arcs", "planes", "circle", "radius", "frames", "modal", "style", "comments", "numbers",
-         "dwell")  # fmt: skip
+PLAIN = ("lines", "short", "rapid", "arcs", "planes", "circle", "radius", "frames", "modal", "style", "comments",
+         "numbers",          "dwell")  # fmt: skip
 WORD = re.compile(rb"(?i)([XYZ])([ \t]*)([+-]?(?:\d+\.?\d*|\.\d+))")
 
 
@@ -87,7 +87,10 @@ def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Path], dialect: str, noi
     assert olp.correct(data, zero[dialect]).data == data
 
 
-@given(seed=st.integers(0, 2**20), cuts=st.lists(st.tuples(st.integers(0, 4000), st.binary(max_size=4)), max_size=6))
+@given(
+    seed=st.integers(0, 2**20),
+    cuts=st.lists(st.tuples(st.integers(0, 4000), st.binary(max_size=4)), max_size=6),
+)
 @settings(max_examples=25)
 def test_l1_a_damaged_program_never_crashes(
     zero: dict[str, Path], shifted: dict[str, Path], seed: int, cuts: list[tuple[int, bytes]]
@@ -198,12 +201,14 @@ def test_l7_arcs_keep_their_radius(
     corrected = olp.correct(text.encode(), bent).data
     at, arcs = np.zeros(2), 0
     for block in corrected.splitlines():
-        found = {key: float(number) for key, number in re.findall(rb"([XYIJ])([+-]?(?:\d+\.?\d*|\.\d+))", block)}
+        found = {
+            key: float(number) for key, number in re.findall(rb"([XYIJ])([+-]?(?:\d+\.?\d*|\.\d+))", block)
+        }
         if b"olp-corrected" in block:
             continue
         end = np.array([found.get(b"X", at[0]), found.get(b"Y", at[1])])
         if b"I" in found or b"J" in found:
-            centre = at + (found.get(b"I", 0.0), found.get(b"J", 0.0))
+            centre = at + np.array([found.get(b"I", 0.0), found.get(b"J", 0.0)])
             arcs += 1
             assert abs(np.linalg.norm(end - centre) - np.linalg.norm(at - centre)) <= RADIUS_MM
         at = end
@@ -222,7 +227,7 @@ def test_l8_the_tally_is_complete(bent: Path, seed: int) -> None:
 
 
 def test_l8_every_machine_move_is_counted(tmp_path: Path) -> None:
-    path = machine(tmp_path, '[squareness]\nC0Y_urad = 50.0\n', tables=TRUE_ZERO)
+    path = machine(tmp_path, "[squareness]\nC0Y_urad = 50.0\n", tables=TRUE_ZERO)
     text = b"G21 G90\nG0 X0 Y0 Z0\nG1 Y100 F100\nG53 G0 Z0\nG0 X5 Y5 Z5\nM30\n"
     moves = olp.correct(text, path).report["moves"]
     assert (moves["total"], moves["passed"], moves["corrected"]) == (4, 1, 3)

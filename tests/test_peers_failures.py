@@ -1,4 +1,4 @@
-"""What other correctors of programs get wrong, each as a test: their reproduced defects and their users' complaints."""
+"""What other correctors of programs get wrong: their defects and their users' complaints, each as a test."""
 
 from __future__ import annotations
 
@@ -115,7 +115,9 @@ def test_expressions_are_refused_with_their_line(skewed: Path, block: bytes) -> 
 
 
 def test_no_radius_is_left_behind_on_a_line(bent: Path) -> None:
-    text = correct(b"G21 G90 G54\nG0 X-40. Y0. Z0.\nG2 X40. Y0. R40. F500\nG3 X-40. Y0. R-41.\nG1 X0.\n", bent)
+    text = correct(
+        b"G21 G90 G54\nG0 X-40. Y0. Z0.\nG2 X40. Y0. R40. F500\nG3 X-40. Y0. R-41.\nG1 X0.\n", bent
+    )
     motion = ""
     for block in text.decode().splitlines():
         code = re.search(r"G0?([0-3])(?!\d)", block)
@@ -141,7 +143,7 @@ def test_the_first_move_and_the_retract_keep_their_height(bent: Path) -> None:
 
 
 def test_no_move_is_made_that_nobody_asked_for(tmp_path: Path) -> None:
-    """No positioning move at an unknown height: inserted blocks take up the play of the axis that turns, no more."""
+    """No positioning move at an unknown height: inserted blocks take up play and no more."""
     path = machine(tmp_path, "[backlash]\nX_um = 20.0\nY_um = 20.0\n", tables=TRUE_ZERO)
     nominal = b"G21G90\nG0X10Y10\nG0Z5\nG1Z-1F100\nX20\nY20\nX10\nY10\nG0Z5\n"
     text = correct(nominal, path)
@@ -162,7 +164,9 @@ def test_modal_lines_and_words_without_spaces_are_read(tmp_path: Path) -> None:
 
 
 def test_arcs_stay_arcs(bent: Path) -> None:
-    text = correct(b"G21 G90 G54\nG0 X-40. Y0. Z0.\nG2 X40. Y0. I40. J0. F500\nG2 X-40. Y0. I-40. J0.\n", bent)
+    text = correct(
+        b"G21 G90 G54\nG0 X-40. Y0. Z0.\nG2 X40. Y0. I40. J0. F500\nG2 X-40. Y0. I-40. J0.\n", bent
+    )
     assert b"G1" not in text
     assert 2 <= len(points(text)) - 1 <= 24
 
@@ -187,7 +191,9 @@ def test_a_map_is_never_applied_twice(skewed: Path) -> None:
         olp.correct(once, skewed)
 
 
-@pytest.mark.parametrize("block", [b"G0 X1999.9999 Y100. Z0.\n", b"G0 X0. Y2001. Z0.\n", b"G0 X0. Y0. Z-1001.\n"])
+@pytest.mark.parametrize(
+    "block", [b"G0 X1999.9999 Y100. Z0.\n", b"G0 X0. Y2001. Z0.\n", b"G0 X0. Y0. Z-1001.\n"]
+)
 def test_outside_the_calibrated_box_nothing_is_guessed(tmp_path: Path, block: bytes) -> None:
     """Others clamp, extrapolate, or take the highest value there, and say nothing."""
     path = machine(tmp_path, "[squareness]\nC0Y_urad = 10000.0\n", tables=TRUE_ZERO)

@@ -1,4 +1,4 @@
-"""Every job that the project ships: corrected and held against the judge, or refused with the line it names."""
+"""Every job that the project ships: corrected and judged, or refused with the line it names."""
 
 from __future__ import annotations
 
@@ -28,12 +28,18 @@ JOBS = {
 #: refused, with the words in the refused line
 REFUSED = {"nasty/block-delete-depends.ngc": "/"}
 #: judged by LinuxCNC: its own dialect, and texts of other controls that it reads
-JUDGED = [name for name in JOBS if name not in REFUSED and name.split("/")[0] in ("gantry-plate", "bridge-cmm", "nasty")]
+JUDGED = [
+    name
+    for name in JOBS
+    if name not in REFUSED and name.split("/")[0] in ("gantry-plate", "bridge-cmm", "nasty")
+]
 
 
 def run(name: str, **options: Any) -> tuple[bytes, olp.Correction]:
     path = FOLDER / name
-    return path.read_bytes(), olp.correct(path, path.with_name("machine.toml"), path.with_name(JOBS[name]), **options)
+    return path.read_bytes(), olp.correct(
+        path, path.with_name("machine.toml"), path.with_name(JOBS[name]), **options
+    )
 
 
 def test_every_program_has_its_job() -> None:
@@ -83,7 +89,7 @@ def test_comments_and_unchanged_lines_survive(name: str) -> None:
 @pytest.mark.oracle
 @pytest.mark.parametrize("name", JUDGED)
 def test_the_judge_agrees(name: str, tmp_path: Path) -> None:
-    """Without what the judge does not model: temperatures, and a touch-off of frames that the program sets itself."""
+    """Without what the judge does not model: temperatures, and the touch-off of frames that the program sets."""
     shutil.copytree((FOLDER / name).parent, tmp_path / "job")
     machine = tmp_path / "job" / "machine.toml"
     calibration = machine.with_name("calibration.toml")

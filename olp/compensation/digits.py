@@ -63,8 +63,10 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     with np.errstate(invalid="ignore"):
         wanted = np.rint((rows.command - rows.offset) / rows.unit * scale)
         unknown = np.isnan(wanted)
-        mantissa = np.where(unknown, 0, wanted).astype(np.int64)
-        written = np.where(unknown, np.nan, mantissa / scale * rows.unit + rows.offset)
+        written = wanted / scale * rows.unit + rows.offset
+        if unknown.any():
+            wanted[unknown] = 0.0
+        mantissa = wanted.astype(np.int64)
     sets = rows.given | rows.reset
     emitted = np.where(fix, written, rows.nominal)
     # an omitted axis holds until its rounded command changes

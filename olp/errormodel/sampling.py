@@ -19,7 +19,11 @@ def steps_needed(
     todo = np.arange(len(delta_mm))
     while todo.size:
         tool = tool_mm if tool_mm.ndim == 1 else tool_mm[todo]
-        bends = model.chord_bound(delta_mm[todo] / count[todo, None], tool) > bend_mm
-        todo = todo[bends & (count[todo] < at_most)]
-        count[todo] *= 2
+        some = delta_mm if len(todo) == len(delta_mm) and at_least == 1 and count[0] == 1 else None
+        bound = model.chord_bound(delta_mm[todo] / count[todo, None] if some is None else some, tool)
+        bends = np.flatnonzero((bound > bend_mm) & (count[todo] < at_most))
+        todo = todo[bends]
+        # a bend goes with the square of the length, or slower: so many halvings are needed at the least
+        halvings = np.maximum(np.ceil(0.5 * np.log2(bound[bends] / bend_mm)), 1).astype(np.int64)
+        count[todo] = np.minimum(count[todo] << halvings, at_most)
     return count

@@ -112,7 +112,9 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
     decimals = edits.decimals.astype(np.int64)
     negative = mantissa < 0
     size = np.abs(mantissa)
-    power = _POW10[decimals]
+    # dividing by one number is several times cheaper than by a column of them
+    one = bool((decimals == decimals[0]).all())
+    power = _POW10[int(decimals[0])] if one else _POW10[decimals]
     whole = size // power
     fraction = size - whole * power
     slow = np.flatnonzero((decimals > 8) | (whole >= 10**8))
@@ -139,13 +141,14 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
         text[:, point + 5 :] = _DIGITS[scaled - high * 10_000].view(np.uint8).reshape(-1, 4)
     else:
         text[:, point + 1 :] = _DIGITS[scaled % 10_000].view(np.uint8).reshape(-1, 4)
-    digits = np.ones(len(size), np.int64)
+    short = whole.astype(np.int32)
+    digits = np.ones(len(size), np.int16)
     for n in range(1, 4 * whole_groups):
-        digits += whole >= _POW10[n]
+        digits += short >= _POW10[n]
     if not leading_zero:
         digits -= (whole == 0) & (decimals > 0)
-    begin = point - digits
-    end = np.where(decimals > 0, point + 1 + decimals, point)
+    begin = np.int16(point) - digits
+    end = np.where(decimals > 0, point + 1 + decimals, point).astype(np.int16)
     begin[bare] = end[bare] = point
     begin -= negative
     rows = np.flatnonzero(negative)
@@ -155,10 +158,10 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
         chosen = with_prefix[edits.prefix[with_prefix] == which]
         for i, byte in enumerate(reversed(prefixes.table[which])):
             text[chosen, begin[chosen] - 1 - i] = byte
-    begin -= widths[edits.prefix]
-    column = np.arange(width)
+    begin -= widths[edits.prefix].astype(np.int16)
+    column = np.arange(width, dtype=np.int16)
     valid = (column >= begin[:, None]) & (column < end[:, None])
-    length = end - begin
+    length = (end - begin).astype(np.int64)
     flat = text[valid]
     if slow.size:
         return _with_slow(flat, length, edits, prefixes, slow, leading_zero)
