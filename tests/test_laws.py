@@ -27,9 +27,20 @@ HALF_DIGIT = 0.5e-3 + SLACK_MM
 TOOL = np.array([0.0, 0.0, -120.0])
 #: what a control may find wrong with an arc, in mm: the strictest of them (grbl) takes 0.005
 RADIUS_MM = 0.005
-#: statements that are no coordinates to correct: local offsets, increments
-PLAIN = ("lines", "short", "rapid", "arcs", "planes", "circle", "radius", "frames", "modal", "style", "comments",
-         "numbers",          "dwell")  # fmt: skip
+#: features whose coordinates are all places in a frame
+PLAIN = (
+    "lines",
+    "short",
+    "rapid",
+    "arcs",
+    "planes",
+    "circle",
+    "radius",
+    "frames",
+    "modal",
+    "style",
+    "comments",
+)
 WORD = re.compile(rb"(?i)([XYZ])([ \t]*)([+-]?(?:\d+\.?\d*|\.\d+))")
 
 

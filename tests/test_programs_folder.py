@@ -89,7 +89,7 @@ def test_comments_and_unchanged_lines_survive(name: str) -> None:
 @pytest.mark.oracle
 @pytest.mark.parametrize("name", JUDGED)
 def test_the_judge_agrees(name: str, tmp_path: Path) -> None:
-    """Without what the judge does not model: temperatures, and the touch-off of frames that the program sets."""
+    """Without what the judge does not model: temperatures, touch-off of frames that the program sets."""
     shutil.copytree((FOLDER / name).parent, tmp_path / "job")
     machine = tmp_path / "job" / "machine.toml"
     calibration = machine.with_name("calibration.toml")

@@ -50,7 +50,8 @@ class HolePlan:
         level_play, bottom_play = _play(program, plan)
         c_level = invert(model, level + shift, tool, level_play)
         c_bottom = invert(model, bottom + shift, tool, bottom_play)
-        lean = np.abs(c_level - c_bottom) / 2
+        # the stroke does not turn the axes of the plane, so its lean is that of the error alone
+        lean = np.abs(invert(model, level + shift, tool) - invert(model, bottom + shift, tool)) / 2
         for i, hole in enumerate(holes):
             lean[i, PLANES[hole.plane][2]] = 0.0
             off = np.array([bool(path.flag[hole.first] & np.uint8(Flag.PASS))])

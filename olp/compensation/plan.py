@@ -123,7 +123,11 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, npt.NDArray[np.
     some = np.flatnonzero(unknown.any(axis=1))
     if some.size:
         blind = (unknown[some][:, None, :] & model.depends_on[None]).any(axis=2)
-        wanting = some[blind.any(axis=1) & ~raw[some].any(axis=1)]
+        # an unknown axis that has an error would need a word, which it never gets
+        tool = path.tool_mm()
+        error = model.error(path.end_mm[some], tool if tool.ndim == 1 else tool[some])
+        lacking = (unknown[some] & (np.nan_to_num(error) != 0)).any(axis=1)
+        wanting = some[(blind.any(axis=1) | lacking) & ~raw[some].any(axis=1)]
         cutting = wanting[path.kind[wanting] != Kind.RAPID]
         if cutting.size:
             i = int(cutting[0])

@@ -79,6 +79,7 @@ class State:
     unit_stated: bool = False
     offset_name: str = "G54"
     offsets: dict[str, list[float]] = field(default_factory=dict)
+    inherited: dict[str, tuple[Vector, Vector] | None] = field(default_factory=dict)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     saved_shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     local: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -132,7 +133,7 @@ class State:
             tool_mm=self._lever(line),
             tool=self.spindle,
             work_offset=self.offset_name,
-            touched=self._touched(work, base, line),
+            touched=self._touch(self.offset_name, base, line),
             tool_touched=self._tool_touched(line),
         )
         known = self._index.get(frame)
@@ -163,22 +164,27 @@ class State:
             )
         return lever
 
-    def _touched(self, work: WorkOffset | None, base: Sequence[float], line: int) -> tuple[Vector, Vector] | None:
+    def _touch(self, name: str, base: Sequence[float], line: int) -> tuple[Vector, Vector] | None:
+        """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's part;
+        one that G10 L2 changed keeps its own."""
+        if name in self.inherited:
+            return self.inherited[name]
+        work = self._work_offset(name)
         if work is not None and work.set_by == "true":
             return None
-        touch = work or WorkOffset(self.offset_name)
+        touch = work or WorkOffset(name, (base[0], base[1], base[2]))
         length = lever = ZERO
         if touch.touch_tool is not None:
             tool = self.setup.tool(touch.touch_tool)
             if tool is None or tool.lever_mm is None:
                 raise ProgramError(
-                    f"work offset {self.offset_name} was touched off with tool {touch.touch_tool}, "
+                    f"work offset {name} was touched off with tool {touch.touch_tool}, "
                     "whose lever is not defined; give its Z_mm or gauge_to_tip_mm",
                     line=line,
                 )
             length, lever = tool.length_mm, tool.lever_mm
         at = [
-            stated if stated is not None else base[i] + length[i] for i, stated in enumerate(touch.touched_at_mm)
+            touch.offset_mm[i] + length[i] if stated is None else stated for i, stated in enumerate(touch.touched_at_mm)
         ]
         return (at[0], at[1], at[2]), lever
 
@@ -371,6 +377,9 @@ class State:
                 base[i] = base[i] + value if adds else value
             else:
                 self._capture(i, word, line, moves)
+                active = self._work_offset(self.offset_name)
+                now = self.offsets.get(self.offset_name) or (list(active.offset_mm) if active else [NAN] * 3)
+                self.inherited[name] = self._touch(self.offset_name, now, line)
                 base[i] = self.position[i] - self.length[i] - self.shift[i] - self.local[i] - value
         self.offsets[name] = base
 

@@ -78,7 +78,10 @@ def prove(
     exempt = np.zeros(len(path), bool)
     exempt[passed] = True
     loose = uncorrected_starts(path, exempt)
-    groups = match(nominal, target, corrected, model) if parts is None else np.cumsum(_with_pecks(nominal, corrected, parts)) - 1
+    if parts is None:
+        groups = match(nominal, target, corrected, model, tolerance_mm + digit_mm)
+    else:
+        groups = np.cumsum(_with_pecks(nominal, corrected, parts)) - 1
     if len(groups) and int(groups[-1]) != len(written) - 1:
         raise ProgramError(
             f"the corrected program has {len(written)} moves where {int(groups[-1]) + 1} were expected; it was not "

@@ -5,56 +5,57 @@ from __future__ import annotations
 import numpy as np
 
 from olp.deviation import Index
-from olp.errormodel import ErrorModel
+from olp.errormodel import ErrorModel, play_states
 from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
 from olp.program.program import Program
 from olp.toolpath import Flag
 
-#: a way-point counts as reached within this; corrections are far smaller, and moves mostly longer
+#: a way-point counts as reached within this where nothing comes nearer; corrections are far smaller
 GATE_MM = 0.05
 _BLOCK = 4096
 
 
-def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel) -> Index:
+def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel, near_mm: float) -> Index:
     """(n,) index of the last move of `corrected` for each move of `program`, whose way-points are `target_mm`.
 
-    Way-points are looked for in order. Raises ProgramError where one is not reached: then the two programs are
-    not the same job.
+    Way-points are looked for in order: the next move that comes within `near_mm`, else the nearest of those within
+    the gate. Raises ProgramError where one is not reached: then the two programs are not the same job.
     """
     nominal, path = program.toolpath, corrected.toolpath
     count, extra = len(nominal), len(path) - len(nominal)
     if extra < 0:
         raise ProgramError(
-            f"the corrected program has {len(path)} moves, fewer than the {count} of the nominal one; it is not a "
-            "correction of it"
+            f"the corrected program has {len(path)} moves, fewer than the {count} of the nominal one; "
+            "it is not a correction of it"
         )
     if extra == 0:
         return np.arange(count)
-    actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm()))
+    lost = model.lost_motion_mm(path.end_mm)
+    play = None if lost is None else play_states(path.end_mm, lost)
+    actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
     loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)
     groups = np.zeros(count, np.int64)
     i = j = 0
     while i < count:
         span = min(_BLOCK, count - i, len(path) - j)
-        away = np.abs(actual[j : j + span] - target_mm[i : i + span]).max(axis=1)
-        near = (away < GATE_MM) | loose[i : i + span]
+        away = np.abs(actual[j : j + span] - target_mm[i : i + span]).max(axis=1, initial=0.0)
+        near = (away < near_mm) | loose[i : i + span]
         run = span if near.all() else int(np.argmin(near))
         groups[i : i + run] = np.arange(j, j + run)
         i, j = i + run, j + run
-        if i < count and run < span:
-            ahead = np.abs(actual[j : j + extra + 1] - target_mm[i]).max(axis=1) < GATE_MM
-            if not ahead.any():
-                raise ProgramError(
-                    f"no move of the corrected program reaches the end of line {int(nominal.line[i])} within "
-                    f"{GATE_MM:g} mm; it is not a correction of this program for this machine",
-                    line=int(path.line[min(j, len(path) - 1)]),
-                )
-            skip = int(np.argmax(ahead))
-            extra -= skip
-            groups[i] = j + skip
-            i, j = i + 1, j + skip + 1
-        elif i < count and span == 0:
-            raise ProgramError("the corrected program ends before the nominal one", line=int(path.line[-1]))
+        if i == count or (run == span and span):
+            continue
+        ahead = np.abs(actual[j : j + extra + 1] - target_mm[i]).max(axis=1, initial=0.0)
+        skip = int(np.argmax(ahead < near_mm)) if (ahead < near_mm).any() else int(np.argmin(ahead)) if len(ahead) else -1
+        if skip < 0 or ahead[skip] > GATE_MM:
+            raise ProgramError(
+                f"no move of the corrected program reaches the end of line {int(nominal.line[i])} within "
+                f"{GATE_MM:g} mm; it is not a correction of this program for this machine",
+                line=int(path.line[min(j, len(path) - 1)]),
+            )
+        groups[i] = j + skip
+        extra -= skip
+        i, j = i + 1, j + skip + 1
     return groups
