@@ -14,7 +14,7 @@ import numpy as np
 
 from olp import __version__, checks
 from olp.compensation.plan import Limits, Plan, plan, zero_shifts
-from olp.compensation.style import Style
+from olp.compensation.style import fewest_decimals
 from olp.compensation.writer import Writer
 from olp.errormodel import Calibration, ErrorModel, build
 from olp.errormodel.base import Array
@@ -319,24 +319,28 @@ def _correct(
     del writer
     tell("prove", 0.7)
     path = program.toolpath
-    nominal = replace(program, words=None)
+    nominal = replace(program, words=None, slot=program.slot[:0])
     del program
+    passed = rows.passed
+    commands = _ends(rows, len(path))
+    corrections = _largest_correction(path, commands)
+    state = checks.state_findings(path, commands, loaded.model, loaded.setup, held=hold)
+    del rows, commands
     corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
     proof = prove(
-        nominal, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit, passed=rows.passed, parts=parts
+        nominal, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit, passed=passed, parts=parts
     )
     _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
-    corrections = _largest_correction(path, rows)
     findings = (
         *checks.calibration_findings(loaded.calibration, date),
-        *checks.proof_findings(proof, rows.passed),
+        *checks.proof_findings(proof, passed),
         *checks.hole_findings(holes, limits.tolerance_mm),
-        *checks.state_findings(path, _ends(rows, len(path)), loaded.model, loaded.setup, held=hold),
+        *state,
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
     )
     report = _report(nominal, (data, name), loaded, proof, findings, tolerance_um)
-    report["moves"] = checks.tally_moves(path, len(rows.passed), parts) | {
+    report["moves"] = checks.tally_moves(path, len(passed), parts) | {
         "inserted_blocks": tally.inserted_blocks,
         "inserted_words": tally.inserted_words,
         "changed_words": tally.changed_words,
@@ -429,17 +433,23 @@ def _ends(rows: Plan, count: int) -> Array:
     return rows.command_mm[last]
 
 
-def _largest_correction(path: Toolpath, rows: Plan) -> float:
-    with np.errstate(invalid="ignore"):
-        away = np.abs(np.nan_to_num(_ends(rows, len(path)) - path.end_mm))
-    return float(np.sqrt((away * away).sum(axis=1)).max(initial=0.0))
+def _largest_correction(path: Toolpath, command_mm: Array) -> float:
+    largest = 0.0
+    for a in range(0, len(path), 1 << 16):
+        away = np.nan_to_num(command_mm[a : a + (1 << 16)] - path.end_mm[a : a + (1 << 16)])
+        largest = max(largest, float(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
+    return largest**0.5
 
 
 def _digit_mm(program: Program, setup: Setup) -> float:
     """The coarsest last digit that the corrected program is written with."""
-    style = Style.of(program, setup.machine.least_increment_mm)
     units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
-    return max(10.0 ** -style.least(axis, unit) * unit for axis in range(3) for unit in units)
+    inch = program.profile.inch_decimals
+    return max(
+        10.0 ** -fewest_decimals(least, unit, inch) * unit
+        for least in setup.machine.least_increment_mm
+        for unit in units
+    )
 
 
 def _stamp(loaded: _Job) -> bytes:

@@ -28,7 +28,7 @@ _ARC_STEPS = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
-    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way (ends included), `bend` the
+    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way and at its end, `bend` the
     part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
     `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known yet."""
 
@@ -77,9 +77,7 @@ def measure(
     judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
     if exempt is not None:
         judged &= ~exempt
-    flank = _unknown_flank(path, model)
-    # a move counts from where its flank is known
-    flank = np.maximum(flank[groups], np.concatenate((flank[:1], flank[groups[:-1]])) if count else flank)
+    flank = _unknown_flank(path, groups, model)
     judged &= ~(flank > bend_mm)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     for a in range(0, count, _BLOCK):
@@ -88,13 +86,13 @@ def measure(
     return Deviation(waypoint, worst, bend, judged, flank)
 
 
-def _unknown_flank(path: Toolpath, model: ErrorModel) -> Array:
-    """(n,) mm: what remains unknown of the play after each move. It shrinks as an axis has moved to and fro, and is
-    gone once that range is the lost motion."""
-    width = model.lost_motion_mm(path.end_mm)
-    out = np.zeros(len(path))
+def _unknown_flank(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
+    """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is more. It
+    shrinks as an axis moves to and fro, and is gone once that range is the lost motion."""
+    width = model.lost_motion_mm(path.end_mm) if len(groups) else None
     if width is None:
-        return out
+        return np.zeros(len(groups))
+    out = np.zeros(len(path))
     for axis in np.flatnonzero((np.nan_to_num(width) > 0).any(axis=0)).tolist():
         command, lost = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
         resets = np.flatnonzero(np.isnan(command))
@@ -104,7 +102,7 @@ def _unknown_flank(path: Toolpath, model: ErrorModel) -> Array:
                 part = command[a:b]
                 reach = np.maximum.accumulate(part) - np.minimum.accumulate(part)
                 out[a:b] = np.hypot(out[a:b], np.maximum(lost[a:b] - np.nan_to_num(reach), 0.0) / 2)
-    return out
+    return np.maximum(out[groups], np.concatenate((out[:1], out[groups[:-1]])))
 
 
 class Tracer:
@@ -178,9 +176,33 @@ class Tracer:
         steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
         if arc.max(initial=-1) >= 0:
             self._arc_steps(arc, known, steps, start, end, tool)
-        point, part, share = self.points(start, end, arc, steps, known)
-        actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
-        self._distances(a, b, first, owner, part, share, np.cumsum(steps) - 1, actual, waypoint, worst, bend)
+        reached, inner = self._samples(start, end, arc, steps, known, tool)
+        # ends of parts inside a nominal move are on the way, too
+        last_part = np.zeros(last - first, bool)
+        last_part[self.groups[a:b] - first] = True
+        cuts = np.flatnonzero(~last_part)
+        away = reached[last_part] - self.target[a:b]
+        waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        worst[:] = waypoint
+        if len(inner.part) or len(cuts):
+            self._bend(reached, inner, owner, arc >= 0, bend)
+            self._on_the_way(a, b, first, owner, inner.with_ends(cuts, reached), worst)
+
+    def _samples(
+        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array
+    ) -> tuple[Array, _Inner]:
+        """Where the tip really is at the end of each part, and at samples inside parts."""
+        long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
+        point, part, share = self.points(start[long], end[long], arc[long], steps[long], known[long])
+        part = long[part]
+        inside = share < 1.0
+        if self.has_play:
+            # play depends on all that came before, so the samples are gone through in order
+            actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
+            return actual[~inside], _Inner(part[inside], share[inside], actual[inside])
+        part, share, point = part[inside], share[inside], point[inside]
+        reached = self.actual(end, tool)
+        return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
     def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, end: Array, tool: Array) -> None:
         rows = np.flatnonzero((arc >= 0) & known)
@@ -205,31 +227,15 @@ class Tracer:
             self.last, self.play = point[-1:], play[-1]
         return point + self.model.error(point, tool, play)
 
-    def _distances(
-        self,
-        a: int,
-        b: int,
-        first: int,
-        owner: Index,
-        part: Index,
-        share: Array,
-        ends: Index,
-        actual: Array,
-        waypoint: Array,
-        worst: Array,
-        bend: Array,
-    ) -> None:
-        nominal, target = self.nominal, self.target
-        goal = target[a:b]
-        begin = np.empty_like(goal)
+    def _on_the_way(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Array) -> None:
+        """Distances of samples from their nominal move, the largest per move."""
+        nominal = self.nominal
+        goal = self.target[a:b]
+        begin = np.zeros_like(goal)
         begin[1:] = goal[:-1]
-        begin[0] = target[a - 1] if a else np.array(nominal.start_mm)
-        group_end = ends[self.groups[a:b] - first]
-        away = actual[group_end] - goal
-        waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
-        of = owner[part]
-        one = len(of) == b - a and len(of) == of[-1] + 1
-        distance = segment_distance(actual, begin if one else begin[of], goal if one else goal[of])
+        begin[0] = self.target[a - 1] if a else np.array(nominal.start_mm)
+        of = owner[inner.part]
+        distance = segment_distance(inner.actual, begin[of], goal[of])
         arc = self.nominal_arc[a:b] if self.nominal_arc is not None else None
         if arc is not None and arc.max(initial=-1) >= 0:
             rows = np.flatnonzero(arc[of] >= 0)
@@ -237,16 +243,13 @@ class Tracer:
             arcs = nominal.arcs
             shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
             distance[rows] = arc_distance(
-                actual[rows], nominal.starts_mm(a, b)[of[rows]] + shift, goal[of[rows]], arcs.centre_mm[which] + shift, arcs.plane[which],
-                arcs.sweep_rad[which], self._near(owner, first, part, share, rows, of),
+                inner.actual[rows], nominal.starts_mm(a, b)[of[rows]] + shift, goal[of[rows]],
+                arcs.centre_mm[which] + shift, arcs.plane[which], arcs.sweep_rad[which],
+                self._near(owner, first, inner.part[rows], inner.share[rows], of[rows]),
             )  # fmt: skip
-        np.fmax.at(worst, of, distance) if not one else np.copyto(worst, distance)
-        if len(part) > len(ends):
-            inner = np.flatnonzero(share < 1.0)
-            straight = inner if arc is None else inner[arc[of[inner]] < 0]
-            self._bend(actual, part, share, ends, straight, bend, of)
+        np.fmax.at(worst, of, distance)
 
-    def _near(self, owner: Index, first: int, part: Index, share: Array, rows: Index, of: Index) -> Array:
+    def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
         """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
         turn = np.zeros(len(owner))
         if self.path_arc is not None:
@@ -255,17 +258,32 @@ class Tracer:
         total = np.bincount(owner, turn)
         before = np.cumsum(turn) - turn
         begin = np.cumsum(total) - total
-        place = before[part[rows]] - begin[of[rows]] + share[rows] * turn[part[rows]]
-        return np.asarray(place / np.maximum(total[of[rows]], 1e-12), float)
+        place = before[part] - begin[of] + share * turn[part]
+        return np.asarray(place / np.maximum(total[of], 1e-12), float)
 
-    def _bend(
-        self, actual: Array, part: Index, share: Array, ends: Index, inner: Index, bend: Array, of: Index
-    ) -> None:
-        """How far the samples leave the chord between the actual ends of their part."""
-        begin = np.where(part[inner] > 0, ends[np.maximum(part[inner] - 1, 0)], -1)
-        inner, begin = inner[begin >= 0], begin[begin >= 0]
-        departure = segment_distance(actual[inner], actual[begin], actual[ends[part[inner]]])
-        np.fmax.at(bend, of[inner], departure)
+    def _bend(self, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Array) -> None:
+        """How far the samples of straight parts leave the chord between the actual ends of their part."""
+        straight = (inner.part > 0) & ~curved[inner.part]
+        part, actual = inner.part[straight], inner.actual[straight]
+        departure = segment_distance(actual, reached[part - 1], reached[part])
+        np.fmax.at(bend, owner[part], departure)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Inner:
+    """Samples inside parts: the part, the share of it, and where the tip is."""
+
+    part: Index
+    share: Array
+    actual: Array
+
+    def with_ends(self, cuts: Index, reached: Array) -> _Inner:
+        """These, and the ends of the parts `cuts`."""
+        return _Inner(
+            np.concatenate((self.part, cuts)),
+            np.concatenate((self.share, np.ones(len(cuts)))),
+            np.concatenate((self.actual, reached[cuts])),
+        )
 
 
 def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:

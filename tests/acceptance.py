@@ -106,6 +106,7 @@ def judged(
     spacing_mm: float = 1.0,
     skip_lines: tuple[int, ...] = (),
     interpreter: Mapping[str, Any] | None = None,
+    shift_by_frame: Mapping[str, Any] | None = None,
 ) -> Deviation:
     """As `judge.path.judge_programs`, with the length along the path in the matching.
 
@@ -117,7 +118,7 @@ def judged(
         _forget(m.pick(m.kind != DWELL))
         for m in (linuxcnc.interpret(text, folder, **setup) for text in (nominal, corrected))
     )
-    shift = shifts(moves, model)
+    shift = shifts(moves, model, shift_by_frame)
     passed = np.isin(moves.line, list(skip_lines))
     real = _sure_of_play(actual(own, model, spacing_mm), model)
     groups = match(real.points[real.dense.last] + _lift(own), moves.axis + shift + _lift(moves))

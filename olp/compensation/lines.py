@@ -21,7 +21,7 @@ Index = npt.NDArray[np.int64]
 Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance
-_SAMPLE_SHARE = 0.03
+_SAMPLE_SHARE = 0.04
 #: chords may end at this many places between two samples, where the error is as good as straight
 _FINE = 4
 _BATCH = 1 << 20
