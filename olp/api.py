@@ -108,18 +108,18 @@ def correct(
 ) -> Correction:
     """Correct a program for a machine, and prove it.
 
-    `program` is a path or the bytes of the text, `machine` the machine file or a Setup. The corrected text is in
-    the program's own dialect; only coordinate words differ, and inserted words and blocks. With `flatten` loops,
-    subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out; on controls
-    that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck. Raises
+    `program` is a path or the bytes of the text, `machine` the machine file or a Setup. The corrected text is
+    in the program's own dialect; only coordinate words differ, and inserted words and blocks. With `flatten`
+    loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out;
+    on controls that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck. Raises
     InputError (ProgramError with its line, ConfigError, OutsideBox) and CannotCompute.
     """
     data, name = _source(program)
     try:
         return _correct(
-            data, name, _load(machine, job, outside_box), tolerance_um=tolerance_um, hold=outside_box == "hold",
-            unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm, contour=contour, rapids=split_rapids, date=date,
-            tell=progress or _silent,
+            data, name, _load(machine, job, outside_box), tolerance_um=tolerance_um,
+            hold=outside_box == "hold", unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm,
+            contour=contour, rapids=split_rapids, date=date, tell=progress or _silent,
         )  # fmt: skip
     except OlpError as error:
         raise (error.in_file(name) if name and error.line is not None else error) from None
@@ -181,7 +181,8 @@ def simulate(
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
 ) -> Simulation:
-    """The path of the tip that the uncompensated machine would really take, in the program's first work frame."""
+    """The path of the tip that the uncompensated machine would really take, in the program's first work
+    frame."""
     from olp.deviation import Tracer
 
     data, name = _source(program)
@@ -193,8 +194,7 @@ def simulate(
         raise error.in_file(name or "<program>") from None
     if not len(path):
         return Simulation(np.zeros((0, 3)), np.zeros(0), "")
-    point, actual, move = Tracer.trace(path, loaded.model, step_mm)
-    del point
+    actual, move = Tracer.trace(path, loaded.model, step_mm)
     home = path.frames[int(path.frame[0])]
     origin = np.array(home.offset_mm) - np.array(home.length_mm)
     lengths = path.per_frame([f.length_mm for f in path.frames])
@@ -203,8 +203,11 @@ def simulate(
     return Simulation(actual[known], path.line[move[known]], home.work_offset)
 
 
-def inspect(program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None) -> dict[str, Any]:
-    """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support matrix."""
+def inspect(
+    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None
+) -> dict[str, Any]:
+    """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
+    matrix."""
     data, name = _source(program)
     setup = _setup(machine, job)
     profile = _profile(setup)
@@ -216,7 +219,8 @@ def inspect(program: PathLike | bytes, machine: PathLike | Setup, job: PathLike 
     with np.errstate(all="ignore"):
         known = path.end_mm[np.isfinite(path.end_mm).all(axis=1)]
     ranges = {
-        axis: [float(known[:, i].min()), float(known[:, i].max())] if len(known) else None for i, axis in enumerate("XYZ")
+        axis: [float(known[:, i].min()), float(known[:, i].max())] if len(known) else None
+        for i, axis in enumerate("XYZ")
     }
     findings = checks.program_findings(found, setup, contour=False)
     return {
@@ -229,7 +233,9 @@ def inspect(program: PathLike | bytes, machine: PathLike | Setup, job: PathLike 
         "axis_range_mm": ranges,
         "tools": sorted({f.tool for f in path.frames if f.tool is not None}),
         "work_offsets": sorted({f.work_offset for f in path.frames}),
-        "path_modes": [{"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in found.path_modes],
+        "path_modes": [
+            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in found.path_modes
+        ],
         "stamped": bool(_STAMP.search(data)),
         "findings": [f.as_dict() for f in findings],
         "support": profile.support(),
@@ -244,15 +250,17 @@ def error_at(
 ) -> dict[str, Any]:
     """The error at one axis position: actual minus commanded at the tip, and what it is made of.
 
-    `tool` is a tool number or a tool vector in mm (gauge point to tip); the default is the tool in the spindle at
-    the start.
+    `tool` is a tool number or a tool vector in mm (gauge point to tip); the default is the tool in the
+    spindle at the start.
     """
     loaded = _load(machine, job, "refuse")
     at = np.array([position_mm], float)
     inside = loaded.model.inside(at)
     if not inside.all():
         axis = "XYZ"[int(np.flatnonzero(~inside[0])[0])]
-        raise ConfigError(f"{axis} = {at[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose a place in it")
+        raise ConfigError(
+            f"{axis} = {at[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose a place in it"
+        )
     lever = np.array(_lever(loaded.setup, tool))
     return {
         "position_mm": [float(v) for v in position_mm],
@@ -260,13 +268,18 @@ def error_at(
         "error_um": (loaded.model.error(at, lever)[0] * 1e3).tolist(),
         "rotation_urad": (loaded.model.rotation(at)[0] * 1e6).tolist(),
         "sources": [
-            {"name": source, "error_um": (part[0] * 1e3).tolist()} for source, part in loaded.model.contributions(at, lever)
+            {"name": source, "error_um": (part[0] * 1e3).tolist()}
+            for source, part in loaded.model.contributions(at, lever)
         ],
     }
 
 
 def flatten(
-    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None, *, expand_cycles: bool = False
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    expand_cycles: bool = False,
 ) -> bytes:
     """Unroll loops, subprograms, expressions and, if asked, canned cycles into plain blocks. Not lossless."""
     data, name = _source(program)
@@ -297,8 +310,8 @@ def _correct(
     stamp = _STAMP.search(data)
     if stamp:
         raise AlreadyCorrected(
-            f"the program carries the stamp `{stamp.group().decode()}`; correcting it again would apply the model "
-            "twice; correct the nominal program",
+            f"the program carries the stamp `{stamp.group().decode()}`; correcting it again would apply the "
+            "model twice; correct the nominal program",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
     if unroll or expand:
@@ -328,7 +341,13 @@ def _correct(
     del rows, commands
     corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
     proof = prove(
-        nominal, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit, passed=passed, parts=parts
+        nominal,
+        corrected,
+        loaded.model,
+        tolerance_mm=limits.tolerance_mm,
+        digit_mm=digit,
+        passed=passed,
+        parts=parts,
     )
     _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
     findings = (
@@ -365,15 +384,20 @@ def _prove_without_deleted(
     try:
         rows = plan(nominal.toolpath, loaded.model, replace(limits, refuse_outside=False))
         proof = prove(
-            nominal, corrected, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit_mm, passed=rows.passed
+            nominal,
+            corrected,
+            loaded.model,
+            tolerance_mm=limits.tolerance_mm,
+            digit_mm=digit_mm,
+            passed=rows.passed,
         )
         good = proof.holds
     except ProgramError:
         good = False
     if not good:
         raise ProgramError(
-            "later blocks depend on this block under block delete, so one correction cannot be right for both switch "
-            "positions; remove the `/`, or give every axis in the first block after it",
+            "later blocks depend on this block under block delete, so one correction cannot be right for "
+            "both switch positions; remove the `/`, or give every axis in the first block after it",
             line=line,
         )
 
@@ -389,7 +413,9 @@ def _report(
     data, name = source
     machine, calibration = loaded.setup.machine, loaded.calibration
     size = proof.size_mm()
-    bend = float(np.where(proof.after.judged & proof.cutting & ~proof.lean, proof.after.bend, 0.0).max(initial=0.0))
+    bend = float(
+        np.where(proof.after.judged & proof.cutting & ~proof.lean, proof.after.bend, 0.0).max(initial=0.0)
+    )
     return {
         "schema": "olp-report-1",
         "program": {
@@ -430,7 +456,7 @@ def _ends(rows: Plan, count: int) -> Array:
     if len(rows) == count:
         return rows.command_mm
     last = np.append(rows.move[1:] != rows.move[:-1], True)
-    return rows.command_mm[last]
+    return np.asarray(rows.command_mm[last], float)
 
 
 def _largest_correction(path: Toolpath, command_mm: Array) -> float:
@@ -438,7 +464,7 @@ def _largest_correction(path: Toolpath, command_mm: Array) -> float:
     for a in range(0, len(path), 1 << 16):
         away = np.nan_to_num(command_mm[a : a + (1 << 16)] - path.end_mm[a : a + (1 << 16)])
         largest = max(largest, float(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
-    return largest**0.5
+    return float(largest**0.5)
 
 
 def _digit_mm(program: Program, setup: Setup) -> float:
@@ -457,7 +483,9 @@ def _stamp(loaded: _Job) -> bytes:
     return before + f"olp-corrected {loaded.digest[:12]} olp {__version__}".encode() + after
 
 
-def _unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
+def _unrolled(
+    data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None
+) -> bytes:
     from olp.program.flatten import flatten as unroll
 
     folder = Path(name).parent if name else None
@@ -489,7 +517,9 @@ def _setup(machine: PathLike | Setup, job: PathLike | None) -> Setup:
 def _profile(setup: Setup) -> Profile:
     profile = PROFILES.get(setup.machine.controller)
     if profile is None:
-        raise ConfigError(f"controller {setup.machine.controller!r} has no profile; expected one of {', '.join(PROFILES)}")
+        raise ConfigError(
+            f"controller {setup.machine.controller!r} has no profile; expected one of {', '.join(PROFILES)}"
+        )
     return profile
 
 
@@ -497,11 +527,13 @@ def _load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["ref
     setup = _setup(machine, job)
     described = setup.machine
     if described.calibration is None:
-        raise ConfigError(f"machine {described.name!r} names no calibration; give the key calibration in its file")
+        raise ConfigError(
+            f"machine {described.name!r} names no calibration; give the key calibration in its file"
+        )
     if "all" in described.compensated_by_controller:
         raise ConfigError(
-            'compensated_by_controller = "all": the control corrects everything already, a corrected program would be '
-            "corrected twice; list the components that it corrects, or switch its tables off"
+            'compensated_by_controller = "all": the control corrects everything already, a corrected program '
+            "would be corrected twice; list the components that it corrects, or switch its tables off"
         )
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
     skip = described.compensated_by_controller - calibration.active_during_measurement
@@ -529,7 +561,9 @@ def _lever(setup: Setup, tool: int | tuple[float, float, float] | None) -> tuple
         return (0.0, 0.0, 0.0)
     found = setup.tool(number)
     if found is None or found.lever_mm is None:
-        raise ConfigError(f"tool {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm in the machine file")
+        raise ConfigError(
+            f"tool {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm in the machine file"
+        )
     return found.lever_mm
 
 
@@ -537,5 +571,7 @@ def _silent(what: str, share: float) -> None:
     return None
 
 
-__all__ = ["Correction", "Simulation", "Verification", "correct", "error_at", "flatten", "inspect", "simulate",
-           "verify"]  # fmt: skip
+__all__ = [
+    "Correction", "Simulation", "Verification", "correct", "error_at", "flatten", "inspect", "simulate",
+    "verify",
+]  # fmt: skip

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.compensation.holes import HolePlan
 from olp.errormodel import Calibration, ErrorModel
@@ -17,6 +18,8 @@ from olp.program.program import Program
 from olp.proof import Proof
 from olp.toolpath import Flag, Kind, Toolpath
 
+Index = npt.NDArray[np.int64]
+
 _LISTED = 20
 _SAMPLED = 4096
 _WORST = 5
@@ -25,7 +28,11 @@ _WORST = 5
 def _finding(code: str, message: str, lines: Sequence[int] = (), count: int | None = None) -> Finding:
     unique = sorted(set(lines))
     return Finding(
-        code, message, unique[0] if unique else None, tuple(unique[:_LISTED]), len(unique) if count is None else count
+        code,
+        message,
+        unique[0] if unique else None,
+        tuple(unique[:_LISTED]),
+        len(unique) if count is None else count,
     )
 
 
@@ -39,26 +46,44 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     path = program.toolpath
     for name, line, _ in program.remarks:
         if name == "unit":
-            out.append(_finding("OLP301", "neither G20 nor G21 stands before the first move; millimetres assumed", [line]))
+            out.append(
+                _finding(
+                    "OLP301", "neither G20 nor G21 stands before the first move; millimetres assumed", [line]
+                )
+            )
         elif name == "increments":
             out.append(
-                _finding("OLP302", "lengths without a decimal point are read as least increments of the control", [line])
+                _finding(
+                    "OLP302",
+                    "lengths without a decimal point are read as least increments of the control",
+                    [line],
+                )
             )
     whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
     if whole.any():
         lines = lines_of(path, whole)
-        out.append(_finding("OLP104", f"{len(lines)} blocks move another axis too; corrected at their ends only", lines))
+        out.append(
+            _finding(
+                "OLP104", f"{len(lines)} blocks move another axis too; corrected at their ends only", lines
+            )
+        )
     deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
     if deleted.any():
         lines = lines_of(path, deleted)
-        out.append(_finding("OLP304", f"{len(lines)} blocks stand under block delete; proved with and without", lines))
+        out.append(
+            _finding(
+                "OLP304", f"{len(lines)} blocks stand under block delete; proved with and without", lines
+            )
+        )
     assumed = sorted({
         f.work_offset for f in path.frames
         if f.touched is not None and (o := setup.work_offset(f.work_offset)) is not None
         and o.touched_at_mm == (None, None, None)
     })  # fmt: skip
     for name in assumed:
-        out.append(_finding("OLP303", f"{name} is taken as touched off on the raw machine at its own position"))
+        out.append(
+            _finding("OLP303", f"{name} is taken as touched off on the raw machine at its own position")
+        )
     if contour:
         out.append(_finding("OLP305", "contours under G41/G42 were taken as the path of the tool"))
     if setup.machine.compensated_by_controller:
@@ -69,32 +94,42 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
 
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     """Does the control leave the path by more than it is corrected?"""
-    out = []
+    out: list[Finding] = []
     if program.profile.name != "linuxcnc":
         return out
     if not program.path_modes and len(program.toolpath):
-        out.append(_finding("OLP201", f"no path mode is stated: {program.profile.path_mode}", [int(program.toolpath.line[0])]))
+        out.append(
+            _finding(
+                "OLP201",
+                f"no path mode is stated: {program.profile.path_mode}",
+                [int(program.toolpath.line[0])],
+            )
+        )
     bare = [m.line for m in program.path_modes if m.tolerance_mm is None]
     if bare:
         out.append(_finding("OLP201", "G64 without P lets the control round corners without bound", bare))
-    wide = [m for m in program.path_modes if m.tolerance_mm is not None and m.tolerance_mm > correction_mm > 0]
+    wide = [
+        m for m in program.path_modes if m.tolerance_mm is not None and m.tolerance_mm > correction_mm > 0
+    ]
     if wide:
         worst = max(m.tolerance_mm or 0.0 for m in wide)
         out.append(
             _finding(
                 "OLP202",
-                f"{wide[0].name} lets the path leave by {worst * 1e3:.3g} um, more than the largest correction of "
-                f"{correction_mm * 1e3:.3g} um",
+                f"{wide[0].name} lets the path leave by {worst * 1e3:.3g} um, more than the largest "
+                f"correction of {correction_mm * 1e3:.3g} um",
                 [m.line for m in wide],
             )
         )
     merging = [m.line for m in program.path_modes if m.merges and (m.tolerance_mm or 0) > 0]
     if merging:
-        out.append(_finding("OLP203", "G64 P without Q0 also merges short blocks within the tolerance", merging))
+        out.append(
+            _finding("OLP203", "G64 P without Q0 also merges short blocks within the tolerance", merging)
+        )
     return out
 
 
-def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Finding]:
+def proof_findings(proof: Proof, passed: Index) -> list[Finding]:
     """What the proof found."""
     out = []
     path = proof.nominal
@@ -105,7 +140,7 @@ def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Fin
         out.append(
             _finding(
                 "OLP101",
-                f"{int(above.sum())} moves end above tolerance{switch}: {size[worst] * 1e3:.2f} um at line "
+                f"{int(above.sum())} moves end above tolerance: {size[worst] * 1e3:.2f} um at line "
                 f"{int(path.line[worst])}, allowed {proof.allowed_mm * 1e3:.2f} um",
                 lines_of(path, above),
             )
@@ -113,7 +148,7 @@ def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Fin
     if not proof.after.judged.any():
         out.append(_finding("OLP107", "no move of this program could be judged"))
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
-    untouched[passed.astype(np.int64)] = True
+    untouched[passed] = True
     if untouched.any():
         lines = lines_of(path, untouched)
         out.append(_finding("OLP102", f"{int(untouched.sum())} moves were written as they were", lines))
@@ -122,8 +157,8 @@ def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Fin
         out.append(
             _finding(
                 "OLP103",
-                f"at {int(unknown.sum())} way-points the flank of an axis is not known yet; the tip may be off by up to "
-                f"{proof.after.flank.max() * 1e3:.1f} um there",
+                f"at {int(unknown.sum())} way-points the flank of an axis is not known yet; the tip may be "
+                f"off by up to {proof.after.flank.max() * 1e3:.1f} um there",
                 lines_of(path, unknown),
             )
         )
@@ -135,7 +170,9 @@ def proof_findings(proof: Proof, passed: Array, *, switch: str = "") -> list[Fin
 
 def hole_findings(holes: HolePlan, tolerance_mm: float) -> list[Finding]:
     """Cycles whose stroke cannot follow the error."""
-    leaning = [h.line for h, lean in zip(holes.holes, holes.lean_mm.tolist(), strict=True) if lean > tolerance_mm]
+    leaning = [
+        h.line for h, lean in zip(holes.holes, holes.lean_mm.tolist(), strict=True) if lean > tolerance_mm
+    ]
     if not leaning:
         return []
     return [
@@ -159,14 +196,20 @@ def state_findings(
             beyond = (command_mm[:, i] < low) | (command_mm[:, i] > high)
             if (beyond & ~nominal_out).any():
                 lines = lines_of(path, beyond & ~nominal_out)
-                out.append(_finding("OLP402", f"{name} is commanded beyond its travel of {low:g} to {high:g} mm", lines))
+                out.append(
+                    _finding(
+                        "OLP402", f"{name} is commanded beyond its travel of {low:g} to {high:g} mm", lines
+                    )
+                )
         if held:
             box = model.box_mm
             out_of = ((command_mm < box[:, 0]) | (command_mm > box[:, 1])).any(axis=1)
             out_of &= (path.flag & np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)) == 0
             if out_of.any():
                 lines = lines_of(path, out_of)
-                out.append(_finding("OLP403", f"{int(out_of.sum())} commands lie outside the calibrated box", lines))
+                out.append(
+                    _finding("OLP403", f"{int(out_of.sum())} commands lie outside the calibrated box", lines)
+                )
     return out
 
 
@@ -175,7 +218,11 @@ def calibration_findings(calibration: Calibration, date: datetime.date | None) -
     until = calibration.valid_until
     if date is None or until is None or date <= until:
         return []
-    return [_finding("OLP401", f"the calibration was valid until {until.isoformat()}, the job is of {date.isoformat()}")]
+    return [
+        _finding(
+            "OLP401", f"the calibration was valid until {until.isoformat()}, the job is of {date.isoformat()}"
+        )
+    ]
 
 
 def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
@@ -189,7 +236,11 @@ def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
     for name, part in model.contributions(path.end_mm[pick], tool if tool.ndim == 1 else tool[pick]):
         size = np.sqrt((part * part).sum(axis=1))
         out.append(
-            {"name": name, "max_um": float(size.max()) * 1e3, "rms_um": float(np.sqrt(np.mean(size * size))) * 1e3}
+            {
+                "name": name,
+                "max_um": float(size.max()) * 1e3,
+                "rms_um": float(np.sqrt(np.mean(size * size))) * 1e3,
+            }
         )
     return sorted(out, key=lambda row: -row["max_um"])
 
@@ -230,7 +281,7 @@ def worst_blocks(program: Program, proof: Proof) -> list[dict[str, Any]]:
     return out
 
 
-def tally_moves(path: Toolpath, passed: int, parts: Array) -> dict[str, int]:
+def tally_moves(path: Toolpath, passed: int, parts: npt.NDArray[np.int32]) -> dict[str, int]:
     """Every move is corrected, corrected approximately, or passed; the three add up to all."""
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)) != 0
     rough = ((path.flag & np.uint8(Flag.CYCLE | Flag.WHOLE)) != 0) | (path.kind == Kind.PROBE)

@@ -8,6 +8,7 @@ which moves of the program belong to which nominal move.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -28,9 +29,10 @@ _ARC_STEPS = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
-    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way and at its end, `bend` the
-    part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
-    `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known yet."""
+    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way and at its end, `bend`
+    the part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
+    `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known
+    yet."""
 
     waypoint: Array
     path: Array
@@ -67,8 +69,9 @@ def measure(
 ) -> Deviation:
     """Hold the actual path of `path` against the nominal one.
 
-    `target_mm` (n, 3) are the nominal way-points where the part really lies; `groups` (n,) is the index of the
-    last move of `path` that belongs to each nominal move. `exempt` moves pass uncorrected and are not judged.
+    `target_mm` (n, 3) are the nominal way-points where the part really lies; `groups` (n,) is the index of
+    the last move of `path` that belongs to each nominal move. `exempt` moves pass uncorrected and are not
+    judged.
     """
     count = len(nominal)
     waypoint = np.full(count, np.nan)
@@ -87,8 +90,8 @@ def measure(
 
 
 def _unknown_flank(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
-    """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is more. It
-    shrinks as an axis moves to and fro, and is gone once that range is the lost motion."""
+    """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is
+    more. It shrinks as an axis moves to and fro, and is gone once that range is the lost motion."""
     width = model.lost_motion_mm(path.end_mm) if len(groups) else None
     if width is None:
         return np.zeros(len(groups))
@@ -97,7 +100,7 @@ def _unknown_flank(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
         command, lost = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
         resets = np.flatnonzero(np.isnan(command))
         edges = [0, *(resets + 1).tolist(), len(command)]
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             if b > a:
                 part = command[a:b]
                 reach = np.maximum.accumulate(part) - np.minimum.accumulate(part)
@@ -120,8 +123,8 @@ class Tracer:
         self.path_arc = _arc_index(path)
 
     @staticmethod
-    def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Array, Index]:
-        """Commands (m, 3) along a path every `step_mm`, where the tip really is (m, 3), and the move of each (m,)."""
+    def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Index]:
+        """Where the tip really is (m, 3) along a path, every `step_mm`, and the move of each (m,)."""
         tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
         start, end, tool = path.starts_mm(), path.end_mm, path.tool_mm()
         length = np.nan_to_num(np.sqrt(((end - start) ** 2).sum(axis=1)))
@@ -132,7 +135,7 @@ class Tracer:
             length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
         steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
         point, part, _ = tracer.points(start, end, arc, steps, np.isfinite(length))
-        return point, tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
+        return tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
 
     def points(
         self, start: Array, end: Array, arc: Index, steps: Index, known: Mask
@@ -150,8 +153,8 @@ class Tracer:
         if curved.size:
             arcs, which = self.path.arcs, arc[part[curved]]
             point[curved] = arc_points(
-                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which],
-                share[curved],
+                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
+                arcs.sweep_rad[which], share[curved],
             )  # fmt: skip
         return point, part, share
 
@@ -165,7 +168,7 @@ class Tracer:
         tool = path.tool_mm(first, last)
         delta = end - start
         steps = np.ones(last - first, np.int64)
-        known = np.isfinite(delta).all(axis=1)
+        known = np.asarray(np.isfinite(delta).all(axis=1))
         cut = known & (path.kind[first:last] != Kind.RAPID)
         if cut.any():
             which = np.flatnonzero(cut)
@@ -175,7 +178,7 @@ class Tracer:
         arc = self.path_arc[first:last] if self.path_arc is not None else np.full(last - first, -1)
         steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
         if arc.max(initial=-1) >= 0:
-            self._arc_steps(arc, known, steps, start, end, tool)
+            self._arc_steps(arc, known, steps, start, tool)
         reached, inner = self._samples(start, end, arc, steps, known, tool)
         # ends of parts inside a nominal move are on the way, too
         last_part = np.zeros(last - first, bool)
@@ -204,7 +207,7 @@ class Tracer:
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
-    def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, end: Array, tool: Array) -> None:
+    def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, tool: Array) -> None:
         rows = np.flatnonzero((arc >= 0) & known)
         arcs = self.path.arcs
         centre = arcs.centre_mm[arc[rows]]
@@ -213,7 +216,8 @@ class Tracer:
         delta = np.repeat(reach[:, None], 3, axis=1)
         part = tool if tool.ndim == 1 else tool[rows]
         steps[rows] = np.maximum(
-            steps[rows], steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10)
+            steps[rows],
+            steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10),
         )
 
     def actual(self, point: Array, tool: Array) -> Array:

@@ -55,7 +55,12 @@ class ConfigError(InputError):
     """A machine, calibration or job file is invalid; `problems` lists every one of them."""
 
     def __init__(
-        self, message: str, *, file: str | None = None, line: int | None = None, problems: tuple[str, ...] = ()
+        self,
+        message: str,
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        problems: tuple[str, ...] = (),
     ) -> None:
         super().__init__(message, file=file, line=line)
         self.problems = problems or (message,)

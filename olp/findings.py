@@ -59,16 +59,17 @@ _TABLE = (
         "OLP101",
         "above tolerance",
         Severity.ERROR,
-        "The written program, read back and run through the error model, leaves the nominal path by more than the "
-        "tolerance plus what rounding to the last digit explains.",
-        "Raise --tolerance-um, let the machine take more digits (least_increment_mm), or look at the listed blocks.",
+        "The written program, read back and run through the error model, leaves the nominal path by more "
+        "than the tolerance plus what rounding to the last digit explains.",
+        "Raise --tolerance-um, let the machine take more digits (least_increment_mm), or look at the listed "
+        "blocks.",
     ),
     Rule(
         "OLP102",
         "moves passed uncorrected",
         Severity.WARNING,
-        "These moves were written as they were: the error there depends on an axis that has not been commanded yet, "
-        "or the control moves by itself (G53, G28, G30), or the section is switched off.",
+        "These moves were written as they were: the error there depends on an axis that has not been "
+        "commanded yet, or the control moves by itself (G53, G28, G30), or the section is switched off.",
         "Give start_mm in the job file, or command all axes in the first rapid.",
     ),
     Rule(
@@ -82,16 +83,16 @@ _TABLE = (
         "OLP104",
         "block moves another axis",
         Severity.INFO,
-        "A block that also moves a rotary or other axis is corrected at its end only and never split; the other "
-        "axis' words are carried untouched.",
+        "A block that also moves a rotary or other axis is corrected at its end only and never split; the "
+        "other axis' words are carried untouched.",
         "Split the block in the source where the path between its ends matters.",
     ),
     Rule(
         "OLP105",
         "canned cycle corrected per hole",
         Severity.WARNING,
-        "A canned cycle moves straight along the tool axis, so it can be exact at one depth only; here the rest of "
-        "the stroke leaves the nominal path by more than the tolerance.",
+        "A canned cycle moves straight along the tool axis, so it can be exact at one depth only; here the "
+        "rest of the stroke leaves the nominal path by more than the tolerance.",
         "Write the cycles out as plain moves with --expand-cycles.",
     ),
     Rule(
@@ -107,13 +108,15 @@ _TABLE = (
         "nothing to prove",
         Severity.WARNING,
         "No move of the program was corrected at a known position, so the proof says nothing.",
-        "Look whether this is the program that you meant; command all axes, or give start_mm in the job file.",
+        "Look whether this is the program that you meant; command all axes, or give start_mm in the job "
+        "file.",
     ),
     Rule(
         "OLP201",
         "path mode without tolerance",
         Severity.WARNING,
-        "In G64 without P the control rounds corners as far as its acceleration asks for, which can be a millimetre.",
+        "In G64 without P the control rounds corners as far as its acceleration asks for, which can be a "
+        "millimetre.",
         "Use G64 P<tolerance> Q0, or G61 where exact stops are affordable.",
     ),
     Rule(
@@ -142,14 +145,15 @@ _TABLE = (
         "numbers without decimal point",
         Severity.INFO,
         "On this control a length without a decimal point counts least increments: X100 is 0.1 mm.",
-        "If the control is set to calculator-type input, state decimal_point = \"calculator\" in the machine file.",
+        'If the control is set to calculator-type input, state decimal_point = "calculator" in the machine '
+        'file.',
     ),
     Rule(
         "OLP303",
         "touch-off assumed",
         Severity.INFO,
         "The work offset is taken as touched off on the raw machine, so the touched point keeps its place.",
-        "State set_by = \"true\" where the part was located by other means.",
+        'State set_by = "true" where the part was located by other means.',
     ),
     Rule(
         "OLP304",
@@ -162,7 +166,8 @@ _TABLE = (
         "OLP305",
         "contour taken as tool path",
         Severity.WARNING,
-        "Under G41/G42 the control offsets the contour by the tool radius; the correction was computed on the contour.",
+        "Under G41/G42 the control offsets the contour by the tool radius; the correction was computed on "
+        "the contour.",
         "Program the tool path where the radius is large against the change of the error.",
     ),
     Rule(

@@ -63,11 +63,14 @@ def arc_distance(
     radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
     lead = (end[rows, third] - start[rows, third]) / sweep
     level = point[rows, third] - start[rows, third] - share * lead * sweep
-    # across a helix, which rises by `lead` per radian, a difference in level counts by the cosine of its pitch
+    # across a helix, which rises by `lead` per radian, a difference in level counts by the cosine of its
+    # pitch
     return np.asarray(np.hypot(np.hypot(p0, p1) - radius, level * radius / np.hypot(radius, lead)), float)
 
 
-def arc_directions(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array) -> Array:
+def arc_directions(
+    start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array
+) -> Array:
     """(n, 3) sign of each axis' motion at shares (n,) of arcs."""
     rows = np.arange(len(start))
     first, second, third = (_AXES[plane][:, i] for i in range(3))

@@ -41,9 +41,9 @@ class Flag(IntFlag):
 class Frame:
     """How words became axis positions for a stretch of moves, and which tool was in the spindle.
 
-    Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length `length_mm`).
-    `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the touch-off
-    of the work offset on the raw machine, None where it was located by other means; `tool_touched`
+    Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
+    `length_mm`). `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the
+    touch-off of the work offset on the raw machine, None where it was located by other means; `tool_touched`
     likewise for the length of the active tool.
     """
 
@@ -110,7 +110,7 @@ class Toolpath:
             return np.zeros(3)
         table = np.array(values, float).reshape(len(values), 3)
         if len(values) == 1 or (table == table[0]).all():
-            return table[0]
+            return np.asarray(table[0], float)
         part = self.frame[first:last]
         if len(part) and (part == part[0]).all():
             return np.asarray(table[part[0]], float)

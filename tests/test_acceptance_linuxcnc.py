@@ -29,6 +29,8 @@ pytestmark = pytest.mark.oracle
 
 #: what the judge's sampling of the path may add
 SLACK_UM = 0.02
+#: the largest difference between directions in the curves of the random machines, in any component at the tip
+DIRECTED_JUMP_UM = 4.0
 MOVING = {
     "lines",
     "short",
@@ -87,6 +89,10 @@ def check(seed: int, folder: Path) -> None:
     result = olp.correct(nominal, path, expand_cycles=True, split_rapids=whole)
     found = judged(nominal, result.data, folder, kinds=KINDS if whole else CUTTING)
     bar = allowed_um(nominal) + SLACK_UM
+    if recipe.directed:
+        # where one axis turns the straightness of another jumps by what depends on direction, and that axis
+        # cannot follow against its own flank: README, honest limits
+        bar += DIRECTED_JUMP_UM
     assert found.after.judged > 0
     assert found.max_um <= bar, f"line {found.worst_line}: {features}"
     assert found.vertex_max_um <= bar

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +35,8 @@ _AXES = np.array(PLANES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
-    """Pieces of arcs: index of the arc in `Arcs`, and the shares of its sweep where the piece begins and ends."""
+    """Pieces of arcs: index of the arc in `Arcs`, and the shares of its sweep where the piece begins and
+    ends."""
 
     arc: Index
     begin: Array
@@ -59,9 +61,10 @@ def subdivide_arcs(
     raw: Mask,
     tolerance: float,
     turning: Mask | None,
+    band: float,
 ) -> Cuts:
-    """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis has
-    lost motion (`turning`), also where that axis turns round."""
+    """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis
+    has lost motion (`turning`), also where that axis turns round."""
     arcs = path.arcs
     if not len(arcs):
         return no_cuts()
@@ -70,7 +73,7 @@ def subdivide_arcs(
     free = free[~raw[arcs.move[free]].any(axis=1)]
     pieces = Pieces(free, np.zeros(len(free)), np.ones(len(free)))
     if turning is not None:
-        pieces = _at_quadrants(path, pieces, turning)
+        pieces = _at_quadrants(path, pieces, turning, band)
     tools = path.tool_mm()
     done: list[Pieces] = []
     for _ in range(_DEEPEST):
@@ -82,8 +85,8 @@ def subdivide_arcs(
         good = departure <= tolerance
         done.append(pieces.pick(good))
         # what an arc cannot follow goes with about the third power of its length
-        count = np.clip(np.ceil((departure[~good] / tolerance) ** (1 / 3) * 1.05), 2, 16).astype(np.int64)
-        pieces = _divided(pieces.pick(~good), count)
+        parts = np.clip(np.ceil((departure[~good] / tolerance) ** (1 / 3) * 1.05), 2, 16)
+        pieces = _divided(pieces.pick(~good), parts.astype(np.int64))
     if len(pieces):
         raise CannotCompute(
             "an arc cannot be followed within the tolerance by any number of arcs; raise --tolerance-um",
@@ -118,14 +121,17 @@ def _ends(path: Toolpath, target: Array, arc: Index) -> tuple[Array, Array]:
     """Targets at the start and the end of arcs; the start lies in the frame of the arc's own move."""
     move = path.arcs.move[arc]
     shift = target[move] - path.end_mm[move]
-    start = np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm)) + shift
+    start = (
+        np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm)) + shift
+    )
     return start, target[move]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bend:
-    """How pieces of arcs are bent: nominal `point` and `command` (n, s, 3) at shares (s,) of the piece, nominal
-    `centre` (n, 3), `mismatch` (n,) of the nominal radii at both ends, `rigid` (n,): shifted, not bent."""
+    """How pieces of arcs are bent: nominal `point` and `command` (n, s, 3) at shares (s,) of the piece,
+    nominal `centre` (n, 3), `mismatch` (n,) of the nominal radii at both ends, `rigid` (n,): shifted, not
+    bent."""
 
     point: Array
     command: Array
@@ -138,13 +144,16 @@ class Bend:
 def sample_groups(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
 ) -> Iterator[tuple[Index, int]]:
-    """Pieces (indices) that need the same number of samples, in batches, so that nothing of the error is missed."""
+    """Pieces (indices) that need the same number of samples, in batches, so that nothing of the error is
+    missed."""
     arcs = path.arcs
     start, end = _ends(path, target, pieces.arc)
     axes = _AXES[arcs.plane[pieces.arc]]
     rows = np.arange(len(pieces))
     centre = arcs.centre_mm[pieces.arc]
-    radius = np.hypot(*(path.end_mm[arcs.move[pieces.arc]][rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1)))
+    radius = np.hypot(
+        *(path.end_mm[arcs.move[pieces.arc]][rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))
+    )
     share = pieces.end - pieces.begin
     delta = np.abs(end - start) * share[:, None]
     for i in (0, 1):
@@ -211,11 +220,12 @@ def fit_pieces(
 def fit(
     bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array
 ) -> tuple[Array, Array]:
-    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples least, and how far that is (n,).
+    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples least, and how far that is
+    (n,).
 
     Least squares on the radial distance; the radius goes linearly from one end to the other. The nominal
-    difference of the radii (mostly none) is asked for strongly, but not where the short chord of more than half a
-    circle would swing its far side.
+    difference of the radii (mostly none) is asked for strongly, but not where the short chord of more than
+    half a circle would swing its far side.
     """
     command, share = bend.command, bend.share
     rows = np.arange(len(command))
@@ -257,19 +267,23 @@ def fit(
     return out, np.hypot(radial, level).max(axis=1)
 
 
-def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask) -> Pieces:
-    """Cut arcs where an axis with lost motion turns round."""
+def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask, band: float) -> Pieces:
+    """Cut arcs where an axis with lost motion turns round, unless it goes on by less than the band."""
     arcs = path.arcs
     rows = np.arange(len(pieces))
     axes = _AXES[arcs.plane[pieces.arc]]
     before = np.where(
-        (arcs.move[pieces.arc] > 0)[:, None], path.end_mm[np.maximum(arcs.move[pieces.arc] - 1, 0)], path.start_mm
+        (arcs.move[pieces.arc] > 0)[:, None],
+        path.end_mm[np.maximum(arcs.move[pieces.arc] - 1, 0)],
+        path.start_mm,
     )
     centre = arcs.centre_mm[pieces.arc]
     angle = np.arctan2(
-        before[rows, axes[:, 1]] - centre[rows, axes[:, 1]], before[rows, axes[:, 0]] - centre[rows, axes[:, 0]]
+        before[rows, axes[:, 1]] - centre[rows, axes[:, 1]],
+        before[rows, axes[:, 0]] - centre[rows, axes[:, 0]],
     )
     sweep = arcs.sweep_rad[pieces.arc]
+    radius = np.hypot(*(before[rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1)))
     arc, begin, end = [], [], []
     for i in range(len(pieces)):
         shares = {0.0, 1.0}
@@ -280,8 +294,9 @@ def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask) -> Pieces:
             low, high = sorted((angle[i], angle[i] + sweep[i]))
             k = np.arange(np.ceil((low - phase) / np.pi), np.floor((high - phase) / np.pi) + 1)
             shares.update(((phase + k * np.pi - angle[i]) / sweep[i]).tolist())
-        edges = sorted(s for s in shares if s in (0.0, 1.0) or 1e-6 < s < 1 - 1e-6)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        least = min(np.sqrt(2 * band / radius[i]) / abs(sweep[i]), 0.25)
+        edges = sorted(s for s in shares if s in (0.0, 1.0) or least < s < 1 - least)
+        for low, high in pairwise(edges):
             arc.append(pieces.arc[i])
             begin.append(low)
             end.append(high)

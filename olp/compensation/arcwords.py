@@ -11,8 +11,8 @@ import numpy.typing as npt
 from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
 from olp.errormodel.base import Array, Mask
 from olp.exceptions import ProgramError
-from olp.program.edits import EditList, Edits
 from olp.geometry import PLANES
+from olp.program.edits import EditList, Edits
 from olp.toolpath import Flag, Kind
 
 if TYPE_CHECKING:
@@ -37,6 +37,29 @@ class _Arc:
     plane: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Arcs:
+    """The same in columns."""
+
+    row: Index
+    move: Index
+    line: npt.NDArray[np.int32]
+    start: Array
+    end: Array
+    centre: Array
+    sweep: Array
+    plane: npt.NDArray[np.int8]
+
+    def pick(self, which: Mask) -> _Arcs:
+        return _Arcs(*(getattr(self, name)[which] for name in _Arcs.__slots__))
+
+    def one(self, i: int) -> _Arc:
+        return _Arc(
+            int(self.row[i]), int(self.move[i]), int(self.line[i]), self.start[i], self.end[i],
+            self.centre[i], float(self.sweep[i]), int(self.plane[i]),
+        )  # fmt: skip
+
+
 def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     """Edits of I, J, K, R and P for the arc rows of a chunk, and whole blocks for their later parts."""
     path = writer.path
@@ -48,13 +71,59 @@ def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     )
     if not arc_row.size:
         return []
+    solved = _solve(writer, rows, arc_row)
+    plain = _is_plain(writer, rows, solved)
     edits = EditList(writer.prefixes)
-    for arc in _solve(writer, rows, arc_row):
+    for i in np.flatnonzero(~plain).tolist():
+        arc = solved.one(i)
         (_head if rows.head[arc.row] else _tail)(writer, rows, arc, edits)
-    return [edits.done()]
+    return [edits.done(), *_plain_words(writer, solved.pick(plain))]
 
 
-def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
+def _is_plain(writer: Writer, rows: Rows, arcs: _Arcs) -> Mask:
+    """Arcs whose block keeps both its centre words, from the start: nearly all there are."""
+    index = np.searchsorted(writer.path.arcs.move, arcs.move)
+    slots = writer.program.arc_slots.word[index]
+    lone = np.arange(len(arcs.row))
+    both = (slots[lone, _AXES[arcs.plane][:, 0]] >= 0) & (slots[lone, _AXES[arcs.plane][:, 1]] >= 0)
+    following = np.minimum(arcs.row + 1, len(rows.move) - 1)
+    split = (following > arcs.row) & (rows.move[following] == arcs.move)
+    plain = (
+        both & (slots[:, 3] < 0) & ~split & rows.head[arcs.row] & ~writer.program.arc_slots.absolute[index]
+    )
+    return np.asarray(plain, bool)
+
+
+def _plain_words(writer: Writer, arcs: _Arcs) -> list[Edits]:
+    """Centre words of many arcs at once."""
+    words, style = writer.words, writer.style
+    index = np.searchsorted(writer.path.arcs.move, arcs.move)
+    unit = writer.frames_unit[writer.path.frame[arcs.move]]
+    out = []
+    for k in (0, 1):
+        for axis in range(3):
+            mine = np.flatnonzero(_AXES[arcs.plane][:, k] == axis)
+            if not mine.size:
+                continue
+            slot = writer.program.arc_slots.word[index[mine], axis]
+            own = style.decimals(slot, axis, unit[mine])
+            fewest = {u: style.centre(axis, u) for u in np.unique(unit[mine]).tolist()}
+            decimals = np.maximum(own, np.array([fewest[u] for u in unit[mine].tolist()]))
+            away = (arcs.centre[mine, axis] - arcs.start[mine, axis]) / unit[mine]
+            mantissa = np.rint(away * 10.0**decimals).astype(np.int64)
+            new = np.flatnonzero(mantissa != words.mantissa[slot] * 10 ** (decimals - own))
+            zero = np.zeros(len(new), np.int32)
+            out.append(
+                Edits(
+                    words.number[slot[new]].astype(np.int64), words.end[slot[new]].astype(np.int64),
+                    mantissa[new], decimals[new].astype(np.int8), zero, zero,
+                )
+            )  # fmt: skip
+            writer.tally.changed_words += len(new)
+    return out
+
+
+def _solve(writer: Writer, rows: Rows, arc_row: Index) -> _Arcs:
     """Centres for rows, from the emitted end points and the bent path between them."""
     path, plan = writer.path, writer.plan
     move = rows.move[arc_row]
@@ -82,12 +151,8 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> list[_Arc]:
         kept[part] = bend.rigid & alike & (~absolute | (np.abs(shift).max(axis=1) < 1e-9))
     kept &= rows.head[arc_row] & (reach == 1.0)
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
-    lines, sweeps, planes, moves = path.line[move].tolist(), sweep.tolist(), plane.tolist(), move.tolist()
-    return [
-        _Arc(row, moves[i], lines[i], start[i], end[i], centre[i], sweeps[i], planes[i])
-        for i, row in enumerate(arc_row.tolist())
-        if not kept[i]
-    ]
+    solved = _Arcs(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)
+    return solved.pick(~kept)
 
 
 def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8], short: Mask) -> Array:
@@ -108,8 +173,11 @@ def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.
     return out
 
 
-def _centre_words(writer: Writer, arc: _Arc, absolute: bool, own: dict[int, int]) -> list[tuple[int, int, int]]:
-    """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own` words."""
+def _centre_words(
+    writer: Writer, arc: _Arc, absolute: bool, own: dict[int, int]
+) -> list[tuple[int, int, int]]:
+    """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own`
+    words."""
     frame = writer.frame_of(arc.move)
     out = []
     for axis in PLANES[arc.plane][:2]:
@@ -121,7 +189,12 @@ def _centre_words(writer: Writer, arc: _Arc, absolute: bool, own: dict[int, int]
 
 
 def _check_sweep(
-    start: Array, end: Array, centre: Array, sweep: Array, plane: npt.NDArray[np.int8], line: npt.NDArray[np.int32]
+    start: Array,
+    end: Array,
+    centre: Array,
+    sweep: Array,
+    plane: npt.NDArray[np.int8],
+    line: npt.NDArray[np.int32],
 ) -> None:
     """A tiny arc must not turn into a whole circle, nor the other way round, by rounding."""
     rows = np.arange(len(start))
@@ -133,12 +206,12 @@ def _check_sweep(
     off = np.abs(np.abs(sweep) - turn)
     off = np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
     whole = np.abs(sweep) > np.pi
-    bad = np.flatnonzero((off > 1.0) | ((np.abs(sweep) < 2 * np.pi + 1e-9) & (whole != (turn > np.pi)) & (off < 0.5) & (
-        np.minimum(np.abs(sweep), turn) < 0.1)))  # fmt: skip
+    flipped = (np.abs(sweep) < 2 * np.pi + 1e-9) & (whole != (turn > np.pi)) & (off < 0.5)
+    bad = np.flatnonzero((off > 1.0) | (flipped & (np.minimum(np.abs(sweep), turn) < 0.1)))
     if bad.size:
         raise ProgramError(
-            "an arc is so short that the last digit decides whether it is a whole circle; let the machine take more "
-            "digits (least_increment_mm), or write this arc as a line",
+            "an arc is so short that the last digit decides whether it is a whole circle; let the machine "
+            "take more digits (least_increment_mm), or write this arc as a line",
             line=int(line[bad[0]]),
         )
 
@@ -194,7 +267,9 @@ def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
     if size > half:
         # how far R as written puts the centre from where it should be
         dx, dy = arc.end[first] - arc.start[first], arc.end[second] - arc.start[second]
-        lean = (1.0 if (arc.sweep > 0) == (sign > 0) else -1.0) * np.sqrt(size * size - half * half) / (2 * half)
+        lean = (
+            (1.0 if (arc.sweep > 0) == (sign > 0) else -1.0) * np.sqrt(size * size - half * half) / (2 * half)
+        )
         off = np.hypot(
             arc.start[first] + dx / 2 - lean * dy - arc.centre[first],
             arc.start[second] + dy / 2 + lean * dx - arc.centre[second],
@@ -212,7 +287,8 @@ def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
 
 
 def _tail(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
-    """A later part: a block of its own with both end points, the third axis where it moves, and the centre."""
+    """A later part: a block of its own with both end points, the third axis where it moves, and the
+    centre."""
     place = int(writer.program.line_end[arc.line - 1])
     index = int(np.searchsorted(writer.path.arcs.move, arc.move))
     absolute = bool(writer.program.arc_slots.absolute[index])

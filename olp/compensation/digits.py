@@ -42,7 +42,8 @@ class AxisRows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Digits:
-    """`emitted` (n,) positions as written, mm; `mantissa`, `decimals` of words; `write`: the word changes or is new."""
+    """`emitted` (n,) positions as written, mm; `mantissa`, `decimals` of words; `write`: the word changes or
+    is new."""
 
     emitted: Array
     mantissa: Index
@@ -98,7 +99,7 @@ def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
         place = np.rint((rows.command - before) / unit * _POW10[grid])
     known = ~np.isnan(place) & ~rows.raw
     if not known.all():
-        return _incremental_raw(rows, before, unit, grid, place, own, known)
+        return _incremental_raw(rows, before, unit, grid, own, known)
     steps = place.astype(np.int64)
     mantissa = np.diff(steps, prepend=0)
     write = np.where(rows.given, mantissa != own, mantissa != 0)
@@ -106,7 +107,7 @@ def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
 
 
 def _incremental_raw(
-    rows: AxisRows, before: float, unit: float, grid: int, place: Array, own: Index, known: Mask
+    rows: AxisRows, before: float, unit: float, grid: int, own: Index, known: Mask
 ) -> Digits:
     """The same one by one, where some rows keep their words or have no known position."""
     count = len(rows.command)

@@ -15,9 +15,9 @@ from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array
+from olp.geometry import PLANES
 from olp.program.edits import EditList, Edits
 from olp.program.program import Hole, Program
-from olp.geometry import PLANES
 from olp.toolpath import Flag
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HolePlan:
-    """(h, 3) commands at the R level and at the bottom of each hole, and how far its stroke leans (h,), in mm."""
+    """(h, 3) commands at the R level and at the bottom of each hole, and how far its stroke leans (h,), in
+    mm."""
 
     holes: tuple[Hole, ...]
     level_mm: Array
@@ -78,7 +79,8 @@ def _play(program: Program, plan: Plan) -> tuple[Array | None, Array | None]:
 def hole_edits(writer: Writer, rows: Rows, a: int, b: int) -> list[Edits]:
     """Edits of the cycle block whose moves are rows a..b, and the positions after it.
 
-    Repeats of a block in G91 share its words but not their corrections: they are written out, one block a hole.
+    Repeats of a block in G91 share its words but not their corrections: they are written out, one block a
+    hole.
     """
     plan = writer.holes
     edits = EditList(writer.prefixes)
@@ -128,7 +130,8 @@ def _hole(writer: Writer, rows: Rows, index: int, a: int, b: int, edits: EditLis
 
 
 class _Words:
-    """Where a hole's words go: into its block, or, for the later repeats in G91, into a block of their own."""
+    """Where a hole's words go: into its block, or, for the later repeats in G91, into a block of their
+    own."""
 
     def __init__(self, writer: Writer, hole: Hole, edits: EditList) -> None:
         self.writer, self.hole, self.edits = writer, hole, edits
@@ -137,7 +140,9 @@ class _Words:
         words = {k: v for k, v in hole.words.items() if k in "XYZR"} or hole.words
         self.anchor = max(words.values())
         self.new: list[tuple[str, int, int]] = []
-        counter = hole.words.get("L", hole.words.get("K") if writer.program.profile.name != "linuxcnc" else None)
+        counter = hole.words.get(
+            "L", hole.words.get("K") if writer.program.profile.name != "linuxcnc" else None
+        )
         if hole.incremental and hole.repeats > 1 and hole.repeat == 0 and counter is not None:
             edits.add(int(writer.words.number[counter]), int(writer.words.end[counter]), 1, 0)
 
@@ -171,24 +176,28 @@ class _Words:
             # a repeat without any step makes the same hole again
             self.new = [("X", 0, 0)]
         for i, (letter, mantissa, decimals) in enumerate(self.new):
-            self.edits.add(place, place, mantissa, decimals, lead + letter.encode(), self.hole.repeat * 8 + 16 + i)
+            self.edits.add(
+                place, place, mantissa, decimals, lead + letter.encode(), self.hole.repeat * 8 + 16 + i
+            )
             lead = b" "
         writer.tally.inserted_blocks += 1
 
 
-def _depth(writer: Writer, out: _Words, letter: str, wanted: float, base: float, axis: int, unit: float) -> float:
-    """R or the depth word: replaced where given, inserted where the inherited value would be wrong. Returns where
-    the axis then is."""
+def _depth(
+    writer: Writer, out: _Words, letter: str, wanted: float, base: float, axis: int, unit: float
+) -> float:
+    """R or the depth word: replaced where given, inserted where the inherited value would be wrong. Returns
+    where the axis then is."""
     slot = out.slot(letter)
     decimals = _decimals(writer, slot, axis, unit)
     mantissa = round((wanted - base) / unit * 10**decimals)
     held = writer.sticky.get(letter)
-    if slot is None and held is not None:
-        if abs(wanted - base - held * unit) <= 0.5 * 10.0**-decimals * unit * (1 + 1e-9):
-            return base + held * unit
+    half = 0.5 * 10.0**-decimals * unit * (1 + 1e-9)
+    if slot is None and held is not None and abs(wanted - base - held * unit) <= half:
+        return float(base + held * unit)
     out.put(letter, axis, mantissa, decimals)
     writer.sticky[letter] = mantissa / 10**decimals
-    return base + mantissa / 10**decimals * unit
+    return float(base + mantissa / 10**decimals * unit)
 
 
 def _decimals(writer: Writer, slot: int | None, axis: int, unit: float) -> int:

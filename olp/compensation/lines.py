@@ -24,7 +24,7 @@ Cuts = tuple[Index, Array, Array]
 _SAMPLE_SHARE = 0.04
 #: chords may end at this many places between two samples, where the error is as good as straight
 _FINE = 4
-_BATCH = 1 << 20
+_BATCH = 1 << 15
 _FEW, _ALL = 16, 1 << 30
 
 
@@ -33,30 +33,25 @@ def no_cuts() -> Cuts:
 
 
 def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask, tolerance: float) -> Cuts:
-    """Cuts (move, share, target) of the moves that are `free` to be split, so that no chord leaves its line by
-    more than `tolerance` mm."""
+    """Cuts (move, share, target) of the moves that are `free` to be split, so that no chord leaves its line
+    by more than `tolerance` mm."""
     tools = path.tool_mm()
-    found: list[Cuts] = []
+    found: list[tuple[Index, Array, Array]] = []
     block = 1 << 16
     for a in range(0, len(path), block):
         b = min(a + block, len(path))
-        start = np.empty((b - a, 3))
+        start = np.zeros((b - a, 3))
         start[1:] = target[a : b - 1]
         start[0] = target[a - 1] if a else np.array(path.start_mm)
         delta = target[a:b] - start
         bound = model.chord_bound(np.nan_to_num(delta), tools if tools.ndim == 1 else tools[a:b])
         long = np.flatnonzero(free[a:b] & (bound > tolerance) & np.isfinite(delta).all(axis=1))
-        if not long.size:
-            continue
-        tool = np.broadcast_to(tools, (len(path), 3))[a:b][long] if tools.ndim == 2 else tools
-        found.append(_cut(model, a + long, start[long], delta[long], tool, tolerance))
+        if long.size:
+            found.append((a + long, start[long], delta[long]))
     if not found:
         return no_cuts()
-    return (
-        np.concatenate([f[0] for f in found]),
-        np.concatenate([f[1] for f in found]),
-        np.concatenate([f[2] for f in found]),
-    )
+    move, start, delta = (np.concatenate([f[i] for f in found]) for i in range(3))
+    return _cut(model, move, start, delta, tools if tools.ndim == 1 else tools[move], tolerance)
 
 
 def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, tolerance: float) -> Cuts:
@@ -69,8 +64,8 @@ def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array
         pick = slice(at, stop)
         parts.append(
             _cut_batch(
-                model, move[pick], start[pick], delta[pick], tool if tool.ndim == 1 else tool[pick], count[pick],
-                tolerance,
+                model, move[pick], start[pick], delta[pick], tool if tool.ndim == 1 else tool[pick],
+                count[pick], tolerance,
             )
         )  # fmt: skip
         at = stop
@@ -106,7 +101,9 @@ def _cut_batch(
         # the search looks at few samples of a long chord; what it found is tested at all of them
         wrong = np.flatnonzero(~_fits(across, where[0] + where[1], reach - where[1], tolerance, _ALL))
         if wrong.size:
-            reach[wrong] = _longest(across, *(w[wrong] for w in where), tolerance, _ALL)
+            reach[wrong] = _longest(
+                across, where[0][wrong], where[1][wrong], where[2][wrong], where[3][wrong], tolerance, _ALL
+            )
         stride[active] = np.maximum(reach - begin[active], 1)
         begin[active] = reach
         going = reach < count[active]
@@ -154,7 +151,9 @@ def _longest(
         todo = todo[(bad[todo] - good[todo] > 1) & (good[todo] < last[todo])]
         jump = good[todo] + np.maximum(good[todo] - begin[todo], 1)
         middle = (good[todo] + np.minimum(bad[todo], last[todo] + 1)) // 2
-        trial[todo] = np.where(galloping[todo], np.minimum(jump, last[todo]), np.maximum(middle, good[todo] + 1))
+        trial[todo] = np.where(
+            galloping[todo], np.minimum(jump, last[todo]), np.maximum(middle, good[todo] + 1)
+        )
         trial[todo] = np.minimum(trial[todo], np.minimum(bad[todo] - 1, last[todo]))
         ended = trial[todo] <= good[todo]
         todo = todo[~ended]
@@ -162,8 +161,8 @@ def _longest(
 
 
 def _fits(across: Array, start: Index, steps: Index, tolerance: float, most: int) -> Mask:
-    """Whether the samples between start and start + steps, `most` of them at the most, stay within tolerance of
-    their chord."""
+    """Whether the samples between start and start + steps, `most` of them at the most, stay within tolerance
+    of their chord."""
     fits = np.ones(len(start), bool)
     wide = np.flatnonzero(steps > 1)
     limit = 1 << 21

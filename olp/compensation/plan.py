@@ -18,13 +18,13 @@ from olp.compensation.reversal import Reversal, carry_play
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.exceptions import OutsideBox, ProgramError
-from olp.machine import ZERO, Vector
+from olp.machine import Vector
 from olp.toolpath import Flag, Frame, Kind, Toolpath
-from olp.units import MM_PER_UM
 
 #: share of the tolerance that chords may use; the rest is for the search's own steps
 CHORD_SHARE = 0.95
-#: an arc through rounded ends with a rounded centre strays by about this much more of the last digit than a line
+#: an arc through rounded ends with a rounded centre strays by about this much more of the last digit than
+#: a line
 ARC_DIGIT_SHARE = 0.6
 #: share that an axis with lost motion may stay behind instead of turning round
 DEAD_BAND_SHARE = 0.25
@@ -35,8 +35,8 @@ _UNSPLIT = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the plan must keep: tolerance of model and chords and the last digit written, in mm; whether rapids are
-    subdivided too, and whether commands outside the calibrated box are refused."""
+    """What the plan must keep: tolerance of model and chords and the last digit written, in mm; whether
+    rapids are subdivided too, and whether commands outside the calibrated box are refused."""
 
     tolerance_mm: float
     digit_mm: float = 0.0
@@ -46,9 +46,10 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """Rows in program order, one or more per move: (r,) `move`; (r, 3) `target_mm` where the tip has to be and
-    `command_mm` to get there; (r, 3) `raw` where the axis keeps what the program says; (r,) `reach`, the share
-    of the move that ends at the row; (r,) `take_up`: only takes up lost motion.
+    """Rows in program order, one or more per move: (r,) `move`; (r, 3) `target_mm` where the tip has to be
+    (kept where lost motion is carried only) and `command_mm` to get there; (r, 3) `raw` where the axis keeps
+    what the program says; (r,) `reach`, the share of the move that ends at the row; (r,) `take_up`: only
+    takes up lost motion.
 
     `passed` are the moves that stay uncorrected for want of a position, `shift_mm` (frames, 3) what each
     frame's touch-off holds.
@@ -105,8 +106,11 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
     cuts_line = subdivide_lines(path, model, target, free, chord)
     chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
-    cuts_arc = subdivide_arcs(path, model, target, raw, chord_arc, None if reversal is None else reversal.axes)
-    rows = _expand(path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model)
+    turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
+    cuts_arc = subdivide_arcs(path, model, target, raw, chord_arc, turning, band)
+    rows = _expand(
+        path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model, reversal is not None
+    )
     if reversal is not None:
         rows = carry_play(path, model, rows, reversal)
     if limits.refuse_outside:
@@ -122,7 +126,7 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, npt.NDArray[np.
     passed = np.zeros(0, np.int64)
     some = np.flatnonzero(unknown.any(axis=1))
     if some.size:
-        blind = (unknown[some][:, None, :] & model.depends_on[None]).any(axis=2)
+        blind = np.any(unknown[some][:, None, :] & model.depends_on[None], axis=2)
         # an unknown axis that has an error would need a word, which it never gets
         tool = path.tool_mm()
         error = model.error(path.end_mm[some], tool if tool.ndim == 1 else tool[some])
@@ -133,8 +137,8 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, npt.NDArray[np.
             i = int(cutting[0])
             axes = " and ".join("XYZ"[a] for a in np.flatnonzero(unknown[i]))
             raise ProgramError(
-                f"a feed move needs the position of {axes} for its correction, but nothing has commanded it yet; "
-                "command all axes in a rapid first, or give start_mm in the job file",
+                f"a feed move needs the position of {axes} for its correction, but nothing has commanded it "
+                "yet; command all axes in a rapid first, or give start_mm in the job file",
                 line=int(path.line[i]),
             )
         raw[some] |= blind | unknown[some]
@@ -152,7 +156,9 @@ def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> npt.NDArray[np.int64
         before = path.end_mm[i - 1] if i else np.array(path.start_mm)
         for axis in np.flatnonzero(~(path.end_mm[i] == before)).tolist():
             j = i + 1
-            while j < len(path) and path.kind[j] == Kind.RAPID and path.end_mm[j, axis] == path.end_mm[i, axis]:
+            while (
+                j < len(path) and path.kind[j] == Kind.RAPID and path.end_mm[j, axis] == path.end_mm[i, axis]
+            ):
                 raw[j, axis] = True
                 held.append(j)
                 j += 1
@@ -175,14 +181,16 @@ def _expand(
     shift: Array,
     cuts: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64], Array]],
     model: ErrorModel,
+    keep_target: bool,
 ) -> Plan:
     """Rows of all moves with the cuts (move, share of the move, target there) before their ends."""
     count = len(path)
+    none = np.zeros((0, 3))
     where = np.concatenate([c[0] for c in cuts])
     if not len(where):
         return Plan(
-            np.arange(count, dtype=np.int32), target, command, raw, np.ones(count), np.zeros(count, bool), passed,
-            shift, None,
+            np.arange(count, dtype=np.int32), target if keep_target else none, command, raw, np.ones(count),
+            np.zeros(count, bool), passed, shift, None,
         )  # fmt: skip
     share = np.concatenate([c[1] for c in cuts])
     point = np.concatenate([c[2] for c in cuts])
@@ -195,9 +203,11 @@ def _expand(
     is_cut[last] = False
     tool = path.tool_mm()
     cut_command = invert(model, point, tool if tool.ndim == 1 else tool[where])
-    out_target = np.empty((len(move), 3))
-    out_target[last], out_target[is_cut] = target, point
-    out_command = np.empty((len(move), 3))
+    out_target = none
+    if keep_target:
+        out_target = np.zeros((len(move), 3))
+        out_target[last], out_target[is_cut] = target, point
+    out_command = np.zeros((len(move), 3))
     out_command[last], out_command[is_cut] = command, cut_command
     reach = np.ones(len(move))
     reach[is_cut] = share
@@ -216,11 +226,11 @@ def _check_box(path: Toolpath, model: ErrorModel, rows: Plan) -> None:
         row = int(np.flatnonzero(out.any(axis=1))[0])
         axis = int(np.flatnonzero(out[row])[0])
         raise OutsideBox(
-            f"axis {'XYZ'[axis]} would be commanded to {rows.command_mm[row, axis]:.3f} mm, outside the calibrated box "
-            f"{box[axis, 0]:g} to {box[axis, 1]:g} mm; move the part, calibrate there, or accept the error at the "
-            "box face with --outside-box hold",
+            f"axis {'XYZ'[axis]} would be commanded to {rows.command_mm[row, axis]:.3f} mm, outside the "
+            f"calibrated box {box[axis, 0]:g} to {box[axis, 1]:g} mm; move the part, calibrate there, or "
+            "accept the error at the box face with --outside-box hold",
             line=int(path.line[rows.move[row]]),
         )
 
 
-__all__ = ["ZERO", "Limits", "Plan", "plan", "targets", "zero_shifts"]
+__all__ = ["Limits", "Plan", "plan", "targets", "zero_shifts"]

@@ -8,9 +8,10 @@ band keeps it where it is instead.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.compensation.invert import invert
 from olp.errormodel import ErrorModel
@@ -20,6 +21,7 @@ from olp.toolpath import Flag, Kind, Toolpath
 if TYPE_CHECKING:
     from olp.compensation.plan import Plan
 
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 _NO_TOOL = np.zeros(3)
 _PASSES = 6
@@ -51,11 +53,11 @@ class Reversal:
 
 
 def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal) -> Plan:
-    """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed move,
-    a row that only takes it up comes first.
+    """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed
+    move, a row that only takes it up comes first.
 
-    Where one axis turns the straightness of another may jump with it, and that one turns too: the states are gone
-    through until they agree.
+    Where one axis turns the straightness of another may jump with it, and that one turns too: the states are
+    gone through until they agree.
     """
     tools = path.tool_mm()
     tool = tools if tools.ndim == 1 else tools[rows.move]
@@ -92,11 +94,12 @@ def _may_turn(path: Toolpath, rows: Plan) -> Mask:
 
 
 def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Mask]:
-    """Play (n,) of one axis that has to bring its load to `position` with lost motion `lost`, where the load then
-    is, and the rows before which the drive has to turn.
+    """Play (n,) of one axis that has to bring its load to `position` with lost motion `lost`, where the load
+    then is, and the rows before which the drive has to turn.
 
-    The play is known as an interval of the lag, in which its middle is taken: at the start it is anything between
-    the two flanks, and each motion narrows it. The axis turns only when it would be off by more than the band.
+    The play is known as an interval of the lag, in which its middle is taken: at the start it is anything
+    between the two flanks, and each motion narrows it. The axis turns only when it would be off by more than
+    the band.
     """
     plays, loads, turns = [], [], []
     at = low = high = float("nan")
@@ -141,7 +144,7 @@ def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mas
     command[stay] = rows.command_mm[where - 1][stay]
     same = rows.move[where] == rows.move[where - 1]
 
-    def insert(column: Array, new: Array) -> Array:
+    def insert(column: npt.NDArray[_Scalar], new: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
         return np.insert(column, where, new, axis=0)
 
     return replace(

@@ -60,11 +60,13 @@ class Style:
         spaced = int(inner.size == 0 or np.mean(text[words.start[inner] - 1] == 32) >= 0.5)
         bare = [3 if step >= 0.0005 else 4 for step in increments_mm]
         return Style(
-            program, increments_mm, (common[0], common[1], common[2]), (finest[0], finest[1], finest[2]), leading_zero,
-            spaced, (bare[0], bare[1], bare[2]),
+            program, increments_mm, (common[0], common[1], common[2]), (finest[0], finest[1], finest[2]),
+            leading_zero, spaced, (bare[0], bare[1], bare[2]),
         )  # fmt: skip
 
-    def decimals(self, slot: Slots, axis: int, unit_mm: float | npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+    def decimals(
+        self, slot: Slots, axis: int, unit_mm: float | npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.int64]:
         """Digits behind the point of words, counting the hidden ones of numbers in least increments."""
         words = self.program.words
         assert words is not None
@@ -98,8 +100,8 @@ class Style:
         return min(max(self.least(axis, unit_mm), self.finest[axis]), _MOST_DECIMALS)
 
     def centre(self, axis: int, unit_mm: float) -> int:
-        """Digits of a centre word: one more than positions where the control takes it, since the far side of an
-        arc moves by twice what its centre does."""
+        """Digits of a centre word: one more than positions where the control takes it, since the far side of
+        an arc moves by twice what its centre does."""
         return min(self.usual(axis, unit_mm) + self.program.profile.free_digits, _MOST_DECIMALS)
 
     def word(self, line: int, letter: str) -> int | None:
@@ -124,7 +126,7 @@ class Style:
         opens = words.first_word[np.searchsorted(words.first_word, word)] == word
         space = np.where(opens, self.spaced, space)
         lower = (text[start] & 32) != 0
-        return space + 3 * lower.astype(np.int64)
+        return np.asarray(space + 3 * lower.astype(np.int64), np.int64)
 
     def separator(self, which: int, axis: int) -> bytes:
         """Text before an inserted number: space and letter."""

@@ -7,6 +7,7 @@ per chunk of text.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -38,8 +39,6 @@ class Tally:
     changed_words: int = 0
     inserted_words: int = 0
     inserted_blocks: int = 0
-    split_moves: int = 0
-    rows: list[Index] = field(default_factory=list)
 
 
 class Writer:
@@ -119,7 +118,7 @@ class Writer:
             while cut < count and lines[self.plan.move[cut]] == lines[self.plan.move[cut - 1]]:
                 cut += 1
             cuts.append(cut)
-        return list(zip(cuts[:-1], cuts[1:], strict=True))
+        return list(pairwise(cuts))
 
     # -- one chunk ---------------------------------------------------------------------------------
 
@@ -141,7 +140,7 @@ class Writer:
         edits: list[Edits] = []
         self._mark_take_ups(rows)
         breaks = self._breaks(rows)
-        for a, b in zip(breaks[:-1], breaks[1:], strict=True):
+        for a, b in pairwise(breaks):
             if flag[a] & _BYPASS & np.uint8(Flag.CYCLE):
                 edits += self._hole(rows, a, b)
             else:
@@ -171,7 +170,9 @@ class Writer:
         key = (rows.flag & np.uint8(Flag.INCREMENTAL | Flag.CYCLE)).astype(np.int64)
         if (key != 0).any():
             frame = self.path.frame[rows.move]
-            key = key + np.where(rows.flag & np.uint8(Flag.INCREMENTAL), (self.frames_unit[frame] > 2) * 256, 0)
+            key = key + np.where(
+                rows.flag & np.uint8(Flag.INCREMENTAL), (self.frames_unit[frame] > 2) * 256, 0
+            )
             cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
             key = np.where(cycle, -1 - self.path.line[rows.move].astype(np.int64), key)
         changes = np.flatnonzero(key[1:] != key[:-1]) + 1
@@ -206,7 +207,7 @@ class Writer:
                 unit=unit,
             )
             before = float(rows.emitted[a - 1, axis]) if a else float(rows.entry[axis])
-            smallest = float(np.min(unit)) if one else float(unit[0])  # type: ignore[index]
+            smallest = unit if isinstance(unit, float) else float(unit[0])
             if counting:
                 digits = incremental(axis_rows, before, self.style.grid(axis, smallest))
             elif one:
@@ -222,14 +223,21 @@ class Writer:
         unit = self.frames_unit[frame]
         cuts = [0, *(np.flatnonzero(unit[1:] != unit[:-1]) + 1).tolist(), len(unit)]
         parts = []
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+        for a, b in pairwise(cuts):
             s = slice(a, b)
-            mine = AxisRows(
-                *(getattr(axis_rows, n)[s] for n in ("command", "nominal", "given", "raw", "reset", "word", "decimals")),
-                axis_rows.offset[s] if np.ndim(axis_rows.offset) else axis_rows.offset,  # type: ignore[index]
-                float(unit[a]),
-            )  # fmt: skip
             u = float(unit[a])
+            offset = axis_rows.offset
+            mine = AxisRows(
+                command=axis_rows.command[s],
+                nominal=axis_rows.nominal[s],
+                given=axis_rows.given[s],
+                raw=axis_rows.raw[s],
+                reset=axis_rows.reset[s],
+                word=axis_rows.word[s],
+                decimals=axis_rows.decimals[s],
+                offset=offset if isinstance(offset, float) else offset[s],
+                unit=u,
+            )
             digits = absolute(mine, before, self.style.least(axis, u), self.style.usual(axis, u))
             before = float(digits.emitted[-1])
             parts.append(digits)
@@ -338,8 +346,10 @@ class Writer:
         arc = np.isin(self.path.kind[rows.move[tails]], (Kind.ARC_CW, Kind.ARC_CCW))
         straight = ~arc | self.plan.take_up[rows.first + tails]
         before = rows.before[tails]
-        place = np.where(before, self.program.line_start[line_no - 1], self.program.line_end[line_no - 1]).astype(np.int64)
-        lead = self._leads(rows, tails, line_no, arc & straight, before)
+        place = np.where(
+            before, self.program.line_start[line_no - 1], self.program.line_end[line_no - 1]
+        ).astype(np.int64)
+        lead = self._leads(line_no, arc & straight, before)
         write = rows.write[tails]
         first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
         out: list[Edits] = []
@@ -348,7 +358,10 @@ class Writer:
             letter = b"XYZ"[axis : axis + 1]
             begins = first_axis[chosen] == axis
             prefix = np.full(len(chosen), self.prefixes(b" " + letter), np.int32)
-            starts = {int(p): self.prefixes(self.prefixes.table[int(p)] + letter) for p in np.unique(lead[chosen[begins]])}
+            starts = {
+                int(p): self.prefixes(self.prefixes.table[int(p)] + letter)
+                for p in np.unique(lead[chosen[begins]])
+            }
             prefix[begins] = [starts[int(p)] for p in lead[chosen[begins]]]
             row = tails[chosen]
             out.append(
@@ -361,19 +374,20 @@ class Writer:
         # a part whose rounded end is where it began needs no block
         np.subtract.at(self.parts, rows.move[tails[empty]], 1)
         for i in np.flatnonzero(before & ~empty).tolist():
-            at, row = int(place[i]), int(tails[i])
-            self._check_take_up(rows, row)
-            out.append(self.one(at, at, BARE, 0, self._feed_of(int(line_no[i])) + self.program.eol(int(line_no[i])), rows.serial(row) + 5))
-            if rows.head[row + 1]:
-                out += self._arc_word(rows, row + 1)
+            at, tail, line = int(place[i]), int(tails[i]), int(line_no[i])
+            self._check_take_up(rows, tail)
+            suffix = self._feed_of(line) + self.program.eol(line)
+            out.append(self.one(at, at, BARE, 0, suffix, rows.serial(tail) + 5))
+            if rows.head[tail + 1]:
+                out += self._arc_word(rows, tail + 1)
         self.tally.inserted_blocks += int((~empty).sum())
         out += self._inverse_time(rows, tails)
         out += self._end_words(rows, tails[~before])
-        self.tally.split_moves += len(np.unique(rows.move[tails]))
         return out
 
-    def _leads(self, rows: Rows, tails: Index, line_no: Index, turning: Mask, before: Mask) -> Index:
-        """Prefix of the first word of each inserted block: line end, `/` and, to take up lost motion at an arc, G1."""
+    def _leads(self, line_no: npt.NDArray[np.int32], turning: Mask, before: Mask) -> Index:
+        """Prefix of the first word of each inserted block: line end, `/` and, to take up lost motion at an
+        arc, G1."""
         lines, which = np.unique(line_no, return_inverse=True)
         table = np.zeros((len(lines), 3), np.int64)
         for i, line in enumerate(lines.tolist()):
@@ -385,8 +399,8 @@ class Writer:
     def _check_take_up(self, rows: Rows, row: int) -> None:
         if rows.flag[row] & np.uint8(Flag.INVERSE_TIME):
             raise ProgramError(
-                "an arc in G93 needs a step that takes up lost motion before it, which has no time of its own; "
-                "program the arc in G94",
+                "an arc in G93 needs a step that takes up lost motion before it, which has no time of its "
+                "own; program the arc in G94",
                 line=int(self.path.line[rows.move[row]]),
             )
 
@@ -403,7 +417,10 @@ class Writer:
         line = int(self.path.line[move])
         code = 2 if self.path.kind[move] == Kind.ARC_CW else 3
         index = self.words.of_line(line)
-        if any(self.words.letter[i] == 71 and self.words.mantissa[i] == code and not self.words.decimals[i] for i in index):
+        if any(
+            self.words.letter[i] == 71 and self.words.mantissa[i] == code and not self.words.decimals[i]
+            for i in index
+        ):
             return []
         slot = self.program.slot[move]
         first = [int(self.words.start[s]) for s in slot if s >= 0]
@@ -430,7 +447,8 @@ class Writer:
             for i in kept:
                 row = int(part[i])
                 if rows.head[row]:
-                    start, end, prefix, order = int(self.words.number[index]), int(self.words.end[index]), b"", 0
+                    start, end = int(self.words.number[index]), int(self.words.end[index])
+                    prefix, order = b"", 0
                 else:
                     start = end = place
                     prefix, order = b" F", rows.serial(row) + 5
@@ -444,7 +462,8 @@ class Writer:
             line = int(self.path.line[move])
             moved = [
                 i for i in self.words.of_line(line)
-                if self.words.letter[i] == 77 and not self.words.decimals[i] and int(self.words.mantissa[i]) in _END_M
+                if self.words.letter[i] == 77 and not self.words.decimals[i]
+                and int(self.words.mantissa[i]) in _END_M
             ]  # fmt: skip
             if not moved:
                 continue
@@ -475,11 +494,8 @@ class Writer:
             own = int(self.words.mantissa[capture.word]) * 10 ** (digits - written)
             new = own + round(delta * 10**digits)
             if new != own:
-                out.append(
-                    self.one(
-                        int(self.words.number[capture.word]), int(self.words.end[capture.word]), new, digits, b"", 0
-                    )
-                )
+                start, end = int(self.words.number[capture.word]), int(self.words.end[capture.word])
+                out.append(self.one(start, end, new, digits, b"", 0))
                 self.tally.changed_words += 1
         return out
 
@@ -490,7 +506,8 @@ class Writer:
         """A single edit."""
         return Edits(
             np.array([start], np.int64), np.array([end], np.int64), np.array([mantissa], np.int64),
-            np.array([decimals], np.int8), np.array([self.prefixes(prefix)], np.int32), np.array([order], np.int32),
+            np.array([decimals], np.int8), np.array([self.prefixes(prefix)], np.int32),
+            np.array([order], np.int32),
         )  # fmt: skip
 
 
@@ -519,7 +536,8 @@ class Rows:
             return int(self.mantissa[row, axis]), int(self.decimals[row, axis])
         frame = writer.frame_of(int(self.move[row]))
         decimals = writer.style.usual(axis, frame.unit_mm)
-        return round((self.emitted[row, axis] - frame.offset_mm[axis]) / frame.unit_mm * 10**decimals), decimals
+        value = (self.emitted[row, axis] - frame.offset_mm[axis]) / frame.unit_mm
+        return round(value * 10**decimals), decimals
 
     def put(self, a: int, b: int, axis: int, digits: Digits) -> None:
         self.emitted[a:b, axis] = digits.emitted

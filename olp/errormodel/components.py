@@ -107,7 +107,6 @@ class _Columns:
 
     def __init__(self, calibration: Calibration, axis: str, skip: frozenset[str]) -> None:
         self._axis = axis
-        self._box = calibration.box_mm[AXES.index(axis)]
         self._keys: list[tuple[str, str]] = []
         self._interpolants: list[Interpolant] = []
         self._of_column: list[tuple[int, int]] = []

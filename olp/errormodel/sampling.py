@@ -11,10 +11,16 @@ MOST_STEPS = 1 << 18
 
 
 def steps_needed(
-    model: ErrorModel, delta_mm: Array, tool_mm: Array, bend_mm: float, *, at_least: int = 1, at_most: int = MOST_STEPS
+    model: ErrorModel,
+    delta_mm: Array,
+    tool_mm: Array,
+    bend_mm: float,
+    *,
+    at_least: int = 1,
+    at_most: int = MOST_STEPS,
 ) -> npt.NDArray[np.int64]:
-    """(n,) equal steps of each straight move by `delta_mm` (n, 3) such that the error bends by less than `bend_mm`
-    within one; `at_least` times a power of two."""
+    """(n,) equal steps of each straight move by `delta_mm` (n, 3) such that the error bends by less than
+    `bend_mm` within one; `at_least` times a power of two."""
     count = np.full(len(delta_mm), at_least, np.int64)
     todo = np.arange(len(delta_mm))
     while todo.size:

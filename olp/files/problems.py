@@ -76,11 +76,11 @@ def _problem(model: type[Table], error: dict[str, Any], lines: Mapping[Path, int
     if kind == "olp":
         return line, f"{key} {error['ctx']['sentence']}"
     value = shown(error["input"])
-    wanted = _wanted(kind, error.get("ctx", {}), path)
+    wanted = _wanted(kind, error.get("ctx", {}))
     return line, f"{key} = {value}; expected {wanted}: {description}"
 
 
-def _wanted(kind: str, context: Mapping[str, Any], path: Path) -> str:
+def _wanted(kind: str, context: Mapping[str, Any]) -> str:
     if kind == "literal_error":
         return "one of " + str(context["expected"]).replace("'", '"')
     if kind == "greater_than":

@@ -165,8 +165,8 @@ class MachineFile(Table):
     )
     decimal_point: Literal["increment", "calculator"] = Field(
         default="increment",
-        description="what a length without a decimal point means to a Fanuc or Haas control: X100 is 100 least "
-        "increments, or 100 units as on a pocket calculator",
+        description="what a length without a decimal point means to a Fanuc or Haas control: X100 is 100 "
+        "least increments, or 100 units as on a pocket calculator",
     )
     controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
     calibration: Text | None = Field(

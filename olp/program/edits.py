@@ -53,7 +53,9 @@ class EditList:
         self._prefixes = prefixes
         self._rows: list[tuple[int, int, int, int, int, int]] = []
 
-    def add(self, start: int, end: int, mantissa: int, decimals: int, prefix: bytes = b"", order: int = 0) -> None:
+    def add(
+        self, start: int, end: int, mantissa: int, decimals: int, prefix: bytes = b"", order: int = 0
+    ) -> None:
         """Replace `start`..`end` by a prefix and a number (BARE: no number)."""
         self._rows.append((start, end, mantissa, decimals, self._prefixes(prefix), order))
 

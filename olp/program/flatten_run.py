@@ -66,7 +66,7 @@ class Walk:
                 if line.deleted and self.block_delete:
                     continue
                 if self._step(line, frame, index):
-                    self._close_tape(frame)
+                    self._close_tape()
                     return
             except ProgramError as error:
                 if error.line is None:
@@ -75,7 +75,7 @@ class Walk:
                     error.file = frame.unit.file
                 raise
 
-    def _close_tape(self, frame: Frame) -> None:
+    def _close_tape(self) -> None:
         """The closing % of the main file is kept, whatever stands between it and the program's end."""
         main = self._frames[0]
         if self._percents == 1:

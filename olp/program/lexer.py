@@ -268,7 +268,7 @@ def _eight_digits(window: npt.NDArray[np.uint64], count: Index) -> Index:
 def _slow_number(text: bytes) -> tuple[int, int] | None:
     """One number of any length; None where it is not one. Beyond 18 digits the last ones are dropped."""
     body = text[1:] if text[:1] in b"+-" else text
-    whole, dot, fraction = body.partition(b".")
+    whole, _, fraction = body.partition(b".")
     if not (whole + fraction).isdigit():
         return None
     whole = whole.lstrip(b"0")

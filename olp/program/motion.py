@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import ProgramError
-from olp.program.lexer import WordChunk
 from olp.geometry import PLANES
+from olp.program.lexer import WordChunk
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -30,7 +30,8 @@ _ARC_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"IJKRP"):
     _ARC_OF[_letter] = _i
 
-#: Largest mismatch of an arc's two radii that LinuxCNC accepts, in mm: both bounds must be exceeded to refuse.
+#: Largest mismatch of an arc's two radii that LinuxCNC accepts, in mm: both bounds must be exceeded to
+#: refuse.
 SPIRAL_ABSOLUTE_MM = 0.0283
 SPIRAL_RELATIVE = 0.001
 
@@ -50,8 +51,8 @@ def modal(chunk_lines: int, lines: Index, codes: Index, carry: int) -> npt.NDArr
 
 @dataclass(slots=True, eq=False)
 class Blocks:
-    """Motion lines of a chunk: (n,) line in the chunk, (n, 3) index of the X, Y, Z word or -1, whether another
-    axis moves too, and per arc its row and (m, 5) index of the I, J, K, R, P word or -1."""
+    """Motion lines of a chunk: (n,) line in the chunk, (n, 3) index of the X, Y, Z word or -1, whether
+    another axis moves too, and per arc its row and (m, 5) index of the I, J, K, R, P word or -1."""
 
     line: Index
     slot: Index
@@ -97,7 +98,13 @@ def gather(chunk: WordChunk, motion: npt.NDArray[np.int16], consumed: Mask) -> B
 
 
 def _slots(
-    chunk: WordChunk, words: Index, row_of: Index, column: npt.NDArray[np.int8], width: int, names: bytes, rows: Index
+    chunk: WordChunk,
+    words: Index,
+    row_of: Index,
+    column: npt.NDArray[np.int8],
+    width: int,
+    names: bytes,
+    rows: Index,
 ) -> Index:
     """(rows, width) table of word indices; a letter that stands twice in one block is refused."""
     slot = np.full((len(rows), width), -1, np.int64)
@@ -115,11 +122,14 @@ def _slots(
 def fill(
     slot: Index, value: Array, incremental: Mask | None, offset: Array, unit: Array | float, at: list[float]
 ) -> Array:
-    """(n, 3) axis positions of consecutive blocks from `at`; offsets (3,) or (n, 3), units scalar or (n, 1)."""
+    """(n, 3) axis positions of consecutive blocks from `at`; offsets (3,) or (n, 3), units scalar or (n,
+    1)."""
     count = len(slot)
     out = np.empty((count, 3))
     order = np.arange(count)
-    units = np.broadcast_to(np.asarray(unit, float).reshape(-1, 1), (count, 1))[:, 0] if np.ndim(unit) else unit
+    units = (
+        np.broadcast_to(np.asarray(unit, float).reshape(-1, 1), (count, 1))[:, 0] if np.ndim(unit) else unit
+    )
     for a in range(3):
         words = slot[:, a]
         given = words >= 0
@@ -144,7 +154,15 @@ def fill(
 
 
 def arc_geometry(
-    start: Array, end: Array, words: Array, *, clockwise: Mask, plane: Index, absolute: Mask, offset: Array, line: Index
+    start: Array,
+    end: Array,
+    words: Array,
+    *,
+    clockwise: Mask,
+    plane: Index,
+    absolute: Mask,
+    offset: Array,
+    line: Index,
 ) -> tuple[Array, Array]:
     """Centres (m, 3), with the start's third coordinate, and signed sweeps (m,), whole turns included.
 
@@ -162,7 +180,7 @@ def arc_geometry(
 
     r0 = r1 = half = np.zeros(len(start))
     refuse(
-        ~(np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)),
+        ~np.asarray(np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)),
         "an arc starts or ends where an axis has not been commanded yet; command X, Y and Z first, or give "
         "start_mm in the job file",
     )
@@ -178,12 +196,17 @@ def arc_geometry(
         "in G90.1 an arc needs both centre words of its plane",
     )
     turns = np.where(np.isnan(turns), 1.0, turns)
-    refuse((turns != np.rint(turns)) | (turns < 1), "P of an arc is its number of turns; expected a whole number")
+    refuse(
+        (turns != np.rint(turns)) | (turns < 1), "P of an arc is its number of turns; expected a whole number"
+    )
     base0, base1 = (np.where(absolute, offset[rows, f], s) for f, s in ((first, s0), (second, s1)))
     centre0, centre1 = np.nan_to_num(c0) + base0, np.nan_to_num(c1) + base1
     if by_radius.any():
         dx, dy, half = e0 - s0, e1 - s1, np.hypot(e0 - s0, e1 - s1) / 2
-        refuse(by_radius & (half == 0), "an arc with R ends where it starts, so its centre is not known; use I, J, K")
+        refuse(
+            by_radius & (half == 0),
+            "an arc with R ends where it starts, so its centre is not known; use I, J, K",
+        )
         size = np.abs(radius)
         refuse(
             by_radius & (half > size + SPIRAL_ABSOLUTE_MM / 2) & (half > size * (1 + SPIRAL_RELATIVE / 2)),
@@ -198,7 +221,8 @@ def arc_geometry(
     refuse((r0 < 1e-9) | (r1 < 1e-9), "an arc has zero radius")
     refuse(
         np.abs(r0 - r1) > np.maximum(SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE * r1),
-        "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end, more than a control accepts",
+        "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end, more than a control "
+        "accepts",
     )
     sweep = np.arctan2(e1 - centre1, e0 - centre0) - np.arctan2(s1 - centre1, s0 - centre0)
     sweep = np.where(clockwise, -sweep, sweep) % (2 * np.pi)

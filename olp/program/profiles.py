@@ -51,7 +51,8 @@ class Profile:
     comment: tuple[bytes, bytes] = (b"(", b")")
 
     def support(self) -> list[dict[str, str]]:
-        """The support matrix, from the table that the interpreter uses: statement, what becomes of it, why."""
+        """The support matrix, from the table that the interpreter uses: statement, what becomes of it,
+        why."""
         what = {Act.CARRY: "carried", Act.REFUSE: "refused", Act.EVENT: "read", Act.MOTION: "corrected"}
         return [
             {
@@ -141,8 +142,8 @@ GRBL = Profile(
     codes=_codes(
         carry=set(),
         extra={431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE},
-        without={330, 331, 520, 300, 960, 970, 730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890, 950, 980, 990}
-        | {430, 640, 281, 301, 411, 421, 410, 420},
+        without={330, 331, 520, 300, 960, 970, 730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890}
+        | {950, 980, 990, 430, 640, 281, 301, 411, 421, 410, 420},
     ),
     refusals=_REFUSE,
     harmless_m=_ISO_M | {56},

@@ -37,7 +37,8 @@ class Words:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArcSlots:
-    """Per arc of the toolpath: (m, 5) indices of its I, J, K, R, P words or -1, and whether I, J, K are absolute."""
+    """Per arc of the toolpath: (m, 5) indices of its I, J, K, R, P words or -1, and whether I, J, K are
+    absolute."""
 
     word: Small
     absolute: npt.NDArray[np.bool_]
@@ -48,8 +49,8 @@ class Hole:
     """One hole of a canned cycle: its moves `first`..`last` of the toolpath and its block's words by letter.
 
     `x_mm`, `y_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
-    `series` counts contiguous cycles; a block of one series inherits R and Z of the one before. `repeat` counts
-    the `repeats` holes of one block from 0.
+    `series` counts contiguous cycles; a block of one series inherits R and Z of the one before. `repeat`
+    counts the `repeats` holes of one block from 0.
     """
 
     line: int
@@ -70,8 +71,8 @@ class Hole:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without a
-    decimal point are whole units."""
+    """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
+    a decimal point are whole units."""
 
     data: bytes
     profile: Profile

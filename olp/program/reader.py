@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import ProgramError
+from olp.geometry import PLANES
 from olp.machine import Setup
 from olp.program.columns import Columns
 from olp.program.cycles import hole_moves, levels
@@ -22,7 +23,6 @@ from olp.program.motion import Array, Blocks, Index, Mask, arc_geometry, fill, g
 from olp.program.profiles import CUTTER_COMPENSATION, CYCLES, PROBES, Act, Profile
 from olp.program.program import ArcSlots, Hole, Program, Words
 from olp.program.state import NAN, Effect, State, Word
-from olp.geometry import PLANES
 from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 
 _SWITCH = re.compile(rb"[(;][ \t]*olp (off|on)\b", re.IGNORECASE)
@@ -50,8 +50,11 @@ class Options:
     contour: bool = False
 
 
-def read(data: bytes, setup: Setup, profile: Profile, options: Options | None = None, *, words: bool = True) -> Program:
-    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read right.
+def read(
+    data: bytes, setup: Setup, profile: Profile, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    right.
 
     Without `words` the columns that only writing needs are left out.
     """
@@ -69,7 +72,8 @@ class _Codes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Context:
-    """A chunk with its numbers and the modal codes in force on each line; `base` is its first word's index."""
+    """A chunk with its numbers and the modal codes in force on each line; `base` is its first word's
+    index."""
 
     chunk: WordChunk
     value: Array
@@ -134,7 +138,9 @@ class _Reader:
     def run(self) -> Program:
         data = self.data
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise ProgramError("the text is UTF-16; expected one byte a character; save it as plain text", line=1)
+            raise ProgramError(
+                "the text is UTF-16; expected one byte a character; save it as plain text", line=1
+            )
         if data[:3] == b"\xef\xbb\xbf":
             # a byte order mark is blank to the lexer, and stays where it is
             data = b"   " + data[3:]
@@ -231,7 +237,8 @@ class _Reader:
         if ends.size and ends[0] < last:
             if chunk.deleted[ends[0]]:
                 raise ProgramError(
-                    "block delete decides here whether the program ends; expected one end for both switch positions",
+                    "block delete decides here whether the program ends; expected one end for both switch "
+                    "positions",
                     line=chunk.first_line + int(ends[0]) + 1,
                 )
             last, self.ended = int(ends[0]) + 1, True
@@ -253,11 +260,13 @@ class _Reader:
             shown = text[:60].decode("latin-1")
             if _FLOW.search(text):
                 raise ProgramError(
-                    f"`{shown}` uses parameters, expressions or flow control; unroll the program with --flatten",
+                    f"`{shown}` uses parameters, expressions or flow control; unroll the program with "
+                    "--flatten",
                     line=number,
                 )
             raise ProgramError(
-                f"`{shown}` is not understood and may move the machine; expected words of a letter and a number",
+                f"`{shown}` is not understood and may move the machine; expected words of a letter and a "
+                "number",
                 line=number,
             )
 
@@ -282,8 +291,8 @@ class _Reader:
                 before = mode[line - 1] if line else carry
                 if mode[line] != before and not (which == 0 and restated.any()):
                     raise ProgramError(
-                        "a block under block delete changes a modal code that later blocks depend on; restate the "
-                        "code in the next block or remove the `/`",
+                        "a block under block delete changes a modal code that later blocks depend on; "
+                        "restate the code in the next block or remove the `/`",
                         line=chunk.first_line + line + 1,
                     )
 
@@ -305,7 +314,9 @@ class _Reader:
                 continue
             number = chunk.first_line + at + 1
             words = self._words(context, at)
-            mine = slice(np.searchsorted(context.codes.line, at), np.searchsorted(context.codes.line, at, "right"))
+            mine = slice(
+                np.searchsorted(context.codes.line, at), np.searchsorted(context.codes.line, at, "right")
+            )
             codes = self._checked(context.codes.code[mine], context.codes.act[mine], words, number)
             self._check_deleted_event(chunk, at, codes, words, number)
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
@@ -336,22 +347,27 @@ class _Reader:
                 if c in CUTTER_COMPENSATION:
                     why = f"{why}; program the tool path, or take the contour as tool path with --contour"
                 raise ProgramError(
-                    why or f"{name} is not known to the {self.profile.name} profile and may move the machine", line=line
+                    why or f"{name} is not known to the {self.profile.name} profile and may move the machine",
+                    line=line,
                 )
         for word in words:
             m = round(word.value * 10)
             if word.letter == "M" and m in _M_REFUSED:
-                raise ProgramError(f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with --flatten", line=line)
+                raise ProgramError(
+                    f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with --flatten", line=line
+                )
         return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 
     def _check_deleted_event(
         self, chunk: WordChunk, at: int, codes: list[int], words: list[Word], line: int
     ) -> None:
-        changes = set(codes) - {40, 280, 300, 530} or any(w.letter == "M" and w.value in (6, 61) for w in words)
+        changes = set(codes) - {40, 280, 300, 530} or any(
+            w.letter == "M" and w.value in (6, 61) for w in words
+        )
         if chunk.deleted[at] and changes:
             raise ProgramError(
-                "a block under block delete changes offsets, units, path mode or the tool, so later blocks depend "
-                "on the switch; remove the `/`",
+                "a block under block delete changes offsets, units, path mode or the tool, so later blocks "
+                "depend on the switch; remove the `/`",
                 line=line,
             )
 
@@ -359,7 +375,8 @@ class _Reader:
         chunk = context.chunk
         span = range(int(chunk.first_word[line]), int(chunk.first_word[line + 1]))
         return [
-            Word(chr(chunk.letter[i]), float(context.value[i]), context.base + i, bool(chunk.pointed[i])) for i in span
+            Word(chr(chunk.letter[i]), float(context.value[i]), context.base + i, bool(chunk.pointed[i]))
+            for i in span
         ]
 
     def _assign(self, context: _Context, rows: _Rows, upto: int) -> None:
@@ -397,7 +414,8 @@ class _Reader:
         if inverse.any():
             flag[inverse] |= np.uint8(Flag.INVERSE_TIME)
         if self.switch_lines:
-            off = np.concatenate(([False], self.switch_off))[np.searchsorted(self.switch_lines, number - 1, "right")]
+            before = np.searchsorted(self.switch_lines, number - 1, "right")
+            off = np.concatenate(([False], self.switch_off))[before]
             flag[off] |= np.uint8(Flag.PASS)
         arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
         if arcs.stop > arcs.start:
@@ -436,7 +454,9 @@ class _Reader:
             offset=np.broadcast_to(offset, end.shape)[row],
             line=line + (context.chunk.first_line + 1),
         )
-        self._put_arcs(row + self.moves, centre, plane, sweep, np.where(words >= 0, words + context.base, -1), absolute)
+        self._put_arcs(
+            row + self.moves, centre, plane, sweep, np.where(words >= 0, words + context.base, -1), absolute
+        )
 
     def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
         frames = self.state.frames
@@ -448,7 +468,8 @@ class _Reader:
         return offsets[frame], units[frame][:, None]
 
     def _scaled(self, context: _Context) -> Array:
-        """Numbers as written, in program units: without a decimal point they count increments on some controls."""
+        """Numbers as written, in program units: without a decimal point they count increments on some
+        controls."""
         if not self.state.bare_increments:
             return context.value
         bare = np.flatnonzero(~context.chunk.pointed & _LENGTHS[context.chunk.letter])
@@ -497,22 +518,29 @@ class _Reader:
             flag |= Flag.INCREMENTAL
         slot = rows.blocks.slot[row : row + 1]
         before = list(state.position)
-        end = fill(
-            slot, self._scaled(context), np.array([True]) if incremental else None, offset, frame.unit_mm, before
-        )
+        relative = np.array([True]) if incremental else None
+        end = fill(slot, self._scaled(context), relative, offset, frame.unit_mm, before)
         self._put_moves(
-            np.array([kind], np.uint8), np.array([flag], np.uint8), np.array([number]), rows.frame[row : row + 1], end,
-            np.where(slot >= 0, slot + context.base, -1),
+            np.array([kind], np.uint8), np.array([flag], np.uint8), np.array([number]),
+            rows.frame[row : row + 1], end, np.where(slot >= 0, slot + context.base, -1),
         )  # fmt: skip
         state.position[:] = end[0].tolist()
         if kind == Kind.PROBE:
             for i in range(3):
-                if not state.position[i] == before[i]:
+                if state.position[i] != before[i]:
                     state.position[i] = NAN
             self._control_move(number, chunk, at)
 
     def _cycle(
-        self, context: _Context, rows: _Rows, row: int, frame: Frame, code: int, line: int, *, incremental: bool
+        self,
+        context: _Context,
+        rows: _Rows,
+        row: int,
+        frame: Frame,
+        code: int,
+        line: int,
+        *,
+        incremental: bool,
     ) -> None:
         state = self.state
         chunk = context.chunk
@@ -527,7 +555,9 @@ class _Reader:
         elif previous != code:
             self.sticky = {}
         value = self._scaled(context)
-        words = {chr(chunk.letter[i]): i for i in range(int(chunk.first_word[at]), int(chunk.first_word[at + 1]))}
+        words = {
+            chr(chunk.letter[i]): i for i in range(int(chunk.first_word[at]), int(chunk.first_word[at + 1]))
+        }
         for letter in "RQ" + "XYZ"[third]:
             if letter in words:
                 self.sticky[letter] = float(value[words[letter]]) * frame.unit_mm
@@ -539,7 +569,9 @@ class _Reader:
         repeats = words.get("L", words.get("K") if self.profile.name != "linuxcnc" else None)
         times = 1 if repeats is None else round(float(context.value[repeats]))
         if times < 1:
-            raise ProgramError("a canned cycle with zero repeats only stores values, which is not read yet", line=line)
+            raise ProgramError(
+                "a canned cycle with zero repeats only stores values, which is not read yet", line=line
+            )
         offset = frame.offset_mm
         z_word, r_word = self.sticky["XYZ"[third]], self.sticky["R"]
         if incremental:
@@ -555,8 +587,8 @@ class _Reader:
             place.append(held if given is None else held + given if incremental else given + offset[axis])
         if any(np.isnan((*place, *state.position))):
             raise ProgramError(
-                "a canned cycle starts where an axis has not been commanded yet; command X, Y and Z first, or give "
-                "start_mm in the job file",
+                "a canned cycle starts where an axis has not been commanded yet; command X, Y and Z first, "
+                "or give start_mm in the job file",
                 line=line,
             )
         start = (state.position[0], state.position[1], state.position[2])
@@ -565,8 +597,9 @@ class _Reader:
             try:
                 strokes = hole_moves(
                     code, start=start, xy=(place[0], place[1]), r=r, z=z, q=self.sticky.get("Q"),
-                    p=self.sticky.get("P"), retract_to_r=context.retract[at] == 990, initial_z=self.series_initial,
-                    plane=17 + plane, profile="linuxcnc" if self.profile.name == "linuxcnc" else "fanuc",
+                    p=self.sticky.get("P"), retract_to_r=context.retract[at] == 990,
+                    initial_z=self.series_initial, plane=17 + plane,
+                    profile="linuxcnc" if self.profile.name == "linuxcnc" else "fanuc",
                 )  # fmt: skip
             except ProgramError as error:
                 raise ProgramError(error.message, line=line) from None
@@ -617,7 +650,8 @@ class _Reader:
     def _refuse_motion(self, code: int, line: int) -> None:
         if code in (-1, 800):
             raise ProgramError(
-                "axis words stand in a block, but no motion code is in force; expected G0, G1, G2 or G3", line=line
+                "axis words stand in a block, but no motion code is in force; expected G0, G1, G2 or G3",
+                line=line,
             )
         raise ProgramError(f"G{code / 10:g} is not read as motion", line=line)
 
@@ -699,7 +733,9 @@ class _Reader:
             toolpath=path,
             words=words,
             slot=self.columns.take("slot", np.int32, 3),
-            arc_slots=ArcSlots(self.columns.take("arc_words", np.int32, 5), self.columns.take("arc_absolute", np.bool_)),
+            arc_slots=ArcSlots(
+                self.columns.take("arc_words", np.int32, 5), self.columns.take("arc_absolute", np.bool_)
+            ),
             line_start=self.columns.take("line_start", np.int32),
             line_end=self.columns.take("line_end", np.int32),
             captures=tuple(self.state.captures),

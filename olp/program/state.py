@@ -108,13 +108,15 @@ class State:
     # -- frames ------------------------------------------------------------------------------------
 
     def frame(self, line: int) -> int:
-        """Index of the present frame; a tool or offset that is not defined is refused here, at its first use."""
+        """Index of the present frame; a tool or offset that is not defined is refused here, at its first
+        use."""
         work = self._work_offset(self.offset_name)
         base = self.offsets.get(self.offset_name)
         if base is None:
             if work is None:
                 raise ProgramError(
-                    f"work offset {self.offset_name} is used but not defined; give [work_offsets.\"{self.offset_name}\"] "
+                    f"work offset {self.offset_name} is used but not defined; give "
+                    f'[work_offsets."{self.offset_name}"] '
                     "in the machine or job file",
                     line=line,
                 )
@@ -152,7 +154,8 @@ class State:
         tool = self.setup.tool(number)
         if tool is None:
             raise ProgramError(
-                f"tool {number} is in the spindle but not defined; give [tools.{number}] in the machine or job file",
+                f"tool {number} is in the spindle but not defined; give [tools.{number}] in the machine or "
+                "job file",
                 line=line,
             )
         lever = tool.lever_mm
@@ -165,8 +168,8 @@ class State:
         return lever
 
     def _touch(self, name: str, base: Sequence[float], line: int) -> tuple[Vector, Vector] | None:
-        """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's part;
-        one that G10 L2 changed keeps its own."""
+        """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's
+        part; one that G10 L2 changed keeps its own."""
         if name in self.inherited:
             return self.inherited[name]
         work = self._work_offset(name)
@@ -184,7 +187,8 @@ class State:
                 )
             length, lever = tool.length_mm, tool.lever_mm
         at = [
-            touch.offset_mm[i] + length[i] if stated is None else stated for i, stated in enumerate(touch.touched_at_mm)
+            touch.offset_mm[i] + length[i] if stated is None else stated
+            for i, stated in enumerate(touch.touched_at_mm)
         ]
         return (at[0], at[1], at[2]), lever
 
@@ -202,7 +206,8 @@ class State:
         tool = self.setup.tool(number)
         if tool is None:
             raise ProgramError(
-                f"{what} uses tool {number}, which is not defined; give [tools.{number}] in the machine or job file",
+                f"{what} uses tool {number}, which is not defined; give [tools.{number}] in the machine or "
+                "job file",
                 line=line,
             )
         return tool.length_mm
@@ -210,7 +215,8 @@ class State:
     # -- values ------------------------------------------------------------------------------------
 
     def length_mm(self, word: Word) -> float:
-        """A length word in mm; without a decimal point it counts least increments where the control says so."""
+        """A length word in mm; without a decimal point it counts least increments where the control says
+        so."""
         return word.value * self.word_scale(word.letter, word.pointed)
 
     def word_scale(self, letter: str, pointed: bool) -> float:
@@ -225,7 +231,8 @@ class State:
         return self.profile.increments_without_point and self.setup.machine.decimal_point == "increment"
 
     def increment(self, letter: str) -> float:
-        """Least increment in program units: 0.001 mm goes with 0.0001 inch (IS-B), 0.0001 mm with 0.00001 inch."""
+        """Least increment in program units: 0.001 mm goes with 0.0001 inch (IS-B), 0.0001 mm with 0.00001
+        inch."""
         axis = {"I": "X", "J": "Y", "K": "Z"}.get(letter, letter)
         least = self.setup.machine.axes[axis if axis in "XYZ" else "X"].least_increment_mm
         metric = 0.0001 if least < 0.0005 else 0.001
@@ -303,8 +310,12 @@ class State:
         """G4: ISO controls take its time from X, too; RS-274 from P alone, so that axis words still move."""
         if not self.profile.cycles_apart:
             return Effect()
-        if any(a in by_letter for a in "YZ") or any(w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()):
-            raise ProgramError("a dwell and a motion stand in one block; give the dwell a block of its own", line=line)
+        if any(a in by_letter for a in "YZ") or any(
+            w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
+        ):
+            raise ProgramError(
+                "a dwell and a motion stand in one block; give the dwell a block of its own", line=line
+            )
         return Effect(consumed=True)
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
@@ -333,7 +344,9 @@ class State:
     def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code in (541, 1540):
             if "P" not in by_letter:
-                raise ProgramError(f"G{code / 10:g} needs a P word with the number of the work offset", line=line)
+                raise ProgramError(
+                    f"G{code / 10:g} needs a P word with the number of the work offset", line=line
+                )
             name = f"G{code / 10:g}P{self._integer(by_letter['P'], line)}"
         else:
             name = f"G{code / 10:g}"
@@ -360,7 +373,8 @@ class State:
         if kind not in (2, 20):
             what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
             raise ProgramError(
-                f"{what} writes the control's tables in a way that is not read; only L2 and L20 are", line=line
+                f"{what} writes the control's tables in a way that is not read; only L2 and L20 are",
+                line=line,
             )
         if "R" in by_letter and by_letter["R"].value != 0:
             raise ProgramError("G10 R rotates the work offset, which is not read yet; use R0", line=line)
@@ -401,7 +415,9 @@ class State:
             base = self.offsets.get(self.offset_name) or (list(work.offset_mm) if work else [NAN] * 3)
             for i, word in axis_words:
                 self._capture(i, word, line, moves)
-                self.shift[i] = self.position[i] - base[i] - self.length[i] - self.local[i] - self.length_mm(word)
+                self.shift[i] = (
+                    self.position[i] - base[i] - self.length[i] - self.local[i] - self.length_mm(word)
+                )
             self.saved_shift = list(self.shift)
 
     def _capture(self, axis: int, word: Word, line: int, moves: int) -> None:
@@ -433,7 +449,9 @@ class State:
 
 def _order(code: int) -> int:
     """RS-274's order of execution within a block."""
-    for rank, codes in enumerate(((40,), (200, 210), (430, 431, 432, 440, 490), range(540, 600), (610, 611, 640))):
+    for rank, codes in enumerate(
+        ((40,), (200, 210), (430, 431, 432, 440, 490), range(540, 600), (610, 611, 640))
+    ):
         if code in codes:
             return rank
     return 9

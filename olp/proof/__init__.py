@@ -1,11 +1,12 @@
-"""Proof by reading back: the written bytes are parsed again, run through the forward model and held against the
-nominal path, at and between the way-points."""
+"""Proof by reading back: the written bytes are parsed again, run through the forward model and held against
+the nominal path, at and between the way-points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.compensation.plan import targets, zero_shifts
 from olp.deviation import Deviation, Index, cutting_moves, measure
@@ -42,8 +43,8 @@ class Proof:
         return self.tolerance_mm + ROUNDING_SHARE * self.digit_mm
 
     def size_mm(self) -> Array:
-        """(n,) the deviation that counts per nominal move: along the path of cutting moves, at the end of others;
-        0 where the move is not judged."""
+        """(n,) the deviation that counts per nominal move: along the path of cutting moves, at the end of
+        others; 0 where the move is not judged."""
         counts = self.after.judged
         at = np.where(counts, np.nan_to_num(self.after.waypoint), 0.0)
         along = np.where(counts & self.cutting & ~self.lean, np.nan_to_num(self.after.path), 0.0)
@@ -69,10 +70,11 @@ def prove(
     tolerance_mm: float,
     digit_mm: float,
     passed: Index,
-    parts: Index | None = None,
+    parts: npt.NDArray[np.int32] | None = None,
 ) -> Proof:
-    """Hold the corrected path against the nominal one. `passed` are nominal moves written uncorrected; `parts` (n,)
-    says how many corrected moves each nominal one became, and is found from the paths where it is not given."""
+    """Hold the corrected path against the nominal one. `passed` are nominal moves written uncorrected;
+    `parts` (n,) says how many corrected moves each nominal one became, and is found from the paths where it
+    is not given."""
     path, written = nominal.toolpath, corrected.toolpath
     target = targets(path, zero_shifts(path.frames, model))
     exempt = np.zeros(len(path), bool)
@@ -81,27 +83,23 @@ def prove(
     if parts is None:
         groups = match(nominal, target, corrected, model, tolerance_mm + digit_mm)
     else:
-        groups = np.cumsum(_with_pecks(nominal, corrected, parts)) - 1
+        groups = np.cumsum(_with_pecks(nominal, corrected, parts), dtype=np.int64) - 1
     if len(groups) and int(groups[-1]) != len(written) - 1:
         raise ProgramError(
-            f"the corrected program has {len(written)} moves where {int(groups[-1]) + 1} were expected; it was not "
-            "written"
+            f"the corrected program has {len(written)} moves where {int(groups[-1]) + 1} were expected; it "
+            "was not written"
         )
     after = measure(path, target, written, groups, model, tolerance_mm * _BEND_SHARE, exempt)
     before = measure(path, target, path, np.arange(len(path)), model, 1e-3, exempt)
     return Proof(path, before, after, tolerance_mm, digit_mm, cutting_moves(path), loose)
 
 
-def _with_pecks(nominal: Program, corrected: Program, parts: Index) -> Index:
-    """A corrected depth may take one peck more or less; the last stroke of a hole answers for the difference."""
+def _with_pecks(nominal: Program, corrected: Program, parts: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """A corrected depth may take one peck more or less; the last stroke of a hole answers for the
+    difference."""
     parts = parts.copy()
     for mine, other in zip(nominal.holes, corrected.holes, strict=True):
         more = (other.last - other.first) - (mine.last - mine.first)
         parts[mine.last - 1] += max(more, 0)
         parts[mine.last + min(more, 0) - 1 : mine.last - 1] -= 1 if more < 0 else 0
     return parts
-
-
-def shared_digit_mm(decimals: tuple[int, int, int], unit_mm: Array) -> float:
-    """The coarsest last digit over axes and units, in mm."""
-    return float(max(10.0 ** -min(decimals) * unit for unit in unit_mm.tolist()) if len(unit_mm) else 0.0)

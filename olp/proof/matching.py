@@ -17,10 +17,11 @@ _BLOCK = 4096
 
 
 def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel, near_mm: float) -> Index:
-    """(n,) index of the last move of `corrected` for each move of `program`, whose way-points are `target_mm`.
+    """(n,) index of the last move of `corrected` for each move of `program`, whose way-points are
+    `target_mm`.
 
-    Way-points are looked for in order: the next move that comes within `near_mm`, else the nearest of those within
-    the gate. Raises ProgramError where one is not reached: then the two programs are not the same job.
+    Way-points are looked for in order: the next move that comes within `near_mm`, else the nearest of those
+    within the gate. Raises ProgramError where one is not reached: then the two programs are not the same job.
     """
     nominal, path = program.toolpath, corrected.toolpath
     count, extra = len(nominal), len(path) - len(nominal)
@@ -48,7 +49,13 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         if i == count or (run == span and span):
             continue
         ahead = np.abs(actual[j : j + extra + 1] - target_mm[i]).max(axis=1, initial=0.0)
-        skip = int(np.argmax(ahead < near_mm)) if (ahead < near_mm).any() else int(np.argmin(ahead)) if len(ahead) else -1
+        skip = (
+            int(np.argmax(ahead < near_mm))
+            if (ahead < near_mm).any()
+            else int(np.argmin(ahead))
+            if len(ahead)
+            else -1
+        )
         if skip < 0 or ahead[skip] > GATE_MM:
             raise ProgramError(
                 f"no move of the corrected program reaches the end of line {int(nominal.line[i])} within "

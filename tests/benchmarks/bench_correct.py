@@ -1,0 +1,140 @@
+"""CPU time and memory of `olp correct` beside LinuxCNC listing the same file, in one run.
+
+    python tests/benchmarks/bench_correct.py [lines]
+
+Prints user CPU seconds of whole commands (the least of three), their ratio, and the peak memory. Peers are
+timed where they are installed (pip install gcode-lib pygcode). Needs LinuxCNC's rs274 for the ratio.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+import olp
+
+ROOT = Path(__file__).resolve().parents[2]
+BOX = {"X": (-10.0, 810.0), "Y": (-400.0, 1300.0), "Z": (-60.0, 70.0)}
+
+
+def machine(folder: Path) -> Path:
+    """A machine with all 21 errors, 50 to 100 um in its box."""
+    rng = np.random.default_rng(3)
+    for axis, (low, high) in BOX.items():
+        at = np.linspace(low, high, 33)
+        u = (at - low) / (high - low)
+        columns = [at]
+        for k in range(6):
+            waves = sum(rng.normal() / (n + 1) ** 1.5 * np.sin(np.pi * (n + 1) * u + n) for n in range(4))
+            columns.append((25.0 if k < 3 else 30.0) * waves)
+        header = [f"{axis}_mm", *(f"E{d}{axis}_um" for d in "XYZ"), *(f"E{d}{axis}_urad" for d in "ABC")]
+        rows = np.column_stack(columns)
+        lines = [",".join(header), *(",".join(f"{v:.6f}" for v in row) for row in rows)]
+        (folder / f"{axis.lower()}.csv").write_text("\n".join(lines) + "\n")
+    box = ", ".join(f"[{low}, {high}]" for low, high in BOX.values())
+    curves = "".join(f'[[curves]]\nfile = "{a}.csv"\n' for a in "xyz")
+    (folder / "calibration.toml").write_text(
+        'schema = "olp-calibration-1"\nmachine = "bench"\nmeasured = 2026-11-01\nvalid_until = 2099-01-01\n'
+        'temperature_degC = 20.0\nsign = "actual-minus-commanded"\nmodel = "rigid-body"\n'
+        f"datum_mm = [0.0, 0.0, 0.0]\nbox_mm = [{box}]\n{curves}"
+        "[squareness]\nC0Y_urad = 20.0\nB0Z_urad = -15.0\nA0Z_urad = 12.0\n"
+    )
+    axes = "".join(
+        f"[axes.{a}]\ntravel_mm = [-2000.0, 2000.0]\nleast_increment_mm = 0.0001\nvelocity_mm_s = 500.0\n"
+        "acceleration_mm_s2 = 2000.0\njerk_mm_s3 = 20000.0\n"
+        for a in BOX
+    )
+    path = folder / "machine.toml"
+    path.write_text(
+        'schema = "olp-machine-1"\nname = "bench"\nchain = "FXYZ"\ncontroller = "linuxcnc"\n'
+        f'calibration = "calibration.toml"\n{axes}[work_offsets.G54]\nset_by = "true"\n'
+        "[tools.1]\nZ_mm = 60.0\n[tools.2]\nZ_mm = 60.0\n[job_defaults]\ntool = 1\n"
+    )
+    return path
+
+
+def user_seconds(command: list[str], times: int = 3) -> tuple[float, int]:
+    """The least user CPU of a command, and its peak memory in kB."""
+    best, peak = float("inf"), 0
+    for _ in range(times):
+        with Path(os.devnull).open("w") as sink:
+            process = subprocess.Popen(command, stdout=sink, stderr=sink)
+            _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode not in (0, 1):
+            raise SystemExit(f"{command[0]} ended with {process.returncode}")
+        best, peak = min(best, usage.ru_utime), max(peak, usage.ru_maxrss)
+    return best, peak
+
+
+def stages(program: Path, described: Path) -> None:
+    """CPU of the parts of one run, in this process."""
+    marks: list[tuple[str, float]] = []
+
+    def tell(what: str, share: float) -> None:
+        marks.append((what, resource.getrusage(resource.RUSAGE_SELF).ru_utime))
+
+    start = resource.getrusage(resource.RUSAGE_SELF).ru_utime
+    olp.correct(program, described, progress=tell)
+    tell("end", 1.0)
+    print(f"  load {marks[0][1] - start:.2f}", end="")
+    for (name, at), (_, until) in pairwise(marks):
+        print(f", {name} {until - at:.2f}", end="")
+    print(" s")
+
+
+def peers(program: Path) -> None:
+    """Other readers of G-code on the same file, where they are installed."""
+    code = {
+        "pygcode": "from pygcode import Line\nfor l in open(F): str(Line(l))",
+        "gcode_lib": "import gcode_lib\ngcode_lib.load(F)",
+    }
+    for name, text in code.items():
+        if importlib.util.find_spec(name) is None:
+            print(f"  {name}: not installed")
+            continue
+        try:
+            cpu, _ = user_seconds([sys.executable, "-c", f"F={str(program)!r}\n{text}"], 1)
+            print(f"  {name}: {cpu:.2f} s to parse")
+        except SystemExit as ended:
+            print(f"  {name}: {ended}")
+
+
+def main() -> None:
+    lines = sys.argv[1] if len(sys.argv) > 1 else "1e6"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        described = machine(folder)
+        for count in ("1e4", lines):
+            program = folder / f"raster_{count}.ngc"
+            generate = [str(ROOT / "programs" / "generate.py"), "raster", count, "-o", str(program)]
+            subprocess.run([sys.executable, *generate], check=True, capture_output=True)
+            out = folder / "out.ngc"
+            correct = ["correct", str(program), "-m", str(described), "-o", str(out), "--force", "--quiet"]
+            cpu, peak = user_seconds([sys.executable, "-m", "olp", *correct])
+            number = program.read_bytes().count(b"\n")
+            memory = f"peak {peak / 1024:.0f} MB, {peak * 1024 / number:.0f} B/line"
+            print(f"{number} lines: olp correct {cpu:.2f} s user CPU, {memory}")
+            if count == "1e4":
+                numpy_cpu, _ = user_seconds([sys.executable, "-c", "import numpy"])
+                print(f"  {cpu / numpy_cpu:.2f} x `python -c 'import numpy'` ({numpy_cpu:.3f} s)")
+            if shutil.which("rs274"):
+                listing, _ = user_seconds(["rs274", "-g", str(program), str(folder / "canon.txt")])
+                print(f"  {cpu / listing:.2f} x rs274 -g listing it ({listing:.2f} s)")
+            stages(program, described)
+        small = folder / "raster_1e4.ngc"
+        print("peers on 1e4 lines:")
+        peers(small)
+
+
+if __name__ == "__main__":
+    main()
