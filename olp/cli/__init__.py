@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import os
 
 import click
 
@@ -26,6 +27,11 @@ VERBS = {
 }
 
 INTERRUPTED = 130
+
+# Read when numpy and pydantic are imported, which a verb does. The matrices here are 3 x 3: threads for them
+# would only spin, and a search for plug-ins reads the metadata of every installed package.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 class _Verbs(click.Group):

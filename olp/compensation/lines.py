@@ -22,9 +22,11 @@ Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance
 _SAMPLE_SHARE = 0.04
-#: chords may end at this many places between two samples, where the error is as good as straight
+#: chords may end at this many places from one sample to the next, where the error is as good as straight
 _FINE = 4
-_BATCH = 1 << 15
+#: a chord is as long as it can be but for this part of it
+_CLOSE = 32
+_BATCH = 1 << 17
 _FEW, _ALL = 16, 1 << 30
 
 
@@ -88,99 +90,83 @@ def _cut_batch(
     error = point - bent(model, point, tools, play)
     length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
     along = (error * delta[owner]).sum(axis=1) / length2[owner]
-    across = _finer(error - along[:, None] * delta[owner], first, count)
-    count = count * _FINE
-    first = np.concatenate(([0], np.cumsum(count + 1)[:-1]))
-    cut_move, cut_share = [], []
+    error -= along[:, None] * delta[owner]
+    across = np.ascontiguousarray(error.T)
+    last = count * _FINE
+    cut_move, cut_place = [], []
     begin = np.zeros(len(move), np.int64)
     active = np.arange(len(move))
-    stride = count.copy()
+    stride = last.copy()
     while active.size:
-        where = (first[active], begin[active], count[active], stride[active])
+        where = (first[active], begin[active], last[active], stride[active])
         reach = _longest(across, *where, tolerance, _FEW)
         # the search looks at few samples of a long chord; what it found is tested at all of them
-        wrong = np.flatnonzero(~_fits(across, where[0] + where[1], reach - where[1], tolerance, _ALL))
+        wrong = np.flatnonzero(~_fits(across, where[0], where[1], reach, tolerance, _ALL))
         if wrong.size:
-            reach[wrong] = _longest(
-                across, where[0][wrong], where[1][wrong], where[2][wrong], where[3][wrong], tolerance, _ALL
-            )
+            reach[wrong] = _longest(across, *(w[wrong] for w in where), tolerance, _ALL)
         stride[active] = np.maximum(reach - begin[active], 1)
         begin[active] = reach
-        going = reach < count[active]
-        active = active[going]
+        active = active[reach < last[active]]
         cut_move.append(active)
-        cut_share.append(begin[active])
+        cut_place.append(begin[active])
     owner = np.concatenate(cut_move)
-    node = np.concatenate(cut_share)
-    share = node / count[owner]
+    share = np.concatenate(cut_place) / last[owner]
     return move[owner], share, start[owner] + share[:, None] * delta[owner]
-
-
-def _finer(across: Array, first: Index, count: Index) -> Array:
-    """Samples with linear ones between them, move by move."""
-    inner = np.ones(len(across), bool)
-    inner[first + count] = False
-    at = np.flatnonzero(inner)
-    step = across[at + 1] - across[at]
-    fine = np.arange(_FINE) / _FINE
-    between = across[at][:, None, :] + fine[:, None] * step[:, None, :]
-    out = np.zeros((len(at) * _FINE + len(first), 3))
-    last = np.cumsum(count * _FINE + 1) - 1
-    keep = np.ones(len(out), bool)
-    keep[last] = False
-    out[keep] = between.reshape(-1, 3)
-    out[last] = across[first + count]
-    return out
 
 
 def _longest(
     across: Array, first: Index, begin: Index, last: Index, stride: Index, tolerance: float, most: int
 ) -> Index:
-    """For each move the farthest sample that one chord from `begin` reaches: gallop, then bisect."""
+    """For each move the farthest place that one chord from `begin` reaches: gallop, then bisect, to 3 % of
+    the chord."""
     good = begin + 1
     bad = last + 1
     trial = np.minimum(begin + np.maximum(stride, 1), last)
     todo = np.arange(len(first))
     galloping = np.ones(len(first), bool)
     while todo.size:
-        fits = _fits(across, first[todo] + begin[todo], trial[todo] - begin[todo], tolerance, most)
+        fits = _fits(across, first[todo], begin[todo], trial[todo], tolerance, most)
         yes, no = todo[fits], todo[~fits]
-        good[yes] = np.maximum(good[yes], trial[yes])
-        bad[no] = np.minimum(bad[no], trial[no])
+        good[yes] = trial[yes]
+        bad[no] = trial[no]
         galloping[no] = False
-        todo = todo[(bad[todo] - good[todo] > 1) & (good[todo] < last[todo])]
-        jump = good[todo] + np.maximum(good[todo] - begin[todo], 1)
-        middle = (good[todo] + np.minimum(bad[todo], last[todo] + 1)) // 2
-        trial[todo] = np.where(
-            galloping[todo], np.minimum(jump, last[todo]), np.maximum(middle, good[todo] + 1)
-        )
-        trial[todo] = np.minimum(trial[todo], np.minimum(bad[todo] - 1, last[todo]))
-        ended = trial[todo] <= good[todo]
-        todo = todo[~ended]
-    return np.minimum(good, last)
+        known, length = good[todo], good[todo] - begin[todo]
+        todo = todo[(bad[todo] - known > 1 + length // _CLOSE) & (known < last[todo])]
+        known, ahead = good[todo], np.minimum(bad[todo] - 1, last[todo])
+        jump = known + (known - begin[todo])
+        middle = np.maximum((known + ahead + 1) // 2, known + 1)
+        trial[todo] = np.minimum(np.where(galloping[todo], jump, middle), ahead)
+    return good
 
 
-def _fits(across: Array, start: Index, steps: Index, tolerance: float, most: int) -> Mask:
-    """Whether the samples between start and start + steps, `most` of them at the most, stay within tolerance
-    of their chord."""
-    fits = np.ones(len(start), bool)
-    wide = np.flatnonzero(steps > 1)
-    limit = 1 << 21
-    at = 0
-    # between two samples of the model the error is taken as straight, so its own samples are enough
-    looked = np.minimum(steps[wide] - 1, np.minimum(np.maximum(steps[wide] // _FINE, _FEW), most))
-    totals = np.cumsum(looked)
-    while at < len(wide):
-        stop = max(int(np.searchsorted(totals, (totals[at - 1] if at else 0) + limit)), at + 1)
-        rows = wide[at:stop]
-        inner = looked[at:stop]
-        offset = np.concatenate(([0], np.cumsum(inner)[:-1]))
-        owner = np.repeat(np.arange(len(rows)), inner)
-        k = (np.arange(len(owner)) - offset[owner] + 1) * steps[rows][owner] // (inner + 1)[owner]
-        a, b = across[start[rows]], across[start[rows] + steps[rows]]
-        u = (k / steps[rows][owner])[:, None]
-        departure = across[start[rows][owner] + k] - (a[owner] + u * (b - a)[owner])
-        size = np.sqrt((departure * departure).sum(axis=1))
-        fits[rows] = np.maximum.reduceat(size, offset) <= tolerance
-        at = stop
+def _fits(across: Array, first: Index, begin: Index, end: Index, tolerance: float, most: int) -> Mask:
+    """Whether the samples between the places `begin` and `end`, `most` of them at the most, stay within
+    tolerance of their chord."""
+    fits = np.ones(len(begin), bool)
+    low = begin // _FINE + 1
+    inner = (end - 1) // _FINE + 1 - low
+    wide = np.flatnonzero(inner > 0)
+    if not wide.size:
+        return fits
+    first, begin, end, low, inner = first[wide], begin[wide], end[wide], low[wide], inner[wide]
+    looked = np.minimum(inner, most)
+    offset = np.concatenate(([0], np.cumsum(looked)[:-1]))
+    owner = np.repeat(np.arange(len(wide)), looked)
+    nth = np.arange(len(owner)) - offset[owner]
+    sample = low[owner] + (2 * nth + 1) * inner[owner] // (2 * looked)[owner]
+    share = (_FINE * sample - begin[owner]) / (end - begin)[owner]
+    sample += first[owner]
+    square = np.zeros(len(owner))
+    for values in across:
+        a, b = _between(values, first, begin), _between(values, first, end)
+        departure = values[sample] - a[owner] - share * (b - a)[owner]
+        square += departure * departure
+    fits[wide] = np.maximum.reduceat(square, offset) <= tolerance * tolerance
     return fits
+
+
+def _between(values: Array, first: Index, place: Index) -> Array:
+    """Samples at places, linear between two of them."""
+    at = first + place // _FINE
+    part = place % _FINE
+    return values[at] + (values[at + (part > 0)] - values[at]) * (part / _FINE)
