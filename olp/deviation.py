@@ -20,6 +20,8 @@ from olp.geometry import arc_distance, arc_points, segment_distance
 from olp.toolpath import Flag, Kind, Toolpath
 
 Index = npt.NDArray[np.int64]
+#: enough for deviations, which are small, and half the memory
+Single = npt.NDArray[np.float32]
 
 _BLOCK = 1 << 15
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
@@ -34,9 +36,9 @@ class Deviation:
     `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known
     yet."""
 
-    waypoint: Array
-    path: Array
-    bend: Array
+    waypoint: Single
+    path: Single
+    bend: Single
     judged: Mask
     flank: Array
 
@@ -47,10 +49,11 @@ class Deviation:
         return {"waypoints": _figures(at), "between": _figures(along)}
 
 
-def _figures(values: Array) -> dict[str, float]:
+def _figures(values: Single) -> dict[str, float]:
     if not len(values):
         return {"max_um": 0.0, "rms_um": 0.0}
-    return {"max_um": float(values.max()) * 1e3, "rms_um": float(np.sqrt(np.mean(values * values))) * 1e3}
+    rms = float(np.sqrt(np.mean(np.square(values, dtype=np.float64))))
+    return {"max_um": float(values.max()) * 1e3, "rms_um": rms * 1e3}
 
 
 def cutting_moves(path: Toolpath) -> Mask:
@@ -74,9 +77,9 @@ def measure(
     judged.
     """
     count = len(nominal)
-    waypoint = np.full(count, np.nan)
-    worst = np.full(count, np.nan)
-    bend = np.zeros(count)
+    waypoint = np.full(count, np.nan, np.float32)
+    worst = np.full(count, np.nan, np.float32)
+    bend = np.zeros(count, np.float32)
     judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
     if exempt is not None:
         judged &= ~exempt
@@ -158,7 +161,7 @@ class Tracer:
             )  # fmt: skip
         return point, part, share
 
-    def block(self, a: int, b: int, waypoint: Array, worst: Array, bend: Array) -> None:
+    def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> None:
         """Fill the columns of nominal moves a..b."""
         first = int(self.groups[a - 1]) + 1 if a else 0
         last = int(self.groups[b - 1]) + 1
@@ -231,7 +234,7 @@ class Tracer:
             self.last, self.play = point[-1:], play[-1]
         return point + self.model.error(point, tool, play)
 
-    def _on_the_way(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Array) -> None:
+    def _on_the_way(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
         """Distances of samples from their nominal move, the largest per move."""
         nominal = self.nominal
         goal = self.target[a:b]
@@ -265,7 +268,7 @@ class Tracer:
         place = before[part] - begin[of] + share * turn[part]
         return np.asarray(place / np.maximum(total[of], 1e-12), float)
 
-    def _bend(self, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Array) -> None:
+    def _bend(self, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
         """How far the samples of straight parts leave the chord between the actual ends of their part."""
         straight = (inner.part > 0) & ~curved[inner.part]
         part, actual = inner.part[straight], inner.actual[straight]

@@ -98,12 +98,16 @@ def _cut_batch(
     active = np.arange(len(move))
     stride = last.copy()
     while active.size:
-        where = (first[active], begin[active], last[active], stride[active])
-        reach = _longest(across, *where, tolerance, _FEW)
+        reach = _longest(
+            across, first[active], begin[active], last[active], stride[active], tolerance, _FEW
+        )
         # the search looks at few samples of a long chord; what it found is tested at all of them
-        wrong = np.flatnonzero(~_fits(across, where[0], where[1], reach, tolerance, _ALL))
+        wrong = np.flatnonzero(~_fits(across, first[active], begin[active], reach, tolerance, _ALL))
         if wrong.size:
-            reach[wrong] = _longest(across, *(w[wrong] for w in where), tolerance, _ALL)
+            again = active[wrong]
+            reach[wrong] = _longest(
+                across, first[again], begin[again], last[again], stride[again], tolerance, _ALL
+            )
         stride[active] = np.maximum(reach - begin[active], 1)
         begin[active] = reach
         active = active[reach < last[active]]
@@ -169,4 +173,5 @@ def _between(values: Array, first: Index, place: Index) -> Array:
     """Samples at places, linear between two of them."""
     at = first + place // _FINE
     part = place % _FINE
-    return values[at] + (values[at + (part > 0)] - values[at]) * (part / _FINE)
+    out: Array = values[at] + (values[at + (part > 0)] - values[at]) * (part / _FINE)
+    return out
