@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from olp.errormodel import ErrorModel, play_states
 from olp.errormodel.base import Array, Mask
-from olp.errormodel.sampling import steps_needed
+from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.geometry import arc_distance, arc_points, segment_distance
 from olp.toolpath import Flag, Kind, Toolpath
 
@@ -121,6 +121,7 @@ class Tracer:
         self.model, self.bend = model, bend
         self.play: Array | None = None
         self.last: Array | None = None
+        self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.lost_motion_mm(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.nominal_arc = _arc_index(nominal)
         self.path_arc = _arc_index(path)
@@ -173,8 +174,9 @@ class Tracer:
         steps = np.ones(last - first, np.int64)
         known = np.asarray(np.isfinite(delta).all(axis=1))
         cut = known & (path.kind[first:last] != Kind.RAPID)
-        if cut.any():
-            which = np.flatnonzero(cut)
+        which = longer(delta, self.clear_mm)
+        which = which[cut[which]]
+        if which.size:
             steps[which] = steps_needed(
                 self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend, at_most=1 << 12
             )

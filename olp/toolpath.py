@@ -104,6 +104,10 @@ class Toolpath:
         """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3)."""
         return self.per_frame([f.tool_mm for f in self.frames], first, last)
 
+    def tools_mm(self) -> Array:
+        """(k, 3) the tool vectors of all frames."""
+        return np.array([f.tool_mm for f in self.frames] or np.zeros((1, 3)), float)
+
     def per_frame(self, values: list[Vector], first: int = 0, last: int | None = None) -> Array:
         """One vector a frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
         if not values:

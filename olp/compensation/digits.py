@@ -37,7 +37,16 @@ class AxisRows:
     word: Index
     decimals: npt.NDArray[np.int8]
     offset: Array | float
-    unit: Array | float
+    unit: float
+
+    def part(self, a: int, b: int, unit: float) -> AxisRows:
+        """Rows a..b, which have one unit."""
+        cut = slice(a, b)
+        return AxisRows(
+            self.command[cut], self.nominal[cut], self.given[cut], self.raw[cut], self.reset[cut],
+            self.word[cut], self.decimals[cut],
+            self.offset if isinstance(self.offset, float) else self.offset[cut], unit,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,15 +94,15 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     previous = np.concatenate(([before], emitted[:-1]))
     with np.errstate(invalid="ignore"):
         insert = moves & ~(np.abs(emitted - previous) < 1e-9)
-    same = rows.word * _INT10[decimals - np.minimum(rows.decimals, decimals)] == mantissa
+    more = decimals - np.minimum(rows.decimals, decimals)
+    same = (rows.word * _INT10[more] if more.any() else rows.word) == mantissa
     return Digits(emitted, mantissa, decimals.astype(np.int8), (fix & ~same) | insert)
 
 
 def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
     """G91: words are differences of positions rounded to `grid` decimals from `before` on."""
-    count = len(rows.command)
-    unit = float(np.max(rows.unit))
-    decimals = np.full(count, grid, np.int8)
+    unit = rows.unit
+    decimals = np.full(len(rows.command), grid, np.int8)
     own = rows.word * _INT10[np.maximum(grid - rows.decimals, 0)]
     with np.errstate(invalid="ignore"):
         place = np.rint((rows.command - before) / unit * _POW10[grid])

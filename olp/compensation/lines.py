@@ -14,7 +14,7 @@ import numpy.typing as npt
 from olp.compensation.invert import bent
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
-from olp.errormodel.sampling import steps_needed
+from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.toolpath import Toolpath
 
 Index = npt.NDArray[np.int64]
@@ -38,6 +38,7 @@ def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask
     """Cuts (move, share, target) of the moves that are `free` to be split, so that no chord leaves its line
     by more than `tolerance` mm."""
     tools = path.tool_mm()
+    clear = clear_length_mm(model, path.tools_mm(), tolerance)
     found: list[tuple[Index, Array, Array]] = []
     block = 1 << 16
     for a in range(0, len(path), block):
@@ -46,8 +47,10 @@ def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask
         start[1:] = target[a : b - 1]
         start[0] = target[a - 1] if a else np.array(path.start_mm)
         delta = target[a:b] - start
-        bound = model.chord_bound(np.nan_to_num(delta), tools if tools.ndim == 1 else tools[a:b])
-        long = np.flatnonzero(free[a:b] & (bound > tolerance) & np.isfinite(delta).all(axis=1))
+        long = longer(delta, clear)
+        long = long[free[a:b][long] & np.isfinite(delta[long]).all(axis=1)]
+        bound = model.chord_bound(delta[long], tools if tools.ndim == 1 else tools[a + long])
+        long = long[bound > tolerance]
         if long.size:
             found.append((a + long, start[long], delta[long]))
     if not found:

@@ -139,12 +139,12 @@ class Writer:
         )
         edits: list[Edits] = []
         self._mark_take_ups(rows)
-        breaks = self._breaks(rows)
-        for a, b in pairwise(breaks):
+        columns = self._columns(rows)
+        for a, b in pairwise(self._breaks(rows)):
             if flag[a] & _BYPASS & np.uint8(Flag.CYCLE):
                 edits += self._hole(rows, a, b)
             else:
-                self._digits(rows, a, b)
+                self._digits(rows, columns, a, b)
         self._after_block_delete(rows)
         edits += self._word_edits(rows)
         edits += arc_edits(self, rows)
@@ -165,83 +165,56 @@ class Writer:
             at = at[take_up[at + 1]] + 1
 
     def _breaks(self, rows: Rows) -> list[int]:
-        """Where the way of counting changes: G90 and G91, units inside G91, canned cycles."""
-        count = len(rows.move)
+        """Where the way of counting changes: G90 and G91, units, canned cycles."""
         key = (rows.flag & np.uint8(Flag.INCREMENTAL | Flag.CYCLE)).astype(np.int64)
-        if (key != 0).any():
-            frame = self.path.frame[rows.move]
-            key = key + np.where(
-                rows.flag & np.uint8(Flag.INCREMENTAL), (self.frames_unit[frame] > 2) * 256, 0
-            )
-            cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
+        key += (self.frames_unit[self.path.frame[rows.move]] > 2) * 256
+        cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
+        if cycle.any():
             key = np.where(cycle, -1 - self.path.line[rows.move].astype(np.int64), key)
         changes = np.flatnonzero(key[1:] != key[:-1]) + 1
-        return [0, *changes.tolist(), count]
+        return [0, *changes.tolist(), len(rows.move)]
 
-    def _digits(self, rows: Rows, a: int, b: int) -> None:
-        """Digits of rows a..b, which all count the same way."""
-        plan, path, words = self.plan, self.path, self.words
-        part = slice(rows.first + a, rows.first + b)
-        move = rows.move[a:b]
-        frame = path.frame[move]
-        one = bool((frame == frame[0]).all())
-        unit: Array | float = float(self.frames_unit[frame[0]]) if one else self.frames_unit[frame]
-        counting = bool(rows.flag[a] & np.uint8(Flag.INCREMENTAL))
-        control = (rows.flag[a:b] & np.uint8(Flag.CONTROL)) != 0
-        nominal = path.end_mm[move]
+    def _columns(self, rows: Rows) -> list[AxisRows]:
+        """Per axis, what its digits are made from."""
+        path, words = self.path, self.words
+        part = slice(rows.first, rows.first + len(rows.move))
+        frame = path.frame[rows.move]
+        one = len(frame) > 0 and bool((frame == frame[0]).all())
+        unit = self.frames_unit[frame[:1]] if one else self.frames_unit[frame]
+        control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
+        offset = self.frames_offset[frame[0]] if one else self.frames_offset[frame]
+        out = []
         for axis in range(3):
-            slot = np.where(rows.head[a:b], self.program.slot[move, axis], -1)
+            nominal = path.end_mm[rows.move, axis]
+            slot = np.where(rows.head, self.program.slot[rows.move, axis], -1)
             given = slot >= 0
-            offset: Array | float = (
-                float(self.frames_offset[frame[0], axis]) if one else self.frames_offset[frame, axis]
-            )
-            axis_rows = AxisRows(
-                command=plan.command_mm[part, axis],
-                nominal=nominal[:, axis],
-                given=given,
-                raw=plan.raw[part, axis],
-                reset=control & np.isnan(nominal[:, axis]),
-                word=np.where(given, words.mantissa[slot], 0),
-                decimals=np.where(given, self.style.decimals(slot, axis, unit), 0).astype(np.int8),
-                offset=offset,
-                unit=unit,
-            )
-            before = float(rows.emitted[a - 1, axis]) if a else float(rows.entry[axis])
-            smallest = unit if isinstance(unit, float) else float(unit[0])
-            if counting:
-                digits = incremental(axis_rows, before, self.style.grid(axis, smallest))
-            elif one:
-                digits = absolute(
-                    axis_rows, before, self.style.least(axis, smallest), self.style.usual(axis, smallest)
+            out.append(
+                AxisRows(
+                    command=self.plan.command_mm[part, axis],
+                    nominal=nominal,
+                    given=given,
+                    raw=self.plan.raw[part, axis],
+                    reset=control & np.isnan(nominal),
+                    word=np.where(given, words.mantissa[slot], 0),
+                    decimals=np.where(given, self.style.decimals(slot, axis, unit), 0).astype(np.int8),
+                    offset=float(offset[axis]) if one else offset[:, axis],
+                    unit=1.0,
                 )
-            else:
-                digits = self._mixed(axis_rows, before, axis, frame)
-            rows.put(a, b, axis, digits)
-
-    def _mixed(self, axis_rows: AxisRows, before: float, axis: int, frame: npt.NDArray[np.int32]) -> Digits:
-        """G90 rows over several frames: one stretch of equal units at a time."""
-        unit = self.frames_unit[frame]
-        cuts = [0, *(np.flatnonzero(unit[1:] != unit[:-1]) + 1).tolist(), len(unit)]
-        parts = []
-        for a, b in pairwise(cuts):
-            s = slice(a, b)
-            u = float(unit[a])
-            offset = axis_rows.offset
-            mine = AxisRows(
-                command=axis_rows.command[s],
-                nominal=axis_rows.nominal[s],
-                given=axis_rows.given[s],
-                raw=axis_rows.raw[s],
-                reset=axis_rows.reset[s],
-                word=axis_rows.word[s],
-                decimals=axis_rows.decimals[s],
-                offset=offset if isinstance(offset, float) else offset[s],
-                unit=u,
             )
-            digits = absolute(mine, before, self.style.least(axis, u), self.style.usual(axis, u))
-            before = float(digits.emitted[-1])
-            parts.append(digits)
-        return Digits(*(np.concatenate([getattr(p, n) for p in parts]) for n in Digits.__slots__))
+        return out
+
+    def _digits(self, rows: Rows, columns: list[AxisRows], a: int, b: int) -> None:
+        """Digits of rows a..b, which all count the same way."""
+        unit = float(self.frames_unit[self.path.frame[rows.move[a]]])
+        counting = bool(rows.flag[a] & np.uint8(Flag.INCREMENTAL))
+        for axis, column in enumerate(columns):
+            before = float(rows.emitted[a - 1, axis]) if a else float(rows.entry[axis])
+            part = column.part(a, b, unit)
+            if counting:
+                digits = incremental(part, before, self.style.grid(axis, unit))
+            else:
+                digits = absolute(part, before, self.style.least(axis, unit), self.style.usual(axis, unit))
+            rows.put(a, b, axis, digits)
 
     def _after_block_delete(self, rows: Rows) -> None:
         """The first block after `/` blocks must not rely on a word that was inserted in them."""

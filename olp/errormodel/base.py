@@ -61,5 +61,6 @@ class ErrorModel(Protocol):
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
         """(n,) upper bound in mm, anywhere in the box, of how far the error along a straight move by delta_mm
-        (n, 3) departs from the straight line between its values at both ends."""
+        (n, 3) departs from the straight line between its values at both ends. It holds as well for every move
+        that is shorter along each axis."""
         ...

@@ -8,19 +8,21 @@ coordinate too. Only departures from the nominal position are carried, so nothin
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.bodies import Body
 from olp.errormodel.boxed import Boxed, as_points, as_tool
-from olp.errormodel.chain_bound import chord_bound
+from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
 from olp.tables import Column
 
 #: A block's columns stay near the second-level cache (1 MB); measured best of 2k to 32k.
 BLOCK = 16384
+#: bounds of the chord are kept for this many spans of tool vectors
+_KEPT = 64
 
 #: A turn about axis a moves coordinate p toward q: (p, q) by axis.
 _PLANES = ((1, 2), (2, 0), (0, 1))
@@ -38,6 +40,7 @@ class RigidBody(Boxed):
     bodies: tuple[Body, ...]
     exact: bool = True
     tool_terms: bool = True
+    _bounds: dict[bytes, list[AxisBound]] = field(default_factory=dict, init=False, repr=False)
 
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         points = as_points(axis_mm)
@@ -118,9 +121,16 @@ class RigidBody(Boxed):
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
         delta = as_points(delta_mm, "delta_mm")
         tool = np.atleast_2d(as_tool(tool_mm, len(delta)))
-        if not self.tool_terms:
+        if not self.tool_terms or not len(tool):
             tool = np.zeros((1, 3))
-        return chord_bound(self.bodies, self.box_mm, delta, tool, second_order=self.exact)
+        span = np.stack([tool.min(axis=0), tool.max(axis=0)])
+        bounds = self._bounds.get(span.tobytes())
+        if bounds is None:
+            if len(self._bounds) > _KEPT:
+                self._bounds.clear()
+            bounds = axis_bounds(self.bodies, self.box_mm, span, second_order=self.exact)
+            self._bounds[span.tobytes()] = bounds
+        return chord_bound(bounds, delta)
 
     def _positions(self, points: Array) -> tuple[list[Array], Mask | None]:
         """Finite columns of positions, and (n, 3) where they are unknown; None where all are known."""

@@ -22,7 +22,7 @@ _BLOCK = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _AxisBound:
+class AxisBound:
     """For a move that takes this axis by d, with h the cell of its table:
     min(curvature/8 (d^2 + 2 h min(d, h)), smooth[bin]) + d (kinks[bin] + sum_k change_k[bin] |delta_k|).
     """
@@ -54,13 +54,9 @@ class _AxisBound:
         return bound
 
 
-def chord_bound(
-    bodies: Sequence[Body], box_mm: Array, delta_mm: Array, tool_mm: Array, *, second_order: bool
-) -> Array:
-    """(n,) bound in mm for moves delta_mm (n, 3) anywhere in the box with tool vectors (m, 3)."""
+def chord_bound(bounds: Sequence[AxisBound], delta_mm: Array) -> Array:
+    """(n,) bound in mm for moves delta_mm (n, 3) anywhere in the box."""
     result = np.zeros(len(delta_mm))
-    tool = tool_mm if len(tool_mm) == 1 else np.stack([tool_mm.min(axis=0), tool_mm.max(axis=0)])
-    bounds = _axis_bounds(bodies, box_mm, tool, second_order)
     for start in range(0, len(delta_mm), _BLOCK):
         part = delta_mm[start : start + _BLOCK]
         lengths = [np.abs(part[:, k]) for k in range(3)]
@@ -69,7 +65,8 @@ def chord_bound(
     return result
 
 
-def _axis_bounds(bodies: Sequence[Body], box_mm: Array, tool: Array, second_order: bool) -> list[_AxisBound]:
+def axis_bounds(bodies: Sequence[Body], box_mm: Array, tool: Array, *, second_order: bool) -> list[AxisBound]:
+    """The bound of each body for tool vectors between the rows of `tool` (m, 3)."""
     reach = {body.axis: _reach(body, box_mm, tool) for body in bodies}
     extra, lipschitz, displaced = 0.0, 0.0, 0.0
     if second_order:
@@ -94,7 +91,7 @@ def _axis_bounds(bodies: Sequence[Body], box_mm: Array, tool: Array, second_orde
 
 def _axis_bound(
     body: Body, reach: Array, extra: float, widened: float, lipschitz: float
-) -> _AxisBound | None:
+) -> AxisBound | None:
     parts = body.components.variation
     if all(v is None or not v.varies for v in parts):
         return None
@@ -121,7 +118,7 @@ def _axis_bound(
         terms += [stretch] if stretch is not None else []
         crosses.append(0.25 * sum(terms, np.zeros(1)) if terms else None)
     kinks = _joined([row.kinks for row in rows])
-    return _AxisBound(
+    return AxisBound(
         axis=body.axis,
         cell_mm=body.components.table.step,
         curvature=math.hypot(*(row.curvature for row in rows)),

@@ -10,6 +10,28 @@ from olp.errormodel.base import Array, ErrorModel
 MOST_STEPS = 1 << 18
 
 
+#: lengths that are tried for a move that needs no sample, in mm
+_LENGTHS = 2.0 ** np.arange(-12.0, 14.0, 0.25)
+
+
+def clear_length_mm(model: ErrorModel, tools_mm: Array, bend_mm: float) -> float:
+    """A length that a move may have along each axis at once, and the error bends by no more than `bend_mm`,
+    with any of the tools (k, 3); 0 where there is none."""
+    span = np.stack([tools_mm.min(axis=0), tools_mm.max(axis=0)])
+    bound = model.chord_bound(np.repeat(_LENGTHS, 2)[:, None] * np.ones(3), np.tile(span, (len(_LENGTHS), 1)))
+    short = np.flatnonzero(bound.reshape(-1, 2).max(axis=1) > bend_mm)
+    clear = int(short[0]) if short.size else len(_LENGTHS)
+    return float(_LENGTHS[clear - 1]) if clear else 0.0
+
+
+def longer(delta_mm: Array, length_mm: float) -> npt.NDArray[np.int64]:
+    """Moves by `delta_mm` (n, 3) that are longer than that along an axis; unknown ones are not."""
+    size = np.abs(delta_mm)
+    return np.flatnonzero(
+        (size[:, 0] > length_mm) | (size[:, 1] > length_mm) | (size[:, 2] > length_mm)
+    )
+
+
 def steps_needed(
     model: ErrorModel,
     delta_mm: Array,
@@ -25,8 +47,7 @@ def steps_needed(
     todo = np.arange(len(delta_mm))
     while todo.size:
         tool = tool_mm if tool_mm.ndim == 1 else tool_mm[todo]
-        some = delta_mm if len(todo) == len(delta_mm) and at_least == 1 and count[0] == 1 else None
-        bound = model.chord_bound(delta_mm[todo] / count[todo, None] if some is None else some, tool)
+        bound = model.chord_bound(delta_mm[todo] / count[todo, None], tool)
         bends = np.flatnonzero((bound > bend_mm) & (count[todo] < at_most))
         todo = todo[bends]
         # a bend goes with the square of the length, or slower: so many halvings are needed at the least
