@@ -92,24 +92,23 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
     deleted = np.zeros(lines, bool)
     marks = _line_heads(text, starts, ends, keep, deleted)
     _drop_comments(text, ends, keep)
-    where = np.flatnonzero(keep)
-    compact = np.full(len(where) + 2 * _PAD + 1, 10, np.uint8)
-    compact[_PAD : _PAD + len(where)] = text[where]
-    body = compact[_PAD : _PAD + len(where) + 1]
-
-    # '+' ',' '-' '.' '/' and digits; ',' and '/' make their line odd below
-    numeric = (compact[_PAD - 1 : _PAD + len(where) + 1] - np.uint8(43)) < 15
-    edges = np.flatnonzero(numeric[1:] != numeric[:-1])
-    begin, stop = edges[0::2], edges[1::2]
+    where: Index | None = None
+    compact, begin, stop = _runs(_blanked(text, keep))
+    line_breaks = newline
+    if begin.size and (compact[begin + (_PAD - 1)] == 32).any():
+        # blanks inside words: take them all out
+        where = np.flatnonzero(keep)
+        compact, begin, stop = _runs(text[where])
+        line_breaks = np.flatnonzero(compact[_PAD : _PAD + len(where)] == 10)
+    body = compact[_PAD : len(compact) - _PAD]
     letter = compact[begin + (_PAD - 1)] & np.uint8(0xDF)
-    bad = _misplaced(body, begin, letter, numeric)
+    bad = _misplaced(body, begin, stop, letter)
     mantissa, decimals, pointed, malformed = _numbers(compact, body, begin, stop)
     if malformed.size:
         bad = np.concatenate((bad, begin[malformed]))
 
-    line_breaks = np.flatnonzero(body[: len(where)] == 10)
     if len(line_breaks) < lines:
-        line_breaks = np.append(line_breaks, len(where))
+        line_breaks = np.append(line_breaks, len(body) - 1)
     first_word = np.empty(lines + 1, np.int64)
     first_word[0] = 0
     first_word[1:] = np.searchsorted(begin, line_breaks)
@@ -128,9 +127,9 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
         mantissa=mantissa,
         decimals=decimals,
         pointed=pointed,
-        start=where[begin - 1] + offset,
-        number=where[begin] + offset,
-        end=where[stop - 1] + (offset + 1),
+        start=(begin - 1 if where is None else where[begin - 1]) + offset,
+        number=(begin if where is None else where[begin]) + offset,
+        end=(stop if where is None else where[stop - 1] + 1) + offset,
         line=line,
         first_word=first_word,
         line_start=starts + offset,
@@ -140,6 +139,21 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
         odd=odd,
         first_line=first_line,
     )
+
+
+def _blanked(text: Bytes, keep: Mask) -> Bytes:
+    """The text with a blank for all that is not kept."""
+    return np.where(keep, text, np.uint8(32))
+
+
+def _runs(text: Bytes) -> tuple[Bytes, Index, Index]:
+    """The text between two pads of line ends, and where runs of the characters of numbers begin and stop."""
+    compact = np.full(len(text) + 2 * _PAD + 1, 10, np.uint8)
+    compact[_PAD : _PAD + len(text)] = text
+    # '+' ',' '-' '.' '/' and digits; ',' and '/' make their line odd below
+    numeric = (compact[_PAD - 1 : _PAD + len(text) + 1] - np.uint8(43)) < 15
+    edges = np.flatnonzero(numeric[1:] != numeric[:-1])
+    return compact, edges[0::2], edges[1::2]
 
 
 def _line_heads(text: Bytes, starts: Index, ends: Index, keep: Mask, deleted: Mask) -> Index:
@@ -196,19 +210,18 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> None:
     keep[inside] = False
 
 
-def _misplaced(body: Bytes, begin: Index, letter: Bytes, numeric: Mask) -> Index:
-    """Positions (in the compact text) of anything that is not part of a word."""
+def _misplaced(body: Bytes, begin: Index, stop: Index, letter: Bytes) -> Index:
+    """Positions of anything that is not part of a word; `body` ends with a line end of its own."""
     alphabetic = (letter - np.uint8(65)) < 26
-    length = len(body) - 1
-    symbols = body[:length]
-    breaks = np.count_nonzero(symbols == 10)
+    symbols = body[:-1]
     separators = np.count_nonzero((symbols == 44) | (symbols == 47))
-    if alphabetic.all() and not separators and len(begin) + breaks == length - np.count_nonzero(numeric):
+    others = len(symbols) - np.count_nonzero((symbols == 32) | (symbols == 10)) - int((stop - begin).sum())
+    if alphabetic.all() and not separators and len(begin) == others:
         return np.zeros(0, np.int64)
-    number = numeric[1 : length + 1]
+    number = (symbols - np.uint8(43)) < 15
     is_letter = ((symbols & np.uint8(0xDF)) - np.uint8(65)) < 26
     followed = np.append(number[1:], False)
-    wrong = ~number & (symbols != 10) & ~(is_letter & followed)
+    wrong = ~number & (symbols != 10) & (symbols != 32) & ~(is_letter & followed)
     wrong |= (symbols == 44) | (symbols == 47)
     return np.concatenate((np.flatnonzero(wrong), begin[~alphabetic]))
 
