@@ -231,6 +231,17 @@ def test_cycles_of_a_fanuc_are_written_out() -> None:
     ]  # fmt: skip
 
 
+def test_a_frame_or_length_that_begins_in_a_block_leaves_its_own_words_known() -> None:
+    hole = "G98 G81 Z-1. R1. F100.\n"
+    source = f"O1\nG90 G0 G54 X1. Y1.\nG43 H4 Z5.\n{hole}G80 G0 Z9.\n{hole}G80\nM30\n"
+    out = fanuc(source, expand_cycles=True).split("\n")
+    strokes = [line.split()[1] for line in out if line.startswith(("G0 Z", "G1"))]
+    assert strokes == ["Z1.", "Z-1.", "Z5.", "Z1.", "Z-1.", "Z9."]
+    lost = refusal("O1\nG90 G0 X1. Y1. Z5.\nG43 H4\nG98 G81 Z-1. R1. F100.\n", "fanuc", expand_cycles=True)
+    assert lost.line == 4
+    assert "position of Z" in str(lost)
+
+
 @pytest.mark.parametrize(
     ("block", "found"),
     [

@@ -14,6 +14,7 @@ from judge.model import JudgeModel
 
 import olp
 from olp.exceptions import OlpError, ProgramError
+from olp.files.config import load_job
 
 FOLDER = Path(__file__).resolve().parents[1] / "programs"
 JOBS = {
@@ -85,6 +86,18 @@ def test_comments_and_unchanged_lines_survive(name: str) -> None:
     comments = re.findall(rb"\([^)\n]*\)", nominal)
     kept = [c for c in re.findall(rb"\([^)\n]*\)", result.data) if b"olp-corrected" not in c]
     assert kept == comments
+
+
+@pytest.mark.parametrize("job", ["job.toml", "job-manifold.toml"])
+def test_cycles_of_a_haas_written_out_are_exact(job: str) -> None:
+    stated = load_job(FOLDER / "haas-mill" / job)
+    assert stated.program is not None
+    assert stated.machine is not None
+    result = olp.correct(
+        stated.program, stated.machine, FOLDER / "haas-mill" / job, expand_cycles=True, peck_clearance_mm=0.5
+    )
+    assert result.report["moves"]["approximated"] == 0
+    assert not [f for f in result.findings if f.severity == "error"]
 
 
 @pytest.mark.oracle

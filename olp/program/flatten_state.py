@@ -33,6 +33,9 @@ _UNSETTING = (
     | frozenset(range(550, 594))
     | frozenset({382, 383, 384, 385, 760, 870, 880, 650, 660})
 )
+#: Of these, the ones that hold already for the move of their own block.
+_FRAMES = frozenset({430, 431, 432, 440, 490, 541, 540}) | frozenset(range(550, 594))
+_LENGTHS = frozenset({430, 440, 490})
 _ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
 _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
 _NO_AXES = frozenset({40, 100, 520, 920, 530, 280, 300, 650})
@@ -102,7 +105,8 @@ class State:
             self.initial = None
             self.held = {}
         if motion:
-            self.motion = next(iter(motion))
+            # G80 beside another motion ends the cycle, and the other moves
+            self.motion = next(iter(motion - {800} or motion))
         given = {AXES.lower().index(letter): value for letter, value in words if letter in ("x", "y", "z")}
         if 920 in codes:
             for axis, value in given.items():
@@ -114,7 +118,10 @@ class State:
             self._move(given)
         if any(letter in "@^" for letter, _ in words):
             self.forget()
+        reached = [self.position[a] if a in given else None for a in range(3)]
         self._after(codes)
+        if self.absolute and not codes & (_NO_AXES | _UNSETTING - _FRAMES) and not self.odd_frame:
+            self.position = [p if p is not None else r for p, r in zip(self.position, reached, strict=True)]
 
     def _modes(self, words: Sequence[Value]) -> set[int]:
         codes = self.codes(words)
@@ -153,7 +160,10 @@ class State:
         if 400 in codes and self.compensated:
             self.compensated = False
             self.forget()
-        if codes & _UNSETTING or self.odd_frame:
+        unsetting = codes & _UNSETTING
+        if unsetting and unsetting <= _LENGTHS and self.dialect == "fanuc" and not self.odd_frame:
+            self.position[2] = None
+        elif unsetting or self.odd_frame:
             self.forget()
 
     def _move(self, given: dict[int, float | None]) -> None:
@@ -310,7 +320,8 @@ class State:
             return clearance or 0.0
         if self.dialect == "fanuc":
             raise ProgramError(
-                f"G{code // 10} pecks with a clearance that the control's parameter sets; give peck_clearance"
+                f"G{code // 10} pecks with a clearance that a parameter of the control sets; "
+                "give peck_clearance_mm (--peck-clearance-mm)"
             )
         if self.unit is None:
             raise ProgramError(f"G{code // 10} before any G20 or G21, on which its peck clearance depends")
