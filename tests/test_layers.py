@@ -27,6 +27,8 @@ LAYERS = (
     {"report", "plots"},
     {"files"},
     {"review"},
+    {"loading"},
+    {"correction"},
     {"api"},
     {"cli"},
 )

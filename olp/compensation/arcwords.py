@@ -16,7 +16,8 @@ from olp.program.edits import EditList, Edits
 from olp.toolpath import Flag, Kind
 
 if TYPE_CHECKING:
-    from olp.compensation.writer import Rows, Writer
+    from olp.compensation.rows import Rows
+    from olp.compensation.writer import Writer
 
 Index = npt.NDArray[np.int64]
 

@@ -21,7 +21,8 @@ from olp.program.program import Hole, Program
 from olp.toolpath import Flag
 
 if TYPE_CHECKING:
-    from olp.compensation.writer import Rows, Writer
+    from olp.compensation.rows import Rows
+    from olp.compensation.writer import Writer
 
 
 @dataclass(frozen=True, slots=True, eq=False)

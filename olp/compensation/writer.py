@@ -6,29 +6,30 @@ per chunk of text.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.arcwords import arc_edits
-from olp.compensation.digits import AxisRows, Digits, absolute, incremental
+from olp.compensation.blocks import block_edits
+from olp.compensation.digits import AxisRows, absolute, incremental
 from olp.compensation.holes import HolePlan, hole_edits
 from olp.compensation.plan import Plan, targets
+from olp.compensation.rows import Rows
+from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array, Mask
-from olp.exceptions import ProgramError
+from olp.errormodel.base import Mask
 from olp.machine import Vector
-from olp.program.edits import BARE, Edits, Prefixes, splice
+from olp.program.edits import Edits, Prefixes, splice
 from olp.program.program import Program
 from olp.toolpath import Flag, Frame, Kind
 
 Index = npt.NDArray[np.int64]
 
 CHUNK = 1 << 15
-_END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
 
 
@@ -141,8 +142,8 @@ class Writer:
         self._mark_take_ups(rows)
         columns = self._columns(rows)
         for a, b in pairwise(self._breaks(rows)):
-            if flag[a] & _BYPASS & np.uint8(Flag.CYCLE):
-                edits += self._hole(rows, a, b)
+            if flag[a] & np.uint8(Flag.CYCLE):
+                edits += hole_edits(self, rows, a, b)
             else:
                 self._digits(rows, columns, a, b)
         self._after_block_delete(rows)
@@ -280,7 +281,7 @@ class Writer:
             out += self._insertions(rows, head[at], slot[at], missing[at])
         tails = np.flatnonzero(~rows.head & ((rows.flag & _BYPASS) == 0))
         if tails.size:
-            out += self._blocks(rows, tails)
+            out += block_edits(self, rows, tails)
         counts = np.bincount(rows.move - rows.move[0])
         self.parts[rows.move[0] : rows.move[-1] + 1] += counts.astype(np.int32)
         return out
@@ -313,140 +314,6 @@ class Writer:
                 self.tally.inserted_words += count
         return out
 
-    def _blocks(self, rows: Rows, tails: Index) -> list[Edits]:
-        """New blocks for the later parts of subdivided moves; plain words, modal codes hold."""
-        line_no = self.path.line[rows.move[tails]]
-        arc = np.isin(self.path.kind[rows.move[tails]], (Kind.ARC_CW, Kind.ARC_CCW))
-        straight = ~arc | self.plan.take_up[rows.first + tails]
-        before = rows.before[tails]
-        place = np.where(
-            before, self.program.line_start[line_no - 1], self.program.line_end[line_no - 1]
-        ).astype(np.int64)
-        lead = self._leads(line_no, arc & straight, before)
-        write = rows.write[tails]
-        first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
-        out: list[Edits] = []
-        for axis in range(3):
-            chosen = np.flatnonzero(write[:, axis] & straight)
-            letter = b"XYZ"[axis : axis + 1]
-            begins = first_axis[chosen] == axis
-            prefix = np.full(len(chosen), self.prefixes(b" " + letter), np.int32)
-            starts = {
-                int(p): self.prefixes(self.prefixes.table[int(p)] + letter)
-                for p in np.unique(lead[chosen[begins]])
-            }
-            prefix[begins] = [starts[int(p)] for p in lead[chosen[begins]]]
-            row = tails[chosen]
-            out.append(
-                Edits(
-                    place[chosen], place[chosen], rows.mantissa[row, axis], rows.decimals[row, axis], prefix,
-                    (row * 8 + 16 + axis).astype(np.int32),
-                )
-            )  # fmt: skip
-        empty = (first_axis < 0) & straight
-        # a part whose rounded end is where it began needs no block
-        np.subtract.at(self.parts, rows.move[tails[empty]], 1)
-        for i in np.flatnonzero(before & ~empty).tolist():
-            at, tail, line = int(place[i]), int(tails[i]), int(line_no[i])
-            self._check_take_up(rows, tail)
-            suffix = self._feed_of(line) + self.program.eol(line)
-            out.append(self.one(at, at, BARE, 0, suffix, rows.serial(tail) + 5))
-            if rows.head[tail + 1]:
-                out += self._arc_word(rows, tail + 1)
-        self.tally.inserted_blocks += int((~empty).sum())
-        out += self._inverse_time(rows, tails)
-        out += self._end_words(rows, tails[~before])
-        return out
-
-    def _leads(self, line_no: npt.NDArray[np.int32], turning: Mask, before: Mask) -> Index:
-        """Prefix of the first word of each inserted block: line end, `/` and, to take up lost motion at an
-        arc, G1."""
-        lines, which = np.unique(line_no, return_inverse=True)
-        table = np.zeros((len(lines), 3), np.int64)
-        for i, line in enumerate(lines.tolist()):
-            start = self.block_start(line)
-            deleted = start[len(self.program.eol(line)) :]
-            table[i] = (self.prefixes(start), self.prefixes(start + b"G1 "), self.prefixes(deleted + b"G1 "))
-        return np.asarray(table[which, np.where(before, 2, np.where(turning, 1, 0))], np.int64)
-
-    def _check_take_up(self, rows: Rows, row: int) -> None:
-        if rows.flag[row] & np.uint8(Flag.INVERSE_TIME):
-            raise ProgramError(
-                "an arc in G93 needs a step that takes up lost motion before it, which has no time of its "
-                "own; program the arc in G94",
-                line=int(self.path.line[rows.move[row]]),
-            )
-
-    def _feed_of(self, line: int) -> bytes:
-        """The F word of a block, for the block that is put before it."""
-        index = self.style.word(line, "F")
-        if index is None:
-            return b""
-        return b" " + self.program.data[int(self.words.start[index]) : int(self.words.end[index])]
-
-    def _arc_word(self, rows: Rows, row: int) -> list[Edits]:
-        """G2 or G3 for an arc block that relied on the modal code which the block before it changed."""
-        move = int(rows.move[row])
-        line = int(self.path.line[move])
-        code = 2 if self.path.kind[move] == Kind.ARC_CW else 3
-        index = self.words.of_line(line)
-        if any(
-            self.words.letter[i] == 71 and self.words.mantissa[i] == code and not self.words.decimals[i]
-            for i in index
-        ):
-            return []
-        slot = self.program.slot[move]
-        first = [int(self.words.start[s]) for s in slot if s >= 0]
-        at = min(first or [int(self.words.start[i]) for i in index if self.words.letter[i] != ord("N")])
-        return [self.one(at, at, BARE, 0, b"G%d " % code, rows.serial(row - 1) + 6)]
-
-    def _inverse_time(self, rows: Rows, tails: Index) -> list[Edits]:
-        """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
-        timed = np.flatnonzero((rows.flag[tails] & np.uint8(Flag.INVERSE_TIME)) != 0)
-        out = []
-        for move in np.unique(rows.move[tails[timed]]).tolist():
-            part = np.flatnonzero(rows.move == move)
-            line = int(self.path.line[move])
-            index = self.style.word(line, "F")
-            if index is None:
-                raise ProgramError("a block in G93 needs its own F word", line=line)
-            value = float(self.words.mantissa[index]) / 10.0 ** int(self.words.decimals[index])
-            reach = self.plan.reach[rows.first + part]
-            share = np.maximum(np.diff(reach, prepend=0.0), 1e-6)
-            decimals = max(int(self.words.decimals[index]), 4)
-            feeds = np.rint(value / share * 10**decimals).astype(np.int64)
-            place = int(self.program.line_end[line - 1])
-            kept = [i for i, r in enumerate(part.tolist()) if rows.head[r] or rows.write[r].any()]
-            for i in kept:
-                row = int(part[i])
-                if rows.head[row]:
-                    start, end = int(self.words.number[index]), int(self.words.end[index])
-                    prefix, order = b"", 0
-                else:
-                    start = end = place
-                    prefix, order = b" F", rows.serial(row) + 5
-                out.append(self.one(start, end, int(feeds[i]), decimals, prefix, order))
-        return out
-
-    def _end_words(self, rows: Rows, tails: Index) -> list[Edits]:
-        """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last."""
-        out = []
-        for move in np.unique(rows.move[tails]).tolist():
-            line = int(self.path.line[move])
-            moved = [
-                i for i in self.words.of_line(line)
-                if self.words.letter[i] == 77 and not self.words.decimals[i]
-                and int(self.words.mantissa[i]) in _END_M
-            ]  # fmt: skip
-            if not moved:
-                continue
-            at = int(self.program.line_end[line - 1])
-            for k, i in enumerate(moved):
-                start, end = int(self.words.start[i]), int(self.words.end[i])
-                out.append(self.one(start, end, BARE, 0, b"", 0))
-                out.append(self.one(at, at, BARE, 0, b" " + self.program.data[start:end], 2**30 + k))
-        return out
-
     def _captures(self, rows: Rows) -> list[Edits]:
         """Words that store the present position (G92, G10 L20) move with the correction of that position."""
         out = []
@@ -472,9 +339,6 @@ class Writer:
                 self.tally.changed_words += 1
         return out
 
-    def _hole(self, rows: Rows, a: int, b: int) -> list[Edits]:
-        return hole_edits(self, rows, a, b)
-
     def one(self, start: int, end: int, mantissa: int, decimals: int, prefix: bytes, order: int) -> Edits:
         """A single edit."""
         return Edits(
@@ -482,53 +346,3 @@ class Writer:
             np.array([decimals], np.int8), np.array([self.prefixes(prefix)], np.int32),
             np.array([order], np.int32),
         )  # fmt: skip
-
-
-@dataclass(slots=True, eq=False)
-class Rows:
-    """Rows of the plan on their way into text. `head` marks the row that keeps its block's own line."""
-
-    first: int
-    move: npt.NDArray[np.int32]
-    head: Mask
-    flag: npt.NDArray[np.uint8]
-    emitted: Array
-    entry: Array
-    write: Mask
-    mantissa: Index
-    decimals: npt.NDArray[np.int8]
-    before: Mask = field(default_factory=lambda: np.zeros(0, bool))
-
-    def serial(self, row: int) -> int:
-        """Order of a row's words among insertions at one place."""
-        return row * 8 + 16
-
-    def number(self, writer: Writer, row: int, axis: int) -> tuple[int, int]:
-        """Mantissa and decimals that say where the axis is after the row, whether or not it changes."""
-        if self.write[row, axis] or self.flag[row] & np.uint8(Flag.INCREMENTAL):
-            return int(self.mantissa[row, axis]), int(self.decimals[row, axis])
-        frame = writer.frame_of(int(self.move[row]))
-        decimals = writer.style.usual(axis, frame.unit_mm)
-        value = (self.emitted[row, axis] - frame.offset_mm[axis]) / frame.unit_mm
-        return round(value * 10**decimals), decimals
-
-    def put(self, a: int, b: int, axis: int, digits: Digits) -> None:
-        self.emitted[a:b, axis] = digits.emitted
-        self.write[a:b, axis] = digits.write
-        self.mantissa[a:b, axis] = digits.mantissa
-        self.decimals[a:b, axis] = digits.decimals
-
-
-def stamped(text: bytes, stamp: bytes, eol: bytes) -> bytes:
-    """The text with the stamp as a line of its own in front, behind a tape mark and a program number."""
-    at = 3 if text[:3] == b"\xef\xbb\xbf" else 0
-    if text[at : at + 1] == b"%":
-        at = _line_after(text, at)
-    if text[at : at + 1] and text[at : at + 1] in b"Oo:":
-        at = _line_after(text, at)
-    return text[:at] + stamp + eol + text[at:]
-
-
-def _line_after(text: bytes, at: int) -> int:
-    end = text.find(b"\n", at)
-    return len(text) if end < 0 else end + 1

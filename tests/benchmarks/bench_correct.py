@@ -1,14 +1,14 @@
 """CPU time and memory of `olp correct` beside LinuxCNC listing the same file, in one run.
 
-    python tests/benchmarks/bench_correct.py [lines]
+    python tests/benchmarks/bench_correct.py [lines] [--peers-python PYTHON]
 
 Prints user CPU seconds of whole commands (the least of three), their ratio, and the peak memory. Peers are
-timed where they are installed (pip install gcode-lib pygcode). Needs LinuxCNC's rs274 for the ratio.
+timed where an interpreter has them (pip install gcode-lib pygcode). Needs LinuxCNC's rs274 for the ratio.
 """
 
 from __future__ import annotations
 
-import importlib.util
+import argparse
 import os
 import resource
 import shutil
@@ -96,30 +96,30 @@ def stages(program: Path, described: Path) -> None:
     print(" s")
 
 
-def peers(program: Path) -> None:
-    """Other readers of G-code on the same file, where they are installed."""
+def peers(program: Path, number: int, python: str) -> None:
+    """Other readers of G-code on the same file, where they are installed: reading alone."""
     code = {
-        "pygcode": "from pygcode import Line\nfor l in open(F): str(Line(l))",
+        "pygcode": "from pygcode import Line\nfor line in open(F): str(Line(line))",
         "gcode_lib": "import gcode_lib\ngcode_lib.load(F)",
     }
     for name, text in code.items():
-        if importlib.util.find_spec(name) is None:
+        if subprocess.run([python, "-c", f"import {name}"], capture_output=True, check=False).returncode:
             print(f"  {name}: not installed")
             continue
-        try:
-            cpu, _ = user_seconds([sys.executable, "-c", f"F={str(program)!r}\n{text}"], 1)
-            print(f"  {name}: {cpu:.2f} s to parse")
-        except SystemExit as ended:
-            print(f"  {name}: {ended}")
+        cpu, _ = user_seconds([python, "-c", f"F={str(program)!r}\n{text}"], 1)
+        print(f"  {name}: {cpu:.1f} s to read it, {cpu / number * 1e6:.1f} us a line")
 
 
 def main() -> None:
-    lines = sys.argv[1] if len(sys.argv) > 1 else "1e6"
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("lines", nargs="?", default="1e6")
+    parser.add_argument("--peers-python", default=sys.executable)
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         described = machine(folder)
         ENVIRONMENT["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
-        for count in ("1e4", lines):
+        for count in ("1e4", options.lines):
             program = folder / f"raster_{count}.ngc"
             generate = [str(ROOT / "programs" / "generate.py"), "raster", count, "-o", str(program)]
             subprocess.run([sys.executable, *generate], check=True, capture_output=True)
@@ -133,12 +133,13 @@ def main() -> None:
                 numpy_cpu, _ = user_seconds([sys.executable, "-c", "import numpy"])
                 print(f"  {cpu / numpy_cpu:.2f} x `python -c 'import numpy'` ({numpy_cpu:.3f} s)")
             if shutil.which("rs274"):
-                listing, _ = user_seconds(["rs274", "-g", str(program), str(folder / "canon.txt")])
+                table = folder / "tool.tbl"
+                table.write_text("T1 P1 Z60\nT2 P2 Z60\n")
+                rs274 = ["rs274", "-g", "-t", str(table), str(program), str(folder / "canon.txt")]
+                listing, _ = user_seconds(rs274)
                 print(f"  {cpu / listing:.2f} x rs274 -g listing it ({listing:.2f} s)")
             stages(program, described)
-        small = folder / "raster_1e4.ngc"
-        print("peers on 1e4 lines:")
-        peers(small)
+        peers(program, number, options.peers_python)
 
 
 if __name__ == "__main__":

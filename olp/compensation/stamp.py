@@ -1,0 +1,35 @@
+"""The stamp of a corrected program: a comment in front of it, by which a second correction is refused."""
+
+from __future__ import annotations
+
+import re
+
+from olp import __version__
+
+_STAMP = re.compile(rb"olp-corrected [0-9a-f]{12}")
+
+
+def find_stamp(text: bytes) -> re.Match[bytes] | None:
+    """Where a text says that it is corrected already."""
+    return _STAMP.search(text)
+
+
+def stamp_line(digest: str, comment: tuple[bytes, bytes]) -> bytes:
+    """The stamp for the calibration with this hash, between the marks of a comment."""
+    before, after = comment
+    return before + f"olp-corrected {digest[:12]} olp {__version__}".encode() + after
+
+
+def stamped(text: bytes, stamp: bytes, eol: bytes) -> bytes:
+    """The text with the stamp as a line of its own in front, behind a tape mark and a program number."""
+    at = 3 if text[:3] == b"\xef\xbb\xbf" else 0
+    if text[at : at + 1] == b"%":
+        at = _line_after(text, at)
+    if text[at : at + 1] and text[at : at + 1] in b"Oo:":
+        at = _line_after(text, at)
+    return text[:at] + stamp + eol + text[at:]
+
+
+def _line_after(text: bytes, at: int) -> int:
+    end = text.find(b"\n", at)
+    return len(text) if end < 0 else end + 1

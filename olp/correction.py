@@ -1,0 +1,229 @@
+"""One correction run: read, plan, write, prove, report. And the report alone, for a verification."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from olp import checks
+from olp.compensation.plan import Limits, Plan, plan
+from olp.compensation.stamp import find_stamp, stamp_line
+from olp.compensation.style import fewest_decimals
+from olp.compensation.writer import Writer
+from olp.errormodel.base import Array
+from olp.exceptions import AlreadyCorrected, ProgramError
+from olp.findings import Finding
+from olp.loading import Loaded, unrolled
+from olp.machine import Setup
+from olp.program.program import Program
+from olp.program.reader import Options, read
+from olp.proof import Proof, prove
+from olp.toolpath import Flag, Toolpath
+from olp.units import MM_PER_UM
+
+Progress = Callable[[str, float], None]
+
+_PROVES = (
+    "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
+    "the error model at those commands brings the tip to the nominal path, at and between the way-points",
+)
+_DOES_NOT_PROVE = (
+    "that the calibration still describes the machine: measure a circle or a diagonal to see that",
+    "what the control does between blocks (blending, following error) and what the process does to the part",
+)
+
+
+def correct_bytes(
+    data: bytes,
+    name: str,
+    loaded: Loaded,
+    *,
+    tolerance_um: float,
+    hold: bool,
+    unroll: bool,
+    expand: bool,
+    clearance: float | None,
+    contour: bool,
+    rapids: bool,
+    date: datetime.date | None,
+    tell: Progress,
+) -> tuple[bytes, dict[str, Any], tuple[Finding, ...]]:
+    """The corrected bytes of a program, the report of the run, and the findings."""
+    stamp = find_stamp(data)
+    if stamp:
+        raise AlreadyCorrected(
+            f"the program carries the stamp `{stamp.group().decode()}`; correcting it again would apply the "
+            "model twice; correct the nominal program",
+            line=data.count(b"\n", 0, stamp.start()) + 1,
+        )
+    if unroll or expand:
+        data = unrolled(data, name, loaded.profile, expand, clearance)
+    tell("read", 0.0)
+    program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
+    tell("correct", 0.2)
+    digit = last_digit_mm(program, loaded.setup)
+    limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
+    rows = plan(program.toolpath, loaded.model, limits)
+    tell("write", 0.5)
+    writer = Writer(
+        program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
+        increments_mm=loaded.setup.machine.least_increment_mm,
+        stamp=stamp_line(loaded.digest, loaded.profile.comment),
+    )  # fmt: skip
+    text = writer.text()
+    parts, tally, holes = writer.parts, writer.tally, writer.holes
+    del writer
+    tell("prove", 0.7)
+    path = program.toolpath
+    nominal = replace(program, words=None, slot=program.slot[:0])
+    del program
+    passed = rows.passed
+    commands = _ends(rows, len(path))
+    corrections = _largest_correction(path, commands)
+    state = checks.state_findings(path, commands, loaded.model, loaded.setup, held=hold)
+    del rows, commands
+    corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    proof = prove(
+        nominal,
+        corrected,
+        loaded.model,
+        tolerance_mm=limits.tolerance_mm,
+        digit_mm=digit,
+        passed=passed,
+        parts=parts,
+    )
+    _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
+    findings = (
+        *checks.calibration_findings(loaded.calibration, date),
+        *checks.proof_findings(proof, passed),
+        *checks.hole_findings(holes, limits.tolerance_mm),
+        *state,
+        *checks.path_mode_findings(nominal, corrections),
+        *checks.program_findings(nominal, loaded.setup, contour=contour),
+    )
+    report = report_of(nominal, (data, name), loaded, proof, findings, tolerance_um)
+    report["moves"] = checks.tally_moves(path, len(passed), parts) | {
+        "inserted_blocks": tally.inserted_blocks,
+        "inserted_words": tally.inserted_words,
+        "changed_words": tally.changed_words,
+    }
+    report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
+    report["largest_correction_um"] = corrections * 1e3
+    return text, report, findings
+
+
+def _prove_without_deleted(
+    program: Program, text: bytes, loaded: Loaded, contour: bool, limits: Limits, digit_mm: float
+) -> None:
+    """With the block-delete switch on, the corrected program has to come out right too."""
+    path = program.toolpath
+    deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
+    if not deleted.any():
+        return
+    options = Options(block_delete=True, contour=contour)
+    line = int(path.line[deleted][0])
+    nominal = read(program.data, loaded.setup, loaded.profile, options, words=False)
+    corrected = read(text, loaded.setup, loaded.profile, options, words=False)
+    try:
+        rows = plan(nominal.toolpath, loaded.model, replace(limits, refuse_outside=False))
+        proof = prove(
+            nominal,
+            corrected,
+            loaded.model,
+            tolerance_mm=limits.tolerance_mm,
+            digit_mm=digit_mm,
+            passed=rows.passed,
+        )
+        good = proof.holds
+    except ProgramError:
+        good = False
+    if not good:
+        raise ProgramError(
+            "later blocks depend on this block under block delete, so one correction cannot be right for "
+            "both switch positions; remove the `/`, or give every axis in the first block after it",
+            line=line,
+        )
+
+
+def report_of(
+    program: Program,
+    source: tuple[bytes, str],
+    loaded: Loaded,
+    proof: Proof,
+    findings: tuple[Finding, ...],
+    tolerance_um: float,
+) -> dict[str, Any]:
+    """The report ("olp-report-1") as far as a proof alone can fill it."""
+    data, name = source
+    machine, calibration = loaded.setup.machine, loaded.calibration
+    size = proof.size_mm()
+    bend = float(
+        np.where(proof.after.judged & proof.cutting & ~proof.lean, proof.after.bend, 0.0).max(initial=0.0)
+    )
+    return {
+        "schema": "olp-report-1",
+        "program": {
+            "name": Path(name).name if name else "",
+            "sha256": hashlib.sha256(data).hexdigest(),
+            "lines": program.lines,
+            "dialect": loaded.profile.name,
+            "moves": len(program.toolpath),
+        },
+        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
+        "calibration": {
+            "measured": calibration.measured,
+            "valid_until": calibration.valid_until,
+            "model": calibration.model,
+            "temperature_degC": calibration.temperature_degC,
+            "sha256": loaded.digest,
+        },
+        "tolerance_um": tolerance_um,
+        "deviation": {
+            "before": proof.before.summary(proof.cutting),
+            "after": proof.after.summary(proof.cutting & ~proof.lean),
+            "path_max_um": float(size.max(initial=0.0)) * 1e3,
+            "allowed_um": proof.allowed_mm * 1e3,
+            "holds": proof.holds,
+        },
+        "budget_um": {"model_and_chords": bend * 1e3, "rounding": 0.87 * proof.digit_mm * 1e3},
+        "orientation": checks.orientation(program.toolpath, loaded.model),
+        "sources": checks.sources(program.toolpath, loaded.model),
+        "worst": checks.worst_blocks(program, proof),
+        "findings": [f.as_dict() for f in findings],
+        "proves": list(_PROVES),
+        "does_not_prove": list(_DOES_NOT_PROVE),
+    }
+
+
+def _ends(rows: Plan, count: int) -> Array:
+    """(n, 3) command at the end of each move."""
+    if len(rows) == count:
+        return rows.command_mm
+    last = np.append(rows.move[1:] != rows.move[:-1], True)
+    return np.asarray(rows.command_mm[last], float)
+
+
+def _largest_correction(path: Toolpath, command_mm: Array) -> float:
+    """How far the commands are from the nominal path, in mm, where they are farthest."""
+    largest = 0.0
+    for a in range(0, len(path), 1 << 16):
+        away = np.nan_to_num(command_mm[a : a + (1 << 16)] - path.end_mm[a : a + (1 << 16)])
+        largest = max(largest, float(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
+    return float(largest**0.5)
+
+
+def last_digit_mm(program: Program, setup: Setup) -> float:
+    """The coarsest last digit that the corrected program is written with."""
+    units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
+    inch = program.profile.inch_decimals
+    return max(
+        10.0 ** -fewest_decimals(least, unit, inch) * unit
+        for least in setup.machine.least_increment_mm
+        for unit in units
+    )

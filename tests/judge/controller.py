@@ -1,0 +1,135 @@
+"""The whole of LinuxCNC, without a screen: task, planner and motion, sampled every servo cycle."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from judge.linuxcnc import SYSTEM_PYTHON, _parameters, _setup
+
+PERIOD_NS = 1_000_000
+SPEED_MM_S, ACCELERATION_MM_S2 = 500.0, 2000.0
+#: kinds of motion as the planner names them
+TRAVERSE, FEED, ARC = 1, 2, 3
+_DRIVER = Path(__file__).with_name("controller_driver.py")
+_NETS = {
+    "joint.0.pos-cmd": "sampler.0.pin.0",
+    "joint.1.pos-cmd": "sampler.0.pin.1",
+    "joint.2.pos-cmd": "sampler.0.pin.2",
+    "motion.motion-type": "sampler.0.pin.3",
+    "joint.0.motor-pos-cmd": "joint.0.motor-pos-fb",
+    "joint.1.motor-pos-cmd": "joint.1.motor-pos-fb",
+    "joint.2.motor-pos-cmd": "joint.2.motor-pos-fb",
+    "iocontrol.0.user-enable-out": "iocontrol.0.emc-enable-in",
+    "iocontrol.0.tool-prepare": "iocontrol.0.tool-prepared",
+    "iocontrol.0.tool-change": "iocontrol.0.tool-changed",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Commanded axis positions (n, 3) in mm, one row a servo cycle, and the kind of motion (n,)."""
+
+    axis: np.ndarray
+    kind: np.ndarray
+
+    @property
+    def cutting(self) -> np.ndarray:
+        """Cycles on a feed move, its first and last one left out: the kind may be told a cycle late."""
+        now = (self.kind == FEED) | (self.kind == ARC)
+        return now & np.roll(now, 1) & np.roll(now, -1)
+
+
+def require() -> None:
+    """Skip the running test without the control; fail it where OLP_REQUIRE_ORACLE=1 promises one."""
+    import pytest
+
+    if shutil.which("linuxcnc") and shutil.which("halsampler"):
+        return
+    if os.environ.get("OLP_REQUIRE_ORACLE") == "1":
+        pytest.fail("OLP_REQUIRE_ORACLE=1, but LinuxCNC itself is not installed")
+    pytest.skip("needs LinuxCNC: apt-get install --no-install-recommends linuxcnc-uspace")
+
+
+def run(program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0) -> Run:
+    """Execute a program from axis position 0 with the offsets and tools of a machine folder.
+
+    Raises RuntimeError where the control reports an error or does not end in time.
+    """
+    folder = folder.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    _configure(machine, folder)
+    (folder / "p.ngc").write_bytes(program)
+    env = {"HOME": str(folder), "PATH": "/usr/bin:/bin:/usr/sbin:/sbin", "CONTROLLER_LIMIT_S": str(limit_s)}
+    env["CONTROLLER_FOLDER"] = str(folder)
+    if os.getuid() == 0:  # the realtime part refuses to be root
+        env |= {"RTAPI_UID": "65534", "RTAPI_FIFO_PATH": str(folder / ".rtapi_fifo")}
+        for path in (folder, *folder.parents):
+            if path.stat().st_uid == os.getuid() and (path.stat().st_mode & 0o055) != 0o055:
+                path.chmod(path.stat().st_mode | 0o055)
+        folder.chmod(0o777)
+    with (folder / "log").open("wb") as log:
+        subprocess.run(
+            ["linuxcnc", str(folder / "m.ini")],
+            env=env, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+            timeout=limit_s + 60, check=False,
+        )  # fmt: skip
+    said = folder / "driver.log"
+    if not said.exists() or said.read_text() != "ended\n":
+        debug = folder / "linuxcnc_debug.txt"
+        texts = [p.read_text(errors="replace")[-2000:] for p in (said, debug) if p.exists()]
+        detail = texts[0] if texts else "it did not start"
+        raise RuntimeError(f"the control did not run the program to its end: {detail}")
+    rows = np.loadtxt(folder / "samples", comments=None, usecols=(1, 2, 3, 4))
+    return Run(rows[:, :3], rows[:, 3].astype(int))
+
+
+def _configure(machine: Path, folder: Path) -> None:
+    setup = _setup(machine, {}, {}, None)
+    sections: dict[str, dict[str, object]] = {
+        "EMC": {"VERSION": "1.1", "MACHINE": "judge"},
+        "DISPLAY": {"DISPLAY": folder / "display", "PROGRAM_PREFIX": folder},
+        "TASK": {"TASK": "milltask", "CYCLE_TIME": 0.001},
+        "RS274NGC": {"PARAMETER_FILE": folder / "v.var"},
+        "EMCMOT": {"EMCMOT": "motmod", "COMM_TIMEOUT": 10.0, "SERVO_PERIOD": PERIOD_NS},
+        "EMCIO": {"EMCIO": "io", "CYCLE_TIME": 0.01, "TOOL_TABLE": folder / "t.tbl"},
+        "HAL": {"HALFILE": folder / "m.hal"},
+        "TRAJ": {
+            "COORDINATES": "X Y Z", "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree", "NO_FORCE_HOMING": 1,
+            "DEFAULT_LINEAR_VELOCITY": SPEED_MM_S, "MAX_LINEAR_VELOCITY": SPEED_MM_S,
+            "MAX_LINEAR_ACCELERATION": ACCELERATION_MM_S2,
+        },
+        "KINS": {"KINEMATICS": "trivkins coordinates=XYZ", "JOINTS": 3},
+    }  # fmt: skip
+    reach = {"MIN_LIMIT": -5000, "MAX_LIMIT": 5000}
+    reach |= {"MAX_VELOCITY": SPEED_MM_S, "MAX_ACCELERATION": ACCELERATION_MM_S2}
+    home = {"HOME": 0.0, "HOME_OFFSET": 0.0, "HOME_SEARCH_VEL": 0, "HOME_LATCH_VEL": 0, "HOME_SEQUENCE": 0}
+    for joint, axis in enumerate("XYZ"):
+        sections[f"AXIS_{axis}"] = dict(reach)
+        sections[f"JOINT_{joint}"] = {"TYPE": "LINEAR", "FERROR": 1000, "MIN_FERROR": 1000, **home, **reach}
+    # called with options of a screen, which it has no use for
+    (folder / "display").write_text(f"#!/bin/sh\nexec {SYSTEM_PYTHON} -I {_DRIVER}\n")
+    (folder / "display").chmod(0o755)
+    (folder / "m.ini").write_text(
+        "".join(
+            f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in section.items())
+            for name, section in sections.items()
+        )
+    )
+    (folder / "m.hal").write_text(
+        "loadrt trivkins coordinates=XYZ\n"
+        f"loadrt motmod servo_period_nsec={PERIOD_NS} num_joints=3\n"
+        "loadrt sampler depth=100000 cfg=fffs\n"
+        "addf motion-command-handler servo-thread\naddf motion-controller servo-thread\n"
+        "addf sampler.0 servo-thread\nsetp sampler.0.enable 0\n"
+        + "".join(f"net n{i} {a} => {b}\n" for i, (a, b) in enumerate(_NETS.items()))
+    )
+    (folder / "v.var").write_text(_parameters(setup))
+    (folder / "t.tbl").write_text(
+        "".join(f"T{n} P{n} X{x!r} Y{y!r} Z{z!r} D{d!r}\n" for n, (x, y, z, d) in setup.tools.items())
+    )
