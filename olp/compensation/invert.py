@@ -13,6 +13,8 @@ TOLERANCE_MM = 1e-9
 _ITERATIONS = 30
 #: errors up to this grow by less than a part in a thousand of themselves over their own length
 _SMALL_MM = 0.15
+#: Rate of growth of the error that is allowed for in any case.
+_LEAST_RATE = 0.01
 #: Points at a time: the columns of one block stay in the second-level cache.
 BLOCK = 1 << 14
 
@@ -31,18 +33,21 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
         state = None if play is None else play[part]
         target = target_mm[part]
         guess = target
-        previous = None
-        for _ in range(_ITERATIONS):
+        previous = np.zeros(1)
+        step = 0.0
+        for i in range(_ITERATIONS):
             e = model.error(guess, tool, state)
             unknown = np.isnan(e)
             if unknown.any():
                 e[unknown] = 0.0
-            if previous is not None:
-                change = np.abs(e - previous).max(initial=0.0)
-                if change < TOLERANCE_MM:
-                    break
+            change = float(np.abs(e - previous).max(initial=0.0))
+            if i and change < TOLERANCE_MM:
+                break
             guess = target - e
-            previous = e
+            # the next change will be this one times the rate at which the error grows
+            if i and change * max(_LEAST_RATE, 10.0 * change / step) < TOLERANCE_MM:
+                break
+            previous, step = e, change
         else:
             raise NotInvertible(
                 f"the error model cannot be inverted to {TOLERANCE_MM:g} mm: its errors grow as fast as the "

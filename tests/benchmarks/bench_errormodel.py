@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from olp.compensation.invert import invert
 from olp.errormodel import Calibration, Curve, build, play_states
 
 BOX = np.array([[0.0, 2000.0], [0.0, 1000.0], [-600.0, 0.0]])
@@ -59,6 +60,8 @@ def main() -> None:
             report(f"{chain} error at random points", partial(model.error, random, tool), n)
             report(f"{chain} error along a path", partial(model.error, walk, tool), n)
             report(f"{chain} error along a path, a tool per point", partial(model.error, walk, tools), n)
+        inner = 1.0 + 0.998 * (walk - 1.0)
+        report("command for a place of the tip", partial(invert, model, inner, tool), n)
         report("error with play", partial(model.error, walk, tool, play), n)
         report("chord_bound", partial(model.chord_bound, delta, tool), n)
     for label, step_mm in (("moves of 1 mm", 1.0), ("moves of 1 um", 1e-3)):
