@@ -1,4 +1,4 @@
-"""The inverse of the error model: the tip comes to its place within 1 pm of what is promised, or it refuses."""
+"""The inverse of the error model: the tip comes to its place within 1 pm, or olp refuses."""
 
 from __future__ import annotations
 

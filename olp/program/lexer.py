@@ -33,6 +33,7 @@ class WordChunk:
 
     `mantissa` / 10**`decimals` is the number as written; `pointed` tells whether it has a decimal point.
     `first_word[i]` is the index of line i's first word, with one extra entry for the end.
+    `comments` are the positions where comments open.
     """
 
     letter: Bytes
@@ -49,6 +50,7 @@ class WordChunk:
     deleted: Mask
     marks: Index
     odd: Index
+    comments: Index
     first_line: int
 
 
@@ -91,7 +93,7 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
     keep[newline] = True
     deleted = np.zeros(lines, bool)
     marks = _line_heads(text, starts, ends, keep, deleted)
-    _drop_comments(text, ends, keep)
+    comments = _drop_comments(text, ends, keep)
     where: Index | None = None
     compact, begin, stop = _runs(_blanked(text, keep))
     line_breaks = newline
@@ -137,6 +139,7 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
         deleted=deleted,
         marks=marks,
         odd=odd,
+        comments=comments + offset,
         first_line=first_line,
     )
 
@@ -180,11 +183,12 @@ def _line_heads(text: Bytes, starts: Index, ends: Index, keep: Mask, deleted: Ma
     return np.array(marks, np.int64)
 
 
-def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> None:
-    """Clear `keep` inside comments: `(` to `)` or the end of the line, `;` to the end of the line."""
+def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> Index:
+    """Clear `keep` inside comments: `(` to `)` or the end of the line, `;` to the end of the line. Returns
+    where they open."""
     opening = np.flatnonzero((text == 40) | (text == 59))
     if not opening.size:
-        return
+        return opening
     line_end = ends[np.searchsorted(ends, opening)]
     closing = np.flatnonzero(text == 41)
     stop = line_end
@@ -208,6 +212,7 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> None:
     inside = np.repeat(comment, lengths)
     inside &= text != 10
     keep[inside] = False
+    return opening
 
 
 def _misplaced(body: Bytes, begin: Index, stop: Index, letter: Bytes) -> Index:

@@ -8,7 +8,7 @@ one modal group, and block delete that later blocks depend on.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +61,8 @@ class Context:
     retract: Modal
     event: Mask
     consumed: Mask
+    #: numbers as written, by the unit in force
+    scaled: dict[float, Array] = field(default_factory=dict)
 
     def number(self, line: int) -> int:
         """The number of a line of the chunk in the program, counted from 1."""
@@ -182,14 +184,25 @@ class Modes:
 
 
 class Switches:
-    """The sections of a text that `(olp off)` exempts."""
+    """The sections of a text that `(olp off)` exempts, as far as it has been read."""
 
     def __init__(self, data: bytes) -> None:
-        marked = b"olp o" in data or b"OLP O" in data
-        found = list(_SWITCH.finditer(data)) if marked else []
-        self._lines = np.array([data.count(b"\n", 0, m.start()) for m in found], np.int64)
+        self._data = data
+        self._text = np.frombuffer(data, np.uint8)
+        self._lines = np.zeros(0, np.int64)
         # the first entry stands for the lines before any switch
-        self._off = np.array([False, *(m.group(1).lower() == b"off" for m in found)])
+        self._off = np.zeros(1, bool)
+
+    def follow(self, chunk: WordChunk) -> None:
+        """Take in the comments of the next chunk."""
+        after = self._text[np.minimum(chunk.comments + 1, len(self._text) - 1)]
+        may_be = chunk.comments[((after | 32) == ord("o")) | (after <= 32)]
+        found = [m for m in (_SWITCH.match(self._data, at) for at in may_be.tolist()) if m]
+        if not found:
+            return
+        place = np.searchsorted(chunk.line_start, [m.start() for m in found], "right") - 1
+        self._lines = np.append(self._lines, chunk.first_line + place)
+        self._off = np.append(self._off, [m.group(1).lower() == b"off" for m in found])
 
     def __bool__(self) -> bool:
         return len(self._lines) > 0
@@ -223,6 +236,8 @@ def scaled(context: Context, state: State, remarks: dict[str, tuple[int, str]]) 
     some controls, which is remarked."""
     if not state.bare_increments:
         return context.value
+    if state.unit_mm in context.scaled:
+        return context.scaled[state.unit_mm]
     chunk = context.chunk
     bare = np.flatnonzero(~chunk.pointed & _LENGTHS[chunk.letter])
     if not bare.size:
@@ -232,6 +247,7 @@ def scaled(context: Context, state: State, remarks: dict[str, tuple[int, str]]) 
         mine = bare[chunk.letter[bare] == letter]
         out[mine] *= state.increment(chr(letter))
     remarks.setdefault("increments", (context.number(int(chunk.line[bare[0]])), ""))
+    context.scaled[state.unit_mm] = out
     return out
 
 

@@ -1,6 +1,6 @@
 """Bulk reading of motion blocks: words of many lines to axis positions, arcs and slots at once.
 
-`Blocks` gathers the motion lines of one chunk; `resolve` turns a stretch of them, over which nothing
+`Blocks` gathers the motion lines of one chunk; `fill` turns a stretch of them, over which nothing
 but modal motion happens, into positions. Omitted axes hold: that is a forward fill.
 """
 

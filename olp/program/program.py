@@ -48,7 +48,7 @@ class ArcSlots:
 class Hole:
     """One hole of a canned cycle: its moves `first`..`last` of the toolpath and its block's words by letter.
 
-    `x_mm`, `y_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
+    `place_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
     `series` counts contiguous cycles; a block of one series inherits R and Z of the one before. `repeat`
     counts the `repeats` holes of one block from 0.
     """

@@ -95,6 +95,7 @@ class _Reader:
     def _chunk(self, chunk: WordChunk) -> None:
         base = self.out.word_count
         self.out.put_words(chunk)
+        self.switches.follow(chunk)
         last = self.modes.program_end(chunk)
         if not last:
             return
