@@ -1,0 +1,1 @@
+"""Re-timing: a route of way-points to a motion in time that keeps every axis inside its limits."""

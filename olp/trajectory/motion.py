@@ -1,0 +1,103 @@
+"""A motion in time, in pieces: positions, velocities, accelerations and jerks at any time, exact to the pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Pieces of a path, each driven by a cubic in time.
+
+    Piece k holds from `start_s[k]` to `start_s[k + 1]`; with u = t - start_s[k] the parameter is
+    s = sum_i `time`[k, i] u^i, and the axis positions are sum_i `path`[`shape`[k], i] s^i in mm: `time`
+    (k, 4), `path` (m, 4, 3), `shape` (k,). Where axes move as cubics of time themselves, s = u. `line` (k,)
+    is the program line of each piece.
+    """
+
+    start_s: Array
+    time: Array
+    path: Array
+    shape: Index
+    line: Index
+
+    @property
+    def duration_s(self) -> float:
+        return float(self.start_s[-1] - self.start_s[0]) if len(self.start_s) else 0.0
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def piece_at(self, time_s: Array) -> Index:
+        """(n,) index of the piece at each time; a time where two join belongs to the later one."""
+        found = np.searchsorted(self.start_s, time_s, side="right") - 1
+        return np.clip(found, 0, max(len(self) - 1, 0))
+
+    def at(self, time_s: Array) -> tuple[Array, Array, Array, Array]:
+        """Position mm, velocity mm/s, acceleration mm/s^2 and jerk mm/s^3, (n, 3) each, at times (n,) s."""
+        piece = self.piece_at(time_s)
+        return self.of(piece, time_s - self.start_s[piece])
+
+    def of(self, piece: Index, u: Array) -> tuple[Array, Array, Array, Array]:
+        """The same at times `u` (n,) after the start of pieces (n,)."""
+        c0, c1, c2, c3 = self.time[piece].T
+        s = c0 + u * (c1 + u * (c2 + u * c3))
+        s1 = (c1 + u * (2.0 * c2 + 3.0 * u * c3))[:, None]
+        s2 = (2.0 * c2 + 6.0 * u * c3)[:, None]
+        s3 = (6.0 * c3)[:, None]
+        shape = self.path[self.shape[piece]]
+        p0, p1, p2, p3 = (shape[:, i] for i in range(4))
+        s = s[:, None]
+        q = p0 + s * (p1 + s * (p2 + s * p3))
+        q1 = p1 + s * (2.0 * p2 + 3.0 * s * p3)
+        q2 = 2.0 * p2 + 6.0 * s * p3
+        q3 = 6.0 * p3
+        return (
+            q,
+            q1 * s1,
+            q2 * s1 * s1 + q1 * s2,
+            q3 * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * s3,
+        )
+
+    def slowed(self, factor: float) -> Motion:
+        """The same path in `factor` times the time: speeds shrink by it, accelerations by its square."""
+        scale = factor ** -np.arange(4.0)
+        begin = self.start_s[0] if len(self.start_s) else 0.0
+        return Motion(begin + (self.start_s - begin) * factor, self.time * scale, self.path, self.shape, self.line)
+
+    def shifted(self, by_s: float) -> Motion:
+        return Motion(self.start_s + by_s, self.time, self.path, self.shape, self.line)
+
+    @staticmethod
+    def rest(at_mm: Array, seconds: float, line: int) -> Motion:
+        """Standing still."""
+        path = np.zeros((1, 4, 3))
+        path[0, 0] = at_mm
+        return Motion(
+            np.array([0.0, seconds]), np.zeros((1, 4)), path, np.zeros(1, np.int64), np.array([line], np.int64)
+        )
+
+    @staticmethod
+    def joined(parts: Sequence[Motion]) -> Motion:
+        """One after the other."""
+        start, shapes, offset, at = [], [], 0, 0.0
+        for part in parts:
+            start.append(part.start_s[:-1] - part.start_s[0] + at)
+            at += part.duration_s
+            shapes.append(part.shape + offset)
+            offset += len(part.path)
+        start.append(np.array([at]))
+        return Motion(
+            np.concatenate(start),
+            np.concatenate([p.time for p in parts]),
+            np.concatenate([p.path for p in parts]),
+            np.concatenate(shapes),
+            np.concatenate([p.line for p in parts]),
+        )

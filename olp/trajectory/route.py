@@ -1,0 +1,39 @@
+"""What is to be driven: way-points with feeds, how near to pass them, and where to wait."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisLimits:
+    """(3,) most velocity mm/s, acceleration mm/s^2 and jerk mm/s^3 of each axis."""
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Route:
+    """A polyline of commanded axis positions.
+
+    `point_mm` (n, 3); `feed_mm_s` (n - 1,) most speed along each segment, inf for rapids; `line` (n - 1,)
+    the line of the program that each segment comes from; `tolerance_mm` (n,) how far from each way-point the
+    path may pass, 0 where it has to be met at rest (both ends are); `dwell_s` (n,) time at rest there.
+    """
+
+    point_mm: Array
+    feed_mm_s: Array
+    line: Index
+    tolerance_mm: Array
+    dwell_s: Array
+
+    def __len__(self) -> int:
+        return len(self.point_mm)
