@@ -1,0 +1,238 @@
+"""Sharp corners: straight moves from rest to rest that overlap in time, so that corners are cut by no more
+than the tolerance.
+
+The last `tau` seconds of a move and the first of the next add up. Both have constant jerk there, J1 and J2
+times g, so that with the corner at 0 the path is the cubic
+    -u1 g J1 (tau - t)^3 / 6 + u2 g J2 t^3 / 6,    0 <= t <= tau,
+at t = tau / 2 the corner is g tau^3 |u2 J2 - u1 J1| / 48 away, and nowhere is the path farther from the
+polyline than that. The middle of each move, from and to an acceleration, is Ruckig's.
+Smoothing in time: S. Tajima, B. Sencer, "Kinematic corner smoothing for high speed machine tools",
+Int. J. Machine Tools and Manufacture 108 (2016).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.exceptions import UsageError
+from olp.trajectory.motion import Motion
+from olp.trajectory.ruckig_moves import solve_all
+from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.scurve import CRUISE, PHASES, states
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: (mm) way-points nearer to the one before are the same
+SAME_MM = 1e-9
+#: overlaps end this part of the first jerk phase early, so that the middle has room
+_ROOM = 0.98
+#: directions below this do not limit a move
+_ALONG = 1e-12
+#: moves in one block: their phases stay in the cache
+_BLOCK = 8192
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overlapped:
+    """`motion`, the segment of the route that each piece drives (k,), and how many moves the closed form
+    had to solve in Ruckig's place. Where two moves overlap the segment is the later."""
+
+    motion: Motion
+    segment: Index
+    replaced: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moves:
+    """n moves: start, direction (n, 3); length, largest speed, acceleration, jerk, feed (n,); and at their
+    n + 1 ends the time that neighbours overlap and the share g of the jerk used for it."""
+
+    start: Array
+    along: Array
+    length: Array
+    speed: Array
+    acceleration: Array
+    jerk: Array
+    overlap_s: Array
+    share: Array
+
+
+def overlap(route: Route, limits: AxisLimits) -> Motion:
+    """The motion along `route`, resting at way-points with no tolerance or with a dwell.
+
+    Raises UsageError where route or limits hold what is no number, or no limit above 0.
+    """
+    return overlap_parts(route, limits).motion
+
+
+def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
+    """As `overlap`, with what each piece came from."""
+    _check(route, limits)
+    count = len(route)
+    if count == 0:
+        return Overlapped(_nothing(), np.zeros(0, np.int64), 0)
+    group = groups_of_same(route.point_mm)
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    tolerance = np.minimum.reduceat(route.tolerance_mm, first)
+    dwell = np.add.reduceat(route.dwell_s, first)
+    segment = first[1:] - 1
+    if segment.size == 0:
+        line = int(route.line[0]) if len(route.line) else 0
+        return Overlapped(Motion.rest(route.point_mm[0], float(dwell[0]), line), np.zeros(1, np.int64), 0)
+    stops = (tolerance <= 0.0) | (dwell > 0.0)
+    points = route.point_mm[first]
+    moves = _moves(points, route.feed_mm_s[segment], np.where(stops, 0.0, tolerance), limits)
+    parts = [
+        _block(moves, points, a, min(a + _BLOCK, len(segment))) for a in range(0, len(segment), _BLOCK)
+    ]
+    offsets = np.cumsum([0] + [len(part.path) for part in parts])
+    seconds = np.concatenate([part.seconds for part in parts])
+    time = np.concatenate([part.time for part in parts])
+    path = np.concatenate([part.path for part in parts])
+    shape = np.concatenate([part.shape + at for part, at in zip(parts, offsets[:-1], strict=True)])
+    owner = np.concatenate([part.owner for part in parts])
+    replaced = sum(part.replaced for part in parts)
+    del parts
+    waits = np.flatnonzero(dwell > 0.0)
+    if waits.size:
+        # a dwell belongs to the segment that ends there; the one before the first move, to the first
+        at = np.searchsorted(owner, waits, side="left")
+        still = np.zeros((len(waits), 4, 3))
+        still[:, 0] = points[waits]
+        seconds = np.insert(seconds, at, dwell[waits])
+        time = np.insert(time, at, 0.0, axis=0)
+        shape = np.insert(shape, at, len(path) + np.arange(len(waits)))
+        owner = np.insert(owner, at, np.maximum(waits - 1, 0))
+        path = np.concatenate([path, still])
+    origin = segment[owner]
+    start = np.concatenate(([0.0], np.cumsum(seconds)))
+    return Overlapped(Motion(start, time, path, shape, route.line[origin]), origin, replaced)
+
+
+def groups_of_same(point_mm: Array) -> Index:
+    """(n,) number of each way-point once those within 1e-9 mm of the first of their group are taken as
+    one."""
+    step = np.sqrt((np.diff(point_mm, axis=0) ** 2).sum(axis=1))
+    begins = np.concatenate(([True], step > SAME_MM))
+    kept = -1
+    # way-points that creep: each within reach of the one before, the whole not
+    for k in np.flatnonzero(~begins).tolist():
+        if begins[k - 1]:
+            kept = k - 1
+        begins[k] = bool(np.sqrt(((point_mm[k] - point_mm[kept]) ** 2).sum()) > SAME_MM)
+    result: Index = np.cumsum(begins) - 1
+    return result
+
+
+def _check(route: Route, limits: AxisLimits) -> None:
+    for name, values in (
+        ("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)
+    ):  # fmt: skip
+        if np.shape(values) != (3,) or not bool(np.all(np.isfinite(values) & (values > 0.0))):
+            raise UsageError(f"the axis limits of {name} are {values}; expected three numbers above 0")
+    if route.point_mm.ndim != 2 or route.point_mm.shape[1] != 3:
+        raise UsageError(f"way-points have shape {route.point_mm.shape}; expected (n, 3)")
+    if not bool(np.isfinite(route.point_mm).all()):
+        raise UsageError("a way-point is not finite")
+    if not bool(np.all(route.feed_mm_s > 0.0)):
+        raise UsageError("a feed is not above 0")
+    for name, values in (("tolerance", route.tolerance_mm), ("dwell", route.dwell_s)):
+        if not bool(np.all(np.isfinite(values) & (values >= 0.0))):
+            raise UsageError(f"a {name} is not a number from 0 up")
+
+
+def _moves(point: Array, feed: Array, tolerance: Array, limits: AxisLimits) -> _Moves:
+    delta = np.diff(point, axis=0)
+    length = np.sqrt((delta * delta).sum(axis=1))
+    along = delta / length[:, None]
+    size = np.maximum(np.abs(along), _ALONG)
+    speed = np.minimum((limits.velocity / size).min(axis=1), feed)
+    acceleration = (limits.acceleration / size).min(axis=1)
+    jerk = (limits.jerk / size).min(axis=1)
+    push = along * jerk[:, None]
+    before, after = push[:-1], push[1:]
+    summed = (limits.jerk / np.maximum(np.abs(before + after), _ALONG * limits.jerk)).min(axis=1)
+    share = np.minimum(1.0, summed)
+    turn = np.sqrt(((after - before) ** 2).sum(axis=1))
+    inner = tolerance[1:-1]
+    # way-point no farther away than the tolerance
+    tau = np.cbrt(48.0 * inner / np.maximum(share * turn, 1e-30))
+    # both inside the first jerk phase of a time-optimal move from rest to rest
+    phase = np.minimum(np.minimum(acceleration / jerk, np.sqrt(speed / jerk)), np.cbrt(length / (2.0 * jerk)))
+    tau = np.minimum(tau, _ROOM * np.minimum(phase[:-1], phase[1:]) / np.sqrt(share))
+    # the summed speed is convex in time: no faster at either end than the slower of both feeds
+    slow = np.minimum(feed[:-1], feed[1:])
+    tau = np.minimum(tau, np.sqrt(2.0 * slow / (share * np.maximum(jerk[:-1], jerk[1:]))))
+    tau = np.where(inner > 0.0, tau, 0.0)
+    ends = np.zeros(1)
+    return _Moves(
+        point[:-1], along, length, speed, acceleration, jerk,
+        np.concatenate((ends, tau, ends)), np.concatenate((ends + 1.0, share, ends + 1.0)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pieces:
+    seconds: Array
+    time: Array
+    path: Array
+    shape: Index
+    owner: Index
+    replaced: int
+
+
+def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
+    """Pieces of moves a to b - 1, each with the overlap that it begins with."""
+    pick = slice(a, b)
+    count = b - a
+    length, jerk = moves.length[pick], moves.jerk[pick]
+    head, tail = moves.overlap_s[a:b], moves.overlap_s[a + 1 : b + 1]
+    head_jerk, tail_jerk = moves.share[a:b] * jerk, moves.share[a + 1 : b + 1] * jerk
+    v0, a0, d0 = head_jerk * head * head / 2.0, head_jerk * head, head_jerk * head**3 / 6.0
+    v1, a1, d1 = tail_jerk * tail * tail / 2.0, -tail_jerk * tail, tail_jerk * tail**3 / 6.0
+    middle = length - d0 - d1
+    solved = solve_all(
+        middle, v0, a0, v1, a1, moves.speed[pick], moves.acceleration[pick], jerk
+    )
+    state = states(solved.duration_s, solved.jerk, middle, v0, a0, v1, a1)
+    # columns of a move: its overlap, then the phases; those of no duration are dropped
+    seconds = np.concatenate((head[:, None], solved.duration_s), axis=1)
+    time = np.zeros((count, PHASES + 1, 4))
+    time[:, 0, 1] = 1.0
+    time[:, 1:, 0] = state.position + d0[:, None]
+    time[:, 1:, 1] = state.velocity
+    time[:, 1:, 2] = state.acceleration / 2.0
+    time[:, 1:, 3] = solved.jerk / 6.0
+    time[:, 1 + CRUISE, 3] = 0.0
+    corners = np.flatnonzero(head > 0.0)
+    path = np.zeros((count + len(corners), 4, 3))
+    path[:count, 0], path[:count, 1] = point[pick], moves.along[pick]
+    if corners.size:
+        path[count:] = _corner(moves, point, a + corners)
+    shape = np.broadcast_to(np.arange(count)[:, None], seconds.shape).copy()
+    shape[corners, 0] = count + np.arange(len(corners))
+    owner = np.broadcast_to(np.arange(a, b)[:, None], seconds.shape)
+    used = seconds > 0.0
+    return _Pieces(
+        seconds[used], time[used], path, shape[used], owner[used], int(np.count_nonzero(solved.replaced))
+    )
+
+
+def _corner(moves: _Moves, point: Array, at: Index) -> Array:
+    """(m, 4, 3) cubics of time where the moves that end and begin at way-points `at` (m,) overlap."""
+    tau = moves.overlap_s[at][:, None]
+    out = moves.along[at - 1] * (moves.share[at] * moves.jerk[at - 1])[:, None]
+    into = moves.along[at] * (moves.share[at] * moves.jerk[at])[:, None]
+    return np.stack(
+        (point[at] - out * tau**3 / 6.0, out * tau * tau / 2.0, -out * tau / 2.0, (out + into) / 6.0), axis=1
+    )
+
+
+def _nothing() -> Motion:
+    none = np.zeros(0, np.int64)
+    return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), none, none)
