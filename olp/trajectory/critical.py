@@ -1,0 +1,253 @@
+"""Speed along a smooth path, in closed form: ramps between the places that bind.
+
+Every piece of the path gets ceilings V, A, J of the speed, acceleration and jerk along it, such that any
+motion inside them is inside every axis limit: with q', q'', q''' by the way,
+
+    axis velocity q' v,  acceleration q' a + q'' v^2,  jerk q' j + 3 q'' v a + q''' v^3.
+
+The profile runs from node to node, where its acceleration is nil, by a ramp up, a stretch at one speed and a
+ramp down. Nodes are the ends, and the dips of V that bind even where jerk is free; a profile that is too
+fast somewhere gets a node at the worst place, until none is (bidirectional scan with jerk: Dong, Ferreira,
+Stori 2007; pruned to the critical points as VPOp does).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.trajectory import ramps
+from olp.trajectory.motion import Motion
+from olp.trajectory.route import Array, AxisLimits, Index
+from olp.trajectory.smooth import SmoothPath
+
+Mask = npt.NDArray[np.bool_]
+
+#: share of each limit that curvature may use up at full speed, and of the jerk left that 3 q'' v a may
+_BY_SPEED, _BY_CROSS = 0.5, 0.5
+_BINDS, _TOO_FAST, _PATIENT = 1e-6, 1e-8, 40
+_TINY = 1e-300
+_BLOCK = 1 << 17
+_ALONE = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Speed along a path: `node` (m + 1,) breaks of the path at which the acceleration is nil, `speed`
+    (m + 1,) there; between, up to `peak` (m,) with `acceleration` and `jerk` (m,). mm, s."""
+
+    node: Index
+    speed: Array
+    peak: Array
+    acceleration: Array
+    jerk: Array
+
+
+def ceilings(path: SmoothPath, limits: AxisLimits) -> tuple[Array, Array, Array]:
+    """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold."""
+    n = len(path)
+    result = np.empty((3, n))
+    for lo in range(0, n, _BLOCK):
+        part = slice(lo, min(lo + _BLOCK, n))
+        result[:, part] = _ceilings(np.diff(path.break_mm[lo : part.stop + 1]), path.shape[part],
+                                    path.feed_mm_s[part], limits)  # fmt: skip
+    return result[0], result[1], result[2]
+
+
+def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits) -> Array:
+    h = length[:, None]
+    first, second, third = shape[:, 1], 2.0 * shape[:, 2], 6.0 * shape[:, 3]
+    # q' is a parabola, inside the hull of its three control points; q'' is linear
+    middle, last = first + 0.5 * h * second, first + h * (second + 0.5 * h * third)
+    m1 = np.maximum(np.maximum(np.abs(first), np.abs(last)), np.abs(middle))
+    m2 = np.maximum(np.abs(second), np.abs(second + h * third))
+    m3 = np.abs(third)
+    size = np.sqrt(np.maximum.reduce([(e * e).sum(axis=1) for e in (first, middle, last)]))
+    m1, m2, m3 = (np.maximum(e, _TINY) for e in (m1, m2, m3))
+    with np.errstate(over="ignore"):
+        v = np.minimum((limits.velocity / m1).min(axis=1), feed / np.maximum(size, _TINY))
+        v = np.minimum(v, np.sqrt(_BY_SPEED * (limits.acceleration / m2).min(axis=1)))
+        v = np.minimum(v, np.cbrt(_BY_SPEED * (limits.jerk / m3).min(axis=1)))
+        cross = 3.0 * m2 * v[:, None]
+        left = limits.jerk - m3 * (v**3)[:, None]
+        a = ((limits.acceleration - m2 * (v**2)[:, None]) / m1).min(axis=1)
+        a = np.minimum(a, (_BY_CROSS * left / np.maximum(cross, _TINY)).min(axis=1))
+        j = ((left - cross * a[:, None]) / m1).min(axis=1)
+    return np.stack((v, a, j))
+
+
+def profile(path: SmoothPath, limits: AxisLimits) -> Profile:
+    """The speed profile from rest to rest, within the ceilings of every piece."""
+    top, most_a, most_j = ceilings(path, limits)
+    x = path.break_mm
+    ceiling = np.concatenate(([0.0], np.minimum(top[:-1], top[1:]), [0.0]))
+    node = _dips(x, top, ceiling, most_a)
+    turn = 0
+    while True:
+        at = np.flatnonzero(node)
+        begin = at[:-1]
+        way = np.diff(x[at])
+        a, j = np.minimum.reduceat(most_a, begin), np.minimum.reduceat(most_j, begin)
+        speed = _reachable(ceiling[at], way, a, j)
+        peak = ramps.peak(speed[:-1], speed[1:], way, np.maximum.reduceat(top, begin), a, j)
+        found = Profile(at, speed, peak, a, j)
+        worst = _too_fast(x, top, found, everywhere=turn >= _PATIENT)
+        if not worst.size:
+            return found
+        node[worst] = True
+        node[worst + 1] = True
+        turn += 1
+
+
+def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
+    """(k + 1,) the ends, and both ends of the pieces whose ceiling is lower than that of a neighbour, higher
+    than that of none, and reached where only acceleration is bounded (no jerk-bounded profile is faster)."""
+    node = np.zeros(len(x), bool)
+    node[0] = node[-1] = True
+    square = ceiling * ceiling
+    rise = np.minimum(2.0 * acceleration * np.diff(x), float(top.max()) ** 2)
+    total = np.concatenate(([0.0], np.cumsum(rise)))
+    square = np.minimum(square, total + np.minimum.accumulate(square - total))
+    total = total[-1] - total
+    back = (square - total)[::-1]
+    square = np.minimum(square, total + np.minimum.accumulate(back)[::-1])
+    free = np.sqrt(np.maximum(square, 0.0))
+    before = np.concatenate(([np.inf], top[:-1]))
+    behind = np.concatenate((top[1:], [np.inf]))
+    dip = (top <= before) & (top <= behind) & ((top < before) | (top < behind))
+    dip &= np.maximum(free[:-1], free[1:]) >= top * (1.0 - _BINDS)
+    node[:-1] |= dip
+    node[1:] |= dip
+    return node
+
+
+def _reachable(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
+    """(m + 1,) the most speeds at the nodes that ramps can join, both ways."""
+    forward = _scan(ceiling, way, a, j)
+    return _scan(forward[::-1].copy(), way[::-1], a[::-1], j[::-1])[::-1].copy()
+
+
+def _scan(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
+    """Speeds such that every rise is one a ramp can make: waves of all nodes at once that lower the speed
+    behind those lowered before; they die out within a chain of rising nodes."""
+    speed = ceiling.copy()
+    todo = np.flatnonzero(speed[1:] > speed[:-1])
+    while todo.size:
+        most = ramps.reach(speed[todo], way[todo], a[todo], j[todo])
+        lower = most < speed[todo + 1]
+        todo = todo[lower] + 1
+        speed[todo] = most[lower]
+        todo = todo[todo < len(way)]
+        todo = todo[speed[todo + 1] > speed[todo]]
+    return speed
+
+
+def _too_fast(x: Array, top: Array, found: Profile, everywhere: bool) -> Index:
+    """The piece of each span that the profile exceeds the most (all of them, if `everywhere`)."""
+    begin, end = found.node[:-1], found.node[1:]
+    slow = np.flatnonzero(np.minimum.reduceat(top, begin) * (1.0 + _TOO_FAST) < found.peak)
+    chosen: list[Index] = []
+    at = 0
+    count = np.cumsum(end[slow] - begin[slow])
+    while at < len(slow):
+        stop = max(int(np.searchsorted(count, (count[at - 1] if at else 0) + _BLOCK)), at + 1)
+        chosen.append(_too_fast_of(x, top, found, slow[at:stop], everywhere))
+        at = stop
+    return np.concatenate(chosen) if chosen else np.zeros(0, np.int64)
+
+
+def _too_fast_of(x: Array, top: Array, found: Profile, spans: Index, everywhere: bool) -> Index:
+    begin, size = found.node[spans], found.node[spans + 1] - found.node[spans]
+    first = np.concatenate(([0], np.cumsum(size)[:-1]))
+    span = np.repeat(spans, size)
+    piece = np.arange(len(span)) - np.repeat(first - begin, size)
+    limit = top[piece] * (1.0 + _TOO_FAST)
+    pick = limit < found.peak[span]
+    span, piece, limit = span[pick], piece[pick], limit[pick]
+    v0, v1, peak = found.speed[span], found.speed[span + 1], found.peak[span]
+    a, j = found.acceleration[span], found.jerk[span]
+    left, whole = x[piece] - x[found.node[span]], x[found.node[span + 1]] - x[found.node[span]]
+    right = x[piece + 1] - x[found.node[span]]
+    up = np.where(limit > v0, ramps.passing(np.maximum(limit, v0), v0, peak, a, j), 0.0)
+    down = whole - np.where(limit > v1, ramps.passing(np.maximum(limit, v1), v1, peak, a, j), 0.0)
+    over = (left < down) & (right > up)
+    if not over.any():
+        return np.zeros(0, np.int64)
+    if everywhere:
+        out: Index = piece[over]
+        return out
+    span, piece = span[over], piece[over]
+    v0, v1, peak, a, j, left, right, whole = (e[over] for e in (v0, v1, peak, a, j, left, right, whole))
+    # the speed there, good enough to rank by: on ramps as if the acceleration were constant
+    rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(v1, peak, a, j)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rising = np.where(right < rise, v0**2 + (peak**2 - v0**2) * right / rise, peak**2)
+        falling = np.where(whole - left < fall, v1**2 + (peak**2 - v1**2) * (whole - left) / fall, peak**2)
+    ratio = np.minimum(rising, falling) / top[piece] ** 2
+    order = np.lexsort((-ratio, span))
+    head = np.concatenate(([True], span[order][1:] != span[order][:-1]))
+    worst: Index = piece[order][head]
+    return worst
+
+
+def critical(path: SmoothPath, limits: AxisLimits) -> Motion:
+    """The motion along `path` from rest to rest; no axis limit and no feed is exceeded."""
+    if not len(path):
+        return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), np.zeros(0, np.int64), path.line)
+    return driven(path, profile(path, limits))
+
+
+def driven(path: SmoothPath, found: Profile) -> Motion:
+    """The motion of a profile: cut wherever the path or the jerk changes, each piece from its own start."""
+    x = path.break_mm
+    start_s, start, speed, acceleration, jerk, lasts = _phases(x, found)
+    # breaks of the path inside a phase; those at the start of one are there already
+    phase = np.searchsorted(start, x[:-1], side="right") - 1
+    inside = np.flatnonzero(start[phase] != x[:-1])
+    phase = phase[inside]
+    way = x[inside] - start[phase]
+    v, a, j = speed[phase], acceleration[phase], jerk[phase]
+    u = np.empty(len(way))
+    for lo in range(0, len(u), _BLOCK):
+        part = slice(lo, lo + _BLOCK)
+        u[part] = ramps.when(way[part], v[part], a[part], j[part], lasts[phase[part]])
+    order = np.argsort(np.concatenate((start, x[inside])), kind="stable")
+    begin = np.concatenate((start_s[:-1], start_s[phase] + u))[order]
+    shape = np.concatenate((np.searchsorted(x, start, side="right") - 1, inside))[order]
+    shape = np.minimum(shape, len(path) - 1)
+    time = np.empty((len(order), 4))
+    time[:, 0] = np.concatenate((start, x[inside]))[order] - x[shape]
+    time[:, 1] = np.concatenate((speed, np.maximum(v + u * (a + 0.5 * u * j), 0.0)))[order]
+    time[:, 2] = np.concatenate((acceleration, a + u * j))[order] / 2.0
+    time[:, 3] = np.concatenate((jerk, j))[order] / 6.0
+    return Motion(np.append(begin, start_s[-1]), time, path.shape, shape, path.line[shape])
+
+
+def _phases(x: Array, found: Profile) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Time (p + 1,), way, speed, acceleration, jerk and duration (p,) of each phase of constant jerk."""
+    v0, v1, peak, a, j = found.speed[:-1], found.speed[1:], found.peak, found.acceleration, found.jerk
+    begin = x[found.node[:-1]]
+    whole = np.diff(x[found.node])
+    up, up_flat = ramps.phases(v0, peak, a, j)
+    down, down_flat = ramps.phases(peak, v1, a, j)
+    rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(peak, v1, a, j)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cruise = np.where(peak > 0.0, np.maximum(whole - rise - fall, 0.0) / peak, 0.0)
+    lasts = np.stack((up, up_flat, up, cruise, down, down_flat, down), axis=1)
+    zero = np.zeros_like(j)
+    jerk = np.stack((j, zero, -j, zero, -j, zero, j), axis=1)
+    high, low = j * up, -j * down
+    acceleration = np.stack((zero, high, high, zero, zero, low, low), axis=1)
+    gain, loss = 0.5 * high * up, 0.5 * low * down
+    speed = np.stack((v0, v0 + gain, peak - gain, peak, peak, peak + loss, v1 - loss), axis=1)
+    start = np.empty_like(lasts)
+    start[:, 0] = begin
+    for i in range(6):
+        t = lasts[:, i]
+        step = t * (speed[:, i] + t * (acceleration[:, i] / 2.0 + t * jerk[:, i] / 6.0))
+        start[:, i + 1] = np.minimum(start[:, i] + step, begin + whole)
+    used = lasts > 0.0
+    start_s = np.concatenate(([0.0], np.cumsum(lasts[used])))
+    return start_s, start[used], speed[used], acceleration[used], jerk[used], lasts[used]

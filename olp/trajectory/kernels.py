@@ -1,0 +1,99 @@
+"""Sums of overlapping cubic kernels over sorted breaks, without cancellation.
+
+Prefix sums would carry the rounding of the narrowest kernel (third derivative du/w^2) over the whole path.
+Here each half of a kernel, one cubic over a range of pieces, is laid on the O(log) nodes of a binary tree
+that make up its range, as its Taylor polynomial at the start of the node; the sums are then handed down to
+the pieces. Only values of kernels that are really there are added.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.trajectory.route import Array, Index
+
+
+def deviations(
+    x: Array, centre: Array, width: Array, bend: Array, begin: Index, middle: Index, end: Index
+) -> Array:
+    """(k, 4, 3) sum of kernels and its first three derivatives at the start of each piece, valid over it.
+
+    `x` (k + 1,) rising breaks; kernel i is bend_i w g((x - centre_i) / w), g(z) = (1 - |z|)^3 / 6, its left
+    half over the pieces begin..middle, its right over middle..end (half open, cut to the breaks given).
+    """
+    k = len(x) - 1
+    depth = max(k - 1, 0).bit_length()
+    size = 1 << depth
+    start = np.concatenate((x[:-1], np.full(size - k, x[-1])))
+    tree = np.zeros((12, 2 * size))
+    top = depth
+    for lo, hi, edge, sign in (
+        (begin, middle, centre - width, 1.0),
+        (middle, end, centre + width, -1.0),
+    ):
+        top = min(top, _lay(tree, size, start, lo, hi, edge, sign, 1.0 / (width * width), bend))
+    for level in range(top, depth):
+        base = 1 << level
+        parent = tree[:, base : 2 * base].reshape(4, 3, base)
+        left = tree[:, 2 * base : 4 * base : 2].reshape(4, 3, base)
+        right = tree[:, 2 * base + 1 : 4 * base : 2].reshape(4, 3, base)
+        span = size >> (level + 1)
+        d = start[span :: 2 * span] - start[:: 2 * span]
+        f, f1, f2, f3 = parent
+        tree[:, 2 * base : 4 * base : 2] = (left + parent).reshape(12, base)
+        shifted = np.stack(
+            (f + d * (f1 + d * (f2 / 2.0 + d * (f3 / 6.0))), f1 + d * (f2 + d * (f3 / 2.0)), f2 + d * f3, f3)
+        )
+        tree[:, 2 * base + 1 : 4 * base : 2] = (right + shifted).reshape(12, base)
+    return np.ascontiguousarray(tree[:, size : size + k].T).reshape(k, 4, 3)
+
+
+def _lay(
+    tree: Array, size: int, start: Array, begin: Index, end: Index, edge: Array, sign: float, third: Array,
+    bend: Array,
+) -> int:  # fmt: skip
+    """Lays sign * bend * third * (x - edge)^3 / 6 on the nodes of begin..end; the highest level used."""
+    lo, hi = begin + size, end + size
+    shift = 0
+    level = size.bit_length() - 1
+    top = level
+    who = np.flatnonzero(lo < hi)
+    lo, hi = lo[who], hi[who]
+    while who.size:
+        base = size >> shift
+        odd_low, odd_high = (lo & 1).astype(bool), (hi & 1).astype(bool)
+        node = np.concatenate((lo[odd_low], hi[odd_high] - 1))
+        if node.size:
+            top = level - shift
+            i = np.concatenate((who[odd_low], who[odd_high]))
+            y = start[(node << shift) - size] - edge[i]
+            f3 = sign * third[i]
+            f2 = f3 * y
+            f1 = f2 * y / 2.0
+            spot = node - base
+            for order, f in enumerate((f1 * y / 3.0, f1, f2, f3)):
+                for axis in range(3):
+                    tree[3 * order + axis, base : 2 * base] += np.bincount(
+                        spot, weights=f * bend[i, axis], minlength=base
+                    )
+        lo, hi = (lo + 1) >> 1, hi >> 1
+        shift += 1
+        on = lo < hi
+        who, lo, hi = who[on], lo[on], hi[on]
+    return top
+
+
+def least_over(value: Array, begin: Index, end: Index) -> Array:
+    """(m,) least of `value` (k,) over each range begin..end (half open), inf over none: a sparse table."""
+    result = np.full(len(begin), np.inf)
+    length = end - begin
+    table = value
+    span = 1
+    while (length >= span).any():
+        here = np.flatnonzero((length >= span) & (length < 2 * span))
+        result[here] = np.minimum(table[begin[here]], table[end[here] - span])
+        if span >= len(value):
+            break
+        table = np.minimum(table[:-span], table[span:]) if len(table) > span else table[:1]
+        span *= 2
+    return result

@@ -1,0 +1,144 @@
+"""Closed forms of one ramp: from a speed to another with no acceleration at both ends, least time.
+
+A ramp from v0 to v1 holds |jerk| <= J and |acceleration| <= A: jerk up, perhaps a stretch at A, jerk down.
+With D = |v1 - v0| it takes 2 sqrt(D/J) where A is not reached (D J <= A^2) and D/A + A/J where it is, and
+being point-symmetric covers (v0 + v1)/2 of that. All functions take and give arrays (n,), mm and s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.trajectory.route import Array, Index
+
+#: below this share of the speed a change of speed is rounding, and is not made
+_NO_CHANGE = 1e-10
+_FEW = 24
+
+
+def phases(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> tuple[Array, Array]:
+    """Seconds of each of the two jerk phases, and of the stretch at `acceleration` between."""
+    change = np.abs(v1 - v0)
+    full = acceleration / jerk
+    steep = change > acceleration * full
+    return np.where(steep, full, np.sqrt(change / jerk)), np.where(steep, change / acceleration - full, 0.0)
+
+
+def seconds(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> Array:
+    """Duration of the ramp."""
+    bend, flat = phases(v0, v1, acceleration, jerk)
+    return 2.0 * bend + flat
+
+
+def distance(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> Array:
+    """Way of the ramp, mm."""
+    return 0.5 * (v0 + v1) * seconds(v0, v1, acceleration, jerk)
+
+
+def reach(v0: Array, way: Array, acceleration: Array, jerk: Array) -> Array:
+    """The most speed a ramp from `v0` attains in `way` mm.
+
+    With A: v1^2 + v1 A^2/J + v0 A^2/J - v0^2 - 2 A way = 0. Without: y = sqrt(v1 - v0) solves
+    y^3 + 2 v0 y = way sqrt(J), which has one root, in closed form by the hyperbolic sine.
+    """
+    full = acceleration * acceleration / jerk
+    steep = way >= (v0 + 0.5 * full) * 2.0 * acceleration / jerk
+    v1 = np.empty_like(v0)
+    v, f, d = v0[steep], full[steep], way[steep]
+    c = 2.0 * acceleration[steep] * d + v * v - v * f
+    v1[steep] = 2.0 * c / (f + np.sqrt(f * f + 4.0 * c))
+    rest = ~steep
+    v, d = v0[rest], way[rest] * np.sqrt(jerk[rest])
+    k = np.sqrt(v / 1.5)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        z = 1.5 * d / (2.0 * v * k)
+        y = np.where(z < 1e100, 2.0 * k * np.sinh(np.arcsinh(z) / 3.0), np.cbrt(d))
+    v1[rest] = v + y * y
+    # a change near the rounding of the speed has no digits left to time it by
+    return np.where(v1 - v0 < _NO_CHANGE * v0, v0, v0 + (v1 - v0) * (1.0 - 1e-12))
+
+
+def peak(v0: Array, v1: Array, way: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
+    """The most speed <= `top` from which both ramps, to v0 before and to v1 behind, fit into `way`.
+
+    Bracketed Newton; the lower bracket is returned, so the ramps always fit.
+    """
+    low = np.maximum(v0, v1)
+    high = np.maximum(top, low)
+
+    def excess(i: Index, p: Array) -> Array:
+        a, j = acceleration[i], jerk[i]
+        out: Array = distance(v0[i], p, a, j) + distance(v1[i], p, a, j) - way[i]
+        return out
+
+    every = np.arange(len(v0))
+    todo = np.flatnonzero(excess(every, high) > 0.0)
+    result = high.copy()
+    result[todo] = low[todo]
+    lo, hi = low[todo], high[todo]
+    trial = 0.5 * (lo + hi)
+    for step in range(_FEW * 2):
+        if not todo.size:
+            break
+        a, j = acceleration[todo], jerk[todo]
+        b, c = v0[todo], v1[todo]
+        t0, t1 = seconds(b, trial, a, j), seconds(c, trial, a, j)
+        f = 0.5 * ((b + trial) * t0 + (c + trial) * t1) - way[todo]
+        fits = f <= 0.0
+        lo = np.where(fits, trial, lo)
+        hi = np.where(fits, hi, trial)
+        result[todo] = lo
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s0 = np.where((trial - b) * j <= a * a, 1.0 / np.sqrt(np.maximum(trial - b, 0.0) * j), 1.0 / a)
+            s1 = np.where((trial - c) * j <= a * a, 1.0 / np.sqrt(np.maximum(trial - c, 0.0) * j), 1.0 / a)
+            slope = 0.5 * (t0 + t1 + (b + trial) * s0 + (c + trial) * s1)
+            # a hair below the root, that the bracket closes from the side that fits
+            newton = trial - f / slope - 1e-12 * trial
+        good = (newton > lo) & (newton < hi) & (step % 4 != 3)
+        trial = np.where(good, newton, 0.5 * (lo + hi))
+        on = (hi - lo > 1e-11 * hi) & ~(fits & (f > -1e-10 * way[todo]))
+        todo, lo, hi, trial = todo[on], lo[on], hi[on], trial[on]
+    return result
+
+
+def passing(speed: Array, v0: Array, v1: Array, acceleration: Array, jerk: Array) -> Array:
+    """Way from the start of a rising ramp to where it passes `speed` (v0 <= speed <= v1)."""
+    bend, flat = phases(v0, v1, acceleration, jerk)
+    gain = 0.5 * jerk * bend * bend
+    done = speed - v0
+    first = np.minimum(np.sqrt(2.0 * done / jerk), bend)
+    way = first * (v0 + jerk * first * first / 6.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        second = np.where(flat > 0.0, np.clip((done - gain) / (jerk * bend), 0.0, flat), 0.0)
+    way += second * (v0 + gain + 0.5 * jerk * bend * second)
+    left = np.sqrt(2.0 * np.maximum(v1 - speed, 0.0) / jerk)
+    back = 0.5 * (v0 + v1) * (2.0 * bend + flat) - left * (v1 - jerk * left * left / 6.0)
+    return np.where(done <= np.maximum(gain, (v1 - v0) - gain), way, back)
+
+
+def when(way: Array, speed: Array, acceleration: Array, jerk: Array, most: Array) -> Array:
+    """Seconds, 0 to `most`, after which speed t + acceleration t^2/2 + jerk t^3/6 equals `way`; the cubic
+    rises over that time. Bracketed Newton to rounding."""
+    half, sixth = 0.5 * acceleration, jerk / 6.0
+    whole = most * (speed + most * (half + most * sixth))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        result = np.clip(np.where(whole > 0.0, most * (way / whole), 0.0), 0.0, most)
+    todo = np.arange(len(way))
+    lo, hi, t = np.zeros_like(way), most.copy(), result.copy()
+    for step in range(80):
+        if not todo.size:
+            break
+        v, h, s = speed[todo], half[todo], sixth[todo]
+        f = t * (v + t * (h + t * s)) - way[todo]
+        slope = v + t * (2.0 * h + 3.0 * t * s)
+        lo = np.where(f <= 0.0, t, lo)
+        hi = np.where(f >= 0.0, t, hi)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = f / slope
+        new = t - move
+        good = (new >= lo) & (new <= hi) & (step % 6 != 5)
+        new = np.where(good, new, 0.5 * (lo + hi))
+        result[todo] = new
+        on = np.abs(new - t) > 1e-15 * most[todo]
+        todo, lo, hi, t = todo[on], lo[on], hi[on], new[on]
+    return result

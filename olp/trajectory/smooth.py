@@ -1,0 +1,257 @@
+"""A polyline rounded within its tolerance: a path of cubics, twice continuously differentiable.
+
+With l the way along the polyline and du_k the change of its direction at vertex k, the path is
+
+    q(l) = polyline(l) + sum_k du_k w_k g((l - l_k) / w_k),   g(x) = (1 - |x|)^3 / 6 for |x| < 1,
+
+whose second derivative is a sum of hats du_k/w_k (1 - |x|) and whose third is constant between the breaks
+l_k and l_k +- w_k. Kernels may overlap, so dense points are smoothed over many of them. One kernel alone
+leaves the polyline by |du| w / 6. l is kept on a grid of a power of two, on which sums and differences of
+breaks are exact: the halves of a kernel meet to the last digit, however long the path and short the kernel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.exceptions import CannotCompute
+from olp.trajectory.kernels import deviations, least_over
+from olp.trajectory.route import Array, AxisLimits, Index, Route
+
+Mask = npt.NDArray[np.bool_]
+
+#: points closer than this, or this share of the least tolerance, are one, mm
+_SAME_MM, _SAME_SHARE, _SAME_LEAST_MM = 1e-4, 0.02, 1e-9
+#: a tolerance above this is as good as none
+_MOST_MM = 1e6
+#: |u1 + u2| of a vertex that turns back on itself
+_REVERSAL = 1e-3
+#: a bend of this little is none
+_STRAIGHT = 1e-12
+#: share of acceleration and jerk that a kernel should use at full feed; wider by _WIDER is never of use
+_SHARE, _WIDER = 0.25, 1.5
+#: most of the way to the ends of the run, where the path must be straight
+_END = 0.6
+_SHRINK, _LEAST_SHRINK, _ROUNDS = 0.95, 0.3, 200
+#: breaks worked on at a time
+_BLOCK = 1 << 17
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmoothPath:
+    """Piece k runs from `break_mm[k]` to `break_mm[k + 1]` (k + 1,) along the polyline: with s the way from
+    its start, its axis positions are sum_i `shape[k, i]` s^i mm, `shape` (k, 4, 3). `feed_mm_s` (k,) is the
+    most speed along it, `line` (k,) its program line. `source` (k,) is the segment of the route."""
+
+    break_mm: Array
+    shape: Array
+    feed_mm_s: Array
+    line: Index
+    source: Index
+
+    def __len__(self) -> int:
+        return len(self.shape)
+
+    def at(self, way_mm: Array) -> tuple[Array, Array, Array, Array]:
+        """Position mm and its first three derivatives by the way, (n, 3) each, at (n,) ways."""
+        k = np.clip(np.searchsorted(self.break_mm, way_mm, side="right") - 1, 0, len(self) - 1)
+        s = (way_mm - self.break_mm[k])[:, None]
+        c0, c1, c2, c3 = (self.shape[k, i] for i in range(4))
+        return (
+            c0 + s * (c1 + s * (c2 + s * c3)),
+            c1 + s * (2.0 * c2 + 3.0 * s * c3),
+            2.0 * c2 + 6.0 * s * c3,
+            6.0 * c3,
+        )
+
+
+def needs_stop(point_mm: Array) -> Mask:
+    """(n,) at which of the points (n, 3) their polyline turns back on itself; those that are all but the same
+    as the one before are skipped."""
+    found = np.zeros(len(point_mm), bool)
+    kept = _distinct(point_mm, _SAME_MM)
+    if len(kept) > 2:
+        delta = np.diff(point_mm[kept], axis=0)
+        u = delta / np.linalg.norm(delta, axis=1)[:, None]
+        found[kept[1:-1]] = np.linalg.norm(u[1:] + u[:-1], axis=1) < _REVERSAL
+    return found
+
+
+def smooth(route: Route, limits: AxisLimits) -> SmoothPath:
+    """The path of one run from rest to rest.
+
+    Every point of it is within the tolerance of the route (interpolated between its way-points) of the
+    polyline, proven by the control points of each cubic; both ends are met exactly, and straight. A
+    reversal is rounded too (its path stands still there for a moment); better make it a stop.
+
+    Raises:
+        CannotCompute: a point that is not finite, an inner tolerance or a feed that is not above zero.
+    """
+    _check(route)
+    inner = np.asarray(route.tolerance_mm, float)[1:-1]
+    same = max(min(_SAME_MM, _SAME_SHARE * float(inner.min(initial=math.inf))), _SAME_LEAST_MM)
+    kept = _distinct(route.point_mm, same)
+    point = route.point_mm[kept]
+    if len(kept) < 2:
+        none = np.zeros(0, np.int64)
+        return SmoothPath(np.zeros(1), np.zeros((0, 4, 3)), np.zeros(0), none, none)
+    source = kept[1:] - 1
+    feed, line = np.asarray(route.feed_mm_s, float)[source], np.asarray(route.line, np.int64)[source]
+    delta = np.diff(point, axis=0)
+    length = np.linalg.norm(delta, axis=1)
+    grid = 2.0 ** math.ceil(math.log2(float(length.sum()) * 2.0**-51))
+    way = np.concatenate(([0.0], np.round(np.cumsum(length) / grid) * grid))
+    if not (np.diff(way) > 0.0).all():
+        # segments below the grid of a path of 1e7 mm: each takes one step of it
+        way = np.concatenate(([0.0], np.cumsum(np.maximum(np.round(length / grid), 1.0)))) * grid
+    u = delta / np.diff(way)[:, None]
+    tolerance = _tolerance(route, kept, 0.0 if len(kept) == len(route) else 2.0 * same)
+    bend = np.diff(u, axis=0)
+    inner = way[1:-1]
+    width = _widths(u, bend, way, feed, tolerance, limits, grid)
+    used = width > 0.0
+    bend, inner, width = bend[used], inner[used], width[used]
+    breaks, width, shape = _fitted(way, u, point, bend, inner, width, tolerance, grid)
+    segment = np.clip(np.searchsorted(way, breaks[:-1], side="right") - 1, 0, len(u) - 1)
+    return SmoothPath(breaks, shape, feed[segment], line[segment], source[segment])
+
+
+def _check(route: Route) -> None:
+    if not np.isfinite(route.point_mm).all():
+        raise CannotCompute("a way-point is not finite")
+    if not (np.asarray(route.tolerance_mm)[1:-1] > 0.0).all():
+        raise CannotCompute("an inner way-point has no tolerance: cut the route there")
+    if not (np.asarray(route.feed_mm_s) > 0.0).all():
+        raise CannotCompute("a feed is not above zero")
+
+
+def _distinct(point: Array, same: float) -> Index:
+    """Indices of points (n, 3) no two neighbours of which are closer than `same`, ends included; those left
+    out are within twice that of one kept."""
+    n = len(point)
+    if n < 2:
+        return np.arange(n)
+    short = np.linalg.norm(np.diff(point, axis=0), axis=1) < same
+    if not short.any():
+        return np.arange(n)
+    keep = np.ones(n, bool)
+    at = 0
+    for first in np.flatnonzero(short).tolist():
+        if first + 1 <= at:
+            continue
+        here = point[first].tolist()
+        at = first + 1
+        while at < n:
+            there = point[at].tolist()
+            if math.dist(here, there) < same:
+                keep[at] = False
+            else:
+                here = there
+                if at == n - 1 or not short[at]:
+                    break
+            at += 1
+    kept = np.flatnonzero(keep).tolist()
+    if kept[-1] != n - 1:
+        end = point[-1]
+        while len(kept) > 1 and math.dist(point[kept[-1]], end) < same:
+            kept.pop()
+        if len(kept) > 1 or math.dist(point[0], end) > 0.0:
+            kept.append(n - 1)
+    return np.array(kept, np.int64)
+
+
+def _tolerance(route: Route, kept: Index, margin: float) -> Array:
+    """(m,) at the way-points kept: the least of theirs and of those left out behind, less `margin`; at the
+    ends that of the neighbours (the kernels end before)."""
+    raw = np.array(route.tolerance_mm, float)
+    if len(kept) <= 2:
+        return np.ones(len(kept))
+    raw[0], raw[-1] = math.inf, math.inf
+    raw = np.minimum.reduceat(raw, kept)
+    tolerance = np.minimum(np.maximum(raw - margin, 0.5 * raw), _MOST_MM)
+    tolerance[0], tolerance[-1] = tolerance[1], tolerance[-2]
+    return tolerance
+
+
+def _widths(
+    u: Array, bend: Array, way: Array, feed: Array, tolerance: Array, limits: AxisLimits, grid: float
+) -> Array:
+    """(m - 2,) first width of each kernel, on the grid: as wide as the tolerance of its vertex lets it, but
+    no wider than full feed has use for."""
+    if not len(bend):
+        return np.zeros(0)
+    with np.errstate(divide="ignore"):
+        speed = np.minimum(feed, (limits.velocity / np.abs(u)).min(axis=1))
+    speed = np.minimum(speed[:-1], speed[1:])
+    most = np.abs(bend)
+    by_acceleration = (most / limits.acceleration).max(axis=1) * speed**2 / _SHARE
+    by_jerk = np.sqrt((most / limits.jerk).max(axis=1) * speed**3 / _SHARE)
+    length = np.diff(way)
+    use = np.maximum(_WIDER * np.maximum(by_acceleration, by_jerk), 0.3 * np.minimum(length[:-1], length[1:]))
+    size = np.linalg.norm(bend, axis=1)
+    end = np.minimum(way[1:-1], way[-1] - way[1:-1])
+    with np.errstate(divide="ignore"):
+        width = np.minimum(np.minimum(use, 6.0 * _SHRINK * tolerance[1:-1] / size), _END * end)
+    width = np.maximum(np.floor(width / grid), 1.0) * grid
+    return np.where(size > _STRAIGHT, width, 0.0)
+
+
+def _fitted(
+    way: Array, u: Array, point: Array, bend: Array, inner: Array, width: Array, tolerance: Array, grid: float
+) -> tuple[Array, Array, Array]:
+    """Breaks, widths and shapes, after every kernel over a place that is too far out has been narrowed."""
+    for turn in range(_ROUNDS):
+        breaks = np.unique(np.concatenate((way, inner - width, inner + width)))
+        begin, middle, end = (np.searchsorted(breaks, e) for e in (inner - width, inner, inner + width))
+        shape = np.empty((len(breaks) - 1, 4, 3))
+        factor = np.ones(len(width))
+        for lo in range(0, len(shape), _BLOCK):
+            hi = min(lo + _BLOCK, len(shape))
+            x = breaks[lo : hi + 1]
+            pick = np.flatnonzero((end > lo) & (begin < hi))
+            a, m, b = (np.clip(e[pick] - lo, 0, hi - lo) for e in (begin, middle, end))
+            taylor = deviations(x, inner[pick], width[pick], bend[pick], a, m, b)
+            share = _allowed(taylor, x, way, tolerance)
+            if (share < 1.0).any():
+                factor[pick] = np.minimum(factor[pick], least_over(share, a, b))
+            segment = np.clip(np.searchsorted(way, x[:-1], side="right") - 1, 0, len(u) - 1)
+            piece = shape[lo:hi]
+            piece[:, 0] = point[segment] + u[segment] * (x[:-1] - way[segment])[:, None] + taylor[:, 0]
+            piece[:, 1] = u[segment] + taylor[:, 1]
+            piece[:, 2] = taylor[:, 2] / 2.0
+            piece[:, 3] = taylor[:, 3] / 6.0
+        narrow = factor < 1.0
+        if not narrow.any():
+            break
+        factor = np.maximum(_SHRINK * factor, _LEAST_SHRINK)
+        width = np.where(narrow, np.maximum(np.floor(width * factor / grid), 1.0) * grid, width)
+        if turn > _ROUNDS // 2 and (width[narrow] == grid).all():
+            break
+    return breaks, width, shape
+
+
+def _allowed(taylor: Array, x: Array, way: Array, tolerance: Array) -> Array:
+    """(k,) by how much the deviation of each piece would have to shrink: 1 where it is within the tolerance.
+
+    The norms of the control points of a cubic in Bernstein form bound its norm; the tolerance, linear on
+    every piece, is its own Bernstein form, so that four comparisons prove the whole piece."""
+    h = np.diff(x)[:, None]
+    e, e1, e2, e3 = (taylor[:, i] for i in range(4))
+    limit = np.interp(x, way, tolerance)
+    share = np.ones(len(taylor))
+    controls = (
+        e,
+        e + h / 3.0 * e1,
+        e + h * (2.0 / 3.0 * e1 + h / 6.0 * e2),
+        e + h * (e1 + h * (0.5 * e2 + h / 6.0 * e3)),
+    )
+    for i, control in enumerate(controls):
+        far = np.sqrt(np.einsum("ij,ij->i", control, control))
+        here = limit[:-1] + (limit[1:] - limit[:-1]) * (i / 3.0)
+        with np.errstate(divide="ignore"):
+            share = np.minimum(share, here / far)
+    return share
