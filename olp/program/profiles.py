@@ -50,6 +50,10 @@ class Profile:
     cycles_apart: bool
     comment: tuple[bytes, bytes] = (b"(", b")")
 
+    def dwell_s(self, number: float, *, pointed: bool) -> float:
+        """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
+        return number / 1000.0 if self.increments_without_point and not pointed else number
+
     def support(self) -> list[dict[str, str]]:
         """The support matrix, from the table that the interpreter uses: statement, what becomes of it,
         why."""

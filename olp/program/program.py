@@ -50,7 +50,8 @@ class Hole:
 
     `place_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
     `series` counts contiguous cycles; a block of one series inherits R and Z of the one before. `repeat`
-    counts the `repeats` holes of one block from 0.
+    counts the `repeats` holes of one block from 0. `rests` are the places in it where the motion rests, as
+    (number of its moves before, seconds): dwells and turns of the spindle.
     """
 
     line: int
@@ -67,6 +68,7 @@ class Hole:
     repeats: int
     series: int
     code: int
+    rests: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

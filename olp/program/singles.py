@@ -6,13 +6,15 @@ What an event does to frames and tools is in `state`, the strokes of one hole ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import ProgramError
 from olp.geometry import PLANES
 from olp.program.collector import Collector
-from olp.program.cycles import hole_moves, levels
+from olp.program.cycles import Stroke, hole_moves, levels
 from olp.program.modes import PLANE_OF, Context, Switches, scaled
 from olp.program.motion import Index, fill
 from olp.program.profiles import CUTTER_COMPENSATION, CYCLES, Act, Profile
@@ -157,6 +159,8 @@ class Singles:
         }
         value = scaled(context, state, out.remarks)
         given = {letter: float(value[i]) for letter, i in words.items()}
+        if "P" in given:
+            given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
         self._inherit(context, at, given, code, third, frame.unit_mm)
         times = self._repeats(context, words, line)
         offset = frame.offset_mm
@@ -207,6 +211,7 @@ class Singles:
                     words={letter: context.base + i for letter, i in words.items()}, plane=plane,
                     place_mm=(place[0], place[1]), r_mm=r, z_mm=z, initial_mm=self._initial,
                     incremental=incremental, repeat=repeat, repeats=times, series=self._series, code=code,
+                    rests=_rests(strokes),
                 )
             )  # fmt: skip
             start = moving[-1].point if moving else start
@@ -245,6 +250,17 @@ class Singles:
                 "a canned cycle with zero repeats only stores values, which is not read yet", line=line
             )
         return times
+
+
+def _rests(strokes: Sequence[Stroke]) -> tuple[tuple[int, float], ...]:
+    """Dwells and turns of the spindle in a hole: moves before each, seconds."""
+    out, moves = [], 0
+    for stroke in strokes:
+        if stroke.kind in ("rapid", "feed"):
+            moves += 1
+        else:
+            out.append((moves, stroke.seconds))
+    return tuple(out)
 
 
 def _deleted(deleted: bool) -> Flag:
