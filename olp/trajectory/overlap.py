@@ -13,26 +13,29 @@ Int. J. Machine Tools and Manufacture 108 (2016).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import UsageError
 from olp.trajectory.motion import Motion
-from olp.trajectory.ruckig_moves import solve_all
 from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.ruckig_moves import solve_all
+from olp.trajectory.same import groups_of_same
 from olp.trajectory.scurve import CRUISE, PHASES, states
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+_Number = TypeVar("_Number", np.float64, np.int64)
 
-#: (mm) way-points nearer to the one before are the same
-SAME_MM = 1e-9
 #: overlaps end this part of the first jerk phase early, so that the middle has room
 _ROOM = 0.98
 #: directions below this do not limit a move
 _ALONG = 1e-12
+#: moves are planned this far inside the limits, as Ruckig is given 1e-9 more than them
+_INSIDE = 1.0 - 1e-8
 #: moves in one block: their phases stay in the cache
 _BLOCK = 8192
 
@@ -87,17 +90,19 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
     stops = (tolerance <= 0.0) | (dwell > 0.0)
     points = route.point_mm[first]
     moves = _moves(points, route.feed_mm_s[segment], np.where(stops, 0.0, tolerance), limits)
-    parts = [
-        _block(moves, points, a, min(a + _BLOCK, len(segment))) for a in range(0, len(segment), _BLOCK)
-    ]
-    offsets = np.cumsum([0] + [len(part.path) for part in parts])
-    seconds = np.concatenate([part.seconds for part in parts])
-    time = np.concatenate([part.time for part in parts])
-    path = np.concatenate([part.path for part in parts])
-    shape = np.concatenate([part.shape + at for part, at in zip(parts, offsets[:-1], strict=True)])
-    owner = np.concatenate([part.owner for part in parts])
-    replaced = sum(part.replaced for part in parts)
-    del parts
+    kept: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
+    numbers: tuple[list[Index], list[Index]] = ([], [])
+    shapes = replaced = 0
+    for a in range(0, len(segment), _BLOCK):
+        part = _block(moves, points, a, min(a + _BLOCK, len(segment)))
+        for values, some in zip(kept, (part.seconds, part.time, part.path), strict=True):
+            values.append(some)
+        numbers[0].append(part.shape + shapes)
+        numbers[1].append(part.owner)
+        shapes += len(part.path)
+        replaced += part.replaced
+    seconds, time, path = (_emptied(values) for values in kept)
+    shape, owner = (_emptied(values) for values in numbers)
     waits = np.flatnonzero(dwell > 0.0)
     if waits.size:
         # a dwell belongs to the segment that ends there; the one before the first move, to the first
@@ -114,19 +119,11 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
     return Overlapped(Motion(start, time, path, shape, route.line[origin]), origin, replaced)
 
 
-def groups_of_same(point_mm: Array) -> Index:
-    """(n,) number of each way-point once those within 1e-9 mm of the first of their group are taken as
-    one."""
-    step = np.sqrt((np.diff(point_mm, axis=0) ** 2).sum(axis=1))
-    begins = np.concatenate(([True], step > SAME_MM))
-    kept = -1
-    # way-points that creep: each within reach of the one before, the whole not
-    for k in np.flatnonzero(~begins).tolist():
-        if begins[k - 1]:
-            kept = k - 1
-        begins[k] = bool(np.sqrt(((point_mm[k] - point_mm[kept]) ** 2).sum()) > SAME_MM)
-    result: Index = np.cumsum(begins) - 1
-    return result
+def _emptied(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:
+    """One array of the parts, which are let go."""
+    whole = np.concatenate(parts)
+    parts.clear()
+    return whole
 
 
 def _check(route: Route, limits: AxisLimits) -> None:
@@ -151,13 +148,13 @@ def _moves(point: Array, feed: Array, tolerance: Array, limits: AxisLimits) -> _
     length = np.sqrt((delta * delta).sum(axis=1))
     along = delta / length[:, None]
     size = np.maximum(np.abs(along), _ALONG)
-    speed = np.minimum((limits.velocity / size).min(axis=1), feed)
-    acceleration = (limits.acceleration / size).min(axis=1)
-    jerk = (limits.jerk / size).min(axis=1)
+    speed = np.minimum((limits.velocity / size).min(axis=1), feed) * _INSIDE
+    acceleration = (limits.acceleration / size).min(axis=1) * _INSIDE
+    jerk = (limits.jerk / size).min(axis=1) * _INSIDE
     push = along * jerk[:, None]
     before, after = push[:-1], push[1:]
     summed = (limits.jerk / np.maximum(np.abs(before + after), _ALONG * limits.jerk)).min(axis=1)
-    share = np.minimum(1.0, summed)
+    share = np.minimum(1.0, summed * _INSIDE)
     turn = np.sqrt(((after - before) ** 2).sum(axis=1))
     inner = tolerance[1:-1]
     # way-point no farther away than the tolerance
@@ -196,9 +193,7 @@ def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
     v0, a0, d0 = head_jerk * head * head / 2.0, head_jerk * head, head_jerk * head**3 / 6.0
     v1, a1, d1 = tail_jerk * tail * tail / 2.0, -tail_jerk * tail, tail_jerk * tail**3 / 6.0
     middle = length - d0 - d1
-    solved = solve_all(
-        middle, v0, a0, v1, a1, moves.speed[pick], moves.acceleration[pick], jerk
-    )
+    solved = solve_all(middle, v0, a0, v1, a1, moves.speed[pick], moves.acceleration[pick], jerk)
     state = states(solved.duration_s, solved.jerk, middle, v0, a0, v1, a1)
     # columns of a move: its overlap, then the phases; those of no duration are dropped
     seconds = np.concatenate((head[:, None], solved.duration_s), axis=1)

@@ -83,7 +83,8 @@ def solve_all(
 
 
 def _check(length: Array, v0: Array, a0: Array, v1: Array, a1: Array, V: Array, A: Array, J: Array) -> None:
-    for name, values in (("length", length), ("speed limit", V), ("acceleration limit", A), ("jerk limit", J)):
+    positive = (("length", length), ("speed limit", V), ("acceleration limit", A), ("jerk limit", J))
+    for name, values in positive:
         if not bool(np.all(np.isfinite(values) & (values > 0.0))):
             raise UsageError(f"{name} of a move is not a number above 0")
     for name, values in (("start speed", v0), ("end speed", v1)):
@@ -171,7 +172,7 @@ def _reaches(
         top = np.maximum(v.max(axis=1), v1)
         small = 1e-9 * np.maximum(top, 1e-3 * V)
         close = np.minimum(_CLOSE_MM, 1e-6 * length) + 1e-14 * length
-        fine = (np.isfinite(duration) & np.isfinite(jerk) & (duration >= 0.0)).all(axis=1)
+        fine: Mask = np.asarray((np.isfinite(duration) & np.isfinite(jerk) & (duration >= 0.0)).all(axis=1))
         fine &= state.missing[0] <= close
         fine &= state.missing[1] <= small
         fine &= state.missing[2] <= 1e-9 * np.minimum(A, J * duration.sum(axis=1))
@@ -191,5 +192,5 @@ def _closed_form(
         few = [x[again] for x in (length, v0, a0, v1, a1, V, A, J)]
         wide = [*few[:6], few[6] * _REACH, few[7] * _REACH]
         duration[again], jerk[again], found = through_peak(*wide)
-        exists[again] = found & _reaches(duration[again], jerk[again], *few[:6], *(x * _REACH for x in few[6:]))
+        exists[again] = found & _reaches(duration[again], jerk[again], *wide)
     return duration, jerk, exists

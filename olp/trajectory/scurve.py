@@ -80,8 +80,9 @@ def _after(t: Array, j: Array, p: Array, v: Array, a: Array) -> tuple[Array, Arr
 
 
 def through_peak(
-    length: Array, v0: Array, a0: Array, v1: Array, a1: Array, velocity: Array, acceleration: Array, jerk: Array
-) -> tuple[Array, Array, Mask]:
+    length: Array, v0: Array, a0: Array, v1: Array, a1: Array,
+    velocity: Array, acceleration: Array, jerk: Array,
+) -> tuple[Array, Array, Mask]:  # fmt: skip
     """Durations and jerks (m, 10) of moves over `length` from speed `v0`, acceleration `a0` to `v1`, `a1`,
     and whether such a move exists: speeds are >= 0 throughout, and it is the fastest of all where
     a0 >= 0 >= a1. The acceleration of a braking start, or of a rising end, is first taken to zero."""
@@ -127,7 +128,9 @@ def through_peak(
     return times, signs, exists
 
 
-def _change(v0: Array, a0: Array, v1: Array, acceleration: Array, jerk: Array) -> tuple[Array, Array, Array, Array]:
+def _change(
+    v0: Array, a0: Array, v1: Array, acceleration: Array, jerk: Array
+) -> tuple[Array, Array, Array, Array]:
     """Times of the three phases, and the distance, from speed v0 with acceleration a0 >= 0 up to v1 with
     none."""
     free = np.sqrt(np.maximum(jerk * (v1 - v0) + a0 * a0 / 2.0, 0.0))

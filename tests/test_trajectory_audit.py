@@ -1,0 +1,143 @@
+"""The audit against brute force, and what it must notice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from olp.exceptions import UsageError
+from olp.trajectory.audit import audit, path_deviation, slowing
+from olp.trajectory.motion import Motion
+from olp.trajectory.overlap import overlap_parts
+from olp.trajectory.route import AxisLimits, Route
+
+LIMITS = AxisLimits(np.array([50.0, 40.0, 30.0]), np.array([500.0, 300.0, 200.0]), np.array([5e3, 4e3, 3e3]))
+number = st.floats(-10.0, 10.0)
+
+
+def motion_of(time, path, seconds) -> Motion:
+    count = len(seconds)
+    return Motion(
+        np.concatenate(([0.0], np.cumsum(seconds))), np.array(time, float), np.array(path, float),
+        np.arange(count), np.arange(count),
+    )  # fmt: skip
+
+
+@st.composite
+def motions(draw, composed):
+    count = draw(st.integers(1, 4))
+    time, path = [], []
+    for _ in range(count):
+        shape = np.array([[draw(number) for _ in range(3)] for _ in range(4)])
+        drive = np.array([draw(number) for _ in range(4)])
+        kind = "composed" if composed else draw(st.sampled_from(["straight", "steady"]))
+        if kind == "straight":
+            shape[2:] = 0.0
+        if kind == "steady":
+            drive[2:] = 0.0
+        time.append(drive)
+        path.append(shape)
+    return motion_of(time, path, [draw(st.floats(0.01, 2.0)) for _ in range(count)])
+
+
+def brute(motion: Motion, count: int):
+    k = np.repeat(np.arange(len(motion)), count)
+    u = np.tile(np.linspace(0.0, 1.0, count), len(motion)) * np.diff(motion.start_s)[k]
+    found = motion.of(k, u)[1:]
+    return [np.abs(x).max(axis=0) for x in found], np.sqrt((found[0] ** 2).sum(axis=1)).max()
+
+
+@settings(deadline=None, max_examples=200)
+@given(motions(composed=False))
+def test_cubics_are_measured_exactly(motion):
+    found = audit(motion, LIMITS, np.full(len(motion), 7.0))
+    (velocity, acceleration, jerk), speed = brute(motion, 2001)
+    for ratio, most, limit in (
+        (found.velocity, velocity, LIMITS.velocity), (found.acceleration, acceleration, LIMITS.acceleration),
+        (found.jerk, jerk, LIMITS.jerk),
+    ):  # fmt: skip
+        assert np.all(ratio * limit >= most * (1 - 1e-9) - 1e-9)
+        assert np.all(ratio * limit <= most * (1 + 1e-3) + 1e-3)
+    assert speed * (1 - 1e-6) - 1e-9 <= found.feed * 7.0 <= speed * (1 + 1e-3) + 1e-3
+
+
+@settings(deadline=None, max_examples=50)
+@given(motions(composed=True))
+def test_composed_pieces_are_looked_at_on_both_ends_and_inside(motion):
+    found = audit(motion, LIMITS)
+    (velocity, _, jerk), _ = brute(motion, 2)
+    assert np.all(found.velocity * LIMITS.velocity >= velocity * (1 - 1e-12))
+    assert np.all(found.jerk * LIMITS.jerk >= jerk * (1 - 1e-12))
+    most = brute(motion, 401)[0][0]
+    assert np.all(found.velocity * LIMITS.velocity >= 0.8 * most)
+
+
+@settings(deadline=None, max_examples=50)
+@given(motions(composed=False))
+def test_slowed_by_its_factor_a_motion_keeps_its_limits(motion):
+    feeds = np.full(len(motion), 7.0)
+    factor = slowing(audit(motion, LIMITS, feeds))
+    assert factor >= 1.0
+    assert slowing(audit(motion.slowed(factor), LIMITS, feeds)) <= 1.0 + 1e-9
+
+
+def test_jumps_are_seen_also_between_blocks(monkeypatch):
+    monkeypatch.setattr("olp.trajectory.audit._BLOCK", 1)
+    path = np.zeros((2, 4, 3))
+    path[0, 1], path[1, 0], path[1, 1] = [1, 0, 0], [1.5, 0, 0], [3, 0, 0]
+    time = [[0, 1, 0, 0], [0, 1, 2, 0]]
+    found = audit(motion_of(time, path, [1.0, 1.0]), LIMITS)
+    assert found.position_jump_mm == pytest.approx(0.5)
+    assert found.velocity_jump_mm_s == pytest.approx(2.0)
+    assert found.acceleration_jump_mm_s2 == pytest.approx(12.0)
+
+
+def test_one_feed_for_each_piece():
+    motion = Motion.rest(np.zeros(3), 1.0, 1)
+    with pytest.raises(UsageError, match="feeds"):
+        audit(motion, LIMITS, np.ones(2))
+    with pytest.raises(UsageError, match="segments"):
+        path_deviation(motion, route_of(np.zeros((2, 3))), np.zeros(2, np.int64))
+    assert audit(motion, LIMITS, np.ones(1)).feed == 0.0
+
+
+def route_of(points) -> Route:
+    points = np.asarray(points, float)
+    n = len(points)
+    near = np.full(n, 0.05)
+    near[[0, -1]] = 0.0
+    return Route(points, np.full(n - 1, 20.0), np.arange(n - 1), near, np.zeros(n))
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6), st.integers(3, 120))
+def test_a_search_finds_no_less_than_the_known_segments(seed, count):
+    random = np.random.default_rng(seed)
+    points = np.cumsum(random.normal(0.0, 1.0, (count, 3)) * random.choice([1.0, 0.02], (count, 1)), axis=0)
+    route = route_of(points)
+    parts = overlap_parts(route, LIMITS)
+    known = path_deviation(parts.motion, route, parts.segment)
+    found = path_deviation(parts.motion, route)
+    assert known.max() <= 0.05 * (1 + 1e-6)
+    assert found.max() <= 0.05 * (1 + 1e-6)
+
+
+def test_a_path_driven_back_and_forth():
+    route = route_of([[0, 0, 0], [10, 0, 0], [0, 0, 0], [10, 0, 0], [10, 5, 0]] * 20)
+    parts = overlap_parts(route, LIMITS)
+    assert path_deviation(parts.motion, route).max() <= 0.05
+
+
+def test_a_detour_is_seen():
+    route = route_of([[0, 0, 0], [10, 0, 0], [10, 10, 0]])
+    other = route_of([[0, 0, 0], [10, 0, 0], [12, 5, 0], [10, 10, 0]])
+    parts = overlap_parts(other, LIMITS)
+    assert path_deviation(parts.motion, route, np.minimum(parts.segment, 1), 9).max() > 1.9
+    assert path_deviation(parts.motion, route, places=9).max() > 1.9
+
+
+def test_one_way_point():
+    route = Route(np.ones((1, 3)), np.zeros(0), np.zeros(0, np.int64), np.zeros(1), np.ones(1))
+    assert path_deviation(Motion.rest(np.array([1.0, 1.0, 3.0]), 1.0, 0), route).tolist() == [2.0]
