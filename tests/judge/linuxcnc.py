@@ -48,6 +48,7 @@ class CanonMoves:
     centre: np.ndarray  # (n, 3) arc centre as an axis position, at the height of the end
     turns: np.ndarray  # (n,) arcs: > 0 counter-clockwise, |turns| circles begun
     plane: np.ndarray  # (n,) 0 XY, 1 YZ, 2 XZ
+    seconds: np.ndarray  # (n,) of dwells
     g92: np.ndarray  # (n, 3)
     known: np.ndarray  # (n, 3) axis position at the end does not depend on the start position
     start_known: bool = True
@@ -72,6 +73,7 @@ class CanonMoves:
             centre=nil,
             turns=ints,
             plane=ints,
+            seconds=np.zeros(n),
             g92=nil,
             known=np.ones((n, 3), bool),
         )
@@ -226,6 +228,7 @@ def _run(data: bytes, setup: _Setup, start_mm: Point) -> CanonMoves:
         rows[:, 11:14] + length,
         rows[:, 14].astype(int),
         rows[:, 15].astype(int) - 1,
+        rows[:, 16],
         rows[:, 17:20],
         np.ones(tip.shape, bool),
         ended=report["error"] is None,
