@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from olp.exceptions import ProgramError as ProgramError
     from olp.files.config import load_setup as load_setup
     from olp.findings import Finding as Finding
+    from olp.retiming import Retiming as Retiming
+    from olp.retiming import retime as retime
 
 _HOME = {
     "Correction": "olp.api",
@@ -40,6 +42,8 @@ _HOME = {
     "error_at": "olp.api",
     "flatten": "olp.api",
     "inspect": "olp.api",
+    "retime": "olp.retiming",
+    "Retiming": "olp.retiming",
     "simulate": "olp.api",
     "verify": "olp.api",
     "CannotCompute": "olp.exceptions",

@@ -25,10 +25,11 @@ LAYERS = (
     {"checks"},
     {"scene"},
     {"report", "plots"},
+    {"report_time"},
     {"files"},
     {"review"},
     {"loading"},
-    {"correction"},
+    {"correction", "retiming"},
     {"api"},
     {"cli"},
 )

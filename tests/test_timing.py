@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -210,6 +211,12 @@ def test_the_tolerance_of_bare_g64_is_the_callers() -> None:
     assert timing(reading("G1 X1 F60\n"), blend_mm=0.2).blend_mm.tolist() == [0.2]
 
 
+@pytest.mark.parametrize("blend", [0.0, -1.0, math.nan])
+def test_a_tolerance_of_nothing_is_refused(blend: float) -> None:
+    with pytest.raises(UsageError, match="above zero"):
+        timing(reading("G1 X1 F60\n"), blend_mm=blend)
+
+
 def test_block_delete_takes_its_words_away() -> None:
     text = "G1 X1 F60\n / F120\n/G4 P3\nX2 (a/b)\n"
     on, off = timed(text), timed(text, block_delete=True)
@@ -296,6 +303,18 @@ def test_inverse_times_are_linuxcncs(tmp_path: Path, seed: int) -> None:
         rows.append(f"{'G20' if inch else 'G21'} {move} {word}")
         at = np.round(to / unit, 4) * unit
     assert compare(("\n".join(rows) + "\nM2\n").encode(), machines.random_machine(tmp_path, seed)) == 60
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("back", ["G98", "G99"])
+@pytest.mark.parametrize("code", ["G73", "G74", "G81", "G82", "G83", "G84", "G85", "G86", "G89"])
+def test_feeds_and_dwells_of_cycles_are_linuxcncs(tmp_path: Path, code: str, back: str) -> None:
+    dwell = "" if code in ("G73", "G81", "G83", "G85") else "P0.25"
+    peck = "Q2" if code in ("G73", "G83") else ""
+    turn = "M4" if code == "G74" else "M3"
+    text = f"G21 G90 G54\nS500 {turn}\nF123\nG0 X1 Y1 Z9\n{back} {code} X5 Z-3 R2 {peck} {dwell} F77\nX9\n"
+    text += "G91 Y2 L3 F50\nG80 G90\nG4 P0.5\nG1 X0\nM2\n"
+    assert compare(text.encode(), machines.random_machine(tmp_path, 1)) >= 6
 
 
 @pytest.mark.oracle

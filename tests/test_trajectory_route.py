@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from test_corpus import PROFILE_OF, programs
+from test_corpus import setups as setups  # a fixture
 from test_programs_folder import FOLDER, JOBS
 from test_timing import reading, setup_of
 
@@ -324,3 +327,19 @@ def test_shipped_programs_and_their_corrections_give_routes(name: str) -> None:
         assert b.dwell_s.sum() == pytest.approx(a.dwell_s.sum())
         np.testing.assert_allclose(b.point_mm.max(axis=0), a.point_mm.max(axis=0), atol=0.2)
         np.testing.assert_allclose(b.point_mm.min(axis=0), a.point_mm.min(axis=0), atol=0.2)
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize("folder", PROFILE_OF)
+def test_real_programs_give_routes(corpus: Path, setups: dict[str, tuple[Path, Path]], folder: str) -> None:
+    setup = load_setup(*setups[folder])
+    done = 0
+    for path in programs(corpus, folder):
+        try:
+            program = read(path.read_bytes(), setup, PROFILES[PROFILE_OF[folder]])
+        except ProgramError:
+            continue
+        for route in routes(program):
+            sound(route)
+        done += 1
+    assert done >= 8

@@ -22,6 +22,7 @@ VERBS = {
     "correct": "Correct a program with the machine's calibrated errors, and prove it.",
     "verify": "Prove a corrected program from the two texts alone.",
     "simulate": "Write the path that the machine would really take, as CSV.",
+    "retime": "Re-time a program within the limits of the axes, and say how long it takes.",
     "schema": "Print the JSON Schema of a machine, calibration or job file.",
     "explain": "Explain the code of a finding, or list all codes.",
 }

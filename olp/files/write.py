@@ -11,6 +11,8 @@ from pathlib import Path
 from olp.exceptions import InputError, OlpError, UsageError
 
 PathLike = str | os.PathLike[str]
+#: a whole file, or its parts in order
+Content = bytes | Iterable[bytes]
 
 
 def read_bytes(path: PathLike) -> bytes:
@@ -32,13 +34,19 @@ def read_bytes(path: PathLike) -> bytes:
         raise InputError(f"cannot be read ({_reason(error)})", file=str(path)) from None
 
 
-def write_bytes(path: PathLike, data: bytes, *, force: bool = False, inputs: Iterable[PathLike] = ()) -> None:
+def write_bytes(
+    path: PathLike, data: Content, *, force: bool = False, inputs: Iterable[PathLike] = ()
+) -> None:
     """Write one file as `write_files` does."""
     write_files({Path(path): data}, force=force, inputs=inputs)
 
 
-def write_files(files: Mapping[Path, bytes], *, force: bool = False, inputs: Iterable[PathLike] = ()) -> None:
+def write_files(
+    files: Mapping[Path, Content], *, force: bool = False, inputs: Iterable[PathLike] = ()
+) -> None:
     """Write files, each whole or not at all; where one cannot be written, none is put in place.
+
+    What comes in parts is written part by part, so that a long file never has to be in memory.
 
     Each goes to a temporary file beside its target and is synced; then all replace their targets. A device
     such as the null device is written to directly. Raises UsageError where a target is one of `inputs`
@@ -53,7 +61,8 @@ def write_files(files: Mapping[Path, bytes], *, force: bool = False, inputs: Ite
     try:
         for current, data in files.items():
             if current.exists() and not current.is_file():
-                current.write_bytes(data)
+                with current.open("wb") as device:
+                    device.writelines([data] if isinstance(data, bytes) else data)
                 continue
             # A link keeps pointing to the file that is written.
             final = Path(os.path.realpath(current))
@@ -88,9 +97,9 @@ def _check(target: Path, force: bool, sources: Iterable[Path]) -> None:
         raise UsageError("exists already; name another file, or overwrite it with --force", file=str(target))
 
 
-def _write_synced(path: Path, data: bytes) -> None:
+def _write_synced(path: Path, data: Content) -> None:
     with path.open("xb") as stream:
-        stream.write(data)
+        stream.writelines([data] if isinstance(data, bytes) else data)
         stream.flush()
         os.fsync(stream.fileno())
 

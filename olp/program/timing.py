@@ -57,8 +57,10 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
 
     `blend_mm` is the tolerance where the path mode is G64 without one; `block_delete` as in the reading.
     Raises ProgramError with its line for a feed move without a feed, and for a feed or a dwell that cannot
-    be read right; UsageError where the program was read without words.
+    be read right; UsageError for a tolerance of nothing, and where the program was read without words.
     """
+    if not blend_mm > 0:
+        raise UsageError(f"the tolerance of G64 is {blend_mm:g} mm; expected a length above zero")
     if program.words is None:
         raise UsageError("the program was read without its words; re-timing needs them")
     scan = Scan.of(program, program.words, block_delete=block_delete)

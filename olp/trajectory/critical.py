@@ -25,8 +25,12 @@ from olp.trajectory.smooth import SmoothPath
 
 Mask = npt.NDArray[np.bool_]
 
-#: share of each limit that curvature may use up at full speed, and of the jerk left that 3 q'' v a may
-_BY_SPEED, _BY_CROSS = 0.5, 0.5
+#: share of each limit that curvature may use up at full speed: in general, where the first profile holds its
+#: speed, and in a bend between straights, where nothing is left to do but to pass
+_BY_SPEED, _BY_DIP, _BY_BEND = 0.6, 0.8, 0.97
+#: share of the jerk left that 3 q'' v a may use up
+_BY_CROSS = 0.5
+_LEVEL = 1.02
 _BINDS, _TOO_FAST, _PATIENT = 1e-6, 1e-8, 40
 _TINY = 1e-300
 _BLOCK = 1 << 17
@@ -45,18 +49,19 @@ class Profile:
     jerk: Array
 
 
-def ceilings(path: SmoothPath, limits: AxisLimits) -> tuple[Array, Array, Array]:
-    """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold."""
+def ceilings(path: SmoothPath, limits: AxisLimits, share: Array) -> tuple[Array, Array, Array]:
+    """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold, when
+    curvature may use up the `share` (k,) of acceleration and jerk at full speed."""
     n = len(path)
     result = np.empty((3, n))
     for lo in range(0, n, _BLOCK):
         part = slice(lo, min(lo + _BLOCK, n))
         result[:, part] = _ceilings(np.diff(path.break_mm[lo : part.stop + 1]), path.shape[part],
-                                    path.feed_mm_s[part], limits)  # fmt: skip
+                                    path.feed_mm_s[part], limits, share[part])  # fmt: skip
     return result[0], result[1], result[2]
 
 
-def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits) -> Array:
+def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits, share: Array) -> Array:
     h = length[:, None]
     first, second, third = shape[:, 1], 2.0 * shape[:, 2], 6.0 * shape[:, 3]
     # q' is a parabola, inside the hull of its three control points; q'' is linear
@@ -68,8 +73,8 @@ def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits) -> A
     m1, m2, m3 = (np.maximum(e, _TINY) for e in (m1, m2, m3))
     with np.errstate(over="ignore"):
         v = np.minimum((limits.velocity / m1).min(axis=1), feed / np.maximum(size, _TINY))
-        v = np.minimum(v, np.sqrt(_BY_SPEED * (limits.acceleration / m2).min(axis=1)))
-        v = np.minimum(v, np.cbrt(_BY_SPEED * (limits.jerk / m3).min(axis=1)))
+        v = np.minimum(v, np.sqrt(share * (limits.acceleration / m2).min(axis=1)))
+        v = np.minimum(v, np.cbrt(share * (limits.jerk / m3).min(axis=1)))
         cross = 3.0 * m2 * v[:, None]
         left = limits.jerk - m3 * (v**3)[:, None]
         a = ((limits.acceleration - m2 * (v**2)[:, None]) / m1).min(axis=1)
@@ -78,9 +83,9 @@ def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits) -> A
     return np.stack((v, a, j))
 
 
-def profile(path: SmoothPath, limits: AxisLimits) -> Profile:
-    """The speed profile from rest to rest, within the ceilings of every piece."""
-    top, most_a, most_j = ceilings(path, limits)
+def profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
+    """The speed profile from rest to rest, within the ceilings of every piece for `share` (k,)."""
+    top, most_a, most_j = ceilings(path, limits, share)
     x = path.break_mm
     ceiling = np.concatenate(([0.0], np.minimum(top[:-1], top[1:]), [0.0]))
     node = _dips(x, top, ceiling, most_a)
@@ -196,7 +201,39 @@ def critical(path: SmoothPath, limits: AxisLimits) -> Motion:
     """The motion along `path` from rest to rest; no axis limit and no feed is exceeded."""
     if not len(path):
         return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), np.zeros(0, np.int64), path.line)
-    return driven(path, profile(path, limits))
+    share = _shares(path)
+    first = profile(path, limits, share)
+    _give_dips(first, share)
+    second = profile(path, limits, share)
+    return driven(path, min(first, second, key=lambda found: _seconds(path, found)))
+
+
+def _shares(path: SmoothPath) -> Array:
+    """(k,) share of the limits for curvature, from the look of the path."""
+    straight = np.ones(len(path) + 4, bool)
+    straight[2:-2] = ~path.shape[:, 2:].any(axis=(1, 2))
+    lonely = ~straight[2:-2] & (
+        (straight[1:-3] & straight[4:]) | (straight[:-4] & straight[3:-1]) | (straight[1:-3] & straight[3:-1])
+    )
+    return np.where(lonely, _BY_BEND, _BY_SPEED)
+
+
+def _give_dips(found: Profile, share: Array) -> None:
+    """Where the profile holds its speed over a whole piece between two nodes, curvature may use up more."""
+    held = np.diff(found.node) == 1
+    held &= found.peak < _LEVEL * np.minimum(found.speed[:-1], found.speed[1:])
+    dips = found.node[:-1][held]
+    share[dips] = np.maximum(share[dips], _BY_DIP)
+
+
+def _seconds(path: SmoothPath, found: Profile) -> float:
+    way = np.diff(path.break_mm[found.node])
+    total = np.zeros_like(way)
+    for end in (found.speed[:-1], found.speed[1:]):
+        ramp = ramps.seconds(end, found.peak, found.acceleration, found.jerk)
+        way -= 0.5 * (end + found.peak) * ramp
+        total += ramp
+    return float((total + np.maximum(way, 0.0) / found.peak).sum())
 
 
 def driven(path: SmoothPath, found: Profile) -> Motion:

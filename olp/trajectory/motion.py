@@ -1,4 +1,4 @@
-"""A motion in time, in pieces: positions, velocities, accelerations and jerks at any time, exact to the pieces."""
+"""A motion in time, in pieces: positions and their derivatives at any time, exact to the pieces."""
 
 from __future__ import annotations
 
@@ -70,7 +70,9 @@ class Motion:
         """The same path in `factor` times the time: speeds shrink by it, accelerations by its square."""
         scale = factor ** -np.arange(4.0)
         begin = self.start_s[0] if len(self.start_s) else 0.0
-        return Motion(begin + (self.start_s - begin) * factor, self.time * scale, self.path, self.shape, self.line)
+        return Motion(
+            begin + (self.start_s - begin) * factor, self.time * scale, self.path, self.shape, self.line
+        )
 
     def shifted(self, by_s: float) -> Motion:
         return Motion(self.start_s + by_s, self.time, self.path, self.shape, self.line)
@@ -81,7 +83,11 @@ class Motion:
         path = np.zeros((1, 4, 3))
         path[0, 0] = at_mm
         return Motion(
-            np.array([0.0, seconds]), np.zeros((1, 4)), path, np.zeros(1, np.int64), np.array([line], np.int64)
+            np.array([0.0, seconds]),
+            np.zeros((1, 4)),
+            path,
+            np.zeros(1, np.int64),
+            np.array([line], np.int64),
         )
 
     @staticmethod

@@ -33,10 +33,11 @@ _REVERSAL = 1e-3
 #: a bend of this little is none
 _STRAIGHT = 1e-12
 #: share of acceleration and jerk that a kernel should use at full feed; wider by _WIDER is never of use
-_SHARE, _WIDER = 0.25, 1.5
+_SHARE, _WIDER = 0.25, 1.25
 #: most of the way to the ends of the run, where the path must be straight
 _END = 0.6
 _SHRINK, _LEAST_SHRINK, _ROUNDS = 0.95, 0.3, 200
+_POWER = 0.4
 #: breaks worked on at a time
 _BLOCK = 1 << 17
 
@@ -227,7 +228,7 @@ def _fitted(
         narrow = factor < 1.0
         if not narrow.any():
             break
-        factor = np.maximum(_SHRINK * factor, _LEAST_SHRINK)
+        factor = np.maximum(_SHRINK * factor**_POWER, _LEAST_SHRINK)
         width = np.where(narrow, np.maximum(np.floor(width * factor / grid), 1.0) * grid, width)
         if turn > _ROUNDS // 2 and (width[narrow] == grid).all():
             break

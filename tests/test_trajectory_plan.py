@@ -1,0 +1,171 @@
+"""The planner over all solvers: limits, path, progress, and that it never fails on what is finite."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import olp
+from olp.exceptions import CannotCompute
+from olp.files import trajectory as files
+from olp.trajectory import plan as planner
+from olp.trajectory.plan import Trajectory, plan
+from olp.trajectory.route import AxisLimits, Route
+
+LIMITS = AxisLimits(np.array([500.0, 400.0, 300.0]), np.array([5e3, 4e3, 3e3]), np.array([1e5, 8e4, 6e4]))
+PROGRAMS = Path(__file__).resolve().parents[1] / "programs"
+JOBS = ("gantry-plate", "bridge-cmm", "table-router", "haas-mill")
+
+
+def route_of(points: np.ndarray, feed: float = 100.0, tolerance: float = 0.01) -> Route:
+    count = len(points)
+    return Route(
+        np.asarray(points, float), np.full(count - 1, feed), np.arange(1, count), np.full(count, tolerance),
+        np.zeros(count),
+    )  # fmt: skip
+
+
+def assert_within(found: Trajectory, limits: AxisLimits, feed: float = np.inf) -> None:
+    """Sampled at 1 kHz and inside every piece, and by differences of the samples."""
+    motion = found.motion
+    inside = (
+        motion.start_s[:-1, None] + np.diff(motion.start_s)[:, None] * np.linspace(0.0, 1.0, 7)[1:-1]
+    ).ravel()
+    for times in (found.sample_times(1e-3), inside):
+        _, velocity, acceleration, jerk, _ = found.at(times)
+        assert (np.abs(velocity) <= limits.velocity * (1 + 1e-6)).all()
+        assert (np.abs(acceleration) <= limits.acceleration * (1 + 1e-6)).all()
+        assert (np.abs(jerk) <= limits.jerk * (1 + 1e-6)).all()
+        assert (np.sqrt((velocity * velocity).sum(axis=1)) <= feed * (1 + 1e-6)).all()
+    position = found.at(np.arange(0.0, found.duration_s, 1e-3))[0]
+    for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+        # positions of 1e3 mm carry 1e-13 mm
+        noise = 1e-12 * 2**order / 1e-3**order
+        assert (np.abs(np.diff(position, order, axis=0)) / 1e-3**order <= limit * (1 + 1e-6) + noise).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    count=st.integers(2, 40),
+    scale=st.sampled_from([1e-3, 0.05, 1.0, 50.0]),
+    feed=st.sampled_from([1.0, 30.0, 200.0, np.inf]),
+    tolerance=st.sampled_from([0.0, 1e-3, 0.02, 1.0]),
+)
+def test_any_polyline_is_driven_within_all_limits(
+    seed: int, count: int, scale: float, feed: float, tolerance: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(size=(count, 3)) * scale * np.exp(rng.normal(size=(count, 1))), axis=0)
+    route = route_of(points, feed, tolerance)
+    found = plan(route, LIMITS)
+    assert_within(found, LIMITS, feed)
+    assert max(leg.deviation_mm for leg in found.legs) <= tolerance * (1 + 1e-6) + 1e-9
+    begin, end = found.at(np.array([0.0, found.duration_s]))[0]
+    assert np.abs(begin - points[0]).max() <= 1e-9
+    assert np.abs(end - points[-1]).max() <= 1e-9
+    for state in found.at(np.array([0.0, found.duration_s]))[1:3]:
+        assert np.abs(state).max() <= 1e-6
+
+
+def test_lines_come_in_order_and_their_times_add_up() -> None:
+    rng = np.random.default_rng(4)
+    found = plan(route_of(np.cumsum(rng.normal(size=(30, 3)), axis=0)), LIMITS)
+    lines, seconds = found.seconds_by_line()
+    assert (np.diff(found.motion.line) >= 0).all()
+    assert seconds.sum() == pytest.approx(found.duration_s)
+    assert set(lines.tolist()) <= set(range(1, 30))
+
+
+def test_dwells_are_waited_at_rest() -> None:
+    points = np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 0, 0]])
+    route = route_of(points)
+    waiting = replace(route, dwell_s=np.array([0.5, 1.25, 0.25]))
+    stopped = replace(route, tolerance_mm=np.zeros(3))
+    assert plan(waiting, LIMITS).duration_s == pytest.approx(plan(stopped, LIMITS).duration_s + 2.0)
+
+
+def test_a_solver_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    route = route_of(np.cumsum(np.random.default_rng(1).normal(size=(20, 3)), axis=0))
+
+    def broken(*args: object) -> None:
+        raise ValueError("no")
+
+    for name in ("smooth", "critical", "overlap"):
+        with monkeypatch.context() as patch:
+            patch.setattr(planner, name, broken)
+            if name == "overlap":
+                assert {leg.solver for leg in plan(route, LIMITS).legs} == {planner.CRITICAL}
+            else:
+                assert {leg.solver for leg in plan(route, LIMITS).legs} <= {
+                    planner.OVERLAP,
+                    planner.EXACT_STOP,
+                }
+
+
+@pytest.mark.parametrize("what", ["point_mm", "tolerance_mm", "dwell_s", "feed_mm_s"])
+def test_what_is_not_finite_is_refused(what: str) -> None:
+    route = route_of(np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 0, 0]]))
+    values = getattr(route, what).copy()
+    values[1] = np.nan
+    with pytest.raises(CannotCompute):
+        plan(replace(route, **{what: values}), LIMITS)
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_shipped_jobs(job: str) -> None:
+    folder = PROGRAMS / job
+    stated = olp.load_setup(folder / "machine.toml", folder / "job.toml").job
+    assert stated.program is not None
+    found = olp.retime(stated.program, folder / "machine.toml", folder / "job.toml")
+    assert found.duration_s > 10.0
+    for trajectory in found.trajectories:
+        assert_within(trajectory, trajectory.limits)
+        assert all(leg.factor < 1.01 for leg in trajectory.legs)
+    assert found.report["path_deviation_um"] <= 100.0
+
+
+# -- files ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def corner() -> Trajectory:
+    return plan(route_of(np.array([[0.0, 0, 0], [3.0, 0, 0], [3.0, 2.0, 1.0]])), LIMITS)
+
+
+def test_csv_gives_every_digit_back(corner: Trajectory) -> None:
+    table = np.loadtxt(io.BytesIO(b"".join(files.csv(corner, 1e-3))), delimiter=",", skiprows=1)
+    position, velocity, acceleration, _, line = corner.at(corner.sample_times(1e-3))
+    assert (table[:, 0] == corner.sample_times(1e-3)).all()
+    assert (table[:, 1:4] == position).all()
+    assert (table[:, 4:7] == velocity).all()
+    assert (table[:, 7:10] == acceleration).all()
+    assert (table[:, 10] == line).all()
+
+
+def test_npz_holds_samples_and_pieces(corner: Trajectory) -> None:
+    with np.load(io.BytesIO(files.npz(corner, 1e-3))) as table:
+        assert (table["position_mm"] == corner.at(table["t_s"])[0]).all()
+        assert (table["piece_start_s"] == corner.motion.start_s).all()
+
+
+def test_ros_is_in_metres(corner: Trajectory) -> None:
+    data = json.loads(files.ros(corner, 1e-3))
+    assert data["joint_names"] == ["X", "Y", "Z"]
+    end = data["points"][-1]
+    assert end["positions"] == pytest.approx([3e-3, 2e-3, 1e-3])
+    stamp = end["time_from_start"]
+    assert stamp["sec"] + stamp["nanosec"] * 1e-9 == pytest.approx(corner.duration_s, abs=1e-9)
+
+
+def test_pvt_times_add_up(corner: Trajectory) -> None:
+    table = np.loadtxt(io.BytesIO(b"".join(files.pvt(corner, 2e-3))), delimiter=",", skiprows=1)
+    assert table[:, 0].sum() == pytest.approx(corner.duration_s)
+    assert table[-1, [1, 3, 5]] == pytest.approx([3.0, 2.0, 1.0])
