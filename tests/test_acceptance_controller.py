@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 import olp
 
-pytestmark = [pytest.mark.oracle, pytest.mark.slow, pytest.mark.xdist_group("controller")]
+pytestmark = [pytest.mark.oracle, pytest.mark.slow]
 
 RANGE = ((-20.0, 20.0), (-20.0, 20.0), (-10.0, 10.0))
 #: what sampling adds, in um; with G61 the control stays on its interpreter's path

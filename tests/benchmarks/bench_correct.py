@@ -1,9 +1,9 @@
 """CPU time and memory of `olp correct` beside LinuxCNC listing the same file, in one run.
 
-    python tests/benchmarks/bench_correct.py [lines] [--peers-python PYTHON]
+    python tests/benchmarks/bench_correct.py [lines [python]]
 
 Prints user CPU seconds of whole commands (the least of three), their ratio, and the peak memory. Peers are
-timed where an interpreter has them (pip install gcode-lib pygcode). Needs LinuxCNC's rs274 for the ratio.
+timed where that python has them (pip install gcode-lib pygcode). Needs LinuxCNC's rs274 for the ratio.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def peers(program: Path, number: int, python: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("lines", nargs="?", default="1e6")
-    parser.add_argument("--peers-python", default=sys.executable)
+    parser.add_argument("peers_python", nargs="?", default=sys.executable)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import subprocess
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,7 +75,10 @@ def run(program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0) 
             if path.stat().st_uid == os.getuid() and (path.stat().st_mode & 0o055) != 0o055:
                 path.chmod(path.stat().st_mode | 0o055)
         folder.chmod(0o777)
-    with (folder / "log").open("wb") as log:
+    lock = Path(tempfile.gettempdir()) / "judge-controller.lock"
+    with lock.open("wb") as one, (folder / "log").open("wb") as log:
+        # its realtime part is one a machine: other processes of the tests wait
+        fcntl.flock(one, fcntl.LOCK_EX)
         subprocess.run(
             ["linuxcnc", str(folder / "m.ini")],
             env=env, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
