@@ -104,7 +104,7 @@ def axis_cubics(motion: Motion, piece: Index) -> tuple[Array, Mask]:
     """(n, 4, 3) axis positions of pieces (n,) as cubics of the time after their start, and where they are
     that; elsewhere the values mean nothing."""
     time, path = motion.time[piece], motion.path[motion.shape[piece]]
-    straight = ~path[:, 2:].any(axis=(1, 2))
+    straight = ~path[:, 2:].any(axis=(1, 2)) & ~time[:, 4:].any(axis=1)
     steady = ~time[:, 2:].any(axis=1)
     # of a straight path only the first rate is not zero, and a cubic of a steady parameter stays one
     c0, c1 = time[:, 0, None], time[:, 1, None]

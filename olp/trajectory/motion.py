@@ -14,11 +14,11 @@ Index = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Pieces of a path, each driven by a cubic in time.
+    """Pieces of a path, each driven by a polynomial in time.
 
     Piece k holds from `start_s[k]` to `start_s[k + 1]`; with u = t - start_s[k] the parameter is
     s = sum_i `time`[k, i] u^i, and the axis positions are sum_i `path`[`shape`[k], i] s^i in mm: `time`
-    (k, 4), `path` (m, 4, 3), `shape` (k,). Where axes move as cubics of time themselves, s = u. `line` (k,)
+    (k, 4) for cubics, (k, 6) where a solver needs quintics, `path` (m, 4, 3), `shape` (k,). Where axes move as cubics of time themselves, s = u. `line` (k,)
     is the program line of each piece.
     """
 
@@ -47,14 +47,9 @@ class Motion:
 
     def of(self, piece: Index, u: Array) -> tuple[Array, Array, Array, Array]:
         """The same at times `u` (n,) after the start of pieces (n,)."""
-        c0, c1, c2, c3 = self.time[piece].T
-        s = c0 + u * (c1 + u * (c2 + u * c3))
-        s1 = (c1 + u * (2.0 * c2 + 3.0 * u * c3))[:, None]
-        s2 = (2.0 * c2 + 6.0 * u * c3)[:, None]
-        s3 = (6.0 * c3)[:, None]
+        s, s1, s2, s3 = (e[:, None] for e in derivatives(self.time[piece], u))
         shape = self.path[self.shape[piece]]
         p0, p1, p2, p3 = (shape[:, i] for i in range(4))
-        s = s[:, None]
         q = p0 + s * (p1 + s * (p2 + s * p3))
         q1 = p1 + s * (2.0 * p2 + 3.0 * s * p3)
         q2 = 2.0 * p2 + 6.0 * s * p3
@@ -68,7 +63,7 @@ class Motion:
 
     def slowed(self, factor: float) -> Motion:
         """The same path in `factor` times the time: speeds shrink by it, accelerations by its square."""
-        scale = factor ** -np.arange(4.0)
+        scale = factor ** -np.arange(float(self.time.shape[1]))
         begin = self.start_s[0] if len(self.start_s) else 0.0
         return Motion(
             begin + (self.start_s - begin) * factor, self.time * scale, self.path, self.shape, self.line
@@ -93,8 +88,11 @@ class Motion:
     @staticmethod
     def joined(parts: Sequence[Motion]) -> Motion:
         """One after the other."""
-        start, shapes, offset, at = [], [], 0, 0.0
+        start, shapes, times, offset, at = [], [], [], 0, 0.0
+        wide = max(p.time.shape[1] for p in parts)
         for part in parts:
+            narrow = wide - part.time.shape[1]
+            times.append(np.pad(part.time, ((0, 0), (0, narrow))) if narrow else part.time)
             start.append(part.start_s[:-1] - part.start_s[0] + at)
             at += part.duration_s
             shapes.append(part.shape + offset)
@@ -102,8 +100,21 @@ class Motion:
         start.append(np.array([at]))
         return Motion(
             np.concatenate(start),
-            np.concatenate([p.time for p in parts]),
+            np.concatenate(times),
             np.concatenate([p.path for p in parts]),
             np.concatenate(shapes),
             np.concatenate([p.line for p in parts]),
         )
+
+
+def derivatives(coefficient: Array, u: Array) -> tuple[Array, Array, Array, Array]:
+    """(n,) values and first three derivatives at `u` (n,) of polynomials `coefficient` (n, 4 or more)."""
+    c = coefficient.T
+    f, f1, f2, f3 = c[-1], np.zeros_like(u), np.zeros_like(u), np.zeros_like(u)
+    for row in c[-2::-1]:
+        # Horner for the value and, over their factorials, its derivatives
+        f3 = f3 * u + f2
+        f2 = f2 * u + f1
+        f1 = f1 * u + f
+        f = f * u + row
+    return f, f1, 2.0 * f2, 6.0 * f3
