@@ -24,13 +24,18 @@ SQUARENESS = ("C0Y", "B0Z", "A0Z")
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Limits of one linear axis: travel (min, max) in mm; mm/s, mm/s2, mm/s3."""
+    """Limits of one linear axis: travel (min, max) in mm; mm/s, mm/s2, mm/s3.
+
+    `compliance_um_per_m_s2` is where the tool stands off its place relative to the workpiece, (X, Y, Z),
+    actual minus commanded, while the axis is accelerated by 1 m/s2.
+    """
 
     travel_mm: tuple[float, float]
     least_increment_mm: float
     velocity_mm_s: float
     acceleration_mm_s2: float
     jerk_mm_s3: float
+    compliance_um_per_m_s2: Vector = ZERO
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +88,8 @@ class Machine:
 
     `decimal_point` tells what a length without a decimal point means to a control that makes a difference
     (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator.
+    `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
+    (None: not stated).
     """
 
     name: str
@@ -97,6 +104,8 @@ class Machine:
     default_work_offset: str = "G54"
     length_active: bool = False
     decimal_point: Literal["increment", "calculator"] = "increment"
+    path_mode: Literal["blend", "exact-stop"] = "blend"
+    blend_mm: float | None = None
 
     @property
     def least_increment_mm(self) -> Vector:

@@ -70,6 +70,23 @@ MACHINE = {
     ),
     "velocity in quotes": ("= 500.0", '= "500"', ["axes.X.velocity_mm_s", "expected a number", "mm/s"]),
     "velocity infinite": ("= 500.0", "= inf", ["axes.X.velocity_mm_s = inf", "finite", "mm/s"]),
+    "compliance below zero": (
+        "jerk_mm_s3 = 20000.0",
+        "jerk_mm_s3 = 20000.0\ncompliance_um_per_m_s2 = -2.0",
+        ["axes.X.compliance_um_per_m_s2 = -2.0", "um per m/s2", "[X, Y, Z]"],
+    ),
+    "compliance of two numbers": (
+        "jerk_mm_s3 = 20000.0",
+        "jerk_mm_s3 = 20000.0\ncompliance_um_per_m_s2 = [1, 2]",
+        ["axes.X.compliance_um_per_m_s2 = [1, 2]", "[X, Y, Z]"],
+    ),
+    "path mode of no kind": (
+        'mode = "blend"',
+        'mode = "exact"',
+        ['path.mode = "exact"', '"blend"', '"exact-stop"'],
+    ),
+    "blend of nothing": ("blend_mm = 0.005", "blend_mm = 0", ["path.blend_mm = 0", "above 0", "mm"]),
+    "blend in um": ("blend_mm = 0.005", "blend_um = 5", ["path.blend_um", "blend_mm"]),
     "increment zero": (
         "least_increment_mm = 0.0005",
         "least_increment_mm = 0",

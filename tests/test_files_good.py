@@ -209,6 +209,7 @@ axes = st.builds(
     Axis,
     st.tuples(st.floats(-1e6, -1e-6), st.floats(0.0, 1e6)),
     *[positive] * 4,
+    vectors,
 )
 touched_offsets = st.builds(
     WorkOffset,
@@ -240,6 +241,8 @@ machines = st.builds(
     default_tool=st.none() | st.integers(0, 99),
     default_work_offset=st.text(min_size=1),
     length_active=st.booleans(),
+    path_mode=st.sampled_from(("blend", "exact-stop")),
+    blend_mm=st.none() | positive,
 )
 
 
@@ -294,3 +297,24 @@ def test_golden_cases_of_the_contract_load(golden: Path) -> None:
         setup = load_setup(folder / "machine.toml")
         assert setup.machine.calibration is not None
         assert len(load_calibration(setup.machine.calibration, setup.machine).curves) == 3
+
+
+def test_a_compliance_of_one_number_is_what_the_tool_stays_behind(tmp_path: Path) -> None:
+    text = (Path(__file__).parent / "broken" / "good" / "machine.toml").read_text()
+    path = tmp_path / "machine.toml"
+    one, three = ("[axes.X]\ncompliance_um_per_m_s2 = 2.5", "[axes.Y]\ncompliance_um_per_m_s2 = [0.5, -3, 1]")
+    path.write_text(text.replace("[axes.X]", one).replace("[axes.Y]", three))
+    stated = {name: axis.compliance_um_per_m_s2 for name, axis in load_machine(path).axes.items()}
+    assert stated == {"X": (-2.5, 0.0, 0.0), "Y": (0.5, -3.0, 1.0), "Z": (0.0, 0.0, 0.0)}
+
+
+def test_the_path_mode_of_a_machine(tmp_path: Path) -> None:
+    text = (Path(__file__).parent / "broken" / "good" / "machine.toml").read_text()
+    path = tmp_path / "machine.toml"
+    for old, new, want in (
+        ("", "", ("blend", 0.005)),
+        ('mode = "blend"', 'mode = "exact-stop"', ("exact-stop", 0.005)),
+        ('[path]\nmode = "blend"\nblend_mm = 0.005', "", ("blend", None)),
+    ):
+        path.write_text(text.replace(old, new))
+        assert (load_machine(path).path_mode, load_machine(path).blend_mm) == want

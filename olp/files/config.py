@@ -15,7 +15,7 @@ from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, MeshTable, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.machine import Axis, Job, Machine, Setup, Tool, WorkOffset
+from olp.machine import Axis, Job, Machine, Setup, Tool, Vector, WorkOffset
 from olp.units import AXES
 
 __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
@@ -72,8 +72,9 @@ def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
             velocity_mm_s=table.velocity_mm_s,
             acceleration_mm_s2=table.acceleration_mm_s2,
             jerk_mm_s3=table.jerk_mm_s3,
+            compliance_um_per_m_s2=_compliance(table.compliance_um_per_m_s2, place),
         )
-        for axis, table in ((axis, getattr(file.axes, axis)) for axis in AXES)
+        for place, (axis, table) in enumerate((axis, getattr(file.axes, axis)) for axis in AXES)
     }
     machine = Machine(
         name=file.name,
@@ -88,8 +89,19 @@ def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         length_active=file.job_defaults.length_active,
+        path_mode=file.path.mode,
+        blend_mm=file.path.blend_mm,
     )
     return machine, lines
+
+
+def _compliance(stated: float | Vector, axis: int) -> Vector:
+    """What the tool stands off its place by; one number is how far it stays behind along the axis."""
+    if isinstance(stated, tuple):
+        return stated
+    own = [0.0, 0.0, 0.0]
+    own[axis] = 0.0 - stated
+    return (own[0], own[1], own[2])
 
 
 def _read_job(path: PathLike) -> tuple[Job, Sequence[MeshTable], Mapping[Path, int]]:

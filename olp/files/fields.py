@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 import re
 from typing import Annotated
 
@@ -91,6 +92,18 @@ def _iso_names(value: object) -> frozenset[str]:
     return frozenset(value)
 
 
+def _compliance(value: object) -> float | tuple[float, float, float]:
+    parts = value if isinstance(value, list | tuple) and len(value) == 3 else [value]
+    numbers = [float(v) for v in parts if isinstance(v, int | float) and not isinstance(v, bool)]
+    one = len(parts) == 1
+    if len(numbers) < len(parts) or not all(map(math.isfinite, numbers)) or (one and numbers[0] < 0.0):
+        raise refusal(
+            f"= {shown(value)}; expected how far the tool stays behind, in um per m/s2 and 0 or above, or "
+            "[X, Y, Z] of it, actual minus commanded"
+        )
+    return numbers[0] if one else (numbers[0], numbers[1], numbers[2])
+
+
 def _offset_name(name: str) -> str:
     if re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
         raise refusal('is no work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
@@ -108,6 +121,19 @@ Triple = Annotated[tuple[float, float, float], Field(strict=False)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Text = Annotated[str, Field(min_length=1)]
+Compliance = Annotated[
+    float | tuple[float, float, float],
+    PlainValidator(_compliance),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0},
+                {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+            ],
+            "default": 0.0,
+        }
+    ),
+]
 IsoNames = Annotated[
     frozenset[str],
     PlainValidator(_iso_names),

@@ -15,6 +15,7 @@ from olp.files.fields import (
     CONTROLLERS,
     SIGN,
     Chain,
+    Compliance,
     Controller,
     Interval,
     IsoNames,
@@ -61,6 +62,11 @@ class AxisTable(Table):
     velocity_mm_s: Positive = Field(description="the largest velocity of the axis, in mm/s")
     acceleration_mm_s2: Positive = Field(description="the largest acceleration of the axis, in mm/s2")
     jerk_mm_s3: Positive = Field(description="the largest jerk of the axis, in mm/s3")
+    compliance_um_per_m_s2: Compliance = Field(
+        default=0.0,
+        description="how far the tool stays behind while the axis is accelerated, in um per m/s2; or "
+        "[X, Y, Z], actual minus commanded, where it gives way in other directions too",
+    )
 
 
 class AxesTable(Table):
@@ -141,6 +147,19 @@ class ToolTable(Table):
         return value
 
 
+class PathTable(Table):
+    mode: Literal["blend", "exact-stop"] = Field(
+        default="blend",
+        description='"blend" (rounds corners within blend_mm) or "exact-stop" (rests at the end of each '
+        "block), until the program says otherwise",
+    )
+    blend_mm: Positive | None = Field(
+        default=None,
+        description="how far the control may leave the path at corners where the program names no "
+        "tolerance, in mm; 0.01 if left out",
+    )
+
+
 class JobDefaultsTable(Table):
     tool: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="the number of the tool in the spindle at the start, one of [tools]"
@@ -178,6 +197,9 @@ class MachineFile(Table):
         'ISO 230-1 names, or "all"',
     )
     axes: AxesTable = Field(description="the tables [axes.X], [axes.Y] and [axes.Z]")
+    path: PathTable = Field(
+        default_factory=PathTable, description="the table [path]: how the control passes from block to block"
+    )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
     job_defaults: JobDefaultsTable = Field(

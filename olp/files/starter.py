@@ -38,7 +38,13 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
     for name in AXES:
         axis = machine.axes[name]
         lines += ["", f"[axes.{name}]"]
-        lines += toml_lines({key: getattr(axis, key) for key in Axis.__dataclass_fields__})
+        stated = {key: getattr(axis, key) for key in Axis.__dataclass_fields__}
+        if axis.compliance_um_per_m_s2 == ZERO:
+            del stated["compliance_um_per_m_s2"]
+        lines += toml_lines(stated)
+    if (machine.path_mode, machine.blend_mm) != ("blend", None):
+        lines += ["", *comment("How the control passes from block to block where a program does not say.")]
+        lines += ["[path]", *toml_lines({"mode": machine.path_mode, "blend_mm": machine.blend_mm})]
     lines += ["", *comment("Axis position of the program's origin, no tool length active.")]
     for offset in machine.work_offsets.values():
         lines += [f"[work_offsets.{toml_key(offset.name)}]", *_work_offset(offset)]
