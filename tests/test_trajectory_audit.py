@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from olp.exceptions import UsageError
-from olp.trajectory.audit import audit, path_deviation, slowing
+from olp.trajectory.audit import audit, slowing
+from olp.trajectory.deviation import deviation_bound, path_deviation
 from olp.trajectory.motion import Motion
 from olp.trajectory.overlap import overlap_parts
 from olp.trajectory.route import AxisLimits, Route
@@ -84,7 +85,7 @@ def test_slowed_by_its_factor_a_motion_keeps_its_limits(motion):
 
 
 def test_jumps_are_seen_also_between_blocks(monkeypatch):
-    monkeypatch.setattr("olp.trajectory.audit._BLOCK", 1)
+    monkeypatch.setattr("olp.trajectory.pieces._BLOCK", 1)
     path = np.zeros((2, 4, 3))
     path[0, 1], path[1, 0], path[1, 1] = [1, 0, 0], [1.5, 0, 0], [3, 0, 0]
     time = [[0, 1, 0, 0], [0, 1, 2, 0]]
@@ -99,7 +100,7 @@ def test_one_feed_for_each_piece():
     with pytest.raises(UsageError, match="feeds"):
         audit(motion, LIMITS, np.ones(2))
     with pytest.raises(UsageError, match="segments"):
-        path_deviation(motion, route_of(np.zeros((2, 3))), np.zeros(2, np.int64))
+        deviation_bound(motion, route_of(np.zeros((2, 3))), np.zeros(2, np.int64), np.zeros(2))
     assert audit(motion, LIMITS, np.ones(1)).feed == 0.0
 
 
@@ -118,10 +119,9 @@ def test_a_search_finds_no_less_than_the_known_segments(seed, count):
     points = np.cumsum(random.normal(0.0, 1.0, (count, 3)) * random.choice([1.0, 0.02], (count, 1)), axis=0)
     route = route_of(points)
     parts = overlap_parts(route, LIMITS)
-    known = path_deviation(parts.motion, route, parts.segment)
-    found = path_deviation(parts.motion, route)
-    assert known.max() <= 0.05 * (1 + 1e-6)
-    assert found.max() <= 0.05 * (1 + 1e-6)
+    near = np.full(len(parts.motion), 0.05 * (1 + 1e-6))
+    assert np.all(deviation_bound(parts.motion, route, parts.segment, near) <= near)
+    assert path_deviation(parts.motion, route).max() <= 0.05 * (1 + 1e-6)
 
 
 def test_a_path_driven_back_and_forth():
@@ -134,7 +134,8 @@ def test_a_detour_is_seen():
     route = route_of([[0, 0, 0], [10, 0, 0], [10, 10, 0]])
     other = route_of([[0, 0, 0], [10, 0, 0], [12, 5, 0], [10, 10, 0]])
     parts = overlap_parts(other, LIMITS)
-    assert path_deviation(parts.motion, route, np.minimum(parts.segment, 1), 9).max() > 1.9
+    near = np.zeros(len(parts.motion))
+    assert deviation_bound(parts.motion, route, np.minimum(parts.segment, 1), near).max() > 1.9
     assert path_deviation(parts.motion, route, places=9).max() > 1.9
 
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from olp.exceptions import UsageError
 from olp.trajectory import ruckig_moves
-from olp.trajectory.audit import audit, path_deviation, slowing
+from olp.trajectory.audit import audit, slowing
+from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.overlap import overlap, overlap_parts
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.same import groups_of_same
@@ -55,8 +56,8 @@ def check(route: Route, limits: AxisLimits = LIMITS, *, differences: bool = True
     for share in (0.0, 0.3, 0.7, 1.0):
         v = rates[:, 1] + share * u * (2 * rates[:, 2] + 3 * share * u * rates[:, 3])
         assert v.min(initial=0.0) >= -2e-9 * speed - 2 * late * rate
-    away = path_deviation(motion, route, parts.segment, 9)
-    assert away.max() <= np.max(route.tolerance_mm) * (1 + 1e-6) + 2e-9 + 1e-14 * size
+    near = np.full(len(motion), np.max(route.tolerance_mm) * (1 + 1e-6) + 2e-9 + 1e-14 * size)
+    assert np.all(deviation_bound(motion, route, parts.segment, near) <= near)
     corners(route, parts)
     assert np.abs(motion.at(np.array([0.0]))[0][0] - route.point_mm[0]).max() <= 1e-9
     assert np.abs(motion.at(motion.start_s[-1:])[0][0] - route.point_mm[-1]).max() <= 2e-9 + late * speed

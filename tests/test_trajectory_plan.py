@@ -44,24 +44,29 @@ def assert_within(found: Trajectory, limits: AxisLimits, feed: float = np.inf) -
         assert (np.abs(acceleration) <= limits.acceleration * (1 + 1e-6)).all()
         assert (np.abs(jerk) <= limits.jerk * (1 + 1e-6)).all()
         assert (np.sqrt((velocity * velocity).sum(axis=1)) <= feed * (1 + 1e-6)).all()
-    position = found.at(np.arange(0.0, found.duration_s, 1e-3))[0]
+    times = np.arange(0.0, found.duration_s, 1e-3)
+    position, velocity = found.at(times)[:2]
+    # positions are known to their last digits, times to theirs, in which the axis moves on
+    noise = 4 * 2.0**-53 * (np.abs(position).max(axis=0) + 2 * (times[:, None] + 1e-3) * np.abs(velocity))
     for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
-        # positions of 1e3 mm carry 1e-13 mm
-        noise = 1e-12 * 2**order / 1e-3**order
-        assert (np.abs(np.diff(position, order, axis=0)) / 1e-3**order <= limit * (1 + 1e-6) + noise).all()
+        position = np.diff(position, axis=0)
+        noise = noise[1:] + noise[:-1]
+        assert (np.abs(position) <= limit * (1 + 1e-6) * 1e-3**order + noise).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     count=st.integers(2, 40),
     scale=st.sampled_from([1e-3, 0.05, 1.0, 50.0]),
-    feed=st.sampled_from([1.0, 30.0, 200.0, np.inf]),
+    pace=st.sampled_from([1.0, 30.0, 200.0, np.inf]),
     tolerance=st.sampled_from([0.0, 1e-3, 0.02, 1.0]),
 )
 def test_any_polyline_is_driven_within_all_limits(
-    seed: int, count: int, scale: float, feed: float, tolerance: float
+    seed: int, count: int, scale: float, pace: float, tolerance: float
 ) -> None:
+    # long moves at a feed that does not take them minutes of samples
+    feed = pace * max(scale / 5.0, 1.0)
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.normal(size=(count, 3)) * scale * np.exp(rng.normal(size=(count, 1))), axis=0)
     route = route_of(points, feed, tolerance)
@@ -129,7 +134,7 @@ def test_shipped_jobs(job: str) -> None:
     for trajectory in found.trajectories:
         assert_within(trajectory, trajectory.limits)
         assert all(leg.factor < 1.01 for leg in trajectory.legs)
-    assert found.report["path_deviation_um"] <= 100.0
+        assert max(leg.deviation_mm for leg in trajectory.legs) <= 0.1
 
 
 # -- files ----------------------------------------------------------------------------------------------
@@ -151,13 +156,13 @@ def test_csv_gives_every_digit_back(corner: Trajectory) -> None:
 
 
 def test_npz_holds_samples_and_pieces(corner: Trajectory) -> None:
-    with np.load(io.BytesIO(files.npz(corner, 1e-3))) as table:
+    with np.load(io.BytesIO(b"".join(files.npz(corner, 1e-3)))) as table:
         assert (table["position_mm"] == corner.at(table["t_s"])[0]).all()
         assert (table["piece_start_s"] == corner.motion.start_s).all()
 
 
 def test_ros_is_in_metres(corner: Trajectory) -> None:
-    data = json.loads(files.ros(corner, 1e-3))
+    data = json.loads(b"".join(files.ros(corner, 1e-3)))
     assert data["joint_names"] == ["X", "Y", "Z"]
     end = data["points"][-1]
     assert end["positions"] == pytest.approx([3e-3, 2e-3, 1e-3])

@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from olp.trajectory import ramps
 from olp.trajectory.motion import Motion
-from olp.trajectory.route import Array, AxisLimits, Index
-from olp.trajectory.smooth import SmoothPath
+from olp.trajectory.route import Array, AxisLimits, Index, Route
+from olp.trajectory.smooth import MOST_WIDTH, SmoothPath
 
 Mask = npt.NDArray[np.bool_]
 
@@ -33,6 +33,8 @@ _BY_CROSS = 0.5
 _LEVEL = 1.02
 _BINDS, _TOO_FAST, _PATIENT = 1e-6, 1e-8, 40
 _TINY = 1e-300
+#: shares of a direction below this do not limit a forecast
+_STRAIGHT = 1e-12
 _BLOCK = 1 << 17
 _ALONE = 64
 
@@ -50,8 +52,8 @@ class Profile:
 
 
 def ceilings(path: SmoothPath, limits: AxisLimits, share: Array) -> tuple[Array, Array, Array]:
-    """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold, when
-    curvature may use up the `share` (k,) of acceleration and jerk at full speed."""
+    """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold,
+    when curvature may use up the `share` (k,) of acceleration and jerk at full speed."""
     n = len(path)
     result = np.empty((3, n))
     for lo in range(0, n, _BLOCK):
@@ -111,14 +113,7 @@ def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
     than that of none, and reached where only acceleration is bounded (no jerk-bounded profile is faster)."""
     node = np.zeros(len(x), bool)
     node[0] = node[-1] = True
-    square = ceiling * ceiling
-    rise = np.minimum(2.0 * acceleration * np.diff(x), float(top.max()) ** 2)
-    total = np.concatenate(([0.0], np.cumsum(rise)))
-    square = np.minimum(square, total + np.minimum.accumulate(square - total))
-    total = total[-1] - total
-    back = (square - total)[::-1]
-    square = np.minimum(square, total + np.minimum.accumulate(back)[::-1])
-    free = np.sqrt(np.maximum(square, 0.0))
+    free = free_speeds(x, ceiling, acceleration)
     before = np.concatenate(([np.inf], top[:-1]))
     behind = np.concatenate((top[1:], [np.inf]))
     dip = (top <= before) & (top <= behind) & ((top < before) | (top < behind))
@@ -126,6 +121,18 @@ def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
     node[:-1] |= dip
     node[1:] |= dip
     return node
+
+
+def free_speeds(x: Array, ceiling: Array, acceleration: Array) -> Array:
+    """(k + 1,) the most speeds at the breaks, below their ceilings, where jerk is free."""
+    square = ceiling * ceiling
+    rise = np.minimum(2.0 * acceleration * np.diff(x), float(square.max(initial=0.0)))
+    total = np.concatenate(([0.0], np.cumsum(rise)))
+    square = np.minimum(square, total + np.minimum.accumulate(square - total))
+    total = total[-1] - total
+    back = (square - total)[::-1]
+    square = np.minimum(square, total + np.minimum.accumulate(back)[::-1])
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _reachable(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
@@ -201,11 +208,44 @@ def critical(path: SmoothPath, limits: AxisLimits) -> Motion:
     """The motion along `path` from rest to rest; no axis limit and no feed is exceeded."""
     if not len(path):
         return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), np.zeros(0, np.int64), path.line)
+    return driven(path, best_profile(path, limits))
+
+
+def best_profile(path: SmoothPath, limits: AxisLimits) -> Profile:
+    """The fastest profile found along a path of one piece and more."""
     share = _shares(path)
     first = profile(path, limits, share)
     _give_dips(first, share)
     second = profile(path, limits, share)
-    return driven(path, min(first, second, key=lambda found: _seconds(path, found)))
+    return min(first, second, key=lambda found: _seconds(path, found))
+
+
+def expected_s(route: Route, limits: AxisLimits) -> Array:
+    """(n - 1,) seconds that `critical` will hardly undercut along each segment of a route.
+
+    A kernel that meets no other bends by du / w at its vertex, w as wide as the tolerance allows: so much
+    speed is left there. Between two such speeds a segment takes as long as with no acceleration at its ends.
+    """
+    delta = np.diff(route.point_mm, axis=0).T
+    length = np.maximum(np.sqrt((delta * delta).sum(axis=0)), _TINY)
+    u = delta / length
+    velocity, a, j = (most[:, None] for most in (limits.velocity, limits.acceleration, limits.jerk))
+    bend = np.abs(np.diff(u, axis=1))
+    with np.errstate(all="ignore"):
+        size = np.maximum(np.abs(u), _STRAIGHT)
+        top = np.minimum((velocity / size).min(axis=0), route.feed_mm_s)
+        along = (a / size).min(axis=0), (j / size).min(axis=0)
+        width = MOST_WIDTH * route.tolerance_mm[1:-1] / np.sqrt((bend * bend).sum(axis=0))
+        slow = np.sqrt(_BY_BEND * width * (a / bend).min(axis=0))
+        slow = np.minimum(slow, np.cbrt(_BY_BEND * width * width * (j / bend).min(axis=0)))
+    reaches = np.concatenate(([0.0], width, [0.0]))
+    apart = (reaches[:-1] + reaches[1:]) <= length
+    slow = np.where(apart[:-1] & apart[1:], slow, np.inf)
+    slow = np.concatenate(([0.0], np.where(route.tolerance_mm[1:-1] > 0.0, slow, 0.0), [0.0]))
+    end = np.minimum(np.maximum(slow[:-1], slow[1:]), top)
+    peak = np.minimum(ramps.reach(end, 0.5 * length, *along), top)
+    way = 2.0 * ramps.distance(end, peak, *along)
+    return np.asarray(2.0 * ramps.seconds(end, peak, *along) + np.maximum(length - way, 0.0) / peak)
 
 
 def _shares(path: SmoothPath) -> Array:
@@ -239,52 +279,86 @@ def _seconds(path: SmoothPath, found: Profile) -> float:
 def driven(path: SmoothPath, found: Profile) -> Motion:
     """The motion of a profile: cut wherever the path or the jerk changes, each piece from its own start."""
     x = path.break_mm
-    start_s, start, speed, acceleration, jerk, lasts = _phases(x, found)
+    clock = Timeline.of(path, found)
     # breaks of the path inside a phase; those at the start of one are there already
-    phase = np.searchsorted(start, x[:-1], side="right") - 1
-    inside = np.flatnonzero(start[phase] != x[:-1])
+    phase = np.searchsorted(clock.way, x[:-1], side="right") - 1
+    inside = np.flatnonzero(clock.way[phase] != x[:-1])
     phase = phase[inside]
-    way = x[inside] - start[phase]
-    v, a, j = speed[phase], acceleration[phase], jerk[phase]
-    u = np.empty(len(way))
+    u = np.empty(len(phase))
     for lo in range(0, len(u), _BLOCK):
         part = slice(lo, lo + _BLOCK)
-        u[part] = ramps.when(way[part], v[part], a[part], j[part], lasts[phase[part]])
-    order = np.argsort(np.concatenate((start, x[inside])), kind="stable")
-    begin = np.concatenate((start_s[:-1], start_s[phase] + u))[order]
-    shape = np.concatenate((np.searchsorted(x, start, side="right") - 1, inside))[order]
+        u[part] = clock.when(phase[part], x[inside[part]])
+    v, a, j = clock.speed[phase], clock.acceleration[phase], clock.jerk[phase]
+    order = np.argsort(np.concatenate((clock.way, x[inside])), kind="stable")
+    begin = np.concatenate((clock.start_s[:-1], clock.start_s[phase] + u))[order]
+    shape = np.concatenate((np.searchsorted(x, clock.way, side="right") - 1, inside))[order]
     shape = np.minimum(shape, len(path) - 1)
     time = np.empty((len(order), 4))
-    time[:, 0] = np.concatenate((start, x[inside]))[order] - x[shape]
-    time[:, 1] = np.concatenate((speed, np.maximum(v + u * (a + 0.5 * u * j), 0.0)))[order]
-    time[:, 2] = np.concatenate((acceleration, a + u * j))[order] / 2.0
-    time[:, 3] = np.concatenate((jerk, j))[order] / 6.0
-    return Motion(np.append(begin, start_s[-1]), time, path.shape, shape, path.line[shape])
+    time[:, 0] = np.concatenate((clock.way, x[inside]))[order] - x[shape]
+    time[:, 1] = np.concatenate((clock.speed, np.maximum(v + u * (a + 0.5 * u * j), 0.0)))[order]
+    time[:, 2] = np.concatenate((clock.acceleration, a + u * j))[order] / 2.0
+    time[:, 3] = np.concatenate((clock.jerk, j))[order] / 6.0
+    return Motion(np.append(begin, clock.start_s[-1]), time, path.shape, shape, path.line[shape])
 
 
-def _phases(x: Array, found: Profile) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Time (p + 1,), way, speed, acceleration, jerk and duration (p,) of each phase of constant jerk."""
-    v0, v1, peak, a, j = found.speed[:-1], found.speed[1:], found.peak, found.acceleration, found.jerk
-    begin = x[found.node[:-1]]
-    whole = np.diff(x[found.node])
-    up, up_flat = ramps.phases(v0, peak, a, j)
-    down, down_flat = ramps.phases(peak, v1, a, j)
-    rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(peak, v1, a, j)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cruise = np.where(peak > 0.0, np.maximum(whole - rise - fall, 0.0) / peak, 0.0)
-    lasts = np.stack((up, up_flat, up, cruise, down, down_flat, down), axis=1)
-    zero = np.zeros_like(j)
-    jerk = np.stack((j, zero, -j, zero, -j, zero, j), axis=1)
-    high, low = j * up, -j * down
-    acceleration = np.stack((zero, high, high, zero, zero, low, low), axis=1)
-    gain, loss = 0.5 * high * up, 0.5 * low * down
-    speed = np.stack((v0, v0 + gain, peak - gain, peak, peak, peak + loss, v1 - loss), axis=1)
-    start = np.empty_like(lasts)
-    start[:, 0] = begin
-    for i in range(6):
-        t = lasts[:, i]
-        step = t * (speed[:, i] + t * (acceleration[:, i] / 2.0 + t * jerk[:, i] / 6.0))
-        start[:, i + 1] = np.minimum(start[:, i] + step, begin + whole)
-    used = lasts > 0.0
-    start_s = np.concatenate(([0.0], np.cumsum(lasts[used])))
-    return start_s, start[used], speed[used], acceleration[used], jerk[used], lasts[used]
+@dataclass(frozen=True, slots=True, eq=False)
+class Timeline:
+    """The phases (p,) of constant jerk of a profile: `start_s` (p + 1,), way, speed, acceleration and jerk
+    (p,) at their start, how long each `lasts` (p,), and the `first` of each span and of none after (m + 1,)."""
+
+    start_s: Array
+    way: Array
+    speed: Array
+    acceleration: Array
+    jerk: Array
+    lasts: Array
+    first: Index
+
+    @staticmethod
+    def of(path: SmoothPath, found: Profile) -> Timeline:
+        v0, v1, peak, a, j = found.speed[:-1], found.speed[1:], found.peak, found.acceleration, found.jerk
+        begin = path.break_mm[found.node[:-1]]
+        whole = np.diff(path.break_mm[found.node])
+        up, up_flat = ramps.phases(v0, peak, a, j)
+        down, down_flat = ramps.phases(peak, v1, a, j)
+        rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(peak, v1, a, j)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cruise = np.where(peak > 0.0, np.maximum(whole - rise - fall, 0.0) / peak, 0.0)
+        lasts = np.stack((up, up_flat, up, cruise, down, down_flat, down), axis=1)
+        zero = np.zeros_like(j)
+        jerk = np.stack((j, zero, -j, zero, -j, zero, j), axis=1)
+        high, low = j * up, -j * down
+        acceleration = np.stack((zero, high, high, zero, zero, low, low), axis=1)
+        gain, loss = 0.5 * high * up, 0.5 * low * down
+        speed = np.stack((v0, v0 + gain, peak - gain, peak, peak, peak + loss, v1 - loss), axis=1)
+        start = np.empty_like(lasts)
+        start[:, 0] = begin
+        for i in range(6):
+            t = lasts[:, i]
+            step = t * (speed[:, i] + t * (acceleration[:, i] / 2.0 + t * jerk[:, i] / 6.0))
+            start[:, i + 1] = np.minimum(start[:, i] + step, begin + whole)
+        used = lasts > 0.0
+        start_s = np.concatenate(([0.0], np.cumsum(lasts[used])))
+        first = np.concatenate(([0], np.cumsum(used.sum(axis=1))))
+        return Timeline(
+            start_s, start[used], speed[used], acceleration[used], jerk[used], lasts[used], first
+        )
+
+    def when(self, phase: Index, way: Array) -> Array:
+        """(n,) seconds into phases (n,) at which ways (n,) are reached."""
+        v, a, j = self.speed[phase], self.acceleration[phase], self.jerk[phase]
+        return ramps.when(np.maximum(way - self.way[phase], 0.0), v, a, j, self.lasts[phase])
+
+    def way_at(self, time_s: Array) -> Array:
+        """(n,) ways at times (n,)."""
+        k = np.clip(np.searchsorted(self.start_s, time_s, side="right") - 1, 0, len(self.way) - 1)
+        u = time_s - self.start_s[k]
+        return np.asarray(
+            self.way[k] + u * (self.speed[k] + u * (self.acceleration[k] / 2.0 + u * self.jerk[k] / 6.0))
+        )
+
+    def at_way(self, way: Array) -> tuple[Array, Array]:
+        """Speed and acceleration (n,) at ways (n,)."""
+        k = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.way) - 1)
+        v, a, j, u = self.speed[k], self.acceleration[k], self.jerk[k], self.when(k, way)
+        return np.maximum(v + u * (a + 0.5 * u * j), 0.0), a + u * j

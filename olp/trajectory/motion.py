@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,8 +20,8 @@ class Motion:
 
     Piece k holds from `start_s[k]` to `start_s[k + 1]`; with u = t - start_s[k] the parameter is
     s = sum_i `time`[k, i] u^i, and the axis positions are sum_i `path`[`shape`[k], i] s^i in mm: `time`
-    (k, 4) for cubics, (k, 6) where a solver needs quintics, `path` (m, 4, 3), `shape` (k,). Where axes move as cubics of time themselves, s = u. `line` (k,)
-    is the program line of each piece.
+    (k, 4) for cubics, (k, 6) where a solver needs quintics, `path` (m, 4, 3), `shape` (k,). Where axes move
+    as cubics of time themselves, s = u. `line` (k,) is the program line of each piece.
     """
 
     start_s: Array
@@ -87,24 +89,32 @@ class Motion:
 
     @staticmethod
     def joined(parts: Sequence[Motion]) -> Motion:
-        """One after the other."""
-        start, shapes, times, offset, at = [], [], [], 0, 0.0
+        """One after the other. A list is emptied, so that what it alone holds is let go on the way."""
+        if len(parts) == 1 and parts[0].start_s[0] == 0.0:
+            return parts[0]
+        start, shape, offset, at = [], [], 0, 0.0
         wide = max(p.time.shape[1] for p in parts)
         for part in parts:
-            narrow = wide - part.time.shape[1]
-            times.append(np.pad(part.time, ((0, 0), (0, narrow))) if narrow else part.time)
             start.append(part.start_s[:-1] - part.start_s[0] + at)
             at += part.duration_s
-            shapes.append(part.shape + offset)
+            shape.append(part.shape + offset)
             offset += len(part.path)
         start.append(np.array([at]))
-        return Motion(
-            np.concatenate(start),
-            np.concatenate(times),
-            np.concatenate([p.path for p in parts]),
-            np.concatenate(shapes),
-            np.concatenate([p.line for p in parts]),
-        )
+        time, path, line = [p.time for p in parts], [p.path for p in parts], [p.line for p in parts]
+        if isinstance(parts, list):
+            parts.clear()
+            del part
+        for i, some in enumerate(time):
+            if some.shape[1] < wide:
+                time[i] = np.pad(some, ((0, 0), (0, wide - some.shape[1])))
+        return Motion(_whole(start), _whole(time), _whole(path), _whole(shape), _whole(line))
+
+
+def _whole(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:
+    """One array of the parts, which are let go."""
+    result = np.concatenate(parts)
+    parts.clear()
+    return result
 
 
 def derivatives(coefficient: Array, u: Array) -> tuple[Array, Array, Array, Array]:

@@ -23,7 +23,7 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.ruckig_moves import solve_all
 from olp.trajectory.same import groups_of_same
-from olp.trajectory.scurve import CRUISE, PHASES, states
+from olp.trajectory.scurve import CRUISE, PHASES, rest_to_rest_s, states
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -73,23 +73,30 @@ def overlap(route: Route, limits: AxisLimits) -> Motion:
     return overlap_parts(route, limits).motion
 
 
+def least_s(route: Route, limits: AxisLimits) -> Array:
+    """(n - 1,) seconds that `overlap` takes along each segment of a route at least: those from rest to rest
+    less the overlap at its end. Raises as `overlap`."""
+    _check(route, limits)
+    result = np.zeros(max(len(route) - 1, 0))
+    if len(route) > 1:
+        first, _, moves = _merged(route, limits)
+        rest = rest_to_rest_s(moves.length, moves.speed, moves.acceleration, moves.jerk)
+        result[first[1:] - 1] = rest - moves.overlap_s[1 : len(first)]
+    return result
+
+
 def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
     """As `overlap`, with what each piece came from."""
     _check(route, limits)
     count = len(route)
     if count == 0:
         return Overlapped(_nothing(), np.zeros(0, np.int64), 0)
-    group = groups_of_same(route.point_mm)
-    first = np.flatnonzero(np.diff(group, prepend=-1))
-    tolerance = np.minimum.reduceat(route.tolerance_mm, first)
-    dwell = np.add.reduceat(route.dwell_s, first)
+    first, dwell, moves = _merged(route, limits)
     segment = first[1:] - 1
     if segment.size == 0:
         line = int(route.line[0]) if len(route.line) else 0
         return Overlapped(Motion.rest(route.point_mm[0], float(dwell[0]), line), np.zeros(1, np.int64), 0)
-    stops = (tolerance <= 0.0) | (dwell > 0.0)
     points = route.point_mm[first]
-    moves = _moves(points, route.feed_mm_s[segment], np.where(stops, 0.0, tolerance), limits)
     kept: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
     numbers: tuple[list[Index], list[Index]] = ([], [])
     shapes = replaced = 0
@@ -117,6 +124,17 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
     origin = segment[owner]
     start = np.concatenate(([0.0], np.cumsum(seconds)))
     return Overlapped(Motion(start, time, path, shape, route.line[origin]), origin, replaced)
+
+
+def _merged(route: Route, limits: AxisLimits) -> tuple[Index, Array, _Moves]:
+    """The first way-points of those that are the same (m,), the dwells there (m,), and the m - 1 moves."""
+    group = groups_of_same(route.point_mm)
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    tolerance = np.minimum.reduceat(route.tolerance_mm, first)
+    dwell = np.add.reduceat(route.dwell_s, first)
+    stops = (tolerance <= 0.0) | (dwell > 0.0)
+    feed = route.feed_mm_s[first[1:] - 1]
+    return first, dwell, _moves(route.point_mm[first], feed, np.where(stops, 0.0, tolerance), limits)
 
 
 def _emptied(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:

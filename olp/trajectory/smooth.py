@@ -38,6 +38,8 @@ _SHARE, _WIDER = 0.25, 1.25
 _END = 0.6
 _SHRINK, _LEAST_SHRINK, _ROUNDS = 0.95, 0.3, 200
 _POWER = 0.4
+#: a kernel is no wider than this times its tolerance over the change of direction
+MOST_WIDTH = 6.0 * _SHRINK
 #: breaks worked on at a time
 _BLOCK = 1 << 17
 
@@ -196,7 +198,7 @@ def _widths(
     size = np.linalg.norm(bend, axis=1)
     end = np.minimum(way[1:-1], way[-1] - way[1:-1])
     with np.errstate(divide="ignore"):
-        width = np.minimum(np.minimum(use, 6.0 * _SHRINK * tolerance[1:-1] / size), _END * end)
+        width = np.minimum(np.minimum(use, MOST_WIDTH * tolerance[1:-1] / size), _END * end)
     width = np.maximum(np.floor(width / grid), 1.0) * grid
     return np.where(size > _STRAIGHT, width, 0.0)
 
