@@ -2,70 +2,137 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-import numpy as np
-
-from olp.exceptions import CannotCompute, OlpError
+from olp.exceptions import CannotCompute, UsageError
 from olp.files import trajectory as files
+from olp.files.write import write_files
 from olp.loading import PathLike, profile_of, setup_of, source_of
 from olp.machine import Setup
-from olp.program.reader import Options, read
-from olp.trajectory.from_program import axis_limits, routes
-from olp.trajectory.plan import Trajectory, plan
+from olp.replanning import Case, Plan, Progress, blend_study, planned, within_inertial
+from olp.trajectory.from_program import axis_limits
+from olp.trajectory.inertia import Inertial, compliance_of
+from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
-from olp.trajectory.summary import summary
+from olp.trajectory.summary import MOST, compare, summary
+from olp.trajectory.usage import LineUse, SlowPlaces
 
-Progress = Callable[[str, float], None]
+Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
+_SUFFIX: Mapping[str, Format] = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
 
 #: what a control's servo takes
 CYCLE_S = 1e-3
+#: of the tolerances that the program uses, those that `blend_study` tries
+FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retiming:
-    """A trajectory for each stretch of the program between places that the control alone knows, the routes
-    that they drive, and the report."""
+    """A trajectory for each stretch of the program between places that the control alone knows, as `plan`,
+    and the report ("olp-retime-1")."""
 
-    trajectories: tuple[Trajectory, ...]
-    routes: tuple[Route, ...]
+    plan: Plan
     report: dict[str, Any]
 
     @property
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        return self.plan.trajectories
+
+    @property
+    def routes(self) -> tuple[Route, ...]:
+        """What the trajectories drive."""
+        return self.plan.case.legs
+
+    @property
+    def lines(self) -> LineUse:
+        """What each line takes, achieves, and is held back by."""
+        return self.plan.lines
+
+    @property
+    def slow(self) -> tuple[SlowPlaces, ...]:
+        """Of each stretch the places where the speed is below half the feed."""
+        return self.plan.slow
+
+    @property
     def duration_s(self) -> float:
-        return sum(t.duration_s for t in self.trajectories)
+        """Without what the control does between stretches."""
+        return self.plan.duration_s
 
     @property
     def trajectory(self) -> Trajectory:
         """The one trajectory of a program that is known all through. Raises CannotCompute where there are
-        more or none."""
-        if len(self.trajectories) != 1:
+        several."""
+        return self._stretch(None)
+
+    def _stretch(self, number: int | None) -> Trajectory:
+        count = len(self.trajectories)
+        if number is None and count != 1:
             raise CannotCompute(
-                f"the program has {len(self.trajectories)} stretches of known position; expected one: give "
-                "start_mm in the job file, and take the moves that the control makes by itself out"
+                f"the program has {count} stretches, between which the control moves by itself (tool "
+                "changes, G28 and kin, probing), so there is no one trajectory; take them one by one"
             )
-        return self.trajectories[0]
+        if number is not None and not 1 <= number <= count:
+            raise UsageError(f"there is no stretch {number}; the program has {count}, counted from 1")
+        return self.trajectories[(number or 1) - 1]
 
-    def to_csv(self, cycle_s: float = CYCLE_S) -> Iterator[bytes]:
-        """The samples of every `cycle_s`, a block at a time. Raises CannotCompute as `trajectory` does."""
-        return files.csv(self.trajectory, cycle_s)
+    def parts(
+        self, kind: Format = "csv", cycle_s: float = CYCLE_S, stretch: int | None = None
+    ) -> Iterator[bytes]:
+        """The samples of every `cycle_s` as a file of a format, part by part; of one stretch, counted from
+        1, where there are several.
 
-    def to_npz(self, cycle_s: float = CYCLE_S) -> bytes:
-        return files.npz(self.trajectory, cycle_s)
+        Raises CannotCompute as `trajectory` does, UsageError for a stretch or a cycle that cannot be, and
+        ConfigError for Parquet without pyarrow.
+        """
+        return _WRITERS[kind](self._stretch(stretch), cycle_s)
 
-    def to_parquet(self, cycle_s: float = CYCLE_S) -> bytes:
-        """The columns of the CSV. Raises ConfigError without pyarrow."""
-        return files.parquet(self.trajectory, cycle_s)
+    def files(
+        self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
+        stretch: int | None = None, progress: Progress | None = None,
+    ) -> dict[Path, Iterator[bytes]]:  # fmt: skip
+        """What `write` writes, by path: one file, or `name-1.csv`, `name-2.csv` ... of several stretches."""
+        target = Path(path)
+        chosen = kind or _SUFFIX.get(target.suffix.lower(), "csv")
+        if stretch is not None or len(self.trajectories) == 1:
+            return {target: self._counted(chosen, cycle_s, stretch, progress)}
+        if not self.trajectories:
+            raise CannotCompute("the program moves nothing, so there is no trajectory to write")
+        return {
+            numbered(target, number): self._counted(chosen, cycle_s, number, progress)
+            for number in range(1, len(self.trajectories) + 1)
+        }
 
-    def to_ros(self, cycle_s: float = CYCLE_S) -> bytes:
-        return files.ros(self.trajectory, cycle_s)
+    def _counted(
+        self, kind: Format, cycle_s: float, stretch: int | None, progress: Progress | None
+    ) -> Iterator[bytes]:
+        whole = max(self._stretch(stretch).duration_s / cycle_s / files.ROWS, 1.0)
+        for done, part in enumerate(self.parts(kind, cycle_s, stretch)):
+            yield part
+            if progress is not None:
+                progress("write", min(done / whole, 1.0))
 
-    def to_pvt(self, cycle_s: float = CYCLE_S) -> Iterator[bytes]:
-        return files.pvt(self.trajectory, cycle_s)
+    def write(
+        self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
+        stretch: int | None = None, *, force: bool = False,
+    ) -> list[Path]:  # fmt: skip
+        """Write the samples; the format is that of the suffix (.csv, .npz, .parquet, .json for ROS) unless
+        given. All files or none. Raises as `parts` and `olp.files.write.write_files` do."""
+        found = self.files(path, kind, cycle_s, stretch)
+        write_files(found, force=force)
+        return list(found)
+
+
+_WRITERS: Mapping[Format, Callable[[Trajectory, float], Iterator[bytes]]] = {
+    "csv": files.csv, "npz": files.npz, "parquet": files.parquet, "ros": files.ros, "pvt": files.pvt,
+}  # fmt: skip
+
+
+def numbered(target: Path, number: int) -> Path:
+    """The file of a stretch, counted from 1, where there are several."""
+    return target.with_name(f"{target.stem}-{number}{target.suffix}")
 
 
 def retime(
@@ -73,58 +140,98 @@ def retime(
     machine: PathLike | Setup,
     job: PathLike | None = None,
     *,
+    nominal: PathLike | bytes | None = None,
     blend_mm: float | None = None,
+    study_blend: bool = False,
+    max_inertial_um: float | None = None,
     contour: bool = False,
+    block_delete: bool = False,
+    flatten: bool = False,
     progress: Progress | None = None,
 ) -> Retiming:
     """The fastest motion found along a program that keeps every axis inside its limits of velocity,
-    acceleration and jerk, the feed, and the path tolerance of G64.
+    acceleration and jerk, the feed, and the path tolerance.
 
-    `blend_mm` is the tolerance where the path mode names none. Raises InputError (ProgramError with its line,
-    ConfigError) and CannotCompute.
+    `nominal` is another program, the one before its correction, to compare times with, line by line.
+    `blend_mm` is the path tolerance where the program names none; it wins over the machine file, and the
+    path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
+    times the tolerances in use. `max_inertial_um` bounds the deviation that accelerations make on the
+    machine's compliance. `block_delete` leaves `/` blocks out, `flatten` unrolls loops, subprograms and
+    expressions first: lines then count in the unrolled text. Raises InputError (ProgramError with its line,
+    ConfigError), UsageError and CannotCompute.
     """
-    data, name = source_of(program)
     setup = setup_of(machine, job)
+    profile_of(setup)
     tell = progress or (lambda what, share: None)
-    try:
-        tell("read", 0.0)
-        found = read(data, setup, profile_of(setup), Options(contour=contour))
-        limits = axis_limits(setup.machine)
-        legs = routes(found) if blend_mm is None else routes(found, blend_mm=blend_mm)
-    except OlpError as error:
-        raise (error.in_file(name) if name and error.line is not None else error) from None
-    trajectories = []
-    edges = np.cumsum([0, *(len(leg) for leg in legs)])
-    for leg, (a, b) in zip(legs, pairwise(edges.tolist()), strict=True):
-        span = (a / max(edges[-1], 1), b / max(edges[-1], 1))
-        trajectories.append(plan(leg, limits, _within(tell, *span)))
-    report = _report(Path(name).name if name else "", setup, tuple(trajectories), legs)
-    return Retiming(tuple(trajectories), legs, report)
 
+    def case_of(source: PathLike | bytes) -> Case:
+        return Case.of(
+            *source_of(source), setup, blend_mm=blend_mm, contour=contour, block_delete=block_delete,
+            flatten=flatten,
+        )  # fmt: skip
 
-def _within(tell: Progress, first: float, last: float) -> Progress:
-    """Progress of one stretch as that of the whole."""
-    return lambda what, share: tell(what, first + share * (last - first))
-
-
-def _report(
-    name: str, setup: Setup, trajectories: tuple[Trajectory, ...], legs: tuple[Route, ...]
-) -> dict[str, Any]:
-    parts = [summary(t, [leg]) for t, leg in zip(trajectories, legs, strict=True)]
-    deviation = [leg.deviation_mm for t in trajectories for leg in t.legs]
+    tell("read", 0.0)
+    case = case_of(program)
+    other = None if nominal is None else case_of(nominal)
+    compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
+    if max_inertial_um is None:
+        found = planned(case, limits, tell)
+    else:
+        found = within_inertial(case, limits, compliance, max_inertial_um * 1e-3, tell)
+    report = _report(case, found, compliance, max_inertial_um)
+    if other is not None:
+        report["nominal"] = _against(found, planned(other, found.limits, tell, "nominal"), other)
+    if study_blend:
+        report["blend_study"] = blend_study(case, found, FACTORS, tell)
+    return Retiming(found, report)
+
+
+def _against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
+    """The times of the nominal program, in all and by line."""
+    rows = compare((before.case.legs, before.lines), (found.case.legs, found.lines))
     return {
+        "program": other.name,
+        "duration_s": before.duration_s,
+        "lines_correspond": rows is not None,
+        "differences": []
+        if rows is None
+        else [row for row in rows[:MOST] if row["nominal_s"] != row["corrected_s"]],
+    }
+
+
+def _report(case: Case, found: Plan, compliance: Any, max_inertial_um: float | None) -> dict[str, Any]:
+    limits = found.limits
+    report: dict[str, Any] = {
         "schema": "olp-retime-1",
-        "program": name,
-        "machine": setup.machine.name,
-        "duration_s": sum(t.duration_s for t in trajectories),
-        "path_deviation_um": max(deviation, default=0.0) * 1e3,
-        "waypoints": sum(len(leg) for leg in legs),
-        "pieces": sum(len(t.motion) for t in trajectories),
+        "program": case.name,
+        "machine": case.setup.machine.name,
+        "waypoints": sum(map(len, case.legs)),
+        "pieces": sum(len(t.motion) for t in found.trajectories),
+        "path": case.tolerances(),
+        "budget_um": {"blending": found.blending_mm * 1e3, "chords_of_arcs": case.chords_mm() * 1e3},
+        "untimed": case.untimed(),
         "limits": {
             "velocity_mm_s": limits.velocity.tolist(),
             "acceleration_mm_s2": limits.acceleration.tolist(),
             "jerk_mm_s3": limits.jerk.tolist(),
         },
-        "stretches": parts,
-    }
+        "stretches": [
+            {"first_line": int(leg.line.min()), "last_line": int(leg.line.max()), "duration_s": t.duration_s}
+            for leg, t in zip(case.legs, found.trajectories, strict=True)
+        ],
+    } | summary(found.trajectories, found.lines, found.slow)
+    if compliance.any():
+        parts = [Inertial.of(t.motion, compliance) for t in found.trajectories]
+        most = max(parts, key=lambda p: p.most_mm, default=None)
+        whole = max(found.duration_s, 1e-300)
+        square = sum(p.rms_mm**2 * t.duration_s for p, t in zip(parts, found.trajectories, strict=True))
+        report["budget_um"]["inertial"] = most.most_mm * 1e3 if most else 0.0
+        report["inertial"] = {
+            "max_um": most.most_mm * 1e3 if most else 0.0,
+            "rms_um": (square / whole) ** 0.5 * 1e3,
+            "across_path_max_um": max((p.across_mm for p in parts), default=0.0) * 1e3,
+            "line": most.line if most else None,
+            "allowed_um": max_inertial_um,
+        }
+    return report

@@ -47,6 +47,7 @@ def test_machine_file_fills_every_value() -> None:
         default_tool=1,
         default_work_offset="G54",
         length_active=True,
+        blend_mm=0.005,
     )
 
 

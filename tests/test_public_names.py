@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 RUN = "from olp.cli import main\ntry: main({!r})\nexcept SystemExit as end: assert end.code == 0, end.code"
 LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
-    *("correct", "verify", "simulate", "inspect", "error_at", "flatten", "load_setup"),
-    *("Correction", "Verification", "Simulation", "Finding"),
+    *("correct", "verify", "simulate", "retime", "inspect", "error_at", "flatten", "load_setup"),
+    *("Correction", "Verification", "Simulation", "Retiming", "Finding"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 
@@ -45,8 +45,8 @@ def test_the_type_checker_sees_the_same_names() -> None:
 
 
 def test_a_name_that_is_not_there() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'retime'"):
-        _ = olp.retime
+    with pytest.raises(AttributeError, match="no attribute 'calibrate'"):
+        _ = olp.calibrate
 
 
 @pytest.mark.parametrize(("code", "free_of"), [

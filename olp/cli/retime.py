@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,16 +16,18 @@ from olp.cli.common import (
     put,
     refuse_early,
     setup_options,
+    silence_stdout,
     source,
     talk,
 )
 from olp.cli.progress import progress
+from olp.exceptions import OlpError, UsageError
 
 if TYPE_CHECKING:
-    from olp.retiming import Retiming
+    from olp.files.write import Content
+    from olp.retiming import Format, Retiming
 
 FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
-_SUFFIX = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
 
 
 @click.command("retime")
@@ -36,60 +38,118 @@ _SUFFIX = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
     "--format",
     "kind",
     type=click.Choice(FORMATS),
-    help="Of OUT; default: by its suffix (.csv, .npz, .parquet, .json), else csv.",
+    help="Of OUT. Default: by its suffix (.csv, .npz, .parquet, .json for ROS), else csv.",
 )
 @click.option("--cycle-ms", type=Length(), default=1.0, show_default=True, help="Time between samples.")
+@click.option("--stretch", type=click.IntRange(min=1), help="Which stretch OUT takes. Default: a file each.")
 @click.option("--blend-mm", type=Length(), help="Path tolerance where the program names none.")
-@click.option("--nominal", metavar="NOMINAL", help="Compare the cycle time with that of another program.")
+@click.option("--blend-study", is_flag=True, help="Time and deviation at other path tolerances too.")
+@click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
+@click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
+@click.option("--slow", metavar="FILE.csv", help="Write the places below half of the feed.")
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
+@click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
+@click.option("--flatten", is_flag=True, help="Unroll loops, subprograms and expressions first.")
+@click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@click.option("-q", "--quiet", is_flag=True, help="No report and no progress.")
+@click.option("--force", is_flag=True, help="Overwrite output files.")
 def command(
     program: str | None,
     machine: str | None,
     job: str | None,
     output: str | None,
-    kind: str | None,
+    kind: Format | None,
     cycle_ms: float,
+    stretch: int | None,
     blend_mm: float | None,
+    blend_study: bool,
     nominal: str | None,
+    lines: str | None,
+    slow: str | None,
     contour: bool,
+    block_delete: bool,
+    flatten: bool,
+    report_file: str | None,
     as_json: bool,
+    quiet: bool,
     force: bool,
 ) -> None:
     """Re-time a program: every axis inside its limits of velocity, acceleration and jerk.
 
-    OUT has axis positions, velocities and accelerations every --cycle-ms.
+    OUT has axis positions, velocities and accelerations every --cycle-ms. Where the control moves by itself
+    (tool changes, G28, probing) the motion is in several stretches, and OUT becomes OUT-1, OUT-2 ...
     """
     call = given(program, machine, job)
+    if call.program == STREAM == nominal:
+        raise UsageError("stdin can be one program only; name PROGRAM or NOMINAL as a file")
+    if as_json and output == STREAM:
+        raise UsageError("JSON on stdout does not go with -o -; write the report to a file with --report")
+    if stretch is not None and output is None:
+        raise UsageError("--stretch chooses what OUT takes; name OUT with -o")
     inputs = (*call.inputs, *files_of(nominal))
-    refuse_early(files_of(output), inputs, force=force)
+    refuse_early(files_of(output, lines, slow, report_file), inputs, force=force)
+    _refuse_twice(files_of(output, lines, slow, report_file))
 
     from olp import report, report_time
-    from olp.files.write import write_bytes
+    from olp.files import trajectory as tables
+    from olp.files.write import write_files
     from olp.retiming import retime
 
-    with progress(quiet=False) as show:
-        result = retime(source(call.program), call.setup, blend_mm=blend_mm, contour=contour, progress=show)
-        other = retime(source(nominal), call.setup, blend_mm=blend_mm, contour=contour) if nominal else None
-    if other is not None:
-        result.report["nominal"] = {"program": nominal, "duration_s": other.duration_s}
-    if output is not None:
-        chosen = kind or _SUFFIX.get(Path(output).suffix.lower(), "csv")
-        data = _written(result, chosen, cycle_ms * 1e-3)
-        if output == STREAM:
-            put(data if isinstance(data, bytes) else b"".join(data))
-        else:
-            write_bytes(output, data, force=force, inputs=inputs)
-            talk(f"wrote {output}")
-    put(
-        report.to_json(result.report) if as_json else report_time.to_text(result.report), err=output == STREAM
-    )
+    with progress(quiet) as show:
+        try:
+            result = retime(
+                source(call.program), call.setup, nominal=None if nominal is None else source(nominal),
+                blend_mm=blend_mm, study_blend=blend_study, contour=contour, block_delete=block_delete,
+                flatten=flatten, progress=show,
+            )  # fmt: skip
+        except OlpError as error:
+            raise (error.in_file("<stdin>") if error.line is not None else error) from None
+        written: dict[Path, Content] = {}
+        if output is not None and output != STREAM:
+            written |= result.files(output, kind, cycle_ms * 1e-3, stretch, show)
+        written |= {Path(name): tables.lines_csv(result.lines) for name in files_of(lines)}
+        written |= {Path(name): tables.slow_csv(result.slow) for name in files_of(slow)}
+        written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
+        write_files(written, force=force, inputs=inputs)
+    if output == STREAM:
+        _stream(_of_one(result, kind, cycle_ms * 1e-3, stretch))
+    if not quiet:
+        for path in written:
+            talk(f"wrote {path}")
+    if as_json:
+        put(report.to_json(result.report))
+    elif not quiet:
+        put(report_time.to_text(result.report), err=output == STREAM)
 
 
-def _written(result: Retiming, kind: str, cycle_s: float) -> bytes | Iterable[bytes]:
-    writers: dict[str, Callable[[float], bytes | Iterable[bytes]]] = {
-        "csv": result.to_csv, "npz": result.to_npz, "parquet": result.to_parquet,
-        "ros": result.to_ros, "pvt": result.to_pvt,
-    }  # fmt: skip
-    return writers[kind](cycle_s)
+def _of_one(result: Retiming, kind: Format | None, cycle_s: float, stretch: int | None) -> Iterable[bytes]:
+    if stretch is None and len(result.trajectories) > 1:
+        raise UsageError(
+            f"the program has {len(result.trajectories)} stretches, and stdout takes one; choose it with "
+            "--stretch, or name a file with -o"
+        )
+    return result.parts(kind or "csv", cycle_s, stretch)
+
+
+def _stream(parts: Iterable[bytes]) -> None:
+    """Write to stdout part by part. A reader that has gone is no error."""
+    import sys
+
+    try:
+        for part in parts:
+            sys.stdout.buffer.write(part)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        silence_stdout()
+    except OSError as error:
+        raise OlpError(f"cannot be written ({error.strerror})", file="<stdout>") from error
+
+
+def _refuse_twice(names: list[str]) -> None:
+    seen: set[Path] = set()
+    for name in names:
+        path = Path(name).resolve()
+        if path in seen:
+            raise UsageError("is named as output twice; name two files", file=name)
+        seen.add(path)

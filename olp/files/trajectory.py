@@ -1,15 +1,22 @@
-"""Trajectories as files: CSV, NPZ, Parquet, ROS JointTrajectory as JSON, and a table of PVT points."""
+"""Trajectories as files: CSV, NPZ, Parquet, ROS JointTrajectory as JSON, a table of PVT points; and tables of
+their lines and slow places.
+
+All are given in parts, so that a long file never has to be in memory.
+"""
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
-from olp.exceptions import ConfigError
+from olp.exceptions import ConfigError, UsageError
 from olp.trajectory.plan import Trajectory
+from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
 
 AXES = "XYZ"
 COLUMNS = (
@@ -19,21 +26,40 @@ COLUMNS = (
     *(f"A{a}_mm_s2" for a in AXES),
     "line",
 )
+LINE_COLUMNS = (
+    "line", "seconds", "dwell_s", "length_mm", "feed_mm_s", "achieved_mm_s", "fastest_mm_s", "lost_s",
+    "limit", "at_limit_s",
+)  # fmt: skip
+SLOW_COLUMNS = (
+    "stretch", "t_s", "seconds", "lost_s", "line", "X_mm", "Y_mm", "Z_mm", "slowest_mm_s", "feed_mm_s",
+    "limit",
+)  # fmt: skip
 #: rows that are in memory at a time
-_ROWS = 1 << 14
+ROWS = 1 << 14
+#: more samples than this are a mistake in the cycle
+MOST_SAMPLES = 200_000_000
+_NANO = 1_000_000_000
 
 
 def rows(trajectory: Trajectory, cycle_s: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """(numbers (n, 10), lines (n,)) of the samples at the control's cycle, a block at a time."""
+    """(numbers (n, 10), lines (n,)) of the samples at the control's cycle, a block at a time.
+
+    Raises UsageError for a cycle that is not above 0, or so short that the samples would be too many.
+    """
+    if not cycle_s > 0.0 or trajectory.duration_s / cycle_s > MOST_SAMPLES:
+        raise UsageError(
+            f"a cycle of {cycle_s:g} s cuts {trajectory.duration_s:.1f} s into too many samples; expected at "
+            f"most {MOST_SAMPLES}"
+        )
     times = trajectory.sample_times(cycle_s)
-    for a in range(0, len(times), _ROWS):
-        t = times[a : a + _ROWS]
+    for a in range(0, len(times), ROWS):
+        t = times[a : a + ROWS]
         position, velocity, acceleration, _, line = trajectory.at(t)
         yield np.column_stack((t, position, velocity, acceleration)), line
 
 
 def csv(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
-    """The samples as CSV, a block at a time; every number in the digits that give it back exactly."""
+    """The samples as CSV; every number in the digits that give it back exactly."""
     yield (",".join(COLUMNS) + "\n").encode()
     for numbers, lines in rows(trajectory, cycle_s):
         # adding 0.0 makes 0 of -0
@@ -44,53 +70,106 @@ def csv(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
         yield "".join(text).encode()
 
 
-def npz(trajectory: Trajectory, cycle_s: float) -> bytes:
+class _Parts(io.RawIOBase):
+    """Takes what is written until it is asked for."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: object) -> int:
+        part = bytes(memoryview(data))  # type: ignore[arg-type]
+        self._parts.append(part)
+        return len(part)
+
+    def take(self) -> bytes:
+        done, self._parts = b"".join(self._parts), []
+        return done
+
+
+def npz(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
     """The samples, and the pieces that they are taken from (see `olp.trajectory.motion.Motion`)."""
-    blocks = list(rows(trajectory, cycle_s))
-    table = np.concatenate([b[0] for b in blocks])
     motion = trajectory.motion
-    sink = io.BytesIO()
-    np.savez_compressed(
-        sink,
-        t_s=table[:, 0], position_mm=table[:, 1:4], velocity_mm_s=table[:, 4:7],
-        acceleration_mm_s2=table[:, 7:10], line=np.concatenate([b[1] for b in blocks]),
-        piece_start_s=motion.start_s, piece_time=motion.time, piece_path=motion.path,
-        piece_shape=motion.shape, piece_line=motion.line,
-    )  # fmt: skip
-    return sink.getvalue()
+    count = len(trajectory.sample_times(cycle_s))
+
+    def columns(a: int, b: int | None) -> Iterator[np.ndarray]:
+        return (n[:, a] if b is None else n[:, a:b] for n, _ in rows(trajectory, cycle_s))
+
+    sampled: dict[str, tuple[tuple[int, ...], npt.DTypeLike, Callable[[], Iterator[np.ndarray]]]] = {
+        "t_s": ((count,), np.float64, lambda: columns(0, None)),
+        "position_mm": ((count, 3), np.float64, lambda: columns(1, 4)),
+        "velocity_mm_s": ((count, 3), np.float64, lambda: columns(4, 7)),
+        "acceleration_mm_s2": ((count, 3), np.float64, lambda: columns(7, 10)),
+        "line": ((count,), np.int64, lambda: (lines for _, lines in rows(trajectory, cycle_s))),
+    }
+    pieces = {
+        "piece_start_s": motion.start_s, "piece_time": motion.time, "piece_path": motion.path,
+        "piece_shape": motion.shape, "piece_line": motion.line,
+    }  # fmt: skip
+    sink = _Parts()
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, (shape, kind, blocks) in sampled.items():
+            yield from _member(archive, sink, name, shape, kind, blocks())
+        for name, array in pieces.items():
+            parts = (array[a : a + ROWS] for a in range(0, len(array), ROWS))
+            yield from _member(archive, sink, name, array.shape, array.dtype, parts)
+    yield sink.take()
 
 
-def parquet(trajectory: Trajectory, cycle_s: float) -> bytes:
+def _member(
+    archive: zipfile.ZipFile, sink: _Parts, name: str, shape: tuple[int, ...], kind: npt.DTypeLike,
+    blocks: Iterator[np.ndarray],
+) -> Iterator[bytes]:  # fmt: skip
+    """One array of an NPZ file, written block by block in numpy's own format."""
+    entry = zipfile.ZipInfo(f"{name}.npy")
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    with archive.open(entry, "w", force_zip64=True) as member:
+        header = {"descr": np.dtype(kind).str, "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(member, header)
+        for block in blocks:
+            member.write(np.ascontiguousarray(block, kind).tobytes())
+            yield sink.take()
+
+
+def parquet(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
     """The columns of the CSV. Raises ConfigError where pyarrow is not installed."""
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
         raise ConfigError("Parquet needs pyarrow, which is not installed; install it or write CSV") from None
-    sink = io.BytesIO()
+    sink = _Parts()
     schema = pa.schema([(name, pa.int64() if name == "line" else pa.float64()) for name in COLUMNS])
     with pq.ParquetWriter(sink, schema) as writer:
         for numbers, lines in rows(trajectory, cycle_s):
             columns = [*numbers.T, lines]
             writer.write_table(pa.table(dict(zip(COLUMNS, columns, strict=True)), schema=schema))
-    return sink.getvalue()
+            yield sink.take()
+    yield sink.take()
 
 
-def ros(trajectory: Trajectory, cycle_s: float) -> bytes:
+def ros(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
     """A trajectory_msgs/JointTrajectory in JSON: metres, and times from the start."""
-    points = []
+    before = '{"joint_names": ' + json.dumps(list(AXES)) + ', "points": [\n'
     for numbers, _ in rows(trajectory, cycle_s):
-        for row in numbers.tolist():
-            seconds = int(row[0])
+        points = []
+        for row in (numbers + 0.0).tolist():
+            seconds, nanosec = divmod(round(row[0] * _NANO), _NANO)
             points.append(
-                {
-                    "positions": [v * 1e-3 for v in row[1:4]],
-                    "velocities": [v * 1e-3 for v in row[4:7]],
-                    "accelerations": [v * 1e-3 for v in row[7:10]],
-                    "time_from_start": {"sec": seconds, "nanosec": round((row[0] - seconds) * 1e9)},
-                }
+                json.dumps(
+                    {
+                        "positions": [v * 1e-3 for v in row[1:4]],
+                        "velocities": [v * 1e-3 for v in row[4:7]],
+                        "accelerations": [v * 1e-3 for v in row[7:10]],
+                        "time_from_start": {"sec": seconds, "nanosec": nanosec},
+                    }
+                )
             )
-    return json.dumps({"joint_names": list(AXES), "points": points}).encode()
+        yield (before + ",\n".join(points)).encode()
+        before = ",\n"
+    yield b"\n]}\n"
 
 
 def pvt(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
@@ -104,3 +183,37 @@ def pvt(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
             out.append(f"{t - before!r},{x!r},{vx!r},{y!r},{vy!r},{z!r},{vz!r}\n")
             before = t
         yield "".join(out).encode()
+
+
+def lines_csv(use: LineUse) -> Iterator[bytes]:
+    """A row a line that moves; the feed of a line with rapids alone is left empty."""
+    yield (",".join(LINE_COLUMNS) + "\n").encode()
+    limit = use.limit()
+    held = use.at_limit_s[np.arange(len(use)), limit]
+    columns = (
+        use.line, use.seconds, use.dwell_s, use.length_mm, use.feed_mm_s, use.achieved_mm_s(),
+        use.fastest_mm_s, use.lost_s(),
+    )  # fmt: skip
+    for a in range(0, len(use), ROWS):
+        part = zip(*(c[a : a + ROWS].tolist() for c in (*columns, limit, held)), strict=True)
+        out = []
+        for line, seconds, dwell, length, feed, achieved, fastest, lost, which, at in part:
+            shown = f"{feed:.6g}" if np.isfinite(feed) else ""
+            out.append(
+                f"{line},{seconds:.9f},{dwell:.9g},{length:.6f},{shown},{achieved:.6g},{fastest:.6g},"
+                f"{lost:.9f},{LIMITS[which]},{at:.9f}\n"
+            )
+        yield "".join(out).encode()
+
+
+def slow_csv(parts: Sequence[SlowPlaces]) -> Iterator[bytes]:
+    """A row a place below half the feed; times count from the start of its stretch."""
+    yield (",".join(SLOW_COLUMNS) + "\n").encode()
+    for stretch, slow in enumerate(parts, 1):
+        for i in range(len(slow)):
+            x, y, z = slow.position_mm[i].tolist()
+            yield (
+                f"{stretch},{slow.start_s[i]:.6f},{slow.seconds[i]:.6f},{slow.lost_s[i]:.6f},{slow.line[i]},"
+                f"{x:.6f},{y:.6f},{z:.6f},{slow.slowest_mm_s[i]:.6g},{slow.feed_mm_s[i]:.6g},"
+                f"{LIMITS[int(slow.limit[i])]}\n"
+            ).encode()

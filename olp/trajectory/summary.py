@@ -1,103 +1,169 @@
-"""What people ask of a trajectory: how long, where, why so slow, and which axis is at its limit."""
+"""What people ask of a trajectory, as plain data: how long, where, why so slow, and which axis is at its
+limit."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from olp.trajectory.motion import Array, Index
 from olp.trajectory.plan import Trajectory
-from olp.trajectory.route import Route
+from olp.trajectory.route import Array, Index, Route
+from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
 
-AXES = "XYZ"
-#: an axis is at its limit where it uses this much of it
-_AT_LIMIT = 0.98
-#: samples of a piece in which its speed and its use of limits are taken
-_SAMPLES = 5
-_BLOCK = 1 << 14
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LineTimes:
-    """Per line of the program (m,): `seconds`, the `length_mm` driven, and the programmed `feed_mm_s`, inf
-    for rapids, the fastest where a line has several."""
-
-    line: Index
-    seconds: Array
-    length_mm: Array
-    feed_mm_s: Array
-
-    def achieved(self) -> Array:
-        """(m,) mean speed over the programmed feed; 1 for rapids."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = self.length_mm / self.seconds / self.feed_mm_s
-        return np.where(np.isfinite(self.feed_mm_s) & (self.seconds > 0), np.nan_to_num(share), 1.0)
+#: lines and places that a report names
+MOST = 10
+#: a step between lines differs between nominal and corrected program by less than this, and this share of it
+_NEAR_MM, _NEAR_SHARE = 0.1, 1e-3
+_RUN = 512
 
 
-def line_times(trajectory: Trajectory, routes: list[Route]) -> LineTimes:
-    """Times, lengths and feeds of the lines that move."""
-    lines, seconds = trajectory.seconds_by_line()
-    length, feed = np.zeros(len(lines)), np.zeros(len(lines))
-    for route in routes:
-        place = np.searchsorted(lines, route.line)
-        delta = np.diff(route.point_mm, axis=0)
-        length += np.bincount(place, np.sqrt((delta * delta).sum(axis=1)), minlength=len(lines))
-        np.maximum.at(feed, place, route.feed_mm_s)
-    return LineTimes(lines, seconds, length, feed)
-
-
-def at_limits(trajectory: Trajectory) -> dict[str, float]:
-    """Share of the time in which each axis is at its limit of velocity, acceleration or jerk."""
-    motion, limits = trajectory.motion, trajectory.limits
-    total = np.zeros((3, 3))
-    share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-    bounds = (limits.velocity, limits.acceleration, limits.jerk)
-    for a in range(0, len(motion), _BLOCK):
-        piece = np.arange(a, min(a + _BLOCK, len(motion)))
-        width = motion.start_s[piece + 1] - motion.start_s[piece]
-        states = motion.of(np.repeat(piece, _SAMPLES), (width[:, None] * share).ravel())[1:]
-        weight = np.repeat(width / _SAMPLES, _SAMPLES)
-        for i, (state, bound) in enumerate(zip(states, bounds, strict=True)):
-            total[i] += weight @ (np.abs(state) >= _AT_LIMIT * bound)
-    whole = max(trajectory.duration_s, 1e-12)
-    names = ("velocity", "acceleration", "jerk")
-    return {
-        f"{axis} {name}": float(total[i, k] / whole)
-        for i, name in enumerate(names)
-        for k, axis in enumerate(AXES)
-    }
-
-
-def summary(trajectory: Trajectory, routes: list[Route], most: int = 10) -> dict[str, Any]:
-    """The answers as plain data, for a report in JSON or text."""
-    times = line_times(trajectory, routes)
-    achieved = times.achieved()
-    slow = np.flatnonzero((achieved < 0.5) & (times.length_mm > 0))
-    order = slow[np.argsort(-times.seconds[slow], kind="stable")]
-    longest = np.argsort(-times.seconds, kind="stable")[:most]
+def summary(trajectories: Sequence[Trajectory], use: LineUse, slow: Sequence[SlowPlaces]) -> dict[str, Any]:
+    """The answers on trajectories driven one after the other, their lines and their slow places."""
+    whole = max(sum(t.duration_s for t in trajectories), 1e-300)
     solvers: dict[str, float] = {}
-    for leg in trajectory.legs:
+    for leg in (leg for t in trajectories for leg in t.legs):
         solvers[leg.solver] = solvers.get(leg.solver, 0.0) + leg.duration_s
+    at_limit = use.at_limit_s.sum(axis=0) / whole
+    most = {
+        name: max((float(getattr(t.audit, name).max()) for t in trajectories), default=0.0)
+        for name in ("velocity", "acceleration", "jerk")
+    }
+    feed_s = float(use.feed_seconds.sum())
+    nominal = feed_s - float(use.lost_s().sum())
     return {
-        "duration_s": trajectory.duration_s,
+        "duration_s": sum(t.duration_s for t in trajectories),
+        "dwell_s": float(use.dwell_s.sum()),
         "solvers_s": solvers,
-        "slowed_by_at_most": max((leg.factor for leg in trajectory.legs), default=1.0),
-        "at_limit": at_limits(trajectory),
-        "below_half_feed": {
-            "lines": len(slow),
-            "seconds": float(times.seconds[slow].sum()),
-            "worst": [
-                {
-                    "line": int(times.line[i]),
-                    "seconds": float(times.seconds[i]),
-                    "achieved": float(achieved[i]),
-                }
-                for i in order[:most].tolist()
-            ],
+        "slowed_by_at_most": max((leg.factor for t in trajectories for leg in t.legs), default=1.0),
+        "largest_share_of_limit": most | {"feed": float(use.most[:, -1].max(initial=0.0))},
+        "at_limit": dict(zip(LIMITS, at_limit.tolist(), strict=True)),
+        "feed_moves": {
+            "seconds": feed_s,
+            "seconds_at_programmed_feed": nominal,
+            "achieved": nominal / feed_s if feed_s > 0.0 else 1.0,
         },
-        "longest": [
-            {"line": int(times.line[i]), "seconds": float(times.seconds[i])} for i in longest.tolist()
+        "below_half_feed": _slow(slow),
+        "longest_lines": [_line(use, i) for i in np.argsort(-use.seconds, kind="stable")[:MOST].tolist()],
+        "slowest_lines": [
+            _line(use, i)
+            for i in np.argsort(-use.lost_s(), kind="stable")[:MOST].tolist()
+            if use.feed_length_mm[i] > 0.0
         ],
     }
+
+
+def _line(use: LineUse, i: int) -> dict[str, Any]:
+    feed = float(use.feed_mm_s[i])
+    return {
+        "line": int(use.line[i]),
+        "seconds": float(use.seconds[i]),
+        "lost_s": float(use.lost_s()[i]),
+        "feed_mm_s": feed if np.isfinite(feed) else None,
+        "achieved_mm_s": float(use.achieved_mm_s()[i]),
+        "limit": LIMITS[int(use.limit()[i])],
+    }
+
+
+def _slow(parts: Sequence[SlowPlaces]) -> dict[str, Any]:
+    worst = []
+    for stretch, slow in enumerate(parts, 1):
+        worst += [
+            {
+                "stretch": stretch,
+                "t_s": float(slow.start_s[i]),
+                "line": int(slow.line[i]),
+                "position_mm": slow.position_mm[i].tolist(),
+                "seconds": float(slow.seconds[i]),
+                "lost_s": float(slow.lost_s[i]),
+                "slowest_mm_s": float(slow.slowest_mm_s[i]),
+                "feed_mm_s": float(slow.feed_mm_s[i]),
+                "limit": LIMITS[int(slow.limit[i])],
+            }
+            for i in np.argsort(-slow.lost_s, kind="stable")[:MOST].tolist()
+        ]
+    worst.sort(key=lambda place: -float(place["lost_s"]))
+    return {
+        "places": sum(map(len, parts)),
+        "seconds": float(sum(slow.seconds.sum() for slow in parts)),
+        "lost_s": float(sum(slow.lost_s.sum() for slow in parts)),
+        "worst": worst[:MOST],
+    }
+
+
+def compare(
+    nominal: tuple[Sequence[Route], LineUse], corrected: tuple[Sequence[Route], LineUse]
+) -> list[dict[str, Any]] | None:
+    """Per line of the nominal program its time there, and that of the lines which stand for it in the
+    corrected one, the largest difference first; None where the lines do not correspond."""
+    before, after = nominal[1], corrected[1]
+    if len(nominal[0]) != len(corrected[0]):
+        return None
+    rows: list[tuple[int, float, float]] = []
+    for here, there in zip(nominal[0], corrected[0], strict=True):
+        (line, end), (other, other_end) = _ends(here), _ends(there)
+        pair = partners(end, other_end)
+        if pair is None:
+            return None
+        pair = pair[1:] - 1
+        spent = np.zeros(len(other))
+        known = np.isin(other, after.line)
+        spent[known] = (after.seconds + after.dwell_s)[np.searchsorted(after.line, other[known])]
+        total = np.diff(np.concatenate(([0.0], np.cumsum(spent)))[np.concatenate(([0], pair + 1))])
+        own = np.zeros(len(line))
+        known = np.isin(line, before.line)
+        own[known] = (before.seconds + before.dwell_s)[np.searchsorted(before.line, line[known])]
+        rows += zip(line.tolist(), own.tolist(), total.tolist(), strict=True)
+    rows.sort(key=lambda row: -abs(row[2] - row[1]))
+    return [{"line": n, "nominal_s": a, "corrected_s": b} for n, a, b in rows]
+
+
+def _ends(route: Route) -> tuple[Index, Array]:
+    """(m,) lines of a route in order, and (m + 1, 3) where it begins and each of them ends."""
+    last = np.flatnonzero(np.diff(route.line, append=-1))
+    return route.line[last], route.point_mm[np.concatenate(([0], last + 1))]
+
+
+def partners(nominal_mm: Array, corrected_mm: Array) -> Index | None:
+    """(n,) for each way-point of a nominal path the one of the corrected path, in order, that stands for it:
+    others were inserted between. None where one is missing.
+
+    A correction shifts way-points, neighbours by nearly the same, so steps are compared and not places.
+    """
+    count, spare = len(nominal_mm), len(corrected_mm) - len(nominal_mm)
+    if spare < 0:
+        return None
+    out = np.zeros(count, np.int64)
+    i = j = 0
+    at = np.zeros(3) if not count else corrected_mm[0] - nominal_mm[0]
+    while i < count:
+        span = min(_RUN, count - i, len(corrected_mm) - j)
+        away = corrected_mm[j : j + span] - nominal_mm[i : i + span]
+        near = _near(np.diff(away, axis=0, prepend=at[None]), _steps(nominal_mm, i, span))
+        run = span if near.all() else int(near.argmin())
+        if run:
+            out[i : i + run] = np.arange(j, j + run)
+            at = away[run - 1]
+            i, j = i + run, j + run
+        if run == span and span:
+            continue
+        ahead = corrected_mm[j : j + spare + 1] - nominal_mm[i] - at
+        found = np.flatnonzero(_near(ahead, _steps(nominal_mm, i, 1)))
+        if not len(found):
+            return None
+        spare -= int(found[0])
+        j += int(found[0])
+        out[i], at = j, corrected_mm[j] - nominal_mm[i]
+        i, j = i + 1, j + 1
+    return out
+
+
+def _near(change: Array, step: Array) -> npt.NDArray[np.bool_]:
+    return np.asarray(np.abs(change).max(axis=1) <= _NEAR_MM + _NEAR_SHARE * step)
+
+
+def _steps(point: Array, first: int, count: int) -> Array:
+    begin = point[np.maximum(np.arange(first, first + count) - 1, 0)]
+    return np.asarray(np.sqrt(((point[first : first + count] - begin) ** 2).sum(axis=1)))

@@ -1,0 +1,298 @@
+"""How a motion uses its limits: by line of the program, and at the places where it falls below half its feed.
+
+Each piece is looked at in five places, ends included, and weighed by the trapezoidal rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.trajectory.motion import Array, Index, Motion
+from olp.trajectory.plan import Trajectory
+from olp.trajectory.route import Route
+
+Mask = npt.NDArray[np.bool_]
+
+#: what a motion can be limited by, in the order of the columns
+LIMITS = (*(f"{axis} {what}" for what in ("velocity", "acceleration", "jerk") for axis in "XYZ"), "feed")
+#: a limit is reached where so much of it is used
+AT_LIMIT = 0.98
+#: a place is slow where the speed is below this share of the feed
+SLOW = 0.5
+_SHARE = np.linspace(0.0, 1.0, 5)
+_WEIGHT = np.array([1.0, 2.0, 2.0, 2.0, 1.0]) / 8.0
+_BLOCK = 1 << 13
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineUse:
+    """Of the m lines that move: (m,) `line`; `seconds` without dwells, and `dwell_s`; `length_mm` of the
+    polyline. Of their feed moves alone: `feed_seconds`, `feed_length_mm` and `feed_mm_s`, the programmed
+    feed, over the length where there are several (inf where all are rapids). `fastest_mm_s` is the top
+    speed; `at_limit_s` (m, 10) the time at each of `LIMITS`, `most` (m, 10) the largest use of it."""
+
+    line: Index
+    seconds: Array
+    dwell_s: Array
+    length_mm: Array
+    feed_seconds: Array
+    feed_length_mm: Array
+    feed_mm_s: Array
+    fastest_mm_s: Array
+    at_limit_s: Array
+    most: Array
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def achieved_mm_s(self) -> Array:
+        """(m,) mean speed of the feed moves; of all moves where all are rapids; 0 where nothing moves."""
+        rapid = ~np.isfinite(self.feed_mm_s)
+        return _over(
+            np.where(rapid, self.length_mm, self.feed_length_mm),
+            np.where(rapid, self.seconds, self.feed_seconds),
+        )
+
+    def achieved(self) -> Array:
+        """(m,) mean speed of the feed moves over their feed, 1 where there are none."""
+        moving = np.isfinite(self.feed_mm_s) & (self.feed_length_mm > 0.0)
+        return np.where(moving, _over(self.achieved_mm_s(), self.feed_mm_s), 1.0)
+
+    def lost_s(self) -> Array:
+        """(m,) time beyond what the feed moves would take at their feed."""
+        return np.asarray(self.feed_seconds - _over(self.feed_length_mm, self.feed_mm_s))
+
+    def limit(self) -> Index:
+        """(m,) which of `LIMITS` holds the line back: the one it is at for longest, else the one it uses
+        most."""
+        return _limit(self.at_limit_s, self.most)
+
+    @staticmethod
+    def joined(parts: Sequence[LineUse]) -> LineUse:
+        """Lines of several stretches; what they have in common is added."""
+        if len(parts) == 1:
+            return parts[0]
+        if not parts:
+            none, wide = np.zeros(0), np.zeros((0, len(LIMITS)))
+            return LineUse(none.astype(np.int64), none, none, none, none, none, none, none, wide, wide)
+        columns = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(LineUse)}
+        line, place = np.unique(columns["line"], return_inverse=True)
+        out: dict[str, Array] = {}
+        nominal = _over(columns["feed_length_mm"], columns["feed_mm_s"])
+        for name, values in columns.items():
+            if name in ("fastest_mm_s", "most"):
+                out[name] = np.zeros((len(line), *values.shape[1:]))
+                np.maximum.at(out[name], place, values)
+            else:
+                out[name] = np.zeros((len(line), *values.shape[1:]))
+                np.add.at(out[name], place, values)
+        out["feed_mm_s"] = _feed(out["feed_length_mm"], _sums(place, nominal, len(line)))
+        return LineUse(line.astype(np.int64), **{k: v for k, v in out.items() if k != "line"})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlowPlaces:
+    """(k,) places in order where the speed is below half the feed: `start_s` and `seconds`, `lost_s` beyond
+    the time that the way takes at the feed; where it is slowest, `line`, `position_mm` (k, 3),
+    `slowest_mm_s` and `feed_mm_s`; and which of `LIMITS` holds it back, as for lines."""
+
+    start_s: Array
+    seconds: Array
+    lost_s: Array
+    line: Index
+    position_mm: Array
+    slowest_mm_s: Array
+    feed_mm_s: Array
+    limit: Index
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    @staticmethod
+    def joined(parts: Sequence[SlowPlaces]) -> SlowPlaces:
+        """Those of several stretches; times are from the start of each."""
+        return SlowPlaces(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(SlowPlaces)))
+
+
+def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
+    """How the motion along a route uses its limits, by line and at slow places."""
+    motion, limits = trajectory.motion, trajectory.limits
+    line, place = np.unique(motion.line, return_inverse=True)
+    count = len(line)
+    feed = feeds_of_pieces(motion, route)
+    bounds = (limits.velocity, limits.acceleration, limits.jerk)
+    still: Mask = np.logical_not(motion.time[:, 1:].any(axis=1))
+    at_limit, most = np.zeros((count, len(LIMITS))), np.zeros((count, len(LIMITS)))
+    fastest = np.zeros(count)
+    places = _Places()
+    for a in range(0, len(motion), _BLOCK):
+        piece = np.arange(a, min(a + _BLOCK, len(motion)))
+        width = motion.start_s[piece + 1] - motion.start_s[piece]
+        states = motion.of(np.repeat(piece, len(_SHARE)), (width[:, None] * _SHARE).ravel())
+        speed = np.sqrt((states[1] * states[1]).sum(axis=1)).reshape(len(piece), -1)
+        use = np.empty((len(piece), len(_SHARE), len(LIMITS)))
+        for i, bound in enumerate(bounds):
+            use[:, :, 3 * i : 3 * i + 3] = (np.abs(states[i + 1]) / bound).reshape(len(piece), -1, 3)
+        use[:, :, 9] = speed / feed[piece, None]
+        weight = width[:, None] * _WEIGHT
+        held = weight[:, :, None] * (use >= AT_LIMIT)
+        np.add.at(at_limit, place[piece], held.sum(axis=1))
+        np.maximum.at(most, place[piece], use.max(axis=1))
+        np.maximum.at(fastest, place[piece], speed.max(axis=1))
+        moving = np.flatnonzero(~still[piece])
+        places.add(
+            motion.start_s[piece, None][moving] + width[moving, None] * _SHARE, weight[moving],
+            speed[moving], feed[piece][moving], motion.line[piece][moving],
+            states[0].reshape(len(piece), -1, 3)[moving], held[moving], use[moving],
+        )  # fmt: skip
+    width = np.diff(motion.start_s)
+    cutting = np.isfinite(feed) & ~still
+    length, feed_length, nominal = _lengths(route, line)
+    return (
+        LineUse(
+            line.astype(np.int64), _sums(place, width * ~still, count),
+            _sums(place, width * still, count), length,
+            _sums(place, width * cutting, count), feed_length, _feed(feed_length, nominal),
+            fastest, at_limit, most,
+        ),
+        places.found(),
+    )  # fmt: skip
+
+
+def _lengths(route: Route, line: Index) -> tuple[Array, Array, Array]:
+    """Of each line (m,): the length of its moves, that of its feed moves, and what these take at their feed.
+
+    Lines whose moves are too short to have pieces of their own are left out.
+    """
+    step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
+    at = np.minimum(np.searchsorted(line, route.line), len(line) - 1)
+    own = line[at] == route.line
+    fed = np.where(np.isfinite(route.feed_mm_s), step, 0.0)
+    columns = (step, fed, fed / route.feed_mm_s)
+    length, feed_length, nominal = (_sums(at[own], column[own], len(line)) for column in columns)
+    return length, feed_length, nominal
+
+
+def feeds_of_pieces(motion: Motion, route: Route) -> Array:
+    """(n,) the feed of the segment that each piece of the motion drives.
+
+    A line has one feed, or moves of several (canned cycles): those are told apart by how much of the line's
+    way lies before a piece.
+    """
+    order = np.argsort(route.line, kind="stable")
+    line, first = np.unique(route.line[order], return_index=True)
+    if not len(line):
+        return np.full(len(motion), np.inf)
+    feed = route.feed_mm_s[order]
+    low, high = np.minimum.reduceat(feed, first), np.maximum.reduceat(feed, first)
+    at = np.minimum(np.searchsorted(line, motion.line), len(line) - 1)
+    out = high[at]
+    mixed = np.flatnonzero(low < high)
+    if not len(mixed):
+        return np.asarray(out, float)
+    step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))[order]
+    stop = np.append(first[1:], len(feed))
+    by_line = np.argsort(motion.line, kind="stable")
+    edges = np.searchsorted(motion.line[by_line], line[mixed])
+    ends = np.searchsorted(motion.line[by_line], line[mixed], side="right")
+    for k, a, b in zip(mixed.tolist(), edges.tolist(), ends.tolist(), strict=True):
+        if a == b:
+            continue
+        piece = by_line[a:b]
+        width = motion.start_s[piece + 1] - motion.start_s[piece]
+        begin, end = motion.of(piece, np.zeros(len(piece)))[0], motion.of(piece, width)[0]
+        way = np.sqrt(((end - begin) ** 2).sum(axis=1))
+        done = (np.cumsum(way) - 0.5 * way) / max(float(way.sum()), 1e-300)
+        own = slice(int(first[k]), int(stop[k]))
+        limit = np.cumsum(step[own]) / max(float(step[own].sum()), 1e-300)
+        out[piece] = feed[own][np.minimum(np.searchsorted(limit, done), len(limit) - 1)]
+    return np.asarray(out, float)
+
+
+class _Places:
+    """Gathers slow places, which may begin in one block of pieces and end in a later one."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._slow = False
+        self._rows: list[tuple[Array, ...]] = []
+
+    def add(
+        self, time: Array, weight: Array, speed: Array, feed: Array, line: Index, position: Array,
+        held: Array, use: Array,
+    ) -> None:  # fmt: skip
+        """Samples (n, 5) of n pieces in order, their time at limits and use of them (n, 5, 10), feed and
+        line of each piece."""
+        slow = (speed < SLOW * feed[:, None]) & np.isfinite(feed)[:, None]
+        flat = slow.ravel()
+        if not flat.size:
+            return
+        begins = flat & ~np.concatenate(([self._slow], flat[:-1]))
+        number = self._count + np.cumsum(begins) - 1
+        self._count, self._slow = self._count + int(begins.sum()), bool(flat[-1])
+        at = np.flatnonzero(flat)
+        if not len(at):
+            return
+        piece = at // slow.shape[1]
+        lost = weight.ravel()[at] * (1.0 - speed.ravel()[at] / feed[piece])
+        columns = (
+            number[at].astype(float), time.ravel()[at], weight.ravel()[at], lost, speed.ravel()[at],
+            feed[piece], line[piece].astype(float), *position.reshape(-1, 3)[at].T,
+            *held.reshape(-1, len(LIMITS))[at].T, *use.reshape(-1, len(LIMITS))[at].T,
+        )  # fmt: skip
+        # the samples of a block are many, its places few
+        self._rows.append(_reduced(columns))
+
+    def found(self) -> SlowPlaces:
+        empty = tuple(np.zeros(0) for _ in range(10 + 2 * len(LIMITS)))
+        rows = self._rows or [empty]
+        columns = _reduced(tuple(np.concatenate(c) for c in zip(*rows, strict=True)))
+        _, time, weight, lost, speed, feed, line, x, y, z = columns[:10]
+        held, most = np.split(np.stack(columns[10:], axis=1), 2, axis=1)
+        limit = _limit(held, most)
+        return SlowPlaces(
+            time, weight, lost, line.astype(np.int64), np.stack((x, y, z), axis=1), speed, feed, limit,
+        )  # fmt: skip
+
+
+def _reduced(columns: tuple[Array, ...]) -> tuple[Array, ...]:
+    """One row a place: the earliest time, sums of time, and what holds where the speed is least."""
+    number, time, weight, lost, speed, *rest = columns
+    if not len(number):
+        return columns
+    first = np.flatnonzero(np.diff(number, prepend=-1.0))
+    slowest = np.lexsort((speed, number))[first]
+    half = 5 + len(LIMITS)
+    held = [np.add.reduceat(column, first) for column in rest[5:half]]
+    held += [np.maximum.reduceat(column, first) for column in rest[half:]]
+    return (
+        number[first], time[first], np.add.reduceat(weight, first), np.add.reduceat(lost, first),
+        speed[slowest], *(column[slowest] for column in rest[:5]), *held,
+    )  # fmt: skip
+
+
+def _limit(at_limit_s: Array, most: Array) -> Index:
+    """(n,) the limit (of ten) that is reached for longest; where none is, the one used most."""
+    reached = at_limit_s.max(axis=1) > 0.0
+    found = np.where(reached, at_limit_s.argmax(axis=1), most.argmax(axis=1))
+    return np.asarray(found, np.int64)
+
+
+def _sums(place: npt.NDArray[np.intp], values: Array, count: int) -> Array:
+    """(count,) sums of values by place."""
+    return np.asarray(np.bincount(place, values, minlength=count), float)
+
+
+def _feed(length: Array, nominal_s: Array) -> Array:
+    """Feed over the length; inf where no move has one."""
+    return np.where(nominal_s > 0.0, length / np.where(nominal_s > 0.0, nominal_s, 1.0), np.inf)
+
+
+def _over(above: Array, below: Array) -> Array:
+    """Quotients, 0 where there is nothing below."""
+    good = below > 0.0
+    return np.asarray(np.where(good, above / np.where(good, below, 1.0), 0.0), float)
