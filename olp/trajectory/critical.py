@@ -217,7 +217,7 @@ def best_profile(path: SmoothPath, limits: AxisLimits) -> Profile:
     first = profile(path, limits, share)
     _give_dips(first, share)
     second = profile(path, limits, share)
-    return min(first, second, key=lambda found: _seconds(path, found))
+    return min(first, second, key=lambda found: seconds(path, found))
 
 
 def expected_s(route: Route, limits: AxisLimits) -> Array:
@@ -266,7 +266,8 @@ def _give_dips(found: Profile, share: Array) -> None:
     share[dips] = np.maximum(share[dips], _BY_DIP)
 
 
-def _seconds(path: SmoothPath, found: Profile) -> float:
+def seconds(path: SmoothPath, found: Profile) -> float:
+    """Time of a profile."""
     way = np.diff(path.break_mm[found.node])
     total = np.zeros_like(way)
     for end in (found.speed[:-1], found.speed[1:]):
@@ -303,8 +304,8 @@ def driven(path: SmoothPath, found: Profile) -> Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
-    """The phases (p,) of constant jerk of a profile: `start_s` (p + 1,), way, speed, acceleration and jerk
-    (p,) at their start, how long each `lasts` (p,), and the `first` of each span and of none after (m + 1,)."""
+    """The phases (p,) of constant jerk of a profile: `start_s` (p + 1,); way, speed, acceleration and jerk at
+    the start of each and how long it `lasts`; `first` (m + 1,) of each span, and their number."""
 
     start_s: Array
     way: Array
@@ -340,9 +341,7 @@ class Timeline:
         used = lasts > 0.0
         start_s = np.concatenate(([0.0], np.cumsum(lasts[used])))
         first = np.concatenate(([0], np.cumsum(used.sum(axis=1))))
-        return Timeline(
-            start_s, start[used], speed[used], acceleration[used], jerk[used], lasts[used], first
-        )
+        return Timeline(start_s, start[used], speed[used], acceleration[used], jerk[used], lasts[used], first)
 
     def when(self, phase: Index, way: Array) -> Array:
         """(n,) seconds into phases (n,) at which ways (n,) are reached."""

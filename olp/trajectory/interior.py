@@ -6,8 +6,8 @@ l'' = b'/2 and l''' = b''/2 sqrt(b) the axes ask for
     velocity |q'| sqrt(b),   acceleration q' b'/2 + q'' b,   jerk (q' b''/2 + 3/2 q'' b' + q''' b) sqrt(b),
 
 the first two linear in b, the third linear over 1/sqrt(b). The time, the integral of 1/sqrt(b), is convex.
-Every row holds three neighbours of the spline's coefficients, so Newton's matrix is pentadiagonal. Multipliers
-follow the path of the primal-dual method (Boyd and Vandenberghe, Convex Optimization, 11.7); of the rows of
+Every row holds three neighbours of the spline's coefficients, so Newton's matrix is pentadiagonal.
+Multipliers follow the primal-dual method (Boyd and Vandenberghe, Convex Optimization, 11.7); of the rows of
 jerk only the part that keeps the matrix positive enters it.
 """
 
@@ -134,15 +134,15 @@ class Spline:
 
 
 class _State:
-    """Slacks of all rows at some coefficients."""
+    """Values of all rows at some coefficients: b, accelerations `a`, jerks over sqrt(b) `j`, and of those the
+    slacks: `u` is the jerk."""
 
-    __slots__ = ("a", "b", "root", "u", "v")
+    __slots__ = ("a", "b", "j", "root", "u", "v")
 
-    def __init__(self, rows: Rows, c: Array) -> None:
-        b, self.a, jerk = rows.spread(c)
-        self.b = b
+    def __init__(self, rows: Rows, b: Array, a: Array, j: Array) -> None:
+        self.b, self.a, self.j = b, a, j
         self.root = np.sqrt(np.maximum(b, 0.0))
-        self.u = jerk * self.root
+        self.u = j * self.root
         self.v = 1.0 - b / rows.most
 
     def inside(self) -> bool:
@@ -153,21 +153,29 @@ class _State:
             and (np.abs(self.u) < 1.0).all()
         )
 
-    def leaves(self, before: _State, share: float) -> bool:
-        """Whether every slack is at least `share` of what it was before."""
-        return bool(
-            (self.b >= share * before.b).all()
-            and (self.v >= share * before.v).all()
-            and (1.0 - self.u >= share * (1.0 - before.u)).all()
-            and (1.0 + self.u >= share * (1.0 + before.u)).all()
-            and (1.0 - self.a >= share * (1.0 - before.a)).all()
-            and (1.0 + self.a >= share * (1.0 + before.a)).all()
+    def toward(self, rows: Rows, change: tuple[Array, Array, Array], most: float) -> tuple[_State, float]:
+        """The state a step on, `most` times `change` at the most, that leaves every row a part of its slack;
+        and its length, 0 if there is none."""
+        db, da, dj = change
+        fall = max(
+            float((-db / self.b).max()),
+            float((db / rows.most / self.v).max()),
+            float((np.abs(da) / (1.0 - np.copysign(1.0, da) * self.a)).max(initial=0.0)),
         )
+        length = min(most, (1.0 - _LEAVE) / fall) if fall > 0.0 else most
+        above, below = _LEAVE * (1.0 - self.u), _LEAVE * (1.0 + self.u)
+        for _ in range(_TRIES):
+            u = (self.j + length * dj) * np.sqrt(self.b + length * db)
+            if (1.0 - u >= above).all() and (1.0 + u >= below).all():
+                there = (self.b + length * db, self.a + length * da, self.j + length * dj)
+                return _State(rows, *there), length
+            length *= _BACK
+        return self, 0.0
 
 
 def fits(rows: Rows, spline: Spline, beta: Array) -> bool:
     """Whether the coefficients are strictly inside every bound."""
-    return bool((beta[2:-2] > 0.0).all() and _State(rows, spline.cells(beta)).inside())
+    return bool((beta[2:-2] > 0.0).all() and _State(rows, *rows.spread(spline.cells(beta))).inside())
 
 
 def least_time(rows: Rows, spline: Spline, beta: Array, most: int = 80) -> Array:
@@ -176,7 +184,7 @@ def least_time(rows: Rows, spline: Spline, beta: Array, most: int = 80) -> Array
     Raises LinAlgError where Newton's matrix cannot be factored.
     """
     beta = beta.copy()
-    here = _State(rows, spline.cells(beta))
+    here = _State(rows, *rows.spread(spline.cells(beta)))
     whole = float(spline.seconds(spline.cells(beta)).sum())
     count = len(rows) * (1 + 4 * rows.jerk.shape[1]) + len(beta) - 4
     mu = _FIRST * whole / count
@@ -186,20 +194,17 @@ def least_time(rows: Rows, spline: Spline, beta: Array, most: int = 80) -> Array
         gradient, band = _newton(rows, spline, here, dual, beta, mu)
         step = np.zeros_like(beta)
         step[2:-2] = _solved(band, gradient)
+        change = rows.spread(spline.cells(step))
         fall = float((-step[2:-2] / beta[2:-2]).max())
-        length = min(1.0, _NEAR / fall) if fall > 0.0 else 1.0
-        for _try in range(_TRIES):
-            there = _State(rows, spline.cells(beta + length * step))
-            if there.leaves(here, _LEAVE):
-                break
-            length *= _BACK
-        else:
-            return beta
-        dual_length = dual.advance(rows, here, spline.cells(step), beta, step, mu)
+        there, length = here.toward(rows, change, min(1.0, _NEAR / fall) if fall > 0.0 else 1.0)
+        if not length:
+            break
+        dual_length = dual.advance(rows, here, change, beta, step, mu)
         beta += length * step
         here = there
         before, whole = whole, float(spline.seconds(spline.cells(beta)).sum())
-        calm = calm + 1 if abs(whole - before) < _DONE * whole and mu * count < _GAP * whole and length > 0.5 else 0
+        still = abs(whole - before) < _DONE * whole and mu * count < _GAP * whole and length > 0.5
+        calm = calm + 1 if still else 0
         if calm >= 2:
             break
         mu *= next(fall for least, fall in _FALL if min(length, dual_length) > least)
@@ -219,12 +224,13 @@ class _Dual:
         self.beta = mu / beta[2:-2]
 
     def advance(
-        self, rows: Rows, here: _State, change: Array, beta: Array, step: Array, mu: float
-    ) -> float:
-        """Moves along Newton's direction for the cells' `change`, as far as all stay positive."""
-        db, da, dj = rows.spread(change)
+        self, rows: Rows, here: _State, change: tuple[Array, Array, Array], beta: Array, step: Array,
+        mu: float,
+    ) -> float:  # fmt: skip
+        """Moves along Newton's direction for the rows' `change`, as far as all stay positive."""
+        db, da, dj = change
         of_root = -0.5 * db / here.b
-        dj *= here.root
+        du = here.root * dj
         moves: list[tuple[Array, Array]] = []
 
         def take(value: Array, slack: Array, gain: Array) -> None:
@@ -234,8 +240,8 @@ class _Dual:
         take(self.v, here.v, -db / rows.most)
         take(self.a[0], 1.0 - here.a, -da)
         take(self.a[1], 1.0 + here.a, da)
-        take(self.u[0], 1.0 - here.u, of_root - dj)
-        take(self.u[1], 1.0 + here.u, of_root + dj)
+        take(self.u[0], 1.0 - here.u, of_root - du)
+        take(self.u[1], 1.0 + here.u, of_root + du)
         take(self.beta, beta[2:-2], step[2:-2])
         fall = max(float((-move / value).max()) for value, move in moves)
         length = min(1.0, _NEAR / fall) if fall > 0.0 else 1.0

@@ -8,25 +8,25 @@ no spline of its square follows, so both ends launch and land at constant jerk.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from olp.trajectory.critical import Profile
+from olp.trajectory.critical import Profile, Timeline
 from olp.trajectory.interior import Rows, Spline, fits, least_time
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import Array, AxisLimits, Index
 from olp.trajectory.smooth import SmoothPath
-from olp.trajectory.speedgrid import CELL_S, Timeline, grid, speed_caps
+from olp.trajectory.speedgrid import CELL_S, grid, speed_caps
 
 #: cells of a window, and how far from there it may end, in windows
 _WINDOW, _MARGIN = 3000, 0.35
-#: how much slower than the closed form the start is, until it is inside all bounds
-_SLOWED = (0.85, 0.7, 0.5)
-#: share of the first phase of jerk that the launch takes, and of a cell's time that its neighbour has at least
+#: how much slower than the closed form windows begin and end, and their start is; further shares of the
+#: square of the speed that are tried for that; cells of a window that is not split for want of a start
+_SLOWED, _STARTS, _SMALL = 0.85, (1.0, 0.7, 0.35), 100
+#: share of the first phase of jerk that the launch takes, and of a cell's time that its neighbour lasts
 _LAUNCH, _CLEAR = 0.25, 0.4
 #: fewest cells of a window
 _FEW = 8
@@ -37,38 +37,58 @@ _GAUSS = 12
 #: b may change by this in one quintic, or its cell is halved, so often at most
 _STEEP, _HALVES = 1.5, 8
 #: usage that is let be, how often rows are tightened, and the starts that are tried then
-_OVER, _TURNS, _AGAIN = 1.0005, 2, (0.95, 0.85, 0.7, 0.5)
+_OVER, _TURNS, _AGAIN = 1.002, 2, (0.95, 0.85, 0.7, 0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Driven:
-    """States at the knots (m + 1,) of a stretch, and seconds (m,) between."""
+    """A stretch from `way` to way (m + 1,), and how it is gone in `seconds` (m,): the coefficients (m, 6) of
+    time of each step of it."""
 
     way: Array
-    speed: Array
-    acceleration: Array
     seconds: Array
+    time: Array
 
 
 def optimised(path: SmoothPath, limits: AxisLimits, found: Profile) -> Motion:
     """A motion along `path` from rest to rest that starts its search from the closed-form profile `found`.
 
-    Bounds are kept at the rows of the search; between them they may be exceeded slightly: audit it. Raises
-    ArithmeticError where no start is inside the bounds.
+    Bounds are kept at the rows of the search; between them they may be exceeded slightly: audit it.
     """
     clock = Timeline.of(path, found)
     cap = speed_caps(path, limits)
     knots = grid(path, limits, found, cap, clock)
-    edges = _edges(path, found, knots)
+    todo = list(pairwise(_edges(path, found, knots)))[::-1]
+    parts = []
+    while todo:
+        first, last = todo.pop()
+        window = _Window.of(path, limits, found, clock, cap, knots, first, last)
+        driven = window.solved()
+        if driven is None and len(window.spline.h) > _SMALL and last - first > 1:
+            middle = _middle(found, first, last)
+            todo += [(middle, last), (first, middle)]
+            continue
+        parts.append(driven or _as_found(path, found, clock, first, last))
+    return _motion(path, parts)
 
-    def windows() -> Iterator[_Window]:
-        for first, last in pairwise(edges):
-            yield _Window.of(path, limits, found, clock, cap, knots, first, last)
 
-    for slowed in _SLOWED:
-        if all(fits(w.rows.rows(), w.spline, slowed**2 * w.start) for w in windows()):
-            return _motion(path, [w.solved(slowed) for w in windows()])
-    raise ArithmeticError("no start of the search is inside the bounds")
+def _as_found(path: SmoothPath, found: Profile, clock: Timeline, first: int, last: int) -> _Driven:
+    """The closed form between two of its nodes, slowed to meet its neighbours."""
+    part = slice(int(clock.first[first]), int(clock.first[last]))
+    way = np.append(clock.way[part], path.break_mm[found.node[last]])
+    powers = _SLOWED ** np.arange(6.0)
+    time = np.zeros((len(way) - 1, 6))
+    time[:, 1], time[:, 2], time[:, 3] = (
+        clock.speed[part], clock.acceleration[part] / 2.0, clock.jerk[part] / 6.0,
+    )  # fmt: skip
+    return _Driven(way, clock.lasts[part] / _SLOWED, time * powers)
+
+
+def _middle(found: Profile, first: int, last: int) -> int:
+    """The slowest node of the middle half between two."""
+    quarter = (last - first) // 4
+    lo, hi = max(first + quarter, first + 1), max(last - quarter, first + 2)
+    return lo + int(np.argmin(found.speed[lo:hi]))
 
 
 def _edges(path: SmoothPath, found: Profile, knots: Array) -> list[int]:
@@ -77,7 +97,8 @@ def _edges(path: SmoothPath, found: Profile, knots: Array) -> list[int]:
     count = max(round(len(knots) / _WINDOW), 1)
     edges = [0]
     for i in range(1, count):
-        lo, hi = np.searchsorted(place, [(i - _MARGIN) * len(knots) / count, (i + _MARGIN) * len(knots) / count])
+        about = np.array([i - _MARGIN, i + _MARGIN]) * len(knots) / count
+        lo, hi = np.searchsorted(place, about)
         if hi > lo > edges[-1]:
             edges.append(int(lo + np.argmin(found.speed[lo:hi])))
     return [*edges, len(found.node) - 1]
@@ -85,9 +106,9 @@ def _edges(path: SmoothPath, found: Profile, knots: Array) -> list[int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _End:
-    """A window's end: `way` where its cells end, `speed` and `acceleration` there over the slow-down, and the
-    `seconds` times the slow-down of the launch or landing beyond (0: none), the way `rest` where that ends, and
-    the way in which no knot should be, `clear`."""
+    """A window's end: `way` where its cells end, `speed` and `acceleration` there over the slow-down; the
+    `seconds` times the slow-down of the launch or landing beyond (0: none), and the way `rest` where that
+    ends; no knot should be nearer than `clear`."""
 
     way: float
     speed: float
@@ -137,26 +158,37 @@ class _Window:
         start = spline.fitted(speed**2, 2.0 * acceleration)
         return _Window(begin, end, _Rows.of(path, limits, cap, z), spline, start)
 
-    def solved(self, slowed: float) -> _Driven:
-        """The stretch in least time."""
-        c = self.spline.cells(_tightened(self.rows, self.spline, slowed**2 * self.start))
+    def solved(self) -> _Driven | None:
+        """The stretch in least time; None where no start is inside the bounds."""
+        rows = self.rows.rows()
+        for share in _STARTS:
+            start = _SLOWED**2 * self.start
+            start[2:-2] *= share
+            if fits(rows, self.spline, start):
+                break
+        else:
+            return None
+        try:
+            c = self.spline.cells(_tightened(self.rows, rows, self.spline, start))
+        except LinAlgError:
+            return None
         way, speed, acceleration, seconds = _states(self.rows.knot, self.spline.h, c)
         if self.begin.seconds:
             way, speed, acceleration = (
                 np.append(e, rest) for e, rest in ((self.begin.rest, way), (0.0, speed), (0.0, acceleration))
             )
-            seconds = np.append(self.begin.seconds / slowed, seconds)
+            seconds = np.append(self.begin.seconds / _SLOWED, seconds)
         if self.end.seconds:
             way, speed, acceleration = (
                 np.append(rest, e) for e, rest in ((self.end.rest, way), (0.0, speed), (0.0, acceleration))
             )
-            seconds = np.append(seconds, self.end.seconds / slowed)
-        return _Driven(way, speed, acceleration, seconds)
+            seconds = np.append(seconds, self.end.seconds / _SLOWED)
+        return _Driven(way, seconds, _quintics(way, speed, acceleration, seconds))
 
 
-def _tightened(rows_at: _Rows, spline: Spline, start: Array) -> Array:
+def _tightened(rows_at: _Rows, rows: Rows, spline: Spline, start: Array) -> Array:
     """The coefficients of least time, with rows tightened beside places that exceed a bound."""
-    beta = least_time(rows_at.rows(), spline, start)
+    beta = least_time(rows, spline, start)
     for _ in range(_TURNS):
         worst = rows_at.worst(spline.cells(beta))
         over = worst > _OVER
@@ -205,7 +237,8 @@ class _Rows:
     def _at(self, places: int) -> Rows:
         part = np.linspace(0.0, 1.0, places)
         place = (self.low[:, None] + (self.high - self.low)[:, None] * part).ravel()
-        piece, cell, share = (np.repeat(e, places) for e in (self.piece, self.cell, self.share))
+        piece, cell = np.repeat(self.piece, places), np.repeat(self.cell, places)
+        share = np.repeat(self.share, places)
         s = (place - self.path.break_mm[piece])[:, None]
         _, c1, c2, c3 = (self.path.shape[piece, i] for i in range(4))
         derivatives = (c1 + s * (2.0 * c2 + 3.0 * s * c3), 2.0 * c2 + 6.0 * s * c3, 6.0 * c3)
@@ -240,8 +273,11 @@ def _states(knot: Array, h: Array, c: Array) -> tuple[Array, Array, Array, Array
         second = np.concatenate(([False], np.repeat(wide, count)[1:]))
         second &= np.concatenate(([False], np.diff(np.repeat(np.arange(len(cell)), count)) == 0))
         first = np.repeat(wide, count) & ~second
-        cell, low, high, middle = (np.repeat(e, count) for e in (cell, low, high, middle))
-        low, high = np.where(second, middle, low), np.where(first, middle, high)
+        cell, middle = np.repeat(cell, count), np.repeat(middle, count)
+        low, high = (
+            np.where(second, middle, np.repeat(low, count)),
+            np.where(first, middle, np.repeat(high, count)),
+        )
     node, weight = np.polynomial.legendre.leggauss(_GAUSS)
     t = low + 0.5 * (high - low) * (node[:, None] + 1.0)
     seconds = (high - low) * h[cell] * (0.5 * weight @ (1.0 / np.sqrt(square(cell, t))))
@@ -253,10 +289,8 @@ def _states(knot: Array, h: Array, c: Array) -> tuple[Array, Array, Array, Array
 def _motion(path: SmoothPath, parts: list[_Driven]) -> Motion:
     """Quintics from knot to knot through the states there, cut where the path changes."""
     way = np.concatenate([parts[0].way[:1], *(p.way[1:] for p in parts)])
-    speed = np.concatenate([parts[0].speed[:1], *(p.speed[1:] for p in parts)])
-    acceleration = np.concatenate([parts[0].acceleration[:1], *(p.acceleration[1:] for p in parts)])
     lasts = np.concatenate([p.seconds for p in parts])
-    quintic = _quintics(way, speed, acceleration, lasts)
+    quintic = np.concatenate([p.time for p in parts])
     x = path.break_mm
     cell = np.searchsorted(way, x[:-1], side="right") - 1
     inside = np.flatnonzero(way[cell] != x[:-1])

@@ -15,13 +15,15 @@ from itertools import pairwise
 import numpy as np
 
 from olp.exceptions import CannotCompute
+from olp.trajectory import critical
 from olp.trajectory.audit import Audit, Ratios, ratios, slowing, with_jumps
-from olp.trajectory.critical import critical, expected_s
 from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.motion import Array, Index, Motion
+from olp.trajectory.optimise import optimised
 from olp.trajectory.overlap import least_s, overlap
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import SmoothPath, needs_stop, smooth
+from olp.trajectory.speedgrid import CELL_S, bound_s
 
 Progress = Callable[[str, float], None]
 
@@ -29,12 +31,17 @@ Progress = Callable[[str, float], None]
 _ROUNDING = 1e-9
 #: ways that the planner knows to drive a run, and how they are named in a report
 OVERLAP, CRITICAL, EXACT_STOP = "overlapped moves", "critical points", "exact stops"
+OPTIMISED = "optimised speed"
 #: runs with fewer segments than this between stops are straight moves to the overlapping solver
 _FEW_SEGMENTS = 2
 #: critical points take no less than this share of what they are expected to
 _AT_BEST = 0.9
 #: a solver whose least time is this share of all others' wins without a contest
 _SURE = 0.8
+#: pieces of a way-point, and of all that is optimised unless asked for: about a minute and a half
+_PIECES, _AFFORDED = 3, 1_000_000
+#: share of the time that has to be gained, and of what jerk costs in closed form that optimising leaves
+_GAIN, _LEFT = 0.003, 0.1
 #: way-points that are forecast together, and of runs that are planned together: a call costs more than a move
 _BLOCK, _TOGETHER = 1 << 15, 1 << 15
 
@@ -83,16 +90,24 @@ class Trajectory:
         return lines.astype(np.int64), seconds
 
 
-def plan(route: Route, limits: AxisLimits, tell: Progress | None = None) -> Trajectory:
-    """The motion of a route that begins and ends at rest. Raises CannotCompute for a route that is not
-    finite."""
+def plan(
+    route: Route, limits: AxisLimits, tell: Progress | None = None, *, optimise: bool | None = None
+) -> Trajectory:
+    """The motion of a route that begins and ends at rest.
+
+    `optimise` tells whether speeds along dense curves are optimised; None: unless that would take minutes.
+    Raises CannotCompute for a route that is not finite.
+    """
     _check(route, limits)
     route = _with_stops(route)
     parts: list[Motion] = []
     legs: list[Leg] = []
     used = Ratios(np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
-    for first, last, rivals in _stretches(route, limits):
-        for motion, leg, ratio in _legs(route, limits, first, last, rivals):
+    stretches = list(_stretches(route, limits))
+    if optimise is None:
+        optimise = _to_optimise(stretches) <= _AFFORDED
+    for first, last, rivals in stretches:
+        for motion, leg, ratio in _legs(route, limits, first, last, rivals, optimise):
             parts += motion
             legs.append(leg)
             used = used.with_those(ratio)
@@ -155,6 +170,16 @@ def _stretches(route: Route, limits: AxisLimits) -> Iterator[tuple[int, int, tup
         yield first, int(stops[-1]), (_Rival(alone, 0.0),)
 
 
+def _to_optimise(stretches: list[tuple[int, int, tuple[_Rival, ...]]]) -> float:
+    """About how many pieces there are to optimise."""
+    return sum(
+        _PIECES * (last - first) + rival.least_s / CELL_S
+        for first, last, rivals in stretches
+        for rival in rivals
+        if rival.solver.bends
+    )
+
+
 def _stops(route: Route) -> Index:
     return np.flatnonzero((route.tolerance_mm == 0.0) | (route.dwell_s > 0.0))
 
@@ -189,7 +214,7 @@ def _promising(least_s: Array) -> tuple[_Rival, ...]:
 
 
 def _legs(
-    route: Route, limits: AxisLimits, first: int, last: int, rivals: tuple[_Rival, ...]
+    route: Route, limits: AxisLimits, first: int, last: int, rivals: tuple[_Rival, ...], optimise: bool
 ) -> Iterator[tuple[list[Motion], Leg, Ratios]]:
     """The stretch from one stop to another, in one leg; run by run where no solver finds that."""
     inner = slice(first, last + 1)
@@ -203,7 +228,7 @@ def _legs(
         ),
         limits,
     )  # fmt: skip
-    found = _fastest(run, rivals)
+    found = _fastest(run, rivals, optimise)
     if found is not None:
         yield _with_rests(route, first, last, found)
         return
@@ -211,7 +236,7 @@ def _legs(
     if len(stops) <= 2:
         raise CannotCompute(f"no solver found a motion along line {int(route.line[first])}")
     for begin, end in pairwise(stops.tolist()):
-        yield from _legs(route, limits, begin, end, rivals)
+        yield from _legs(route, limits, begin, end, rivals, optimise)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,18 +254,33 @@ class _Found:
         return self.motion.duration_s * self.factor
 
 
-def _fastest(run: Run, rivals: tuple[_Rival, ...]) -> _Found | None:
+def _fastest(run: Run, rivals: tuple[_Rival, ...], optimise: bool) -> _Found | None:
     """The fastest of what the solvers find; those that were given no chance are asked when all else fails,
     and the last one then: stops everywhere are never the fastest."""
     best: _Found | None = None
     for rival in rivals:
         if best is None or rival.least_s < best.duration_s:
             best = _better(run, rival.solver, best)
+    if optimise and best is not None and any(rival.solver.bends for rival in rivals):
+        best = _optimised(run, best)
     asked = [rival.solver for rival in rivals]
     for solver in (*_SOLVERS, _LAST):
         if best is None and solver not in asked:
             best = _better(run, solver, best)
     return best
+
+
+def _optimised(run: Run, best: _Found) -> _Found:
+    """The motion of optimised speed where it may be faster."""
+    try:
+        path, profile = run.path(), run.profile()
+    except CannotCompute:
+        return best
+    bound, closed = bound_s(path, run.limits), critical.seconds(path, profile)
+    if bound + _LEFT * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
+        return best
+    solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), _LAST.least_s, bends=True)
+    return _better(run, solver, best) or best
 
 
 def _better(run: Run, solver: Solver, best: _Found | None) -> _Found | None:
@@ -300,12 +340,19 @@ class Run:
         self.route = route
         self.limits = limits
         self._path: SmoothPath | None = None
+        self._profile: critical.Profile | None = None
 
     def path(self) -> SmoothPath:
         """Raises CannotCompute where the run stops on its way."""
         if self._path is None:
             self._path = smooth(self.route, self.limits)
         return self._path
+
+    def profile(self) -> critical.Profile:
+        """Speeds in closed form along the path; raises as that."""
+        if self._profile is None:
+            self._profile = critical.best_profile(self.path(), self.limits)
+        return self._profile
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -337,8 +384,8 @@ _SOLVERS = (
     ),
     Solver(
         CRITICAL,
-        lambda run: critical(run.path(), run.limits),
-        lambda route, limits: _AT_BEST * expected_s(route, limits),
+        lambda run: critical.driven(run.path(), run.profile()),
+        lambda route, limits: _AT_BEST * critical.expected_s(route, limits),
         bends=True,
     ),
 )

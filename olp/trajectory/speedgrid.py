@@ -1,60 +1,33 @@
-"""A closed-form speed profile as a clock, and the grid of cells that its times make."""
+"""The grid of cells that the times of a closed-form speed profile make, and what bounds those times."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.trajectory import ramps
-from olp.trajectory.critical import Profile, _phases, ceilings
+from olp.trajectory.critical import Profile, Timeline, ceilings, free_speeds
 from olp.trajectory.route import Array, AxisLimits, Index
 from olp.trajectory.smooth import SmoothPath
 
-#: time of a cell in the closed-form profile, s; of one at full feed, in cells; least share of one
+#: time of a cell in the closed-form profile, s; of one at full feed, in cells; least share of one; least
+#: cells of a path
 CELL_S = 4e-3
-_CRUISE, _LEAST = 20.0, 0.4
-#: cells of a ramp at the least, where a span takes longer than _LONG cells, and their least time, s
-_OF_RAMP, _LONG, _SHORTEST_S = 6, 10.0, 5e-4
+_CRUISE, _LEAST, _OF_PATH = 20.0, 0.4, 60.0
+#: cells of a ramp at the least, if it changes the speed by more than the share _LEVEL
+_OF_RAMP, _LEVEL = 6, 0.02
 #: share of the smaller cell beside it that a knot may move
 _MOVE = 0.3
+#: share for curvature that leaves acceleration as on a straight path
+_STRAIGHT = 1e-12
+#: a limit that never binds
+_FREE = 1e30
 #: a speed this near to the feed is it
 _AT_FEED = 0.999
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Timeline:
-    """Phases (p,) of constant jerk: `start_s` (p + 1,), way, speed, acceleration and jerk at their start."""
-
-    start_s: Array
-    way: Array
-    speed: Array
-    acceleration: Array
-    jerk: Array
-    seconds: Array
-
-    @staticmethod
-    def of(path: SmoothPath, found: Profile) -> Timeline:
-        return Timeline(*_phases(path.break_mm, found))
-
-    def way_at(self, time_s: Array) -> Array:
-        k = np.clip(np.searchsorted(self.start_s, time_s, side="right") - 1, 0, len(self.way) - 1)
-        u = time_s - self.start_s[k]
-        return np.asarray(
-            self.way[k] + u * (self.speed[k] + u * (self.acceleration[k] / 2.0 + u * self.jerk[k] / 6.0))
-        )
-
-    def at_way(self, way: Array) -> tuple[Array, Array]:
-        """Speed and acceleration (n,) at ways (n,)."""
-        k = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.way) - 1)
-        v, a, j = self.speed[k], self.acceleration[k], self.jerk[k]
-        u = ramps.when(np.maximum(way - self.way[k], 0.0), v, a, j, self.seconds[k])
-        return np.maximum(v + u * (a + 0.5 * u * j), 0.0), a + u * j
-
-
 def speed_caps(path: SmoothPath, limits: AxisLimits) -> Array:
     """(k,) most speed along each piece for the feed and the axes' velocities."""
-    free = AxisLimits(limits.velocity, np.full(3, np.inf), np.full(3, np.inf))
+    free = AxisLimits(limits.velocity, np.full(3, _FREE), np.full(3, _FREE))
     return ceilings(path, free, np.ones(len(path)))[0]
 
 
@@ -64,7 +37,7 @@ def grid(path: SmoothPath, limits: AxisLimits, found: Profile, cap: Array, clock
     a, j = found.acceleration, found.jerk
     rise = ramps.seconds(found.speed[:-1], found.peak, a, j)
     fall = ramps.seconds(found.speed[1:], found.peak, a, j)
-    ways = ramps.distance(found.speed[:-1], found.peak, a, j) + ramps.distance(found.speed[1:], found.peak, a, j)
+    ways = sum(ramps.distance(v, found.peak, a, j) for v in (found.speed[:-1], found.speed[1:]))
     x = path.break_mm
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.nan_to_num(np.maximum(np.diff(x[found.node]) - ways, 0.0) / found.peak)
@@ -73,14 +46,12 @@ def grid(path: SmoothPath, limits: AxisLimits, found: Profile, cap: Array, clock
     least = np.minimum.reduceat(cap, begin)
     free = np.minimum.reduceat(ceilings(path, limits, np.ones(len(path)))[0], begin)
     at_feed = (found.peak >= _AT_FEED * least) & (free >= _AT_FEED * least)
-    few = np.where(whole > _LONG * CELL_S, _OF_RAMP, 1)
-    up, down = (
-        _count(t, np.maximum(np.ceil(t / CELL_S - 1e-9), np.minimum(few, np.ceil(t / _SHORTEST_S))))
-        for t in (rise, fall)
-    )
-    flat = _count(level, np.where(at_feed, np.maximum(2, np.ceil(level / (_CRUISE * CELL_S))),
-                                  np.ceil(level / CELL_S)))  # fmt: skip
-    flat = np.where((level > 0.0) & (level < CELL_S), 1, flat)
+    cell_s = cell_seconds(float(whole.sum()))
+    up = _of_ramp(rise, found.speed[:-1], found.peak, cell_s)
+    down = _of_ramp(fall, found.speed[1:], found.peak, cell_s)
+    flat = _count(level, np.where(at_feed, np.maximum(2, np.ceil(level / (_CRUISE * cell_s))),
+                                  np.ceil(level / cell_s)))  # fmt: skip
+    flat = np.where((level > 0.0) & (level < cell_s), 1, flat)
     up = np.where(up + flat + down == 0, 1, up)
     start = np.concatenate(([0.0], np.cumsum(whole)))
     times, span = [], []
@@ -92,9 +63,8 @@ def grid(path: SmoothPath, limits: AxisLimits, found: Profile, cap: Array, clock
     time, owner = np.concatenate(times), np.concatenate(span)
     order = np.argsort(time, kind="stable")
     time, owner = time[order], owner[order]
-    cell = np.maximum(rise, fall) / np.maximum(np.maximum(up, down), 1)
-    cell = np.where((whole > _LONG * CELL_S) & (cell > 0.0), np.clip(cell, _SHORTEST_S, CELL_S), CELL_S)
-    gap = _LEAST * cell
+    cells = [np.where(count > 1, t / np.maximum(count, 1), np.inf) for t, count in ((rise, up), (fall, down))]
+    gap = _LEAST * np.minimum(np.minimum(*cells), cell_s)
     kept = time[_apart(time, gap[owner])]
     return _on_breaks(np.unique(np.concatenate((x[:1], clock.way_at(kept), x[-1:]))), x)
 
@@ -106,6 +76,17 @@ def _on_breaks(knot: Array, x: Array) -> Array:
     gap = np.diff(knot)
     room = _MOVE * np.minimum(np.concatenate((gap[:1], gap)), np.concatenate((gap, gap[-1:])))
     return np.unique(np.where(np.abs(near - knot) <= room, near, knot))
+
+
+def cell_seconds(whole: float) -> float:
+    """Time of a cell for a path that takes `whole` seconds."""
+    return min(CELL_S, whole / _OF_PATH)
+
+
+def _of_ramp(lasts: Array, speed: Array, peak: Array, cell_s: float) -> Index:
+    """(m,) cells of ramps: more than their time asks for, where they change the speed much."""
+    steep = np.where(peak - speed > _LEVEL * peak, _OF_RAMP, 1)
+    return _count(lasts, np.maximum(np.ceil(lasts / cell_s - 1e-9), steep))
 
 
 def _count(lasts: Array, count: Array) -> Index:
@@ -120,3 +101,16 @@ def _apart(time: Array, gap: Array) -> Index:
             kept.append(i)
             last = t
     return np.array(kept, np.int64)
+
+
+def bound_s(path: SmoothPath, limits: AxisLimits) -> float:
+    """About the least seconds that a motion along the path could take if jerk were free."""
+    x = path.break_mm
+    top = ceilings(path, limits, np.ones(len(path)))[0]
+    free = AxisLimits(limits.velocity, limits.acceleration, np.full(3, _FREE))
+    acceleration = ceilings(path, free, np.full(len(path), _STRAIGHT))[1]
+    ends = np.concatenate(([0.0], np.minimum(top[:-1], top[1:]), [0.0]))
+    speed = free_speeds(x, ends, acceleration)
+    h = np.diff(x)
+    peak = np.sqrt(np.maximum(speed[:-1], speed[1:]) ** 2 + acceleration * h)
+    return float((h / np.minimum(top, peak)).sum())
