@@ -14,6 +14,7 @@ import numpy as np
 from olp.exceptions import CannotCompute, OlpError, UsageError
 from olp.loading import profile_of, unrolled
 from olp.machine import Setup
+from olp.program.feed_words import Shared, check_feeds, write_feeds
 from olp.program.feeds import lengths_mm
 from olp.program.program import Program
 from olp.program.reader import Options, read
@@ -44,6 +45,7 @@ class Case:
     blend_mm: float
     blend_from: str
     block_delete: bool
+    contour: bool
     legs: tuple[Route, ...]
 
     @staticmethod
@@ -64,17 +66,25 @@ class Case:
                 Path(name).name if name else "", setup, program,
                 next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
                 "the call" if blend_mm is not None else "the machine file" if stated else "the default",
-                block_delete, (),
+                block_delete, contour, (),
             ).driven()  # fmt: skip
         except OlpError as error:
             raise (error.in_file(name) if name and error.line is not None else error) from None
-        if len(program.toolpath) and not case.legs:
+        if not case.legs and case.untimed()["moves"]:
             raise CannotCompute(
                 "no move of the program begins and ends at known positions of all axes, so nothing can be "
                 "timed; give start_mm in the job file, or command X, Y and Z first",
                 file=name or None,
             )
         return case
+
+    def rewritten(self, data: bytes) -> Case:
+        """Another text in place of this one's, read in the same way. Raises ProgramError."""
+        options = Options(block_delete=self.block_delete, contour=self.contour)
+        program = read(data, self.setup, profile_of(self.setup), options)
+        # the machine's mode at the start is no word of the text
+        modes = (*(m for m in self.program.path_modes if m.line == 0), *program.path_modes)
+        return replace(self, program=replace(program, path_modes=modes)).driven()
 
     def driven(self) -> Case:
         """The same with its stretches."""
@@ -183,6 +193,36 @@ def within_inertial(
             return found
         cap = min(cap, most_mm * cap / largest) * (1.0 - 1e-3)
     raise CannotCompute(f"no plan keeps the inertial deviation within {most_mm * 1e3:g} um")
+
+
+def with_feeds(found: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[str, Any]]:
+    """The text with the planned feeds in its F words, read back, and a report of it; `duration_s` is what the
+    text takes, planned once more.
+
+    Raises ProgramError for a feed that cannot be written, CannotCompute where it does not read back.
+    """
+    case, lines = found.case, found.lines
+    fed = np.flatnonzero((lines.feed_length_mm > 0.0) & (lines.feed_seconds > 0.0))
+    planned_s = lines.feed_seconds[fed]
+    try:
+        written = write_feeds(
+            case.program, lines.line[fed], planned_s, planned_s - lines.lost_s()[fed], shared=shared,
+            block_delete=case.block_delete,
+        )  # fmt: skip
+    except OlpError as error:
+        raise (error.in_file(case.name) if case.name else error) from None
+    other = case.rewritten(written.data)
+    check_feeds(case.program, other.program, block_delete=case.block_delete)
+    again = planned(other, found.limits, tell, "feeds")
+    return written.data, {
+        "words": written.words,
+        "changed": written.changed,
+        "shared": written.shared,
+        "rule": shared,
+        "slower_lines": written.slower,
+        "kept_lines": list(written.kept),
+        "duration_s": again.duration_s,
+    }
 
 
 def blend_study(case: Case, found: Plan, factors: Sequence[float], tell: Progress) -> list[dict[str, Any]]:

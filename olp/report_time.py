@@ -177,8 +177,14 @@ def _feeds_written(report: Report) -> Iterator[str]:
         WIDTH,
     )
     if written["shared"]:
+        took = (
+            "took the least planned feed of them"
+            if written["rule"] == "least"
+            else "took the feed that takes as long in all"
+        )
         yield from textwrap.wrap(
-            f"{written['shared']} F words hold for several blocks; they took the least planned feed of them.",
+            f"{written['shared']} F words hold for several blocks and {took}; {written['slower_lines']} "
+            "lines were planned slower than the feed that they have now.",
             WIDTH, initial_indent="  ", subsequent_indent="  ",
         )  # fmt: skip
     if written["kept_lines"]:

@@ -12,7 +12,8 @@ from olp.files import trajectory as files
 from olp.files.write import write_files
 from olp.loading import PathLike, profile_of, setup_of, source_of
 from olp.machine import Setup
-from olp.replanning import Case, Plan, Progress, blend_study, planned, within_inertial
+from olp.program.feed_words import Shared
+from olp.replanning import Case, Plan, Progress, blend_study, planned, with_feeds, within_inertial
 from olp.trajectory.from_program import axis_limits
 from olp.trajectory.inertia import Inertial, compliance_of
 from olp.trajectory.plan import Trajectory
@@ -114,6 +115,17 @@ class Retiming:
             if progress is not None:
                 progress("write", min(done / whole, 1.0))
 
+    def with_feeds(self, shared: Shared = "mean", progress: Progress | None = None) -> bytes:
+        """The text of the program with the mean planned feed of each block in its F words, never above the
+        programmed one; `report["write_feed"]` tells what changed and what the text takes then.
+
+        An F word that holds for several blocks takes the feed that takes as long in all, or with "least" the
+        least planned feed of them. Raises ProgramError for a feed that cannot be written in the style of
+        its word.
+        """
+        data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or _silent)
+        return data
+
     def write(
         self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
         stretch: int | None = None, *, force: bool = False,
@@ -128,6 +140,10 @@ class Retiming:
 _WRITERS: Mapping[Format, Callable[[Trajectory, float], Iterator[bytes]]] = {
     "csv": files.csv, "npz": files.npz, "parquet": files.parquet, "ros": files.ros, "pvt": files.pvt,
 }  # fmt: skip
+
+
+def _silent(what: str, share: float) -> None:
+    return None
 
 
 def numbered(target: Path, number: int) -> Path:
@@ -162,7 +178,7 @@ def retime(
     """
     setup = setup_of(machine, job)
     profile_of(setup)
-    tell = progress or (lambda what, share: None)
+    tell = progress or _silent
 
     def case_of(source: PathLike | bytes) -> Case:
         return Case.of(

@@ -25,6 +25,7 @@ from olp.exceptions import OlpError, UsageError
 
 if TYPE_CHECKING:
     from olp.files.write import Content
+    from olp.program.feed_words import Shared
     from olp.retiming import Format, Retiming
 
 FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
@@ -47,6 +48,15 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
 @click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
 @click.option("--slow", metavar="FILE.csv", help="Write the places below half of the feed.")
+@click.option("--write-feed", metavar="FILE", help="Write the program with the planned feeds in its F words.")
+@click.option(
+    "--shared-feed",
+    type=click.Choice(["mean", "least"]),
+    default="mean",
+    show_default=True,
+    help="What an F word takes that holds for several blocks: the feed that takes as long in all, or "
+    "the least planned feed.",
+)
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
 @click.option("--flatten", is_flag=True, help="Unroll loops, subprograms and expressions first.")
@@ -67,6 +77,8 @@ def command(
     nominal: str | None,
     lines: str | None,
     slow: str | None,
+    write_feed: str | None,
+    shared_feed: Shared,
     contour: bool,
     block_delete: bool,
     flatten: bool,
@@ -83,13 +95,15 @@ def command(
     call = given(program, machine, job)
     if call.program == STREAM == nominal:
         raise UsageError("stdin can be one program only; name PROGRAM or NOMINAL as a file")
-    if as_json and output == STREAM:
-        raise UsageError("JSON on stdout does not go with -o -; write the report to a file with --report")
+    on_stdout = [name for name in (output, write_feed) if name == STREAM]
+    if len(on_stdout) + as_json > 1:
+        raise UsageError("stdout takes one result; write the others to files (-o, --write-feed, --report)")
     if stretch is not None and output is None:
         raise UsageError("--stretch chooses what OUT takes; name OUT with -o")
     inputs = (*call.inputs, *files_of(nominal))
-    refuse_early(files_of(output, lines, slow, report_file), inputs, force=force)
-    _refuse_twice(files_of(output, lines, slow, report_file))
+    outputs = files_of(output, lines, slow, write_feed, report_file)
+    refuse_early(outputs, inputs, force=force)
+    _refuse_twice(outputs)
 
     from olp import report, report_time
     from olp.files import trajectory as tables
@@ -103,15 +117,20 @@ def command(
                 blend_mm=blend_mm, study_blend=blend_study, contour=contour, block_delete=block_delete,
                 flatten=flatten, progress=show,
             )  # fmt: skip
+            feeds = None if write_feed is None else result.with_feeds(shared_feed, show)
         except OlpError as error:
             raise (error.in_file("<stdin>") if error.line is not None else error) from None
         written: dict[Path, Content] = {}
         if output is not None and output != STREAM:
             written |= result.files(output, kind, cycle_ms * 1e-3, stretch, show)
         written |= {Path(name): tables.lines_csv(result.lines) for name in files_of(lines)}
+        if feeds is not None:
+            written |= {Path(name): feeds for name in files_of(write_feed)}
         written |= {Path(name): tables.slow_csv(result.slow) for name in files_of(slow)}
         written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
         write_files(written, force=force, inputs=inputs)
+    if feeds is not None and write_feed == STREAM:
+        put(feeds)
     if output == STREAM:
         _stream(_of_one(result, kind, cycle_ms * 1e-3, stretch))
     if not quiet:
@@ -120,7 +139,7 @@ def command(
     if as_json:
         put(report.to_json(result.report))
     elif not quiet:
-        put(report_time.to_text(result.report), err=output == STREAM)
+        put(report_time.to_text(result.report), err=bool(on_stdout))
 
 
 def _of_one(result: Retiming, kind: Format | None, cycle_s: float, stretch: int | None) -> Iterable[bytes]:

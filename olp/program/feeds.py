@@ -90,6 +90,28 @@ def lengths_mm(path: Toolpath) -> Array:
     return np.asarray(out, float)
 
 
+def governing(scan: Scan) -> tuple[Index, Index]:
+    """(n,) the feed moves, and which of the F words of the scan, in order, gives the feed of each.
+
+    Raises ProgramError for a feed move without a feed, and a canned cycle in G93.
+    """
+    path = scan.program.toolpath
+    move = np.flatnonzero(path.kind != Kind.RAPID)
+    if not len(move):
+        return move, move
+    line = path.line[move].astype(np.int64)
+    mode, since = _modes(scan).at(line)
+    _, f_line = scan.of_letter(b"F")
+    latest = np.searchsorted(f_line, line, "right") - 1
+    inverse = mode == _INVERSE
+    # G93: a block's own; else since the mode began
+    needed = np.where(inverse, line, since)
+    stated = (latest >= 0) & (np.append(f_line, -1)[latest] >= needed)
+    _refuse(~stated, line, inverse)
+    _refuse_cycles(path, move, inverse, line)
+    return move, latest.astype(np.int64)
+
+
 def feeds(scan: Scan) -> Array:
     """(n,) feed of each move in mm/s: inf for rapids, NaN for moves of the control's own and where the time
     of G93 has no length. Raises ProgramError for a feed move without a feed, or one that cannot be read
@@ -97,23 +119,16 @@ def feeds(scan: Scan) -> Array:
     path = scan.program.toolpath
     out = np.full(len(path), np.inf)
     out[(path.flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
-    move = np.flatnonzero(path.kind != Kind.RAPID)
+    move, latest = governing(scan)
     if not len(move):
         return out
     line = path.line[move].astype(np.int64)
     modes = _modes(scan)
-    mode, since = modes.at(line)
+    mode, _ = modes.at(line)
     f_word, f_line = scan.of_letter(b"F")
     value, pointed = numbers(scan.words, f_word), scan.words.pointed[f_word]
     unit = _unit(scan, f_line)
-    latest = np.searchsorted(f_line, line, "right") - 1
-    stated = latest >= 0
     inverse = mode == _INVERSE
-    # G93: a block's own; else since the mode began
-    needed = np.where(inverse, line, since)
-    stated &= np.append(f_line, -1)[latest] >= needed
-    _refuse(~stated, line, inverse)
-    _refuse_cycles(path, move, inverse, line)
     used = np.unique(latest)
     _check_values(scan, modes, f_line[used], value[used], pointed[used], unit[used])
     feed = value[latest] * unit[latest] / 60.0
