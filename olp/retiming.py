@@ -12,6 +12,7 @@ from olp.files import trajectory as files
 from olp.files.write import write_files
 from olp.loading import PathLike, profile_of, setup_of, source_of
 from olp.machine import Setup
+from olp.plots import Format as Picture
 from olp.program.feed_words import Shared
 from olp.replanning import Case, Plan, Progress, blend_study, planned, with_feeds, within_inertial
 from olp.trajectory.from_program import axis_limits
@@ -23,6 +24,8 @@ from olp.trajectory.usage import LineUse, SlowPlaces
 
 Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
 _SUFFIX: Mapping[str, Format] = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
+
+PICTURES: Mapping[str, Picture] = {".svg": "svg", ".png": "png"}
 
 #: what a control's servo takes
 CYCLE_S = 1e-3
@@ -99,8 +102,7 @@ class Retiming:
         chosen = kind or _SUFFIX.get(target.suffix.lower(), "csv")
         if stretch is not None or len(self.trajectories) == 1:
             return {target: self._counted(chosen, cycle_s, stretch, progress)}
-        if not self.trajectories:
-            raise CannotCompute("the program moves nothing, so there is no trajectory to write")
+        self._any()
         return {
             numbered(target, number): self._counted(chosen, cycle_s, number, progress)
             for number in range(1, len(self.trajectories) + 1)
@@ -125,6 +127,35 @@ class Retiming:
         """
         data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or _silent)
         return data
+
+    def plots(
+        self, path: PathLike, stretch: int | None = None, *, from_s: float = 0.0, to_s: float | None = None
+    ) -> dict[Path, bytes]:
+        """Pictures of speed, velocity, acceleration and jerk over time beside their limits, by path: one
+        file (.svg or .png), or one a stretch. Raises UsageError for another suffix, and for a span of time
+        with nothing in it."""
+        from olp.plots_time import motion_plot
+
+        target = Path(path)
+        kind = PICTURES.get(target.suffix.lower())
+        if kind is None:
+            raise UsageError(f"the plot {str(path)!r} ends in no known format; expected .svg or .png")
+        self._any()
+        count = len(self.trajectories)
+        numbers = [stretch] if stretch is not None else list(range(1, count + 1))
+        out = {}
+        for number in numbers:
+            found = self._stretch(number)
+            route = self.routes[number - 1]
+            name = f"{self.report['program'] or 'program'} on {self.report['machine']}"
+            lines = f"lines {int(route.line.min())} to {int(route.line.max())}"
+            where = numbered(target, number) if len(numbers) > 1 else target
+            out[where] = motion_plot(found, route, f"{name}, {lines}", kind, from_s=from_s, to_s=to_s)
+        return out
+
+    def _any(self) -> None:
+        if not self.trajectories:
+            raise CannotCompute("the program moves nothing, so there is no trajectory")
 
     def write(
         self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,

@@ -25,7 +25,7 @@ LAYERS = (
     {"checks"},
     {"scene"},
     {"report", "plots"},
-    {"report_time"},
+    {"report_time", "plots_time"},
     {"files"},
     {"review"},
     {"loading"},

@@ -42,12 +42,23 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     help="Of OUT. Default: by its suffix (.csv, .npz, .parquet, .json for ROS), else csv.",
 )
 @click.option("--cycle-ms", type=Length(), default=1.0, show_default=True, help="Time between samples.")
-@click.option("--stretch", type=click.IntRange(min=1), help="Which stretch OUT takes. Default: a file each.")
+@click.option(
+    "--stretch", type=click.IntRange(min=1), help="Which stretch OUT and --plot take. Default: a file each."
+)
 @click.option("--blend-mm", type=Length(), help="Path tolerance where the program names none.")
+@click.option(
+    "--max-inertial-um",
+    type=Length(),
+    help="Hold accelerations so low that the machine gives way by no more than this.",
+)
 @click.option("--blend-study", is_flag=True, help="Time and deviation at other path tolerances too.")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
 @click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
 @click.option("--slow", metavar="FILE.csv", help="Write the places below half of the feed.")
+@click.option("--plot", metavar="FILE", help="Draw the motion and its limits over time, as .svg or .png.")
+@click.option(
+    "--plot-span", type=(float, float), metavar="FROM TO", help="Seconds of the motion that --plot draws."
+)
 @click.option("--write-feed", metavar="FILE", help="Write the program with the planned feeds in its F words.")
 @click.option(
     "--shared-feed",
@@ -73,10 +84,13 @@ def command(
     cycle_ms: float,
     stretch: int | None,
     blend_mm: float | None,
+    max_inertial_um: float | None,
     blend_study: bool,
     nominal: str | None,
     lines: str | None,
     slow: str | None,
+    plot: str | None,
+    plot_span: tuple[float, float] | None,
     write_feed: str | None,
     shared_feed: Shared,
     contour: bool,
@@ -98,10 +112,14 @@ def command(
     on_stdout = [name for name in (output, write_feed) if name == STREAM]
     if len(on_stdout) + as_json > 1:
         raise UsageError("stdout takes one result; write the others to files (-o, --write-feed, --report)")
-    if stretch is not None and output is None:
-        raise UsageError("--stretch chooses what OUT takes; name OUT with -o")
+    if stretch is not None and output is None and plot is None:
+        raise UsageError("--stretch chooses what OUT and the plot take; name one with -o or --plot")
+    if plot is not None and Path(plot).suffix.lower() not in (".svg", ".png"):
+        raise UsageError(f"the plot {plot!r} ends in no known format; expected .svg or .png")
+    if plot_span is not None and plot is None:
+        raise UsageError("--plot-span says what --plot draws; name a file with --plot")
     inputs = (*call.inputs, *files_of(nominal))
-    outputs = files_of(output, lines, slow, write_feed, report_file)
+    outputs = files_of(output, lines, slow, plot, write_feed, report_file)
     refuse_early(outputs, inputs, force=force)
     _refuse_twice(outputs)
 
@@ -114,7 +132,8 @@ def command(
         try:
             result = retime(
                 source(call.program), call.setup, nominal=None if nominal is None else source(nominal),
-                blend_mm=blend_mm, study_blend=blend_study, contour=contour, block_delete=block_delete,
+                blend_mm=blend_mm, study_blend=blend_study,
+                max_inertial_um=max_inertial_um, contour=contour, block_delete=block_delete,
                 flatten=flatten, progress=show,
             )  # fmt: skip
             feeds = None if write_feed is None else result.with_feeds(shared_feed, show)
@@ -127,6 +146,9 @@ def command(
         if feeds is not None:
             written |= {Path(name): feeds for name in files_of(write_feed)}
         written |= {Path(name): tables.slow_csv(result.slow) for name in files_of(slow)}
+        if plot is not None:
+            start, end = plot_span or (0.0, None)
+            written |= result.plots(plot, stretch, from_s=start, to_s=end)
         written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
         write_files(written, force=force, inputs=inputs)
     if feeds is not None and write_feed == STREAM:
