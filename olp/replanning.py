@@ -30,6 +30,8 @@ Progress = Callable[[str, float], None]
 
 #: plans that a bound on the inertial deviation may take before it is made sure of
 _TRIALS = 3
+#: share by which a peak of acceleration may pass between the places that are looked at
+_UNSEEN = 1e-4
 #: lines that a report names
 _LINES = 8
 
@@ -182,16 +184,17 @@ def within_inertial(
             "the machine file states no compliance, so inertial deviation cannot be bounded; give "
             "compliance_um_per_m_s2 in [axes.X], [axes.Y] or [axes.Z]"
         )
-    certain = sure(limits, compliance, most_mm) * (1.0 - 1e-6)
+    certain = sure(limits, compliance, most_mm) * (1.0 - 2.0 * _UNSEEN)
     size = np.sqrt((compliance * compliance).sum(axis=0))
     cap = float((size * limits.acceleration).max())
     for trial in range(_TRIALS + 1):
         cap = certain if trial == _TRIALS else max(cap, certain)
         found = planned(case, capped(limits, compliance, cap), tell, "plan" if trial == 0 else "bound")
         largest = max((Inertial.of(t.motion, compliance).most_mm for t in found.trajectories), default=0.0)
-        if largest <= most_mm:
+        if largest * (1.0 + _UNSEEN) <= most_mm:
             return found
-        cap = min(cap, most_mm * cap / largest) * (1.0 - 1e-3)
+        # a cap above what was reached bound nothing
+        cap = min(cap, largest) * (most_mm / largest) * (1.0 - 1e-3)
     raise CannotCompute(f"no plan keeps the inertial deviation within {most_mm * 1e3:g} um")
 
 

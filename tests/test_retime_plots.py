@@ -56,7 +56,8 @@ def test_a_span_cuts_the_motion() -> None:
     way, _ = random_route(3)
     found = plan(way, LIMITS)
     whole = found.duration_s
-    pieces = np.arange(*found.motion.piece_at(np.array([0.3, 0.6]) * whole) + (0, 1))
+    first, last = found.motion.piece_at(np.array([0.3, 0.6]) * whole)
+    pieces = np.arange(first, last + 1)
     time, *_ = plots_time._lines(found, pieces, 0.3 * whole, 0.6 * whole)
     assert (time[0], time[-1]) == pytest.approx((0.3 * whole, 0.6 * whole))
     assert motion_plot(found, way, "", from_s=0.3 * whole, to_s=0.6 * whole)
