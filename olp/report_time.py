@@ -102,8 +102,15 @@ def _budget(report: Report) -> Iterator[str]:
         "chords_of_arcs": "chords that stand for arcs, at most",
         "inertial": "inertial: the machine gives way to acceleration",
     }
+    proof = report.get("proof")
     yield "Off the programmed path, largest in um"
-    yield from table(("", "max"), [(titles.get(k, k), f"{v:.2f}") for k, v in budget.items() if v])
+    rows = [(titles.get(k, k), f"{v:.2f}") for k, v in budget.items() if v]
+    if proof:
+        rows.insert(
+            0, (f"the axes, by the proof of {printable(proof['program'])}", f"{proof['path_max_um']:.2f}")
+        )
+        rows.append(("all of it in one place, at most", f"{proof['at_most_um']:.2f}"))
+    yield from table(("", "max"), rows)
     path = report["path"]
     stated = ", ".join(f"{v:g}" for v in path["stated_um"][:6])
     parts = [f"{stated} um named by the program" if stated else ""]

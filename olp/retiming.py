@@ -188,6 +188,7 @@ def retime(
     job: PathLike | None = None,
     *,
     nominal: PathLike | bytes | None = None,
+    proof: Mapping[str, Any] | None = None,
     blend_mm: float | None = None,
     study_blend: bool = False,
     max_inertial_um: float | None = None,
@@ -200,7 +201,8 @@ def retime(
     acceleration and jerk, the feed, and the path tolerance.
 
     `nominal` is another program, the one before its correction, to compare times with, line by line.
-    `blend_mm` is the path tolerance where the program names none; it wins over the machine file, and the
+    `proof` is the report of the program's correction ("olp-report-1"), whose budget then stands beside this
+    one. `blend_mm` is the path tolerance where the program names none; it wins over the machine file, and the
     path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
     times the tolerances in use. `max_inertial_um` bounds the deviation that accelerations make on the
     machine's compliance. `block_delete` leaves `/` blocks out, `flatten` unrolls loops, subprograms and
@@ -229,6 +231,8 @@ def retime(
     report = _report(case, found, compliance, max_inertial_um)
     if other is not None:
         report["nominal"] = _against(found, planned(other, found.limits, tell, "nominal"), other)
+    if proof is not None:
+        report["proof"] = _static(proof, report)
     if study_blend:
         report["blend_study"] = blend_study(case, found, FACTORS, tell)
     return Retiming(found, report)
@@ -244,6 +248,30 @@ def _against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
         "differences": []
         if rows is None
         else [row for row in rows[:MOST] if row["nominal_s"] != row["corrected_s"]],
+    }
+
+
+def _static(proof: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
+    """What the proof of a correction leaves, and the sum with what the motion adds, in um. Raises UsageError
+    for what is no such report, or is of another machine."""
+    try:
+        if proof["schema"] != "olp-report-1":
+            raise KeyError(proof["schema"])
+        machine, left = str(proof["machine"]["name"]), float(proof["deviation"]["path_max_um"])
+        budget = {str(key): float(value) for key, value in proof["budget_um"].items()}
+        program = str(proof["program"]["name"])
+    except (KeyError, TypeError, ValueError):
+        raise UsageError(
+            'the proof is no report of a correction; expected one of schema "olp-report-1", as olp correct '
+            "and olp verify write"
+        ) from None
+    if machine != report["machine"]:
+        raise UsageError(f"the proof is for machine {machine!r}, and this one is {report['machine']!r}")
+    return {
+        "program": program,
+        "budget_um": budget,
+        "path_max_um": left,
+        "at_most_um": left + sum(report["budget_um"].values()),
     }
 
 

@@ -349,6 +349,24 @@ def test_corrected_against_nominal(tmp_path: Path) -> None:
     assert "do not correspond" in other.stdout
 
 
+def test_the_budget_stands_beside_that_of_the_correction(tmp_path: Path) -> None:
+    nominal, out, proof = PROGRAMS / "nasty" / "crlf.ngc", tmp_path / "out.ngc", tmp_path / "proof.json"
+    bed = PROGRAMS / "nasty" / "machine.toml"
+    assert run("correct", nominal, "-m", bed, "-o", out, "-q", "--report", proof).exit_code == 0
+    static = json.loads(proof.read_text())
+    report = report_of(out, "-m", bed, "--proof", proof)
+    assert report["proof"]["budget_um"] == static["budget_um"]
+    left = static["deviation"]["path_max_um"]
+    assert report["proof"]["at_most_um"] == pytest.approx(left + sum(report["budget_um"].values()))
+    assert "by the proof of crlf.ngc" in run("retime", out, "-m", bed, "--proof", proof).stdout
+    for text, code in (("{", 3), ("[]", 2), ("{}", 2), (json.dumps(report), 2)):
+        proof.write_text(text)
+        refused = run("retime", out, "-m", bed, "--proof", proof)
+        assert (refused.exit_code, refused.stdout) == (code, "")
+    proof.write_text(json.dumps(static | {"machine": {"name": "another"}}))
+    assert "another" in run("retime", out, "-m", bed, "--proof", proof).stderr
+
+
 def test_a_wider_tolerance_saves_time_and_costs_path(job: Path, tmp_path: Path) -> None:
     study = report_of(program(tmp_path), "-j", job, "--blend-study")["blend_study"]
     assert [row["factor"] for row in study] == [0.25, 0.5, 1.0, 2.0, 4.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,7 +21,7 @@ from olp.cli.common import (
     talk,
 )
 from olp.cli.progress import progress
-from olp.exceptions import OlpError, UsageError
+from olp.exceptions import InputError, OlpError, UsageError
 
 if TYPE_CHECKING:
     from olp.files.write import Content
@@ -53,6 +53,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 )
 @click.option("--blend-study", is_flag=True, help="Time and deviation at other path tolerances too.")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
+@click.option("--proof", metavar="report.json", help="Set the budget beside that of the correction's report.")
 @click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
 @click.option("--slow", metavar="FILE.csv", help="Write the places below half of the feed.")
 @click.option("--plot", metavar="FILE", help="Draw the motion and its limits over time, as .svg or .png.")
@@ -87,6 +88,7 @@ def command(
     max_inertial_um: float | None,
     blend_study: bool,
     nominal: str | None,
+    proof: str | None,
     lines: str | None,
     slow: str | None,
     plot: str | None,
@@ -118,7 +120,7 @@ def command(
         raise UsageError(f"the plot {plot!r} ends in no known format; expected .svg or .png")
     if plot_span is not None and plot is None:
         raise UsageError("--plot-span says what --plot draws; name a file with --plot")
-    inputs = (*call.inputs, *files_of(nominal))
+    inputs = (*call.inputs, *files_of(nominal, proof))
     outputs = files_of(output, lines, slow, plot, write_feed, report_file)
     refuse_early(outputs, inputs, force=force)
     _refuse_twice(outputs)
@@ -132,6 +134,7 @@ def command(
         try:
             result = retime(
                 source(call.program), call.setup, nominal=None if nominal is None else source(nominal),
+                proof=None if proof is None else _json(proof),
                 blend_mm=blend_mm, study_blend=blend_study,
                 max_inertial_um=max_inertial_um, contour=contour, block_delete=block_delete,
                 flatten=flatten, progress=show,
@@ -162,6 +165,19 @@ def command(
         put(report.to_json(result.report))
     elif not quiet:
         put(report_time.to_text(result.report), err=bool(on_stdout))
+
+
+def _json(name: str) -> dict[str, Any]:
+    """The mapping in a JSON file. Raises InputError."""
+    import json
+
+    from olp.files.write import read_bytes
+
+    try:
+        found = json.loads(read_bytes(name))
+    except ValueError as error:
+        raise InputError(f"is no JSON ({error}); expected a report of olp correct", file=name) from None
+    return found if isinstance(found, dict) else {}
 
 
 def _of_one(result: Retiming, kind: Format | None, cycle_s: float, stretch: int | None) -> Iterable[bytes]:
