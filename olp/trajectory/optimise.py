@@ -26,8 +26,11 @@ _WINDOW, _MARGIN = 3000, 0.35
 #: how much slower than the closed form windows begin and end, and their start is; further shares of the
 #: square of the speed that are tried for that; cells of a window that is not split for want of a start
 _SLOWED, _STARTS, _SMALL = 0.85, (1.0, 0.7, 0.35), 100
-#: share of the first phase of jerk that the launch takes, and of a cell's time that its neighbour lasts
-_LAUNCH, _CLEAR = 0.25, 0.4
+#: share of the first phase of jerk that the launch takes, and where its way would not have as many _DIGITS;
+#: share of a cell's time that its neighbour lasts
+_LAUNCH, _LONGEST, _DIGITS, _CLEAR = 0.04, 0.25, 1e8, 0.4
+#: growth of the times of cells after a launch, their most, and the part of a window that they may take
+_GROW, _MOST, _PART = 1.2, 40, 0.4
 #: fewest cells of a window
 _FEW = 8
 #: places of a piece between breaks: rows, and where usage is looked at
@@ -107,25 +110,37 @@ def _edges(path: SmoothPath, found: Profile, knots: Array) -> list[int]:
 @dataclass(frozen=True, slots=True, eq=False)
 class _End:
     """A window's end: `way` where its cells end, `speed` and `acceleration` there over the slow-down; the
-    `seconds` times the slow-down of the launch or landing beyond (0: none), and the way `rest` where that
-    ends; no knot should be nearer than `clear`."""
+    `seconds` times the slow-down of the launch or landing beyond (0: none), the way `rest` where that ends,
+    the `knots` beside it, and the way `clear` of them where others may be."""
 
     way: float
     speed: float
     acceleration: float
     seconds: float
     rest: float
+    knots: Array
     clear: float
 
     @staticmethod
-    def of(found: Profile, x: Array, node: int, span: int, sign: float) -> _End:
-        way, speed = float(x[found.node[node]]), float(found.speed[node])
+    def of(found: Profile, clock: Timeline, x: Array, node: int, span: int, most_s: float) -> _End:
+        """The end at a node beside a span of the profile, with knots for `most_s` seconds from there, which
+        are negative before an end."""
+        way, speed, sign = float(x[found.node[node]]), float(found.speed[node]), float(np.sign(most_s))
         if speed > 0.0:
-            return _End(way, speed, 0.0, 0.0, way, _CLEAR * CELL_S * speed)
+            return _End(way, speed, 0.0, 0.0, way, np.zeros(0), way + sign * _CLEAR * CELL_S * speed)
         a, j, peak = (float(e[span]) for e in (found.acceleration, found.jerk, found.peak))
-        seconds = _LAUNCH * min(a / j, float(np.sqrt(peak / j)))
+        phase = min(a / j, float(np.sqrt(peak / j)))
+        fine = j * (_LAUNCH * phase) ** 3 > _DIGITS * np.spacing(x[-1])
+        seconds = (_LAUNCH if fine else _LONGEST) * phase
         gone = j * seconds**3 / 6.0
-        return _End(way + sign * gone, 0.5 * j * seconds**2, sign * j * seconds, seconds, way, 2.0 * gone)
+        # cells that grow in time until they are as long as all others
+        times = seconds * _GROW ** np.arange(1.0, _MOST)
+        times = times[fine & (times * (1.0 - 1.0 / _GROW) < CELL_S) & (times < abs(most_s))]
+        knots = clock.way_at(clock.start_s[clock.first[node]] + sign * times)
+        begin = way + sign * gone
+        last = np.concatenate(([way, begin], knots))[-2:]
+        clear = float(last[1] + _CLEAR * (last[1] - last[0]))
+        return _End(begin, 0.5 * j * seconds**2, sign * j * seconds, seconds, way, knots, clear)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,10 +160,11 @@ class _Window:
         first: int, last: int,
     ) -> _Window:  # fmt: skip
         x = path.break_mm
-        begin, end = _End.of(found, x, first, first, 1.0), _End.of(found, x, last, last - 1, -1.0)
-        low, high = (e.way + sign * e.clear for e, sign in ((begin, 1.0), (end, -1.0)))
-        inner = knots[np.searchsorted(knots, low) : np.searchsorted(knots, high)]
-        z = np.concatenate(([begin.way], inner, [end.way]))
+        lasts = float(clock.start_s[clock.first[last]] - clock.start_s[clock.first[first]])
+        begin = _End.of(found, clock, x, first, first, _PART * lasts)
+        end = _End.of(found, clock, x, last, last - 1, -_PART * lasts)
+        inner = knots[np.searchsorted(knots, begin.clear) : np.searchsorted(knots, end.clear)]
+        z = np.concatenate(([begin.way], begin.knots, inner, end.knots[::-1], [end.way]))
         if len(z) <= _FEW:
             z = np.linspace(begin.way, end.way, _FEW + 1)
         speed, acceleration = clock.at_way(z)
