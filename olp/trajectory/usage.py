@@ -1,6 +1,6 @@
 """How a motion uses its limits: by line of the program, and at the places where it falls below half its feed.
 
-Each piece is looked at in five places, ends included, and weighed by the trapezoidal rule.
+Each piece is looked at in the middle and at both ends, weighed by the trapezoidal rule.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ LIMITS = (*(f"{axis} {what}" for what in ("velocity", "acceleration", "jerk") fo
 AT_LIMIT = 0.98
 #: a place is slow where the speed is below this share of the feed
 SLOW = 0.5
-_SHARE = np.linspace(0.0, 1.0, 5)
-_WEIGHT = np.array([1.0, 2.0, 2.0, 2.0, 1.0]) / 8.0
+_SHARE = np.array([0.0, 0.5, 1.0])
+_WEIGHT = np.array([0.25, 0.5, 0.25])
 _BLOCK = 1 << 13
 
 
@@ -132,22 +132,29 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
     for a in range(0, len(motion), _BLOCK):
         piece = np.arange(a, min(a + _BLOCK, len(motion)))
         width = motion.start_s[piece + 1] - motion.start_s[piece]
-        states = motion.of(np.repeat(piece, len(_SHARE)), (width[:, None] * _SHARE).ravel())
-        speed = np.sqrt((states[1] * states[1]).sum(axis=1)).reshape(len(piece), -1)
-        use = np.empty((len(piece), len(_SHARE), len(LIMITS)))
+        # one place of all pieces after the other: sums over few places are then sums of long rows
+        shape = (len(_SHARE), len(piece), 3)
+        states = [
+            state.reshape(shape)
+            for state in motion.of(np.tile(piece, len(_SHARE)), (_SHARE[:, None] * width).ravel())
+        ]
+        speed = np.sqrt((states[1] * states[1]).sum(axis=2))
+        use = np.empty((*shape[:2], len(LIMITS)))
         for i, bound in enumerate(bounds):
-            use[:, :, 3 * i : 3 * i + 3] = (np.abs(states[i + 1]) / bound).reshape(len(piece), -1, 3)
-        use[:, :, 9] = speed / feed[piece, None]
-        weight = width[:, None] * _WEIGHT
+            np.abs(states[i + 1] / bound, out=use[:, :, 3 * i : 3 * i + 3])
+        use[:, :, 9] = speed / feed[piece]
+        weight = _WEIGHT[:, None] * width
         held = weight[:, :, None] * (use >= AT_LIMIT)
-        np.add.at(at_limit, place[piece], held.sum(axis=1))
-        np.maximum.at(most, place[piece], use.max(axis=1))
-        np.maximum.at(fastest, place[piece], speed.max(axis=1))
+        first = np.flatnonzero(np.diff(place[piece], prepend=-1))
+        own = place[piece[first]]
+        np.add.at(at_limit, own, np.add.reduceat(held.sum(axis=0), first))
+        np.maximum.at(most, own, np.maximum.reduceat(use.max(axis=0), first))
+        np.maximum.at(fastest, own, np.maximum.reduceat(speed.max(axis=0), first))
+        time = motion.start_s[piece] + _SHARE[:, None] * width
         moving = np.flatnonzero(~still[piece])
         places.add(
-            motion.start_s[piece, None][moving] + width[moving, None] * _SHARE, weight[moving],
-            speed[moving], feed[piece][moving], motion.line[piece][moving],
-            states[0].reshape(len(piece), -1, 3)[moving], held[moving], use[moving],
+            time[:, moving], speed[:, moving], feed[piece[moving]], motion.line[piece[moving]],
+            states[0][:, moving], held[:, moving], use[:, moving],
         )  # fmt: skip
     width = np.diff(motion.start_s)
     cutting = np.isfinite(feed) & ~still
@@ -222,13 +229,11 @@ class _Places:
         self._rows: list[tuple[Array, ...]] = []
 
     def add(
-        self, time: Array, weight: Array, speed: Array, feed: Array, line: Index, position: Array,
-        held: Array, use: Array,
-    ) -> None:  # fmt: skip
-        """Samples (n, 5) of n pieces in order, their time at limits and use of them (n, 5, 10), feed and
-        line of each piece."""
-        slow = (speed < SLOW * feed[:, None]) & np.isfinite(feed)[:, None]
-        flat = slow.ravel()
+        self, time: Array, speed: Array, feed: Array, line: Index, position: Array, held: Array, use: Array
+    ) -> None:
+        """Samples (k, n) at k places of n pieces, positions (k, n, 3), time at limits and use of them
+        (k, n, 10); feed and line (n,) of each piece."""
+        flat = ((speed < SLOW * feed) & np.isfinite(feed)).T.ravel()
         if not flat.size:
             return
         begins = flat & ~np.concatenate(([self._slow], flat[:-1]))
@@ -237,12 +242,12 @@ class _Places:
         at = np.flatnonzero(flat)
         if not len(at):
             return
-        piece = at // slow.shape[1]
-        lost = weight.ravel()[at] * (1.0 - speed.ravel()[at] / feed[piece])
+        piece, place = np.divmod(at, len(speed))
+        seconds, lost = _below(time[:, piece], speed[:, piece] / feed[piece], place)
         columns = (
-            number[at].astype(float), time.ravel()[at], weight.ravel()[at], lost, speed.ravel()[at],
-            feed[piece], line[piece].astype(float), *position.reshape(-1, 3)[at].T,
-            *held.reshape(-1, len(LIMITS))[at].T, *use.reshape(-1, len(LIMITS))[at].T,
+            number[at].astype(float), time[place, piece], seconds, lost, speed[place, piece], feed[piece],
+            line[piece].astype(float), *position[place, piece].T, *held[place, piece].T,
+            *use[place, piece].T,
         )  # fmt: skip
         # the samples of a block are many, its places few
         self._rows.append(_reduced(columns))
@@ -257,6 +262,30 @@ class _Places:
         return SlowPlaces(
             time, weight, lost, line.astype(np.int64), np.stack((x, y, z), axis=1), speed, feed, limit,
         )  # fmt: skip
+
+
+def _below(time: Array, share: Array, place: Index) -> tuple[Array, Array]:
+    """(n,) the time below half the feed around each slow sample, and what of it is lost against the feed.
+
+    `time` and `share` of the feed (k, n) at k places of the piece of each sample, which is at `place` (n,).
+    Between two slow places each has half of the time, next to a fast one it has what lies below half.
+    """
+    every = np.arange(len(place))
+    own = share[place, every]
+    seconds, lost = np.zeros(len(place)), np.zeros(len(place))
+    for step in (-1, 1):
+        beside = place + step
+        inside = (beside >= 0) & (beside < len(share))
+        beside = np.where(inside, beside, place)
+        other = share[beside, every]
+        span = np.abs(time[beside, every] - time[place, every])
+        slow = other < SLOW
+        part = np.where(slow, 0.5, (SLOW - own) / np.where(slow, 1.0, other - own)) * span
+        # the nearer half of the way to a slow neighbour, all of the way to half the feed
+        mean = np.where(slow, 0.75 * own + 0.25 * other, 0.5 * (own + SLOW))
+        seconds += part
+        lost += part * (1.0 - mean)
+    return seconds, lost
 
 
 def _reduced(columns: tuple[Array, ...]) -> tuple[Array, ...]:
