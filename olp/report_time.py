@@ -142,14 +142,15 @@ def _slow(report: Report) -> Iterator[str]:
     slow = report["below_half_feed"]
     if not slow["places"]:
         return
+    places = _count(slow["places"], "place", "places")
     yield (
-        f"{slow['places']} places below half of the feed, {slow['seconds']:.2f} s in all, "
-        f"{slow['lost_s']:.2f} s lost there"
+        f"{places} below half of the feed, {slow['seconds']:.2f} s in all, {slow['lost_s']:.2f} s lost there"
     )
     rows = [
         (
-            str(w["line"]), *(f"{v:.3f}" for v in w["position_mm"]), f"{60.0 * w['feed_mm_s']:.0f}",
-            f"{60.0 * w['slowest_mm_s']:.0f}", f"{w['lost_s']:.3f}", w["limit"],
+            str(w["line"]), *(f"{round(v, 3) + 0.0:.3f}" for v in w["position_mm"]),
+            f"{60.0 * w['feed_mm_s']:.0f}", f"{60.0 * w['slowest_mm_s']:.0f}", f"{w['lost_s']:.3f}",
+            w["limit"],
         )
         for w in slow["worst"][:_ROWS]
     ]  # fmt: skip
@@ -189,9 +190,10 @@ def _feeds_written(report: Report) -> Iterator[str]:
             if written["rule"] == "least"
             else "took the feed that takes as long in all"
         )
+        lines = _count(written["slower_lines"], "line was", "lines were")
         yield from textwrap.wrap(
-            f"{written['shared']} F words hold for several blocks and {took}; {written['slower_lines']} "
-            "lines were planned slower than the feed that they have now.",
+            f"{_count(written['shared'], 'F word holds', 'F words hold')} for several blocks and {took}; "
+            f"{lines} planned slower than the feed that is there now.",
             WIDTH, initial_indent="  ", subsequent_indent="  ",
         )  # fmt: skip
     if written["kept_lines"]:
@@ -208,8 +210,8 @@ def _notes(report: Report) -> Iterator[str]:
         lines = ", ".join(map(str, untimed["lines"]))
         more = ", ..." if untimed["moves"] > len(untimed["lines"]) else ""
         yield from textwrap.wrap(
-            f"Not timed: {untimed['moves']} moves from or to places that the control alone knows (lines "
-            f"{lines}{more}), and tool changes.",
+            f"Not timed: {_count(untimed['moves'], 'move', 'moves')} from or to places that are not known "
+            f"(lines {lines}{more}): at the start without start_mm, and where the control moves by itself.",
             WIDTH,
         )
 
@@ -229,6 +231,10 @@ def clock(seconds: float) -> str:
     minutes, rest = divmod(whole, 60.0)
     hours, minutes = divmod(int(minutes), 60)
     return f"{seconds:.2f} s" + (f" ({hours}:{minutes:02d}:{rest:04.1f})" if whole >= 60.0 else "")
+
+
+def _count(number: int, one: str, several: str) -> str:
+    return f"{number} {one if number == 1 else several}"
 
 
 def _percent(share: Any, digits: int) -> str:

@@ -19,7 +19,8 @@ from olp.program.program import Program, Words
 
 Shared = Literal["mean", "least"]
 
-#: a feed may be off by this share through rounding before it takes another decimal
+#: a feed may be off by this share through rounding before it takes another decimal, and stays as it is where
+#: the planned one is that near
 _COARSE = 0.01
 _MOST_DECIMALS = 6
 #: a line is counted as slower than its feed by more than this share
@@ -51,7 +52,8 @@ def write_feeds(
     shared: Shared = "mean",
     block_delete: bool = False,
 ) -> FeedsWritten:
-    """The text with the mean planned feed of each block in its F words, never above the programmed one.
+    """The text with the mean planned feed of each block in its F words, where that is below the programmed
+    one by more than 1 %.
 
     `line` (m,) are lines with feed moves, ascending; `planned_s` (m,) is what these moves take, and
     `programmed_s` what they would take at the programmed feed. Raises ProgramError with its line where a
@@ -90,7 +92,7 @@ def write_feeds(
     if pair is not None:
         slower = int((programmed_s[place] / planned_s[place] < share[owner] * (1.0 - _SLOWER)).sum())
     parts, begin, changed, several = [], 0, 0, 0
-    for k in np.flatnonzero(share < 1.0).tolist():
+    for k in np.flatnonzero(share < 1.0 - _COARSE).tolist():
         text = _written(program, words, int(word[k]), float(share[k]), int(at[k]))
         if text is None:
             continue
