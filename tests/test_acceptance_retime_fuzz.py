@@ -24,7 +24,7 @@ def faults(seeds: range, base: olp.Setup) -> dict[int, tuple[str, ...]]:
 
 
 def test_random_programs_keep_every_limit(base: olp.Setup) -> None:
-    assert faults(range(20), base) == {}
+    assert faults(range(10), base) == {}
 
 
 @pytest.mark.slow

@@ -181,7 +181,14 @@ OWN: dict[str, Callable[[], Case]] = {
 }
 
 
-@pytest.mark.parametrize("name", [*CASES, *OWN])
+#: motions of minutes, whose speeds take long to be optimised
+LONG = ("gentle jerk", "one axis slow", "jerk of 10", "acceleration of 1")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in [*CASES, *OWN]],
+)
 def test_every_limit_is_kept(name: str) -> None:
     held(*(CASES[name] if name in CASES else OWN[name])())
 
