@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,12 @@ from olp.trajectory.route import AxisLimits, Route
 
 LIMITS = AxisLimits(np.array([500.0, 400.0, 300.0]), np.array([5e3, 4e3, 3e3]), np.array([1e5, 8e4, 6e4]))
 PROGRAMS = Path(__file__).resolve().parents[1] / "programs"
-JOBS = ("gantry-plate", "bridge-cmm", "table-router", "haas-mill")
+JOBS = (
+    pytest.param("gantry-plate", marks=pytest.mark.slow),
+    pytest.param("bridge-cmm", marks=pytest.mark.slow),
+    pytest.param("table-router", marks=pytest.mark.slow),
+    "haas-mill",
+)
 
 
 def route_of(points: np.ndarray, feed: float = 100.0, tolerance: float = 0.01) -> Route:
@@ -103,16 +109,78 @@ def test_a_solver_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) 
     def broken(*args: object) -> None:
         raise ValueError("no")
 
-    for name in ("smooth", "critical", "overlap"):
+    bent = {planner.CRITICAL, planner.OPTIMISED}
+    for name, left in (
+        ("smooth", {planner.OVERLAP}),
+        ("best_profile", {planner.OVERLAP}),
+        ("optimised", {planner.OVERLAP, planner.CRITICAL}),
+        ("overlap", bent),
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(planner, name, broken)
-            if name == "overlap":
-                assert {leg.solver for leg in plan(route, LIMITS).legs} == {planner.CRITICAL}
-            else:
-                assert {leg.solver for leg in plan(route, LIMITS).legs} <= {
-                    planner.OVERLAP,
-                    planner.EXACT_STOP,
-                }
+            assert {leg.solver for leg in plan(route, LIMITS).legs} <= left
+
+
+def test_what_no_solver_drives_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*args: object) -> None:
+        raise ValueError("no")
+
+    monkeypatch.setattr(planner, "smooth", broken)
+    monkeypatch.setattr(planner, "overlap", broken)
+    with pytest.raises(CannotCompute, match="line 1"):
+        plan(route_of(np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 0, 0]])), LIMITS)
+
+
+def arcs(count: int, seed: int = 0) -> Route:
+    """Runs of few segments between stops, some with dwells: arcs, corners and lines."""
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0.0, np.pi / 2, 21)
+    arc = 5.0 * np.stack((np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle), axis=1)[1:]
+    kinds = (arc, np.array([[3.0, 0, 0], [3.0, 3, 0], [6.0, 3, 1]]), np.array([[2.0, 1, 0]]))
+    points, stops = [np.zeros((1, 3))], [0]
+    for kind in rng.integers(0, 3, count).tolist():
+        points.append(points[-1][-1] + kinds[kind])
+        stops.append(stops[-1] + len(kinds[kind]))
+    route = route_of(np.concatenate(points))
+    route.tolerance_mm[stops] = 0.0
+    route.dwell_s[stops] = rng.choice([0.0, 0.0, 0.25], count + 1)
+    return route
+
+
+def test_short_runs_are_planned_together_as_well_as_one_by_one() -> None:
+    route = arcs(40)
+    found = plan(route, LIMITS, optimise=False)
+    assert_within(found, LIMITS, 100.0)
+    stops = np.flatnonzero(route.tolerance_mm == 0.0)
+    alone = 0.0
+    for a, b in pairwise(stops.tolist()):
+        run = route_of(route.point_mm[a : b + 1])
+        alone += plan(run, LIMITS, optimise=False).duration_s
+    assert found.duration_s == pytest.approx(alone + route.dwell_s.sum(), rel=1e-6)
+    assert sum(leg.duration_s for leg in found.legs) == pytest.approx(found.duration_s)
+    assert [leg.first for leg in found.legs] == [0, *(leg.last for leg in found.legs[:-1])]
+    assert {leg.solver for leg in found.legs} == {planner.OVERLAP, planner.CRITICAL}
+    assert max(found.audit.position_jump_mm, found.audit.velocity_jump_mm_s) <= 1e-8
+    # every stop is met at rest, for as long as it dwells
+    at_rest = np.abs(found.motion.of(np.arange(len(found.motion)), np.zeros(len(found.motion)))[1]).max(
+        axis=1
+    )
+    still = found.motion.of(np.flatnonzero(at_rest <= 1e-9), np.zeros(int((at_rest <= 1e-9).sum())))[0]
+    away = np.linalg.norm(still[:, None] - route.point_mm[stops[:-1]][None], axis=2).min(axis=0)
+    assert away.max() <= 1e-9
+    waits = np.diff(found.motion.start_s)[~found.motion.time.any(axis=1)]
+    assert waits.sum() == pytest.approx(route.dwell_s.sum())
+
+
+def test_blocks_and_groups_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    route = arcs(30, seed=3)
+    whole = plan(route, LIMITS, optimise=False)
+    monkeypatch.setattr(planner, "_BLOCK", 7)
+    monkeypatch.setattr(planner, "_TOGETHER", 11)
+    monkeypatch.setattr("olp.trajectory.pieces._BLOCK", 5)
+    split = plan(route, LIMITS, optimise=False)
+    assert len(split.legs) > len(whole.legs)
+    assert split.duration_s == pytest.approx(whole.duration_s, rel=1e-9)
 
 
 @pytest.mark.parametrize("what", ["point_mm", "tolerance_mm", "dwell_s", "feed_mm_s"])

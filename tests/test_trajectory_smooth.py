@@ -107,6 +107,31 @@ def test_reversals_are_told() -> None:
     assert not needs_stop(np.repeat(point[:1], 5, axis=0)).any()
 
 
+def test_rests_are_met_exactly_and_straight() -> None:
+    given_route, limits = CASES["noise 0.2"]()
+    stops = np.array([20, 21, 77])
+    given_route.tolerance_mm[stops] = 0.0
+    path = smooth(given_route, limits)
+    joins = path.break_mm[path.rest]
+    q = path.at(joins)
+    assert np.abs(q[0] - given_route.point_mm[stops]).max() <= 1e-12
+    assert path.rest.size == 3
+    for k in (path.rest, path.rest - 1):
+        assert np.abs(path.shape[k, 2:]).max() == 0.0
+    # between rests the path is that of the run alone
+    edges = [0, *stops.tolist(), len(given_route) - 1]
+    for a, b, k, end in zip(edges[:-1], edges[1:], [0, *path.rest], [*path.rest, len(path)], strict=True):
+        alone = smooth(
+            Route(
+                given_route.point_mm[a : b + 1], given_route.feed_mm_s[a:b], given_route.line[a:b],
+                given_route.tolerance_mm[a : b + 1], given_route.dwell_s[a : b + 1],
+            ),
+            limits,
+        )  # fmt: skip
+        ways = np.linspace(0.0, 1.0, 300) * min(alone.break_mm[-1], path.break_mm[end] - path.break_mm[k])
+        assert np.abs(path.at(path.break_mm[k] + ways)[0] - alone.at(ways)[0]).max() <= 1e-9
+
+
 def test_nothing_to_drive() -> None:
     assert len(smooth(route(np.zeros((1, 3)), 1.0, 0.1), LIMITS)) == 0
     assert len(smooth(route(np.zeros((4, 3)), 1.0, 0.1), LIMITS)) == 0
@@ -126,7 +151,7 @@ def test_bad_routes_are_refused(broken: str) -> None:
     if broken == "point":
         good.point_mm[1, 1] = np.nan
     elif broken == "tolerance":
-        good.tolerance_mm[1] = 0.0
+        good.tolerance_mm[1] = -0.1
     else:
         good.feed_mm_s[1] = 0.0
     with pytest.raises(CannotCompute):

@@ -2,8 +2,8 @@
 
 Where the axes are cubics of time (a straight path, or a path driven at constant rate) the extremes are
 those of quadratics and lines, taken in closed form. Elsewhere the polynomials are of degree nine and more:
-there the extremes of the path's derivatives, times those of the parameter's, bound the axes; a piece whose
-bound is above a limit is looked at on both ends and densely inside.
+there the extremes of the path's derivatives, times those of the parameter's, bound the axes; where that
+bound is above a limit, the largest values are found by branch and bound.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from olp.exceptions import UsageError
+from olp.trajectory.extremes import largest as extreme
+from olp.trajectory.extremes import nodes
 from olp.trajectory.motion import Array, Motion
 from olp.trajectory.pieces import Mask, Pieces, bernstein, blocks
 from olp.trajectory.route import AxisLimits
 
-#: places looked at in a piece of high degree, and for the speed along the path, ends included
-_PLACES = 17
+#: places looked at for the speed along the path, ends included
 _SPEED_PLACES = 5
 #: a bound above a limit by this is rounding
 _ROUNDING = 1e-9
@@ -27,7 +28,7 @@ _ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True, eq=False)
 class Ratios:
     """Largest ratios to the limits: `velocity`, `acceleration`, `jerk` (3,) per axis, and `feed` along the
-    path (0 if none was given). What is below 1 may be a bound, and what the motion does less."""
+    path (0 if none was given). What is no more than 1 may be a bound, and what the motion does less."""
 
     velocity: Array
     acceleration: Array
@@ -77,9 +78,8 @@ def ratios(motion: Motion, limits: AxisLimits, feed_mm_s_by_piece: Array | None 
     largest, feed = np.zeros((3, 3)), 0.0
     for part, pieces in blocks(motion):
         given = None if feed_mm_s_by_piece is None else feed_mm_s_by_piece[part]
-        found, feed = _of(pieces, most, given, feed)
-        largest = np.maximum(largest, found)
-    velocity, acceleration, jerk = largest / most
+        largest, feed = _of(pieces, most, given, (largest, feed))
+    velocity, acceleration, jerk = largest
     return Ratios(velocity, acceleration, jerk, feed)
 
 
@@ -116,28 +116,47 @@ def _states(pieces: Pieces, s: Array, s1: Array, s2: Array) -> tuple[Array, Arra
     return pieces.positions(s), slope * s1, pieces.bends(s) * (s1 * s1) + slope * s2
 
 
-def _of(pieces: Pieces, most: Array, feed: Array | None, fastest: float) -> tuple[Array, float]:
-    """(3, 3) largest velocity, acceleration and jerk, and the largest share of the feed, `fastest` before."""
+def _of(pieces: Pieces, most: Array, feed: Array | None, before: tuple[Array, float]) -> tuple[Array, float]:
+    """(3, 3) largest ratios to `most`, and of the speed to the feed, where those `before` are no larger."""
     value, speed, exact, even = _bounds(pieces)
-    with np.errstate(invalid="ignore"):
-        over = ~exact & ~(value <= (most * (1.0 + _ROUNDING))[:, :, None]).all(axis=(0, 1))
-        if feed is not None:
-            over |= ~exact & ~(speed <= feed * (1.0 + _ROUNDING))
-    rows = np.flatnonzero(over)
-    largest = np.zeros((3, 3))
+    ratio = value / most[:, :, None]
+    share = np.zeros_like(speed) if feed is None else speed / feed
+    closely = ~exact & ~((ratio <= 1.0 + _ROUNDING).all(axis=(0, 1)) & (share <= 1.0 + _ROUNDING))
+    rows = np.flatnonzero(~closely)
+    largest = np.maximum(before[0], ratio[:, :, rows].max(axis=2, initial=0.0))
+    fastest = max(before[1], float(share[~closely & (even | ~exact)].max(initial=0.0)))
+    rows = np.flatnonzero(closely)
     if rows.size:
-        some = pieces.take(rows)
-        largest, speed[rows] = _dense(some)
-        value[:, :, rows] = 0.0
-    largest = np.maximum(largest, value.max(axis=2))
-    if feed is None:
-        return largest, fastest
-    share = speed / feed
-    fastest = max(fastest, float(share[even].max(initial=0.0)))
+        largest, fastest = _exactly(
+            pieces.take(rows), most, None if feed is None else feed[rows], largest, fastest
+        )
     # a bound that is no larger than what is reached elsewhere needs no closer look
     rows = np.flatnonzero(exact & ~even & (share > fastest))
-    share[rows] = _fastest(pieces.take(rows)) / feed[rows]
-    return largest, max(fastest, float(share[rows].max(initial=0.0)), float(share[~exact].max(initial=0.0)))
+    if feed is not None and rows.size:
+        fastest = max(fastest, float((_fastest(pieces.take(rows)) / feed[rows]).max()))
+    return largest, fastest
+
+
+def _exactly(
+    pieces: Pieces, most: Array, feed: Array | None, largest: Array, fastest: float
+) -> tuple[Array, float]:
+    """The same of pieces of any degree, by branch and bound; below 1 nothing is told apart."""
+    degree = 3 * (len(pieces.time) - 1) - 1
+    third = 6.0 * pieces.path[3]
+    values = np.empty((degree + 1, 3, *pieces.path.shape[1:]))
+    for row, share in zip(values, nodes(degree), strict=True):
+        s, s1, s2, s3 = pieces.parameters(share * pieces.seconds)
+        slope, bend = pieces.slopes(s), pieces.bends(s)
+        row[0] = slope * s1
+        row[1] = bend * (s1 * s1) + slope * s2
+        row[2] = third * s1**3 + bend * (3.0 * s1 * s2) + slope * s3
+    if feed is not None:
+        fastest = max(fastest, extreme(values[:, 0] / feed, max(fastest, 1.0)))
+    values /= most[:, :, None]
+    found = np.array([
+        [extreme(values[:, i, axis, None], max(1.0, largest[i, axis])) for axis in range(3)] for i in range(3)
+    ])  # fmt: skip
+    return np.maximum(largest, found), fastest
 
 
 def _bounds(pieces: Pieces) -> tuple[Array, Array, Mask, Mask]:
@@ -199,25 +218,6 @@ def _square(vector: Array) -> Array:
     return result
 
 
-def _dense(pieces: Pieces) -> tuple[Array, Array]:
-    """(3, 3) largest velocity, acceleration and jerk at places in the pieces, (n,) largest speed of each."""
-    largest, speed2 = np.zeros((3, 3)), np.zeros(len(pieces.seconds))
-    third = 6.0 * pieces.path[3]
-    for share in _places():
-        s, s1, s2, s3 = pieces.parameters(share * pieces.seconds)
-        slope, bend = pieces.slopes(s), pieces.bends(s)
-        velocity = slope * s1
-        found = (
-            velocity,
-            bend * (s1 * s1) + slope * s2,
-            third * s1**3 + bend * (3.0 * s1 * s2) + slope * s3,
-        )
-        for i, values in enumerate(found):
-            largest[i] = np.maximum(largest[i], np.abs(values).max(axis=1))
-        speed2 = np.maximum(speed2, _square(velocity))
-    return largest, np.sqrt(speed2)
-
-
 def _fastest(pieces: Pieces) -> Array:
     """(n,) largest speed along the path of pieces driven at constant rate."""
     rate, seconds = np.abs(pieces.time[1]), pieces.seconds
@@ -245,10 +245,4 @@ def _fastest(pieces: Pieces) -> Array:
 def _dot(a: Array, b: Array) -> Array:
     """(n,) scalar products of (3, n) and (3, n)."""
     result: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return result
-
-
-def _places() -> Array:
-    """Shares of a piece: the ends, and points denser toward them, where jerk is largest."""
-    result: Array = (1.0 - np.cos(np.linspace(0.0, np.pi, _PLACES))) / 2.0
     return result

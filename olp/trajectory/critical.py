@@ -1,14 +1,10 @@
 """Speed along a smooth path, in closed form: ramps between the places that bind.
 
-Every piece of the path gets ceilings V, A, J of the speed, acceleration and jerk along it, such that any
-motion inside them is inside every axis limit: with q', q'', q''' by the way,
-
-    axis velocity q' v,  acceleration q' a + q'' v^2,  jerk q' j + 3 q'' v a + q''' v^3.
-
-The profile runs from node to node, where its acceleration is nil, by a ramp up, a stretch at one speed and a
-ramp down. Nodes are the ends, and the dips of V that bind even where jerk is free; a profile that is too
-fast somewhere gets a node at the worst place, until none is (bidirectional scan with jerk: Dong, Ferreira,
-Stori 2007; pruned to the critical points as VPOp does).
+Every piece has ceilings of the speed, acceleration and jerk along it (olp.trajectory.ceilings). The profile
+runs from node to node, where its acceleration is nil, by a ramp up, a stretch at one speed and a ramp down.
+Nodes are the rests, and the dips of the speed's ceiling that bind even where jerk is free; a profile that is
+too fast somewhere gets a node at the worst place, until none is (bidirectional scan with jerk: Dong,
+Ferreira, Stori 2007; pruned to the critical points as VPOp does).
 """
 
 from __future__ import annotations
@@ -19,23 +15,20 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.trajectory import ramps
-from olp.trajectory.motion import Motion
-from olp.trajectory.route import Array, AxisLimits, Index, Route
-from olp.trajectory.smooth import MOST_WIDTH, SmoothPath
+from olp.trajectory.ceilings import ceilings as ceilings
+from olp.trajectory.motion import Motion, whole
+from olp.trajectory.route import Array, AxisLimits, Index
+from olp.trajectory.smooth import SmoothPath
 
 Mask = npt.NDArray[np.bool_]
 
 #: share of each limit that curvature may use up at full speed: in general, where the first profile holds its
 #: speed, and in a bend between straights, where nothing is left to do but to pass
-_BY_SPEED, _BY_DIP, _BY_BEND = 0.6, 0.8, 0.97
-#: share of the jerk left that 3 q'' v a may use up
-_BY_CROSS = 0.5
+_BY_SPEED, _BY_DIP, BY_BEND = 0.6, 0.8, 0.97
 _LEVEL = 1.02
 _BINDS, _TOO_FAST, _PATIENT = 1e-6, 1e-8, 40
-_TINY = 1e-300
-#: shares of a direction below this do not limit a forecast
-_STRAIGHT = 1e-12
-_BLOCK = 1 << 17
+#: pieces of the path, and spans of a profile, worked on at a time
+_BLOCK, _SPANS = 1 << 17, 1 << 15
 _ALONE = 64
 
 
@@ -51,45 +44,12 @@ class Profile:
     jerk: Array
 
 
-def ceilings(path: SmoothPath, limits: AxisLimits, share: Array) -> tuple[Array, Array, Array]:
-    """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold,
-    when curvature may use up the `share` (k,) of acceleration and jerk at full speed."""
-    n = len(path)
-    result = np.empty((3, n))
-    for lo in range(0, n, _BLOCK):
-        part = slice(lo, min(lo + _BLOCK, n))
-        result[:, part] = _ceilings(np.diff(path.break_mm[lo : part.stop + 1]), path.shape[part],
-                                    path.feed_mm_s[part], limits, share[part])  # fmt: skip
-    return result[0], result[1], result[2]
-
-
-def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits, share: Array) -> Array:
-    h = length[:, None]
-    first, second, third = shape[:, 1], 2.0 * shape[:, 2], 6.0 * shape[:, 3]
-    # q' is a parabola, inside the hull of its three control points; q'' is linear
-    middle, last = first + 0.5 * h * second, first + h * (second + 0.5 * h * third)
-    m1 = np.maximum(np.maximum(np.abs(first), np.abs(last)), np.abs(middle))
-    m2 = np.maximum(np.abs(second), np.abs(second + h * third))
-    m3 = np.abs(third)
-    size = np.sqrt(np.maximum.reduce([(e * e).sum(axis=1) for e in (first, middle, last)]))
-    m1, m2, m3 = (np.maximum(e, _TINY) for e in (m1, m2, m3))
-    with np.errstate(over="ignore"):
-        v = np.minimum((limits.velocity / m1).min(axis=1), feed / np.maximum(size, _TINY))
-        v = np.minimum(v, np.sqrt(share * (limits.acceleration / m2).min(axis=1)))
-        v = np.minimum(v, np.cbrt(share * (limits.jerk / m3).min(axis=1)))
-        cross = 3.0 * m2 * v[:, None]
-        left = limits.jerk - m3 * (v**3)[:, None]
-        a = ((limits.acceleration - m2 * (v**2)[:, None]) / m1).min(axis=1)
-        a = np.minimum(a, (_BY_CROSS * left / np.maximum(cross, _TINY)).min(axis=1))
-        j = ((left - cross * a[:, None]) / m1).min(axis=1)
-    return np.stack((v, a, j))
-
-
 def profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
     """The speed profile from rest to rest, within the ceilings of every piece for `share` (k,)."""
     top, most_a, most_j = ceilings(path, limits, share)
     x = path.break_mm
     ceiling = np.concatenate(([0.0], np.minimum(top[:-1], top[1:]), [0.0]))
+    ceiling[path.rest] = 0.0
     node = _dips(x, top, ceiling, most_a)
     turn = 0
     while True:
@@ -109,10 +69,11 @@ def profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
 
 
 def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
-    """(k + 1,) the ends, and both ends of the pieces whose ceiling is lower than that of a neighbour, higher
-    than that of none, and reached where only acceleration is bounded (no jerk-bounded profile is faster)."""
+    """(k + 1,) where it rests, and both ends of the pieces whose ceiling is lower than that of a neighbour,
+    higher than that of none, and reached where only acceleration is bounded (no jerk-bounded profile is
+    faster)."""
     node = np.zeros(len(x), bool)
-    node[0] = node[-1] = True
+    node[ceiling == 0.0] = True
     free = free_speeds(x, ceiling, acceleration)
     before = np.concatenate(([np.inf], top[:-1]))
     behind = np.concatenate((top[1:], [np.inf]))
@@ -217,35 +178,35 @@ def best_profile(path: SmoothPath, limits: AxisLimits) -> Profile:
     first = profile(path, limits, share)
     _give_dips(first, share)
     second = profile(path, limits, share)
-    return min(first, second, key=lambda found: seconds(path, found))
+    return _by_run(path, first, second)
 
 
-def expected_s(route: Route, limits: AxisLimits) -> Array:
-    """(n - 1,) seconds that `critical` will hardly undercut along each segment of a route.
+def _by_run(path: SmoothPath, first: Profile, second: Profile) -> Profile:
+    """From one rest to the next the faster of two profiles."""
+    both = (first, second)
+    run = [np.searchsorted(path.rest, found.node[:-1], side="right") for found in both]
+    before, after = (
+        np.bincount(of, _seconds(path, found), minlength=len(path.rest) + 1)
+        for of, found in zip(run, both, strict=True)
+    )
+    better = after < before
+    if better.all() or not better.any():
+        return second if better.all() else first
+    spans = [np.flatnonzero(mine[of]) for mine, of in zip((~better, better), run, strict=True)]
+    order = np.argsort(np.concatenate([found.node[k] for found, k in zip(both, spans, strict=True)]))
 
-    A kernel that meets no other bends by du / w at its vertex, w as wide as the tolerance allows: so much
-    speed is left there. Between two such speeds a segment takes as long as with no acceleration at its ends.
-    """
-    delta = np.diff(route.point_mm, axis=0).T
-    length = np.maximum(np.sqrt((delta * delta).sum(axis=0)), _TINY)
-    u = delta / length
-    velocity, a, j = (most[:, None] for most in (limits.velocity, limits.acceleration, limits.jerk))
-    bend = np.abs(np.diff(u, axis=1))
-    with np.errstate(all="ignore"):
-        size = np.maximum(np.abs(u), _STRAIGHT)
-        top = np.minimum((velocity / size).min(axis=0), route.feed_mm_s)
-        along = (a / size).min(axis=0), (j / size).min(axis=0)
-        width = MOST_WIDTH * route.tolerance_mm[1:-1] / np.sqrt((bend * bend).sum(axis=0))
-        slow = np.sqrt(_BY_BEND * width * (a / bend).min(axis=0))
-        slow = np.minimum(slow, np.cbrt(_BY_BEND * width * width * (j / bend).min(axis=0)))
-    reaches = np.concatenate(([0.0], width, [0.0]))
-    apart = (reaches[:-1] + reaches[1:]) <= length
-    slow = np.where(apart[:-1] & apart[1:], slow, np.inf)
-    slow = np.concatenate(([0.0], np.where(route.tolerance_mm[1:-1] > 0.0, slow, 0.0), [0.0]))
-    end = np.minimum(np.maximum(slow[:-1], slow[1:]), top)
-    peak = np.minimum(ramps.reach(end, 0.5 * length, *along), top)
-    way = 2.0 * ramps.distance(end, peak, *along)
-    return np.asarray(2.0 * ramps.seconds(end, peak, *along) + np.maximum(length - way, 0.0) / peak)
+    def merged(one: Array, other: Array) -> Array:
+        result: Array = np.concatenate((one[spans[0]], other[spans[1]]))[order]
+        return result
+
+    begins = np.concatenate((first.node[spans[0]], second.node[spans[1]]))[order]
+    return Profile(
+        np.append(begins, first.node[-1]),
+        np.append(merged(first.speed, second.speed), 0.0),
+        merged(first.peak, second.peak),
+        merged(first.acceleration, second.acceleration),
+        merged(first.jerk, second.jerk),
+    )
 
 
 def _shares(path: SmoothPath) -> Array:
@@ -255,7 +216,7 @@ def _shares(path: SmoothPath) -> Array:
     lonely = ~straight[2:-2] & (
         (straight[1:-3] & straight[4:]) | (straight[:-4] & straight[3:-1]) | (straight[1:-3] & straight[3:-1])
     )
-    return np.where(lonely, _BY_BEND, _BY_SPEED)
+    return np.where(lonely, BY_BEND, _BY_SPEED)
 
 
 def _give_dips(found: Profile, share: Array) -> None:
@@ -268,38 +229,56 @@ def _give_dips(found: Profile, share: Array) -> None:
 
 def seconds(path: SmoothPath, found: Profile) -> float:
     """Time of a profile."""
+    return float(_seconds(path, found).sum())
+
+
+def _seconds(path: SmoothPath, found: Profile) -> Array:
+    """(m,) times between its nodes."""
     way = np.diff(path.break_mm[found.node])
     total = np.zeros_like(way)
     for end in (found.speed[:-1], found.speed[1:]):
         ramp = ramps.seconds(end, found.peak, found.acceleration, found.jerk)
         way -= 0.5 * (end + found.peak) * ramp
         total += ramp
-    return float((total + np.maximum(way, 0.0) / found.peak).sum())
+    return np.asarray(total + np.maximum(way, 0.0) / found.peak)
 
 
 def driven(path: SmoothPath, found: Profile) -> Motion:
     """The motion of a profile: cut wherever the path or the jerk changes, each piece from its own start."""
-    x = path.break_mm
+    starts, times, shapes, at = [np.zeros(1)], [], [], 0.0
+    for lo in range(0, len(found.peak), _SPANS):
+        hi = min(lo + _SPANS, len(found.peak))
+        some = Profile(found.node[lo : hi + 1], found.speed[lo : hi + 1],
+                       *(e[lo:hi] for e in (found.peak, found.acceleration, found.jerk)))  # fmt: skip
+        end_s, time, shape = _driven(path, some)
+        starts.append(at + end_s)
+        at = float(starts[-1][-1])
+        times.append(time)
+        shapes.append(shape)
+    start, time, shape = whole(starts), whole(times), whole(shapes)
+    return Motion(start, time, path.shape, shape, path.line[shape])
+
+
+def _driven(path: SmoothPath, found: Profile) -> tuple[Array, Array, Index]:
+    """Of the pieces (p,) of some spans: the seconds until each ends, (p, 4) polynomials, piece of the path."""
+    low, high = int(found.node[0]), int(found.node[-1])
+    x = path.break_mm[low:high]
     clock = Timeline.of(path, found)
     # breaks of the path inside a phase; those at the start of one are there already
-    phase = np.searchsorted(clock.way, x[:-1], side="right") - 1
-    inside = np.flatnonzero(clock.way[phase] != x[:-1])
+    phase = np.searchsorted(clock.way, x, side="right") - 1
+    inside = np.flatnonzero(clock.way[phase] != x)
     phase = phase[inside]
-    u = np.empty(len(phase))
-    for lo in range(0, len(u), _BLOCK):
-        part = slice(lo, lo + _BLOCK)
-        u[part] = clock.when(phase[part], x[inside[part]])
+    u = clock.when(phase, x[inside])
     v, a, j = clock.speed[phase], clock.acceleration[phase], clock.jerk[phase]
     order = np.argsort(np.concatenate((clock.way, x[inside])), kind="stable")
     begin = np.concatenate((clock.start_s[:-1], clock.start_s[phase] + u))[order]
     shape = np.concatenate((np.searchsorted(x, clock.way, side="right") - 1, inside))[order]
-    shape = np.minimum(shape, len(path) - 1)
     time = np.empty((len(order), 4))
     time[:, 0] = np.concatenate((clock.way, x[inside]))[order] - x[shape]
     time[:, 1] = np.concatenate((clock.speed, np.maximum(v + u * (a + 0.5 * u * j), 0.0)))[order]
     time[:, 2] = np.concatenate((clock.acceleration, a + u * j))[order] / 2.0
     time[:, 3] = np.concatenate((clock.jerk, j))[order] / 6.0
-    return Motion(np.append(begin, clock.start_s[-1]), time, path.shape, shape, path.line[shape])
+    return np.append(begin[1:], clock.start_s[-1]), time, shape + low
 
 
 @dataclass(frozen=True, slots=True, eq=False)

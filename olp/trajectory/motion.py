@@ -71,6 +71,13 @@ class Motion:
             begin + (self.start_s - begin) * factor, self.time * scale, self.path, self.shape, self.line
         )
 
+    def part(self, pieces: slice) -> Motion:
+        """Some pieces, one after the other, and the paths between the first and the last that they drive."""
+        shape = self.shape[pieces]
+        low, high = (int(shape.min()), int(shape.max()) + 1) if len(shape) else (0, 0)
+        start = self.start_s[pieces.start : pieces.stop + 1]
+        return Motion(start, self.time[pieces], self.path[low:high], shape - low, self.line[pieces])
+
     def shifted(self, by_s: float) -> Motion:
         return Motion(self.start_s + by_s, self.time, self.path, self.shape, self.line)
 
@@ -107,11 +114,11 @@ class Motion:
         for i, some in enumerate(time):
             if some.shape[1] < wide:
                 time[i] = np.pad(some, ((0, 0), (0, wide - some.shape[1])))
-        return Motion(_whole(start), _whole(time), _whole(path), _whole(shape), _whole(line))
+        return Motion(whole(start), whole(time), whole(path), whole(shape), whole(line))
 
 
-def _whole(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:
-    """One array of the parts, which are let go."""
+def whole(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:
+    """One array of the parts; their list is emptied, so that what it alone holds is let go."""
     result = np.concatenate(parts)
     parts.clear()
     return result

@@ -13,13 +13,12 @@ Int. J. Machine Tools and Manufacture 108 (2016).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import UsageError
-from olp.trajectory.motion import Motion
+from olp.trajectory.motion import Motion, whole
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.ruckig_moves import solve_all
 from olp.trajectory.same import groups_of_same
@@ -28,7 +27,6 @@ from olp.trajectory.scurve import CRUISE, PHASES, rest_to_rest_s, states
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
-_Number = TypeVar("_Number", np.float64, np.int64)
 
 #: overlaps end this part of the first jerk phase early, so that the middle has room
 _ROOM = 0.98
@@ -108,8 +106,8 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
         numbers[1].append(part.owner)
         shapes += len(part.path)
         replaced += part.replaced
-    seconds, time, path = (_emptied(values) for values in kept)
-    shape, owner = (_emptied(values) for values in numbers)
+    seconds, time, path = (whole(values) for values in kept)
+    shape, owner = (whole(values) for values in numbers)
     waits = np.flatnonzero(dwell > 0.0)
     if waits.size:
         # a dwell belongs to the segment that ends there; the one before the first move, to the first
@@ -135,13 +133,6 @@ def _merged(route: Route, limits: AxisLimits) -> tuple[Index, Array, _Moves]:
     stops = (tolerance <= 0.0) | (dwell > 0.0)
     feed = route.feed_mm_s[first[1:] - 1]
     return first, dwell, _moves(route.point_mm[first], feed, np.where(stops, 0.0, tolerance), limits)
-
-
-def _emptied(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:
-    """One array of the parts, which are let go."""
-    whole = np.concatenate(parts)
-    parts.clear()
-    return whole
 
 
 def _check(route: Route, limits: AxisLimits) -> None:

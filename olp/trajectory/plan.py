@@ -15,9 +15,10 @@ from itertools import pairwise
 import numpy as np
 
 from olp.exceptions import CannotCompute
-from olp.trajectory import critical
 from olp.trajectory.audit import Audit, Ratios, ratios, slowing, with_jumps
+from olp.trajectory.critical import Profile, best_profile, driven, seconds
 from olp.trajectory.deviation import deviation_bound
+from olp.trajectory.forecast import expected_s
 from olp.trajectory.motion import Array, Index, Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.overlap import least_s, overlap
@@ -44,6 +45,10 @@ _PIECES, _AFFORDED = 3, 1_000_000
 _GAIN, _LEFT = 0.003, 0.1
 #: way-points that are forecast together, and of runs that are planned together: a call costs more than a move
 _BLOCK, _TOGETHER = 1 << 15, 1 << 15
+#: what a solver that fails may raise
+_FAILURES = (ArithmeticError, ValueError, IndexError, CannotCompute)
+#: short runs have no more segments; optimising one takes at least as long as this many pieces
+_SHORT, _CALL = 64, 500
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,16 +108,15 @@ def plan(
     parts: list[Motion] = []
     legs: list[Leg] = []
     used = Ratios(np.zeros(3), np.zeros(3), np.zeros(3), 0.0)
-    stretches = list(_stretches(route, limits))
-    if optimise is None:
-        optimise = _to_optimise(stretches) <= _AFFORDED
-    for first, last, rivals in stretches:
-        for motion, leg, ratio in _legs(route, limits, first, last, rivals, optimise):
-            parts += motion
-            legs.append(leg)
+    stretches = _runs(route, limits)
+    least = _least_to_optimise(stretches) if optimise is None else (0 if optimise else len(route))
+    for stretch in _together(stretches, least):
+        for motion, some, ratio in _legs(route, limits, stretch, least):
+            parts.append(motion)
+            legs += some
             used = used.with_those(ratio)
             if tell is not None:
-                tell("plan", leg.last / (len(route) - 1))
+                tell("plan", some[-1].last / (len(route) - 1))
     if not parts:
         where = route.point_mm[0] if len(route) else np.zeros(3)
         parts.append(
@@ -148,36 +152,68 @@ def _with_stops(route: Route) -> Route:
     return replace(route, tolerance_mm=tolerance)
 
 
-def _stretches(route: Route, limits: AxisLimits) -> Iterator[tuple[int, int, tuple[_Rival, ...]]]:
-    """First and last way-point of what is planned together, and the solvers that may win there. Runs for
-    which only one remains are often many and short: they go together."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stretch:
+    """What is planned together: way-points `first` to `last`, both at rest, in `runs`, and the solvers that
+    may win there, the most promising first."""
+
+    first: int
+    last: int
+    rivals: tuple[_Rival, ...]
+    runs: int = 1
+
+    @property
+    def segments(self) -> int:
+        return self.last - self.first
+
+    @property
+    def bends(self) -> bool:
+        return any(rival.solver.bends for rival in self.rivals)
+
+    def cost(self) -> float:
+        """About how many pieces there are to optimise."""
+        if not self.bends:
+            return 0.0
+        return _CALL + _PIECES * self.segments + max(rival.least_s for rival in self.rivals) / CELL_S
+
+
+def _runs(route: Route, limits: AxisLimits) -> list[_Stretch]:
     stops = _stops(route)
     if len(stops) < 2:
-        return
-    seconds = _forecast(route, limits, stops)
-    first, alone = 0, None
-    for k, (begin, end) in enumerate(pairwise(stops.tolist())):
-        rivals = _promising(seconds[:, k])
-        only = rivals[0].solver if len(rivals) == 1 else None
-        if alone is not None and (only is not alone or end - first > _TOGETHER):
-            yield first, begin, (_Rival(alone, 0.0),)
-            alone = None
-        if only is None:
-            yield begin, end, rivals
-        elif alone is None:
-            first, alone = begin, only
-    if alone is not None:
-        yield first, int(stops[-1]), (_Rival(alone, 0.0),)
+        return []
+    least_s = _forecast(route, limits, stops).T
+    return [
+        _Stretch(begin, end, _promising(some))
+        for (begin, end), some in zip(pairwise(stops.tolist()), least_s, strict=True)
+    ]
 
 
-def _to_optimise(stretches: list[tuple[int, int, tuple[_Rival, ...]]]) -> float:
-    """About how many pieces there are to optimise."""
-    return sum(
-        _PIECES * (last - first) + rival.least_s / CELL_S
-        for first, last, rivals in stretches
-        for rival in rivals
-        if rival.solver.bends
-    )
+def _least_to_optimise(runs: list[_Stretch]) -> int:
+    """The fewest segments of a run that is worth optimising, within what is afforded in all."""
+    long = sum(run.cost() for run in runs if run.segments > _SHORT)
+    short = sum(run.cost() for run in runs if run.segments <= _SHORT)
+    if long + short <= _AFFORDED:
+        return 0
+    return _SHORT + 1 if long <= _AFFORDED else max(run.last for run in runs) + 1
+
+
+def _together(runs: list[_Stretch], least: int) -> Iterator[_Stretch]:
+    """The runs, those joined that stay straight or are short and not to be optimised: they may be many."""
+    group: _Stretch | None = None
+    for run in runs:
+        small = not run.bends or run.segments < min(least, _SHORT + 1)
+        if group is not None and (not small or run.last - group.first > _TOGETHER):
+            yield group
+            group = None
+        if not small:
+            yield run
+        elif group is None:
+            group = run
+        else:
+            rivals = group.rivals if len(group.rivals) >= len(run.rivals) else run.rivals
+            group = _Stretch(group.first, run.last, rivals, group.runs + 1)
+    if group is not None:
+        yield group
 
 
 def _stops(route: Route) -> Index:
@@ -214,29 +250,40 @@ def _promising(least_s: Array) -> tuple[_Rival, ...]:
 
 
 def _legs(
-    route: Route, limits: AxisLimits, first: int, last: int, rivals: tuple[_Rival, ...], optimise: bool
-) -> Iterator[tuple[list[Motion], Leg, Ratios]]:
-    """The stretch from one stop to another, in one leg; run by run where no solver finds that."""
+    route: Route, limits: AxisLimits, stretch: _Stretch, least: int
+) -> Iterator[tuple[Motion, list[Leg], Ratios]]:
+    """The motion of a stretch and the legs it is made of; run by run where a solver fails on the whole."""
+    first, last = stretch.first, stretch.last
     inner = slice(first, last + 1)
-    dwell = route.dwell_s[inner].copy()
-    dwell[[0, -1]] = 0.0
     # pieces are named by their segment while feeds are audited, by their line afterwards
     run = Run(
         Route(
             route.point_mm[inner], route.feed_mm_s[first:last], np.arange(last - first),
-            route.tolerance_mm[inner], dwell,
+            route.tolerance_mm[inner], np.zeros(last - first + 1),
         ),
         limits,
     )  # fmt: skip
-    found = _fastest(run, rivals, optimise)
-    if found is not None:
-        yield _with_rests(route, first, last, found)
+    if stretch.runs == 1 or len(stretch.rivals) == 1:
+        found = _fastest(run, stretch.rivals, stretch.segments >= least and stretch.runs == 1)
+        chosen = [] if found is None else [(0, last - first, found)]
+    else:
+        chosen = _contest(run, stretch.rivals)
+    if chosen:
+        motion = chosen[0][2].driven() if len(chosen) == 1 else _mixed(chosen)
+        legs = [
+            Leg(first + a, first + b, found.solver, found.duration_s, found.factor, found.deviation_mm)
+            for a, b, found in chosen
+        ]
+        used = chosen[0][2].ratios
+        for _, _, found in chosen[1:]:
+            used = used.with_those(found.ratios)
+        yield _with_dwells(route, first, last, motion), _waiting(route, legs), used
         return
     stops = first + _stops(run.route)
     if len(stops) <= 2:
         raise CannotCompute(f"no solver found a motion along line {int(route.line[first])}")
     for begin, end in pairwise(stops.tolist()):
-        yield from _legs(route, limits, begin, end, rivals, optimise)
+        yield from _legs(route, limits, _Stretch(begin, end, stretch.rivals), least)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,6 +299,36 @@ class _Found:
     @property
     def duration_s(self) -> float:
         return self.motion.duration_s * self.factor
+
+    def driven(self) -> Motion:
+        return self.motion if self.factor == 1.0 else self.motion.slowed(self.factor)
+
+
+def _contest(run: Run, rivals: tuple[_Rival, ...]) -> list[tuple[int, int, _Found]]:
+    """First and last way-point of runs that one solver drives best, one after the other; none where a solver
+    fails, or has to be slowed down because of one run."""
+    all_found = [_better(run, rival.solver, None) for rival in rivals]
+    candidates = [found for found in all_found if found is not None and found.factor == 1.0]
+    if len(candidates) < len(rivals):
+        return []
+    stops = _stops(run.route)
+    of_run = [np.searchsorted(stops, found.motion.line, side="right") - 1 for found in candidates]
+    seconds = np.stack([
+        np.bincount(of, np.diff(found.motion.start_s), minlength=len(stops) - 1)
+        for of, found in zip(of_run, candidates, strict=True)
+    ])  # fmt: skip
+    winner = np.argmin(seconds, axis=0)
+    edges = np.concatenate(([0], 1 + np.flatnonzero(np.diff(winner)), [len(winner)]))
+    out = []
+    for a, b in pairwise(edges.tolist()):
+        found, of = candidates[winner[a]], of_run[winner[a]]
+        pieces = slice(int(np.searchsorted(of, a)), int(np.searchsorted(of, b)))
+        out.append((int(stops[a]), int(stops[b]), replace(found, motion=found.motion.part(pieces))))
+    return out
+
+
+def _mixed(chosen: list[tuple[int, int, _Found]]) -> Motion:
+    return Motion.joined([found.motion for _, _, found in chosen])
 
 
 def _fastest(run: Run, rivals: tuple[_Rival, ...], optimise: bool) -> _Found | None:
@@ -274,9 +351,9 @@ def _optimised(run: Run, best: _Found) -> _Found:
     """The motion of optimised speed where it may be faster."""
     try:
         path, profile = run.path(), run.profile()
-    except CannotCompute:
+    except _FAILURES:
         return best
-    bound, closed = bound_s(path, run.limits), critical.seconds(path, profile)
+    bound, closed = bound_s(path, run.limits), seconds(path, profile)
     if bound + _LEFT * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
         return best
     solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), _LAST.least_s, bends=True)
@@ -300,19 +377,40 @@ def _better(run: Run, solver: Solver, best: _Found | None) -> _Found | None:
     return _Found(motion, solver.name, factor, used.slowed(factor), float(deviation.max(initial=0.0)))
 
 
-def _with_rests(route: Route, first: int, last: int, found: _Found) -> tuple[list[Motion], Leg, Ratios]:
-    """The leg of a motion, with the dwell at its end, and that at its start if it is the first."""
-    motion = found.motion if found.factor == 1.0 else found.motion.slowed(found.factor)
-    parts = [replace(motion, line=route.line[first:last][motion.line])]
-    wait = 0.0
-    if first == 0 and route.dwell_s[0] > 0.0:
-        wait += float(route.dwell_s[0])
-        parts.insert(0, Motion.rest(route.point_mm[0], wait, int(route.line[0])))
-    if route.dwell_s[last] > 0.0:
-        wait += float(route.dwell_s[last])
-        parts.append(Motion.rest(route.point_mm[last], float(route.dwell_s[last]), int(route.line[last - 1])))
-    leg = Leg(first, last, found.solver, found.duration_s + wait, found.factor, found.deviation_mm)
-    return parts, leg, found.ratios
+def _with_dwells(route: Route, first: int, last: int, motion: Motion) -> Motion:
+    """The motion of a stretch with its rests, and the lines of the program."""
+    line = route.line[first:last][motion.line]
+    waits = _dwells(route, first, last)
+    if not waits.size:
+        return replace(motion, line=line)
+    seconds = route.dwell_s[waits]
+    at = np.searchsorted(motion.line, waits - first)
+    still = np.zeros((len(waits), 4, 3))
+    still[:, 0] = route.point_mm[waits]
+    lasts = np.insert(np.diff(motion.start_s), at, seconds)
+    return Motion(
+        np.concatenate(([0.0], np.cumsum(lasts))),
+        np.insert(motion.time, at, 0.0, axis=0),
+        np.concatenate((motion.path, still)),
+        np.insert(motion.shape, at, len(motion.path) + np.arange(len(waits))),
+        # a dwell belongs to the line that ends there; the one before the first move, to the first
+        np.insert(line, at, route.line[np.maximum(waits - 1, 0)]),
+    )
+
+
+def _dwells(route: Route, first: int, last: int) -> Index:
+    """Way-points with a dwell of a stretch: that at its start belongs to the one before."""
+    begin = first if first == 0 else first + 1
+    return np.asarray(begin + np.flatnonzero(route.dwell_s[begin : last + 1] > 0.0))
+
+
+def _waiting(route: Route, legs: list[Leg]) -> list[Leg]:
+    """The legs with the time that they wait."""
+    waits = [float(route.dwell_s[_dwells(route, leg.first, leg.last)].sum()) for leg in legs]
+    return [
+        replace(leg, duration_s=leg.duration_s + wait) if wait else leg
+        for leg, wait in zip(legs, waits, strict=True)
+    ]
 
 
 def _allowed(run: Route) -> Array:
@@ -327,7 +425,7 @@ def _tried(solve: Callable[[], Motion]) -> Motion | None:
     """A solver that fails leaves the field to the others."""
     try:
         motion = solve()
-    except (ArithmeticError, ValueError, IndexError, CannotCompute):
+    except _FAILURES:
         return None
     sound = np.isfinite(motion.time).all() and (np.diff(motion.start_s) >= 0.0).all()
     return motion if sound else None
@@ -340,18 +438,18 @@ class Run:
         self.route = route
         self.limits = limits
         self._path: SmoothPath | None = None
-        self._profile: critical.Profile | None = None
+        self._profile: Profile | None = None
 
     def path(self) -> SmoothPath:
-        """Raises CannotCompute where the run stops on its way."""
+        """Raises CannotCompute as `smooth`."""
         if self._path is None:
             self._path = smooth(self.route, self.limits)
         return self._path
 
-    def profile(self) -> critical.Profile:
+    def profile(self) -> Profile:
         """Speeds in closed form along the path; raises as that."""
         if self._profile is None:
-            self._profile = critical.best_profile(self.path(), self.limits)
+            self._profile = best_profile(self.path(), self.limits)
         return self._profile
 
 
@@ -384,8 +482,8 @@ _SOLVERS = (
     ),
     Solver(
         CRITICAL,
-        lambda run: critical.driven(run.path(), run.profile()),
-        lambda route, limits: _AT_BEST * critical.expected_s(route, limits),
+        lambda run: driven(run.path(), run.profile()),
+        lambda route, limits: _AT_BEST * expected_s(route, limits),
         bends=True,
     ),
 )

@@ -48,13 +48,15 @@ _BLOCK = 1 << 17
 class SmoothPath:
     """Piece k runs from `break_mm[k]` to `break_mm[k + 1]` (k + 1,) along the polyline: with s the way from
     its start, its axis positions are sum_i `shape[k, i]` s^i mm, `shape` (k, 4, 3). `feed_mm_s` (k,) is the
-    most speed along it, `line` (k,) its program line. `source` (k,) is the segment of the route."""
+    most speed along it, `line` (k,) its program line. `source` (k,) is the segment of the route. Breaks
+    `rest` (r,) are met at rest, as both ends are."""
 
     break_mm: Array
     shape: Array
     feed_mm_s: Array
     line: Index
     source: Index
+    rest: Index
 
     def __len__(self) -> int:
         return len(self.shape)
@@ -85,23 +87,24 @@ def needs_stop(point_mm: Array) -> Mask:
 
 
 def smooth(route: Route, limits: AxisLimits) -> SmoothPath:
-    """The path of one run from rest to rest.
+    """The path of a route that begins and ends at rest, and rests at way-points without tolerance.
 
     Every point of it is within the tolerance of the route (interpolated between its way-points) of the
-    polyline, proven by the control points of each cubic; both ends are met exactly, and straight. A
+    polyline, proven by the control points of each cubic; rests are met exactly, and straight. A
     reversal is rounded too (its path stands still there for a moment); better make it a stop.
 
     Raises:
-        CannotCompute: a point that is not finite, an inner tolerance or a feed that is not above zero.
+        CannotCompute: a point that is not finite, a tolerance below zero, a feed that is not above it.
     """
     _check(route)
     inner = np.asarray(route.tolerance_mm, float)[1:-1]
-    same = max(min(_SAME_MM, _SAME_SHARE * float(inner.min(initial=math.inf))), _SAME_LEAST_MM)
-    kept = _distinct(route.point_mm, same)
+    least = float(inner.min(initial=math.inf, where=inner > 0.0))
+    same = max(min(_SAME_MM, _SAME_SHARE * least), _SAME_LEAST_MM)
+    kept = _kept(route.point_mm, 1 + np.flatnonzero(inner == 0.0), same)
     point = route.point_mm[kept]
     if len(kept) < 2:
         none = np.zeros(0, np.int64)
-        return SmoothPath(np.zeros(1), np.zeros((0, 4, 3)), np.zeros(0), none, none)
+        return SmoothPath(np.zeros(1), np.zeros((0, 4, 3)), np.zeros(0), none, none, none)
     source = kept[1:] - 1
     feed, line = np.asarray(route.feed_mm_s, float)[source], np.asarray(route.line, np.int64)[source]
     delta = np.diff(point, axis=0)
@@ -112,24 +115,45 @@ def smooth(route: Route, limits: AxisLimits) -> SmoothPath:
         # segments below the grid of a path of 1e7 mm: each takes one step of it
         way = np.concatenate(([0.0], np.cumsum(np.maximum(np.round(length / grid), 1.0)))) * grid
     u = delta / np.diff(way)[:, None]
-    tolerance = _tolerance(route, kept, 0.0 if len(kept) == len(route) else 2.0 * same)
+    rest = 1 + np.flatnonzero(route.tolerance_mm[kept[1:-1]] == 0.0)
+    tolerance = _tolerance(route, kept, rest, 0.0 if len(kept) == len(route) else 2.0 * same)
     bend = np.diff(u, axis=0)
     inner = way[1:-1]
-    width = _widths(u, bend, way, feed, tolerance, limits, grid)
+    width = _widths(u, bend, way, rest, feed, tolerance, limits, grid)
     used = width > 0.0
     bend, inner, width = bend[used], inner[used], width[used]
-    breaks, width, shape = _fitted(way, u, point, bend, inner, width, tolerance, grid)
+    # toward a rest the tolerance stays that of the way-point before
+    ends = np.stack((tolerance[:-1], tolerance[1:]), axis=1)
+    leave, arrive = np.append(0, rest), np.append(rest, len(way) - 1)
+    ends[leave, 0], ends[arrive - 1, 1] = tolerance[leave + 1], tolerance[arrive - 1]
+    breaks, width, shape = _fitted(way, u, point, bend, inner, width, ends, grid)
     segment = np.clip(np.searchsorted(way, breaks[:-1], side="right") - 1, 0, len(u) - 1)
-    return SmoothPath(breaks, shape, feed[segment], line[segment], source[segment])
+    at_rest = np.searchsorted(breaks, way[rest])
+    return SmoothPath(breaks, shape, feed[segment], line[segment], source[segment], at_rest)
 
 
 def _check(route: Route) -> None:
     if not np.isfinite(route.point_mm).all():
         raise CannotCompute("a way-point is not finite")
-    if not (np.asarray(route.tolerance_mm)[1:-1] > 0.0).all():
-        raise CannotCompute("an inner way-point has no tolerance: cut the route there")
+    if not (np.asarray(route.tolerance_mm)[1:-1] >= 0.0).all():
+        raise CannotCompute("a tolerance is not zero or above")
     if not (np.asarray(route.feed_mm_s) > 0.0).all():
         raise CannotCompute("a feed is not above zero")
+
+
+def _kept(point: Array, rest: Index, same: float) -> Index:
+    """Indices of points (n, 3) kept: the ends, those at `rest` (r,), and between them no two neighbours
+    closer than `same`."""
+    if not len(rest):
+        return _distinct(point, same)
+    keep = np.ones(len(point), bool)
+    edges = np.concatenate(([0], rest, [len(point) - 1]))
+    short = np.flatnonzero(np.linalg.norm(np.diff(point, axis=0), axis=1) < same)
+    for run in np.unique(np.searchsorted(rest, short, side="right")).tolist():
+        a, b = int(edges[run]), int(edges[run + 1])
+        keep[a + 1 : b + 1] = False
+        keep[a + _distinct(point[a : b + 1], same)] = True
+    return np.flatnonzero(keep)
 
 
 def _distinct(point: Array, same: float) -> Index:
@@ -167,22 +191,22 @@ def _distinct(point: Array, same: float) -> Index:
     return np.array(kept, np.int64)
 
 
-def _tolerance(route: Route, kept: Index, margin: float) -> Array:
-    """(m,) at the way-points kept: the least of theirs and of those left out behind, less `margin`; at the
-    ends that of the neighbours (the kernels end before)."""
+def _tolerance(route: Route, kept: Index, rest: Index, margin: float) -> Array:
+    """(m,) at the way-points kept: the least of theirs and of those left out behind, less `margin`; none at
+    the ends and at `rest` (r,): the kernels end before."""
     raw = np.array(route.tolerance_mm, float)
     if len(kept) <= 2:
         return np.ones(len(kept))
     raw[0], raw[-1] = math.inf, math.inf
     raw = np.minimum.reduceat(raw, kept)
-    tolerance = np.minimum(np.maximum(raw - margin, 0.5 * raw), _MOST_MM)
-    tolerance[0], tolerance[-1] = tolerance[1], tolerance[-2]
-    return tolerance
+    raw[rest] = math.inf
+    return np.minimum(np.maximum(raw - margin, 0.5 * raw), _MOST_MM)
 
 
 def _widths(
-    u: Array, bend: Array, way: Array, feed: Array, tolerance: Array, limits: AxisLimits, grid: float
-) -> Array:
+    u: Array, bend: Array, way: Array, rest: Index, feed: Array, tolerance: Array, limits: AxisLimits,
+    grid: float,
+) -> Array:  # fmt: skip
     """(m - 2,) first width of each kernel, on the grid: as wide as the tolerance of its vertex lets it, but
     no wider than full feed has use for."""
     if not len(bend):
@@ -196,10 +220,13 @@ def _widths(
     length = np.diff(way)
     use = np.maximum(_WIDER * np.maximum(by_acceleration, by_jerk), 0.3 * np.minimum(length[:-1], length[1:]))
     size = np.linalg.norm(bend, axis=1)
-    end = np.minimum(way[1:-1], way[-1] - way[1:-1])
+    ends = way[np.concatenate(([0], rest, [len(way) - 1]))]
+    behind = np.searchsorted(ends, way[1:-1], side="right")
+    end = np.minimum(way[1:-1] - ends[behind - 1], ends[behind] - way[1:-1])
     with np.errstate(divide="ignore"):
         width = np.minimum(np.minimum(use, MOST_WIDTH * tolerance[1:-1] / size), _END * end)
     width = np.maximum(np.floor(width / grid), 1.0) * grid
+    width[rest - 1] = 0.0
     return np.where(size > _STRAIGHT, width, 0.0)
 
 
@@ -218,10 +245,10 @@ def _fitted(
             pick = np.flatnonzero((end > lo) & (begin < hi))
             a, m, b = (np.clip(e[pick] - lo, 0, hi - lo) for e in (begin, middle, end))
             taylor = deviations(x, inner[pick], width[pick], bend[pick], a, m, b)
-            share = _allowed(taylor, x, way, tolerance)
+            segment = np.clip(np.searchsorted(way, x[:-1], side="right") - 1, 0, len(u) - 1)
+            share = _allowed(taylor, x, way, segment, tolerance)
             if (share < 1.0).any():
                 factor[pick] = np.minimum(factor[pick], least_over(share, a, b))
-            segment = np.clip(np.searchsorted(way, x[:-1], side="right") - 1, 0, len(u) - 1)
             piece = shape[lo:hi]
             piece[:, 0] = point[segment] + u[segment] * (x[:-1] - way[segment])[:, None] + taylor[:, 0]
             piece[:, 1] = u[segment] + taylor[:, 1]
@@ -237,14 +264,16 @@ def _fitted(
     return breaks, width, shape
 
 
-def _allowed(taylor: Array, x: Array, way: Array, tolerance: Array) -> Array:
+def _allowed(taylor: Array, x: Array, way: Array, segment: Index, tolerance: Array) -> Array:
     """(k,) by how much the deviation of each piece would have to shrink: 1 where it is within the tolerance.
 
     The norms of the control points of a cubic in Bernstein form bound its norm; the tolerance, linear on
     every piece, is its own Bernstein form, so that four comparisons prove the whole piece."""
     h = np.diff(x)[:, None]
     e, e1, e2, e3 = (taylor[:, i] for i in range(4))
-    limit = np.interp(x, way, tolerance)
+    first, last = tolerance[segment].T
+    slope = (last - first) / np.diff(way)[segment]
+    begin, end = (first + slope * (place - way[segment]) for place in (x[:-1], x[1:]))
     share = np.ones(len(taylor))
     controls = (
         e,
@@ -254,7 +283,7 @@ def _allowed(taylor: Array, x: Array, way: Array, tolerance: Array) -> Array:
     )
     for i, control in enumerate(controls):
         far = np.sqrt(np.einsum("ij,ij->i", control, control))
-        here = limit[:-1] + (limit[1:] - limit[:-1]) * (i / 3.0)
+        here = begin + (end - begin) * (i / 3.0)
         with np.errstate(divide="ignore"):
             share = np.minimum(share, here / far)
     return share

@@ -1,0 +1,216 @@
+"""Time and memory of planning a million way-points: python tests/benchmarks/bench_retime_million.py [job ...]
+
+    --points N     way-points of each job (default 1e6)
+    --toppra N     TOPP-RA beside our solvers, in one run, on N way-points (needs toppra)
+
+Each job runs in a process of its own, so that its peak of memory is its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import numpy as np
+import retime_paths
+
+from olp.trajectory import plan as planner
+from olp.trajectory.critical import critical
+from olp.trajectory.overlap import overlap
+from olp.trajectory.route import Route
+from olp.trajectory.smooth import SmoothPath, smooth
+
+#: what the planner calls, in the order of a report
+STAGES = (
+    "_forecast", "smooth", "best_profile", "driven", "optimised", "overlap", "ratios", "deviation_bound",
+    "with_jumps",
+)  # fmt: skip
+#: grid points that TOPP-RA gets for each way-point
+GRID = 3
+
+
+def _route(points: np.ndarray, feed: float, tolerance: float) -> Route:
+    count = len(points)
+    allowed = np.full(count, tolerance)
+    allowed[[0, -1]] = 0.0
+    return Route(points, np.full(count - 1, feed), np.arange(1, count), allowed, np.zeros(count))
+
+
+def _raster(count: int) -> Route:
+    return _route(retime_paths.freeform(max(count // 501, 1)), 100.0, 0.01)
+
+
+def _lines(count: int) -> Route:
+    return _route(retime_paths.corrected(max(count // 201, 1)), 300.0, 0.005)
+
+
+def _strokes(count: int) -> Route:
+    return _route(retime_paths.engraving(count - 1), 100.0, 0.01)
+
+
+def _stops(count: int) -> Route:
+    return _route(retime_paths.engraving(count - 1), 100.0, 0.0)
+
+
+def _noise(count: int) -> Route:
+    return _route(retime_paths.zigzag(count - 1), 100.0, 0.005)
+
+
+def _drilling(count: int) -> Route:
+    """Holes: across, down, up, with a stop where the drill turns back."""
+    k = np.arange(count)
+    hole, what = k // 3, k % 3
+    points = np.column_stack((hole % 500 * 2.0, hole // 500 * 2.0, np.where(what == 1, -5.0, 2.0)))
+    return _route(points, 50.0, 0.02)
+
+
+def _arcs(count: int) -> Route:
+    """Arcs of twenty chords between exact stops, with corners."""
+    angle = np.linspace(0.0, np.pi / 2, 21)[:-1]
+    one = np.column_stack((np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle)) * 10.0
+    number = np.repeat(np.arange(count // 20), 20)
+    points = np.tile(one, (count // 20, 1)) + np.column_stack((10.0 * number, 0.0 * number, 0.0 * number))
+    route = _route(points, 100.0, 0.01)
+    route.tolerance_mm[::20] = 0.0
+    return route
+
+
+JOBS: dict[str, Callable[[int], Route]] = {
+    "raster": _raster, "lines": _lines, "strokes": _strokes, "stops": _stops, "noise": _noise,
+    "drilling": _drilling, "arcs": _arcs,
+}  # fmt: skip
+
+
+def _user() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_utime
+
+
+def _watched(name: str, spent: dict[str, float]) -> None:
+    inner = getattr(planner, name)
+
+    def outer(*args: Any) -> Any:
+        start = _user()
+        try:
+            return inner(*args)
+        finally:
+            spent[name] = spent.get(name, 0.0) + _user() - start
+
+    setattr(planner, name, outer)
+
+
+def one(job: str, count: int) -> None:
+    """Plan one job and print what it took."""
+    route = JOBS[job](count)
+    spent: dict[str, float] = {}
+    for name in STAGES:
+        if hasattr(planner, name):
+            _watched(name, spent)
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    found = planner.plan(route, retime_paths.LIMITS)
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    user = after.ru_utime - before.ru_utime
+    solvers = sorted({leg.solver for leg in found.legs})
+    slowed = max(leg.factor for leg in found.legs)
+    print(
+        f"{job:9s}{len(route):9d}{user:9.1f}{after.ru_stime - before.ru_stime:8.1f}{len(route) / user:10.0f}"
+        f"{after.ru_maxrss / 1e3:9.0f}{found.duration_s:11.1f}{len(found.motion):10d}{len(found.legs):8d}"
+        f"{slowed:9.5f}  {', '.join(solvers)}"
+    )
+    stages = ", ".join(f"{name.strip('_')} {seconds:.1f}" for name, seconds in spent.items())
+    print(f"         user s: {stages}", flush=True)
+
+
+def beside_toppra(count: int) -> None:
+    """Way-points a second of TOPP-RA on the smooth path, and of our solvers, user CPU."""
+    import toppra
+    import toppra.algorithm
+    import toppra.constraint
+    from toppra.interpolator import AbstractGeometricPath
+
+    toppra.setup_logging("ERROR")
+    limits = retime_paths.LIMITS
+
+    class Path3(AbstractGeometricPath):
+        """A smooth path, and the way as a fourth axis, whose velocity is the feed."""
+
+        def __init__(self, path: SmoothPath) -> None:
+            self.path = path
+
+        def __call__(self, way: Any, order: int = 0) -> np.ndarray:
+            way = np.atleast_1d(np.asarray(way, float))
+            own = (way, np.ones_like(way), np.zeros_like(way))[order]
+            return np.column_stack((self.path.at(way)[order], own))
+
+        @property
+        def dof(self) -> int:
+            return 4
+
+        @property
+        def path_interval(self) -> np.ndarray:
+            return self.path.break_mm[[0, -1]]
+
+    print("path        way-points   TOPP-RA/s   critical points/s   ratio   overlapped moves/s   ratio")
+    for job in ("raster", "lines", "strokes"):
+        route = JOBS[job](count)
+        path = smooth(route, limits)
+        grid = np.interp(
+            np.linspace(0.0, 1.0, GRID * len(route)), np.linspace(0.0, 1.0, len(path.break_mm)), path.break_mm
+        )
+        velocity, acceleration = np.append(limits.velocity, route.feed_mm_s[0]), limits.acceleration
+        start = _user()
+        solver = toppra.algorithm.TOPPRA(
+            [
+                toppra.constraint.JointVelocityConstraint(np.column_stack((-velocity, velocity))),
+                toppra.constraint.JointAccelerationConstraint(
+                    np.column_stack((-np.append(acceleration, 1e6), np.append(acceleration, 1e6)))
+                ),
+            ],
+            Path3(path), gridpoints=grid, solver_wrapper="seidel",
+        )  # fmt: skip
+        solved = solver.compute_parameterization(0, 0)[1] is not None
+        theirs = len(route) / (_user() - start) if solved else np.nan
+        start = _user()
+        critical(smooth(route, limits), limits)
+        ours = len(route) / (_user() - start)
+        start = _user()
+        overlap(route, limits)
+        moves = len(route) / (_user() - start)
+        print(
+            f"{job:10s}{len(route):12d}{theirs:12.0f}{ours:20.0f}{ours / theirs:8.1f}{moves:21.0f}"
+            f"{moves / theirs:8.1f}",
+            flush=True,
+        )
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser()
+    ask.add_argument("jobs", nargs="*", default=list(JOBS))
+    ask.add_argument("--points", type=float, default=1e6)
+    ask.add_argument("--toppra", type=float)
+    ask.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
+    given = ask.parse_args()
+    if given.toppra:
+        beside_toppra(int(given.toppra))
+        return
+    if given.here:
+        one(given.jobs[0], int(given.points))
+        return
+    print(
+        "job     way-points   user s   sys s  points/s  peak MB duration s    pieces    legs   slowed solvers"
+    )
+    for job in given.jobs:
+        start = time.monotonic()
+        subprocess.run([sys.executable, __file__, job, "--points", str(given.points), "--here"], check=True)
+        print(f"         wall {time.monotonic() - start:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
