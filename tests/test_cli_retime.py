@@ -22,6 +22,7 @@ from olp.files.trajectory import COLUMNS, LINE_COLUMNS, SLOW_COLUMNS
 from olp.trajectory.usage import LIMITS
 
 PROGRAMS = Path(__file__).resolve().parents[1] / "programs"
+BED = PROGRAMS / "nasty" / "machine.toml"
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"
 SQUARE = "G21 G90 G54\nG64 P0.02\nG1 X40 F3000\nY40\nX0\nY0\nG4 P0.5\nG1 X1 Z5 F60\nM2\n"
 #: three stretches: a tool change and G28 leave the axes where the control wants
@@ -330,41 +331,53 @@ def test_nothing_exceeds_its_limit(job: Path, tmp_path: Path) -> None:
     assert report["budget_um"]["blending"] <= 20.0
 
 
-def test_corrected_against_nominal(tmp_path: Path) -> None:
-    nominal, out = PROGRAMS / "nasty" / "crlf.ngc", tmp_path / "corrected.ngc"
-    bed = PROGRAMS / "nasty" / "machine.toml"
-    assert run("correct", nominal, "-m", bed, "-o", out, "-q").exit_code == 0
-    report = report_of(out, "-m", bed, "--nominal", nominal)
-    against = report["nominal"]
+@pytest.fixture(scope="module")
+def corrected(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a nominal program, its correction, which has more blocks, and the report of that."""
+    folder = tmp_path_factory.mktemp("corrected")
+    nominal = program(folder, "G21 G90 G54 G64 P0.01 Q0\nG0 X10 Y10 Z5\nG1 X260 F3000\nY120\nX20\nM2\n")
+    words = ("-o", folder / "out.ngc", "-q", "--report", folder / "proof.json")
+    assert run("correct", nominal, "-m", BED, *words).exit_code == 0
+    return folder
+
+
+def test_corrected_against_nominal(corrected: Path, tmp_path: Path) -> None:
+    nominal, out = corrected / "part.ngc", corrected / "out.ngc"
+    assert len(out.read_text().splitlines()) > len(nominal.read_text().splitlines()) + 1
+    result = run("retime", out, "-m", BED, "--nominal", nominal, "--report", tmp_path / "r.json")
+    assert "Against part.ngc:" in result.stdout
+    assert "Largest differences" in result.stdout
+    against = json.loads((tmp_path / "r.json").read_text())["nominal"]
+    alone = olp.retime(nominal, BED)
     assert against["lines_correspond"]
-    assert against["duration_s"] == report_of(nominal, "-m", bed)["duration_s"]
-    assert against["differences"]
+    assert against["duration_s"] == alone.duration_s
     change = [abs(row["corrected_s"] - row["nominal_s"]) for row in against["differences"]]
     assert change == sorted(change, reverse=True)
-    text = run("retime", out, "-m", bed, "--nominal", nominal).stdout
-    assert "Against crlf.ngc:" in text
-    assert "Largest differences" in text
-    other = run("retime", PROGRAMS / "nasty" / "modal.ngc", "-m", bed, "--nominal", nominal)
+    by_line = dict(zip(alone.lines.line.tolist(), alone.lines.seconds.tolist(), strict=True))
+    assert {row["line"] for row in against["differences"]} == by_line.keys() == {3, 4, 5}
+    for row in against["differences"]:
+        assert row["nominal_s"] == pytest.approx(by_line[row["line"]])
+    other = run("retime", program(tmp_path, "G0 X10 Y10 Z5\nG1 X40 F60\n"), "-m", BED, "--nominal", nominal)
     assert other.exit_code == 0
     assert "do not correspond" in other.stdout
 
 
-def test_the_budget_stands_beside_that_of_the_correction(tmp_path: Path) -> None:
-    nominal, out, proof = PROGRAMS / "nasty" / "crlf.ngc", tmp_path / "out.ngc", tmp_path / "proof.json"
-    bed = PROGRAMS / "nasty" / "machine.toml"
-    assert run("correct", nominal, "-m", bed, "-o", out, "-q", "--report", proof).exit_code == 0
+def test_the_budget_stands_beside_that_of_the_correction(corrected: Path, tmp_path: Path) -> None:
+    out, proof = corrected / "out.ngc", tmp_path / "proof.json"
+    proof.write_bytes((corrected / "proof.json").read_bytes())
     static = json.loads(proof.read_text())
-    report = report_of(out, "-m", bed, "--proof", proof)
+    result = run("retime", out, "-m", BED, "--proof", proof, "--report", tmp_path / "r.json")
+    assert "by the proof of part.ngc" in result.stdout
+    report = json.loads((tmp_path / "r.json").read_text())
     assert report["proof"]["budget_um"] == static["budget_um"]
     left = static["deviation"]["path_max_um"]
     assert report["proof"]["at_most_um"] == pytest.approx(left + sum(report["budget_um"].values()))
-    assert "by the proof of crlf.ngc" in run("retime", out, "-m", bed, "--proof", proof).stdout
     for text, code in (("{", 3), ("[]", 2), ("{}", 2), (json.dumps(report), 2)):
         proof.write_text(text)
-        refused = run("retime", out, "-m", bed, "--proof", proof)
+        refused = run("retime", out, "-m", BED, "--proof", proof)
         assert (refused.exit_code, refused.stdout) == (code, "")
     proof.write_text(json.dumps(static | {"machine": {"name": "another"}}))
-    assert "another" in run("retime", out, "-m", bed, "--proof", proof).stderr
+    assert "another" in run("retime", out, "-m", BED, "--proof", proof).stderr
 
 
 def test_a_wider_tolerance_saves_time_and_costs_path(job: Path, tmp_path: Path) -> None:

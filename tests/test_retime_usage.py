@@ -77,7 +77,7 @@ def test_moves_of_one_line_have_their_own_feeds() -> None:
     assert lines.feed_seconds == pytest.approx([np.diff(found.motion.start_s)[down].sum()])
 
 
-@settings(max_examples=50)
+@settings(max_examples=12)
 @given(st.integers(0, 10_000))
 def test_lines_and_places_share_out_the_whole(seed: int) -> None:
     way, limits = random_route(seed)
@@ -98,7 +98,7 @@ def test_lines_and_places_share_out_the_whole(seed: int) -> None:
     assert (near[fed] <= lines.feed_seconds[fed] * lines.feed_mm_s[fed] * (1 + 1e-5)).all()
 
 
-@settings(max_examples=30)
+@settings(max_examples=6)
 @given(st.integers(0, 10_000))
 def test_two_stretches_make_one_table(seed: int) -> None:
     way, limits = random_route(seed)
