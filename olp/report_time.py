@@ -118,11 +118,17 @@ def _budget(report: Report) -> Iterator[str]:
         parts.append(f"{path['default_um']:g} um from {path['default_from']} where it names none")
     if path["exact_stop_at_start"]:
         parts.append("exact stop from the start, by the machine file")
-    yield "  Path tolerance: " + "; ".join(filter(None, parts))
+    found = "; ".join(filter(None, parts)) or "none, the program asks for the exact path all through"
+    yield f"  Path tolerance: {found}"
     inertial = report.get("inertial")
     if inertial:
         allowed = inertial["allowed_um"]
-        bound = "" if allowed is None else f", {allowed:g} um allowed: accelerations are held down to it"
+        held = ", ".join(f"{v:.0f}" for v in report["limits"]["acceleration_mm_s2"])
+        bound = (
+            ""
+            if allowed is None
+            else f"; {allowed:g} um are allowed, so accelerations of X, Y, Z are held to {held} mm/s2"
+        )
         text = (
             f"Inertial deviation: {inertial['max_um']:.2f} um max in line {inertial['line']}, "
             f"{inertial['rms_um']:.2f} rms, {inertial['across_path_max_um']:.2f} max across the path{bound}"

@@ -431,6 +431,12 @@ def test_a_program_may_leave_the_exact_stop_of_the_machine(tmp_path: Path) -> No
     assert left["duration_s"] < stop["duration_s"]
 
 
+def test_an_exact_path_has_no_tolerance(job: Path, tmp_path: Path) -> None:
+    result = run("retime", program(tmp_path, "G61.1\nG1 X40 F3000\nY40\n"), "-j", job, "--blend-study")
+    assert "Path tolerance: none" in result.stdout
+    assert len({line.split()[-2] for line in result.stdout.splitlines() if line.startswith("  x ")}) == 1
+
+
 def test_block_delete_and_flatten(job: Path, tmp_path: Path) -> None:
     part = program(tmp_path, "G1 X40 F3000\n/Y40\nX0\n")
     assert (

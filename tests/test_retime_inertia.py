@@ -153,6 +153,12 @@ def _limits(acceleration: list[float], setup: Setup) -> AxisLimits:
     )
 
 
+def test_the_text_says_what_the_bound_holds(job: Path, tmp_path: Path) -> None:
+    text = run("retime", program(tmp_path), "-j", job, "--max-inertial-um", "0.5").stdout
+    assert "0.5 um are allowed" in " ".join(text.split())
+    assert max(map(len, text.splitlines())) <= 100
+
+
 def test_a_bound_that_does_not_bind_changes_nothing(job: Path, tmp_path: Path) -> None:
     path = job.with_name("machine.toml")
     free = olp.retime(program(tmp_path), path, job)
