@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import olp
 from olp.exceptions import CannotCompute
 from olp.files import trajectory as files
-from olp.trajectory import plan as planner
+from olp.trajectory import contest, solvers, stretches
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import AxisLimits, Route
 
@@ -109,15 +109,15 @@ def test_a_solver_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) 
     def broken(*args: object) -> None:
         raise ValueError("no")
 
-    bent = {planner.CRITICAL, planner.OPTIMISED}
-    for name, left in (
-        ("smooth", {planner.OVERLAP}),
-        ("best_profile", {planner.OVERLAP}),
-        ("optimised", {planner.OVERLAP, planner.CRITICAL}),
-        ("overlap", bent),
+    bent = {solvers.CRITICAL, solvers.OPTIMISED}
+    for module, name, left in (
+        (solvers, "smooth", {solvers.OVERLAP}),
+        (solvers, "best_profile", {solvers.OVERLAP}),
+        (contest, "optimised", {solvers.OVERLAP, solvers.CRITICAL}),
+        (solvers, "overlap", bent),
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(planner, name, broken)
+            patch.setattr(module, name, broken)
             assert {leg.solver for leg in plan(route, LIMITS).legs} <= left
 
 
@@ -125,8 +125,8 @@ def test_what_no_solver_drives_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*args: object) -> None:
         raise ValueError("no")
 
-    monkeypatch.setattr(planner, "smooth", broken)
-    monkeypatch.setattr(planner, "overlap", broken)
+    monkeypatch.setattr(solvers, "smooth", broken)
+    monkeypatch.setattr(solvers, "overlap", broken)
     with pytest.raises(CannotCompute, match="line 1"):
         plan(route_of(np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 0, 0]])), LIMITS)
 
@@ -159,7 +159,7 @@ def test_short_runs_are_planned_together_as_well_as_one_by_one() -> None:
     assert found.duration_s == pytest.approx(alone + route.dwell_s.sum(), rel=1e-6)
     assert sum(leg.duration_s for leg in found.legs) == pytest.approx(found.duration_s)
     assert [leg.first for leg in found.legs] == [0, *(leg.last for leg in found.legs[:-1])]
-    assert {leg.solver for leg in found.legs} == {planner.OVERLAP, planner.CRITICAL}
+    assert {leg.solver for leg in found.legs} == {solvers.OVERLAP, solvers.CRITICAL}
     assert max(found.audit.position_jump_mm, found.audit.velocity_jump_mm_s) <= 1e-8
     # every stop is met at rest, for as long as it dwells
     at_rest = np.abs(found.motion.of(np.arange(len(found.motion)), np.zeros(len(found.motion)))[1]).max(
@@ -175,8 +175,8 @@ def test_short_runs_are_planned_together_as_well_as_one_by_one() -> None:
 def test_blocks_and_groups_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     route = arcs(30, seed=3)
     whole = plan(route, LIMITS, optimise=False)
-    monkeypatch.setattr(planner, "_BLOCK", 7)
-    monkeypatch.setattr(planner, "_TOGETHER", 11)
+    monkeypatch.setattr(stretches, "_BLOCK", 7)
+    monkeypatch.setattr(stretches, "_TOGETHER", 11)
     monkeypatch.setattr("olp.trajectory.pieces._BLOCK", 5)
     split = plan(route, LIMITS, optimise=False)
     assert len(split.legs) > len(whole.legs)

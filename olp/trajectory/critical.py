@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from olp.trajectory import ramps
 from olp.trajectory.ceilings import ceilings as ceilings
-from olp.trajectory.motion import Motion, whole
+from olp.trajectory.growing import Growing
+from olp.trajectory.motion import Motion
 from olp.trajectory.route import Array, AxisLimits, Index
 from olp.trajectory.smooth import SmoothPath
 
@@ -245,22 +246,24 @@ def _seconds(path: SmoothPath, found: Profile) -> Array:
 
 def driven(path: SmoothPath, found: Profile) -> Motion:
     """The motion of a profile: cut wherever the path or the jerk changes, each piece from its own start."""
-    starts, times, shapes, at = [np.zeros(1)], [], [], 0.0
+    starts, times = Growing(np.zeros(0)), Growing(np.zeros((0, 4)))
+    shapes, at = Growing(np.zeros(0, np.int64)), 0.0
+    starts.append(np.zeros(1))
     for lo in range(0, len(found.peak), _SPANS):
         hi = min(lo + _SPANS, len(found.peak))
         some = Profile(found.node[lo : hi + 1], found.speed[lo : hi + 1],
                        *(e[lo:hi] for e in (found.peak, found.acceleration, found.jerk)))  # fmt: skip
         end_s, time, shape = _driven(path, some)
         starts.append(at + end_s)
-        at = float(starts[-1][-1])
+        at += float(end_s[-1])
         times.append(time)
         shapes.append(shape)
-    start, time, shape = whole(starts), whole(times), whole(shapes)
-    return Motion(start, time, path.shape, shape, path.line[shape])
+    which = shapes.whole()
+    return Motion(starts.whole(), times.whole(), path.shape, which, path.line[which])
 
 
 def _driven(path: SmoothPath, found: Profile) -> tuple[Array, Array, Index]:
-    """Of the pieces (p,) of some spans: the seconds until each ends, (p, 4) polynomials, piece of the path."""
+    """Of the pieces (p,) of some spans: seconds until each ends, (p, 4) polynomials, piece of the path."""
     low, high = int(found.node[0]), int(found.node[-1])
     x = path.break_mm[low:high]
     clock = Timeline.of(path, found)

@@ -18,7 +18,7 @@ def expected_s(route: Route, limits: AxisLimits) -> Array:
     """(n - 1,) seconds that `critical` will hardly undercut along each segment of a route.
 
     A kernel that meets no other bends by du / w at its vertex, w as wide as the tolerance allows: so much
-    speed is left there. Between two such speeds a segment takes as long as with no acceleration at its ends.
+    speed is left in it. Between two such speeds a segment takes as long as with no acceleration at its ends.
     """
     delta = np.diff(route.point_mm, axis=0).T
     length = np.maximum(np.sqrt((delta * delta).sum(axis=0)), _TINY)
@@ -34,9 +34,23 @@ def expected_s(route: Route, limits: AxisLimits) -> Array:
         slow = np.minimum(slow, np.cbrt(BY_BEND * width * width * (j / bend).min(axis=0)))
     reaches = np.concatenate(([0.0], width, [0.0]))
     apart = (reaches[:-1] + reaches[1:]) <= length
-    slow = np.where(apart[:-1] & apart[1:], slow, np.inf)
-    slow = np.concatenate(([0.0], np.where(route.tolerance_mm[1:-1] > 0.0, slow, 0.0), [0.0]))
-    end = np.minimum(np.maximum(slow[:-1], slow[1:]), top)
-    peak = np.minimum(ramps.reach(end, 0.5 * length, *along), top)
-    way = 2.0 * ramps.distance(end, peak, *along)
-    return np.asarray(2.0 * ramps.seconds(end, peak, *along) + np.maximum(length - way, 0.0) / peak)
+    apart = apart[:-1] & apart[1:]
+    slow = np.where(route.tolerance_mm[1:-1] > 0.0, np.where(apart, slow, np.inf), 0.0)
+    # through a kernel the speed is held
+    held = np.where(apart & (slow > 0.0), width, 0.0)
+    ends = []
+    way = length.copy()
+    total = np.zeros_like(length)
+    for side in (0, 1):
+        some = np.insert(held, side * len(held), 0.0)
+        speed = np.minimum(np.insert(slow, side * len(slow), 0.0), top)
+        total += np.where(some > 0.0, some / np.maximum(speed, _TINY), 0.0)
+        way -= some
+        ends.append(speed)
+    way = np.maximum(way, 0.0)
+    # between different speeds half as long as between twice the one and twice the other
+    for end in ends:
+        peak = np.minimum(ramps.reach(end, 0.5 * way, *along), top)
+        used = 2.0 * ramps.distance(end, peak, *along)
+        total += ramps.seconds(end, peak, *along) + 0.5 * np.maximum(way - used, 0.0) / peak
+    return np.asarray(total)

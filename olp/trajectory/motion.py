@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from olp.trajectory.growing import Growing
+
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,33 +95,61 @@ class Motion:
         )
 
     @staticmethod
-    def joined(parts: Sequence[Motion]) -> Motion:
-        """One after the other. A list is emptied, so that what it alone holds is let go on the way."""
-        if len(parts) == 1 and parts[0].start_s[0] == 0.0:
-            return parts[0]
-        start, shape, offset, at = [], [], 0, 0.0
-        wide = max(p.time.shape[1] for p in parts)
+    def joined(parts: Iterable[Motion]) -> Motion:
+        """One after the other; each is taken when the one before has been copied. Of one, itself, from 0."""
+        first: Motion | None = None
+        whole: _Joined | None = None
         for part in parts:
-            start.append(part.start_s[:-1] - part.start_s[0] + at)
-            at += part.duration_s
-            shape.append(part.shape + offset)
-            offset += len(part.path)
-        start.append(np.array([at]))
-        time, path, line = [p.time for p in parts], [p.path for p in parts], [p.line for p in parts]
-        if isinstance(parts, list):
-            parts.clear()
-            del part
-        for i, some in enumerate(time):
-            if some.shape[1] < wide:
-                time[i] = np.pad(some, ((0, 0), (0, wide - some.shape[1])))
-        return Motion(whole(start), whole(time), whole(path), whole(shape), whole(line))
+            if first is None:
+                first = part
+                continue
+            if whole is None:
+                whole = _Joined()
+                whole.add(first)
+            whole.add(part)
+        if whole is not None:
+            return whole.motion()
+        if first is None:
+            return _Joined().motion()
+        return first if first.start_s[0] == 0.0 else first.shifted(-first.start_s[0])
 
 
-def whole(parts: list[npt.NDArray[_Number]]) -> npt.NDArray[_Number]:
-    """One array of the parts; their list is emptied, so that what it alone holds is let go."""
-    result = np.concatenate(parts)
-    parts.clear()
-    return result
+class _Joined:
+    """Motions one after the other."""
+
+    def __init__(self) -> None:
+        self._start = Growing(np.zeros(0))
+        self._time = Growing(np.zeros((0, 4)))
+        self._path = Growing(np.zeros((0, 4, 3)))
+        self._shape = Growing(np.zeros(0, np.int64))
+        self._line = Growing(np.zeros(0, np.int64))
+        self._wide = 4
+        self._end_s = 0.0
+
+    def add(self, part: Motion) -> None:
+        wide = part.time.shape[1]
+        if wide > self._wide:
+            before = self._time.whole()
+            self._time = Growing(np.zeros((0, wide)))
+            self._time.append(np.pad(before, ((0, 0), (0, wide - self._wide))))
+            self._wide = wide
+        narrow = self._wide - wide
+        self._time.append(np.pad(part.time, ((0, 0), (0, narrow))) if narrow else part.time)
+        self._start.append(part.start_s[:-1] - part.start_s[0] + self._end_s)
+        self._end_s += part.duration_s
+        self._shape.append(part.shape + len(self._path))
+        self._path.append(part.path)
+        self._line.append(part.line)
+
+    def motion(self) -> Motion:
+        self._start.append(np.array([self._end_s]))
+        return Motion(
+            self._start.whole(),
+            self._time.whole(),
+            self._path.whole(),
+            self._shape.whole(),
+            self._line.whole(),
+        )
 
 
 def derivatives(coefficient: Array, u: Array) -> tuple[Array, Array, Array, Array]:

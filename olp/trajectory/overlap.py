@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import UsageError
-from olp.trajectory.motion import Motion, whole
+from olp.trajectory.growing import Growing
+from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.ruckig_moves import solve_all
 from olp.trajectory.same import groups_of_same
@@ -95,19 +96,20 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
         line = int(route.line[0]) if len(route.line) else 0
         return Overlapped(Motion.rest(route.point_mm[0], float(dwell[0]), line), np.zeros(1, np.int64), 0)
     points = route.point_mm[first]
-    kept: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
-    numbers: tuple[list[Index], list[Index]] = ([], [])
-    shapes = replaced = 0
+    none = np.zeros(0, np.int64)
+    all_seconds, all_time, all_path = (Growing(np.zeros(e)) for e in ((0,), (0, 4), (0, 4, 3)))
+    all_shape, all_owner = Growing(none), Growing(none)
+    replaced = 0
     for a in range(0, len(segment), _BLOCK):
         part = _block(moves, points, a, min(a + _BLOCK, len(segment)))
-        for values, some in zip(kept, (part.seconds, part.time, part.path), strict=True):
-            values.append(some)
-        numbers[0].append(part.shape + shapes)
-        numbers[1].append(part.owner)
-        shapes += len(part.path)
+        all_shape.append(part.shape + len(all_path))
+        all_owner.append(part.owner)
+        all_seconds.append(part.seconds)
+        all_time.append(part.time)
+        all_path.append(part.path)
         replaced += part.replaced
-    seconds, time, path = (whole(values) for values in kept)
-    shape, owner = (whole(values) for values in numbers)
+    seconds, time, path = all_seconds.whole(), all_time.whole(), all_path.whole()
+    shape, owner = all_shape.whole(), all_owner.whole()
     waits = np.flatnonzero(dwell > 0.0)
     if waits.size:
         # a dwell belongs to the segment that ends there; the one before the first move, to the first

@@ -1,0 +1,123 @@
+"""Which runs of a route are planned together, and by which solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.trajectory.contest import stops_of
+from olp.trajectory.route import Array, AxisLimits, Index, Route
+from olp.trajectory.solvers import SOLVERS, Rival
+from olp.trajectory.speedgrid import CELL_S
+
+#: runs with no more segments than this between stops are straight moves to the overlapping solver
+_FEW_SEGMENTS = 2
+#: a solver whose least time is this share of all others' wins without a contest
+_SURE = 0.8
+#: pieces of a way-point, and of all that is optimised unless asked for: about a minute and a half
+_PIECES, _AFFORDED = 3, 1_000_000
+#: short runs have no more segments; optimising one takes at least as long as this many pieces
+_SHORT, _CALL = 64, 500
+#: way-points that are forecast together, and of runs that are planned together: a call costs more than a move
+_BLOCK, _TOGETHER = 1 << 15, 1 << 15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """What is planned together: way-points `first` to `last`, both at rest, in `runs`, and the solvers that
+    may win there, the most promising first."""
+
+    first: int
+    last: int
+    rivals: tuple[Rival, ...]
+    runs: int = 1
+
+    @property
+    def segments(self) -> int:
+        return self.last - self.first
+
+    @property
+    def bends(self) -> bool:
+        return any(rival.solver.bends for rival in self.rivals)
+
+    def cost(self) -> float:
+        """About how many pieces there are to optimise."""
+        if not self.bends:
+            return 0.0
+        return _CALL + _PIECES * self.segments + max(rival.least_s for rival in self.rivals) / CELL_S
+
+
+def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:
+    """From each stop to the next, and the solvers that may win, the most promising first."""
+    stops = stops_of(route)
+    if len(stops) < 2:
+        return []
+    least_s = _forecast(route, limits, stops)
+    order = np.argsort(least_s, axis=0, kind="stable")
+    first = np.take_along_axis(least_s, order[:1], axis=0)[0]
+    # moves that stay straight take what is forecast; a path that bends may take far longer
+    bends = np.array([solver.bends for solver in SOLVERS])[order[0]]
+    keep = least_s <= np.where(bends, np.inf, first / _SURE)
+    # there are as many runs as way-points in a program of exact stops
+    alone = [(Rival(solver, 0.0),) for solver in SOLVERS]
+    runs = []
+    for begin, end, ranks, fits, some in zip(
+        stops[:-1].tolist(), stops[1:].tolist(), order.T.tolist(), keep.T.tolist(), least_s.T.tolist(),
+        strict=True,
+    ):  # fmt: skip
+        if sum(fits) == 1:
+            rivals = alone[ranks[0]]
+        else:
+            rivals = tuple(Rival(SOLVERS[i], some[i]) for i in ranks if fits[i])
+        runs.append(Stretch(begin, end, rivals))
+    return runs
+
+
+def least_to_optimise(runs: list[Stretch]) -> int:
+    """The fewest segments of a run that is worth optimising, within what is afforded in all."""
+    long = sum(run.cost() for run in runs if run.segments > _SHORT)
+    short = sum(run.cost() for run in runs if run.segments <= _SHORT)
+    if long + short <= _AFFORDED:
+        return 0
+    return _SHORT + 1 if long <= _AFFORDED else max(run.last for run in runs) + 1
+
+
+def together(runs: list[Stretch], least: int) -> Iterator[Stretch]:
+    """The runs, those joined that stay straight or are short and not to be optimised: they may be many."""
+    short = min(least, _SHORT + 1)
+    begin = 0
+    group: list[Stretch] = []
+    for run in [*runs, None]:
+        small = run is not None and (run.segments < short or not run.bends)
+        if group and (run is None or not small or run.last - begin > _TOGETHER):
+            rivals = max((some.rivals for some in group), key=len)
+            yield Stretch(begin, group[-1].last, rivals, len(group))
+            group = []
+        if run is not None and not small:
+            yield run
+        elif run is not None:
+            if not group:
+                begin = run.first
+            group.append(run)
+
+
+def _forecast(route: Route, limits: AxisLimits, stops: Index) -> Array:
+    """(s, r) seconds that each solver takes at least, or nearly so, for each run."""
+    count = len(route) - 1
+    each = np.empty((len(SOLVERS), count))
+    for a in range(0, count, _BLOCK):
+        b = min(a + _BLOCK, count)
+        # what comes before and behind matters to the ends of the block
+        c, d = max(a - 1, 0), min(b + 1, count)
+        some = Route(
+            route.point_mm[c : d + 1], route.feed_mm_s[c:d], route.line[c:d], route.tolerance_mm[c : d + 1],
+            route.dwell_s[c : d + 1],
+        )  # fmt: skip
+        for i, solver in enumerate(SOLVERS):
+            each[i, a:b] = solver.least_s(some, limits)[a - c : b - c]
+    seconds: Array = np.add.reduceat(each, stops[:-1], axis=1)
+    few = np.diff(stops) <= _FEW_SEGMENTS
+    seconds[[solver.bends for solver in SOLVERS]] += np.where(few, np.inf, 0.0)
+    return seconds
