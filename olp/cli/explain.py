@@ -42,7 +42,8 @@ def _severity(rule: Rule) -> str:
 
 def _text(rule: Rule) -> str:
     parts = [f"{rule.code} {rule.title} ({_severity(rule)})"]
-    for title, sentence in (("Why it matters", rule.why), ("What to do", rule.remedy)):
+    sections = (("Why it matters", rule.why), ("Example", rule.example), ("What to do", rule.remedy))
+    for title, sentence in sections:
         parts.append(f"{title}:\n" + textwrap.fill(sentence, 96, initial_indent="  ", subsequent_indent="  "))
     return "\n\n".join(parts) + "\n"
 
@@ -53,5 +54,6 @@ def _as_dict(rule: Rule) -> dict[str, str]:
         "title": rule.title,
         "severity": _severity(rule),
         "why": rule.why,
+        "example": rule.example,
         "remedy": rule.remedy,
     }
