@@ -31,11 +31,15 @@ if TYPE_CHECKING:
     from olp.exceptions import ProgramError as ProgramError
     from olp.files.config import load_setup as load_setup
     from olp.findings import Finding as Finding
+    from olp.gate import Check as Check
+    from olp.gate import check as check
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
 
 _HOME = {
+    "Check": "olp.gate",
     "Correction": "olp.api",
+    "check": "olp.gate",
     "Simulation": "olp.api",
     "Verification": "olp.api",
     "correct": "olp.api",

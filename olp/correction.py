@@ -25,7 +25,7 @@ from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.proof import Proof, prove
-from olp.toolpath import Flag, Toolpath
+from olp.toolpath import Flag, Index, Toolpath
 from olp.units import MM_PER_UM
 
 Progress = Callable[[str, float], None]
@@ -49,6 +49,7 @@ class Run:
     nominal: Program
     corrected: Program
     proof: Proof
+    passed: Index
     report: dict[str, Any]
     findings: tuple[Finding, ...]
 
@@ -128,7 +129,7 @@ def correct_bytes(
     }
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     report["largest_correction_um"] = corrections * 1e3
-    return Run(text, nominal, corrected, proof, report, findings)
+    return Run(text, nominal, corrected, proof, passed, report, findings)
 
 
 def verify_programs(
@@ -159,7 +160,7 @@ def verify_programs(
         *checks.program_findings(first, loaded.setup, contour=contour),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)
-    return Run(second.data, first, second, proof, report, findings)
+    return Run(second.data, first, second, proof, rows.passed, report, findings)
 
 
 def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:

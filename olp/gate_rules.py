@@ -53,10 +53,10 @@ GATE = (
     ),
     Rule(
         "OLP309",
-        "time of a block changed",
+        "feed changed",
         Severity.WARNING,
-        "A block of the corrected program takes more than 5 % longer or shorter than in the nominal one, by "
-        "its own length and feed: an F word was lost or changed on the way.",
+        "The corrected program moves at another feed than the nominal one, by more than 5 %: an F word or a "
+        "feed mode was lost or changed on the way.",
         "Compare the F words of both programs at these lines.",
         "`G1 X100 F600` in the nominal program, and F60 in the corrected one.",
     ),

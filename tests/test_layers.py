@@ -13,7 +13,9 @@ import olp
 PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
-    {"exceptions", "findings", "units"},
+    {"exceptions", "rule", "units"},
+    {"gate_rules"},
+    {"findings"},
     {"geometry", "tables"},
     {"machine"},
     {"toolpath"},
@@ -25,12 +27,13 @@ LAYERS = (
     {"checks"},
     {"scene"},
     {"report", "plots"},
-    {"report_time", "plots_time"},
+    {"report_time", "plots_time", "report_check"},
     {"files"},
     {"review"},
     {"loading"},
     {"replanning"},
     {"correction", "retiming"},
+    {"gate"},
     {"api"},
     {"cli"},
 )

@@ -1,4 +1,4 @@
-"""Checks of where a program goes, and of what the machine's files say: limits, calibration, tool, temperature."""
+"""Checks of where a program goes, and of what the files say: limits, calibration, tool, temperature."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from olp.checks.base import finding, lines_of
 from olp.errormodel import Calibration
 from olp.errormodel.base import Array
 from olp.findings import Finding
-from olp.machine import Job, Machine, Sanity
+from olp.machine import Job, Machine, Sanity, Setup
 from olp.proof import ROUNDING_SHARE
 from olp.toolpath import Flag, Toolpath
 
@@ -33,8 +33,8 @@ def travel_findings(path: Toolpath, machine: Machine) -> list[Finding]:
 
 
 def box_findings(path: Toolpath, box_mm: Array, code: str) -> list[Finding]:
-    """Commands outside the calibrated box (3, 2), arcs on their way included; OLP405, or OLP403 where the error at
-    its face was asked for."""
+    """Commands outside the calibrated box (3, 2), arcs on their way included; OLP405, or OLP403 where the
+    error at its face was asked for."""
     low, high = path.reach_mm()
     out = (low < box_mm[:, 0] - _ON_LIMIT_MM) | (high > box_mm[:, 1] + _ON_LIMIT_MM)
     moves = out.any(axis=1) & ((path.flag & _UNTOUCHED) == 0)
@@ -87,8 +87,8 @@ def temperature_findings(job: Job, calibration: Calibration, sanity: Sanity) -> 
     if not far:
         return []
     stated = ", ".join(f"{name} {value:g} degC" for name, value in sorted(far.items()))
-    what = f"{stated}, and the calibration was made at {at:g} degC; {sanity.temperature_within_K:g} K are allowed"
-    return [finding("OLP407", what)]
+    what = f"{stated}, and the calibration was made at {at:g} degC"
+    return [finding("OLP407", f"{what}; {sanity.temperature_within_K:g} K are allowed")]
 
 
 def sanity_findings(path: Toolpath, correction_mm: Array, sanity: Sanity) -> list[Finding]:
@@ -112,3 +112,16 @@ def digit_findings(digit_mm: float, tolerance_mm: float) -> list[Finding]:
         return []
     what = f"rounding to {digit_mm:g} mm leaves up to {rounding * 1e3:.3g} um, the tolerance is "
     return [finding("OLP411", f"{what}{tolerance_mm * 1e3:g} um")]
+
+
+def orientation_findings(
+    path: Toolpath, largest_rad: float, setup: Setup, tolerance_mm: float
+) -> list[Finding]:
+    """Does the tool lean so far that the rim of its face is off by more than the tolerance?"""
+    tools = {frame.tool for frame in path.frames if frame.tool is not None}
+    radius = max((t.radius_mm for n in tools if (t := setup.tool(n)) is not None), default=0.0)
+    off = largest_rad * radius
+    if off <= tolerance_mm:
+        return []
+    what = f"the tool leans by up to {largest_rad * 1e6:.3g} urad, which is {off * 1e3:.3g} um at a radius of "
+    return [finding("OLP106", f"{what}{radius:g} mm")]
