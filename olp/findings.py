@@ -157,7 +157,7 @@ _TABLE = (
         "block delete",
         Severity.INFO,
         "Blocks under `/` were taken as executed; the program was proved with them left out too.",
-        "Nothing.",
+        "Nothing, where both positions of the switch are meant.",
         "`/G1 X100`.",
     ),
     Rule(

@@ -13,10 +13,12 @@ import numpy as np
 from olp import checks
 from olp.checks import motion, state
 from olp.checks.base import finding
+from olp.checks.clearance import Clearances, Solid, clearances
 from olp.compensation.stamp import find_stamp
 from olp.correction import Progress, Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import OlpError, UsageError
+from olp.files.meshes import read_triangles
 from olp.findings import RULES, Finding
 from olp.geometry import PLANES
 from olp.loading import Loaded, PathLike, load, setup_of, source_of
@@ -26,13 +28,18 @@ from olp.program.reader import Options, read
 from olp.proof import Proof
 from olp.units import MM_PER_UM, RAD_PER_URAD
 
+#: blocks with the least clearance that a report names
+_NEAREST = 20
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """What a gate found, and the report of it ("olp-check-1")."""
+    """What a gate found, the report of it ("olp-check-1"), and the clearance of every block where the job has
+    meshes."""
 
     findings: tuple[Finding, ...]
     report: dict[str, Any]
+    clearances: Clearances | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,12 +110,18 @@ def check(
         case = _case(data, name, nominal, loaded, options, tolerance_um, date, outside, tell)
         tell("check", 0.8)
         found = _findings(case, tolerance_um * MM_PER_UM, outside, date, contour)
+        around = _clearances(case, codes, tell)
     except OlpError as error:
         raise (error.in_file(name) if name and error.line is not None else error) from None
     if everything:
         found.append(finding("OLP410", 'compensated_by_controller is "all"'))
+    if around is not None:
+        found += around.findings(setup.machine.sanity.clearance_mm)
     kept = tuple(sorted((f for f in found if f.code in codes), key=lambda f: (f.code, f.line or 0)))
-    return Check(kept, _report(case, kept, codes, date, tolerance_um))
+    report = _report(case, kept, codes, date, tolerance_um)
+    if around is not None:
+        report["clearance"] = list(around.nearest(_NEAREST).rows())
+    return Check(kept, report, around)
 
 
 def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
@@ -195,6 +208,20 @@ def _findings(
             largest = float(np.sqrt((correction * correction).sum(axis=1)).max(initial=0.0))
             found += checks.path_mode_findings(case.written, largest)
     return found
+
+
+def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | None:
+    """None where there are no meshes, or nobody asks."""
+    setup = case.loaded.setup
+    if not setup.job.meshes or not any(code.startswith("OLP7") for code in codes):
+        return None
+    tell("clearance", 0.9)
+    solids = [
+        Solid(mesh, Path(mesh.file).name, read_triangles(mesh.file) * mesh.unit_mm)
+        for mesh in setup.job.meshes
+    ]
+    path = case.written.toolpath if case.run is None else case.proof().written
+    return clearances(path, case.loaded.model, setup, solids)
 
 
 def _corrections(nominal: Program, proof: Proof) -> Array:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
@@ -153,6 +155,18 @@ def to_junit(report: Report, fail_on: str) -> str:
 def _sentence(finding: Mapping[str, Any], name: str) -> str:
     place = name if finding["line"] is None else f"{name}:{finding['line']}"
     return f"{place}: {finding['severity']}: {finding['code']} {finding['message']}"
+
+
+def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
+    """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the place in the frame named."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"])
+    for row in rows:
+        names = (row["part"], row["mesh"], row["role"], row["frame"])
+        lengths = (f"{v:.6f}" for v in row["point_mm"])
+        writer.writerow([row["line"], f"{row['clearance_mm']:.6f}", *names, *lengths])
+    return buffer.getvalue().encode()
 
 
 #: format to what writes it, from the report ("olp-check-1") and the severity that fails the gate

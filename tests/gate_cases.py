@@ -32,14 +32,16 @@ class Call:
     controller: str = "linuxcnc"
     increment_mm: float = 0.001
     job: str = ""
+    start: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict)
     swap: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def machine(self, folder: Path) -> Path:
+        job = f"start_mm = {{ {self.start} }}\n{self.job}"
         path = machine(
             folder, self.calibration, self.curves, controller=self.controller, keys=self.keys,
-            tables=self.tables, job=self.job, increment_mm=self.increment_mm,
+            tables=self.tables, job=job, increment_mm=self.increment_mm,
         )  # fmt: skip
         for name, data in self.files.items():
             (folder / name).write_bytes(data)
@@ -95,6 +97,30 @@ BACK = "[backlash]\nX_um = 20.0\n"
 WIGGLE = b"G1 X100\n" + b"".join(b"G1 X%.3f\n" % (100 + 0.15 * (k % 2)) for k in range(1, 8))
 SLOWER = b"".join(b"G1 X%.3f\n" % (100 + 0.25 * (k % 2)) for k in range(1, 8))
 FANUC = b"G21 G90 G54\nG0 X0. Y0. Z0.\nF600\n"
+
+
+def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> bytes:
+    """A box as ASCII STL."""
+    corner = [[(low, high)[(k >> i) & 1][i] for i in range(3)] for k in range(8)]
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
+    out = ["solid box"]
+    for face in faces:
+        out += ["facet normal 0 0 0", "outer loop"]
+        out += ["vertex {:.17g} {:.17g} {:.17g}".format(*corner[k]) for k in face]
+        out += ["endloop", "endfacet"]
+    return ("\n".join([*out, "endsolid box"]) + "\n").encode()
+
+
+def clamp(high: float, role: str = "fixture", frame: str = "G54") -> dict[str, Any]:
+    """A block in the way from X0 to X100, between X40 and X60, whose top is at `high`."""
+    return {
+        "job": f'[[meshes]]\nfile = "clamp.stl"\nrole = "{role}"\nframe = "{frame}"\n',
+        "files": {"clamp.stl": block((40.0, -10.0, -50.0), (60.0, 10.0, high))},
+    }
+
+
+OVER = b"G0 Z10\nG0 X100\n"
 
 #: code -> (a call that triggers it, one that just does not)
 CASES: dict[str, tuple[Call, Call]] = {
@@ -185,5 +211,17 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP411": (
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
+    ),
+    "OLP701": (
+        Call(OVER, tables=tool(50.0), **clamp(10.0)),
+        Call(OVER, tables=tool(50.0), **clamp(9.999)),
+    ),
+    "OLP702": (
+        Call(OVER, tables=tool(50.0), **clamp(9.001)),
+        Call(OVER, tables=tool(50.0), **clamp(8.999)),
+    ),
+    "OLP703": (
+        Call(OVER, tables=tool(50.0).replace("Z_mm = 50.0", "Z_mm = 0.0"), **clamp(0.0)),
+        Call(OVER, tables=tool(50.0), swap={}, **clamp(0.0), start="X = 0.0, Y = 0.0, Z = 0.0"),
     ),
 }

@@ -21,7 +21,7 @@ LAYERS = (
     {"toolpath"},
     {"program"},
     {"errormodel"},
-    {"deviation"},
+    {"deviation", "clearance"},
     {"compensation", "trajectory", "calibration"},
     {"proof"},
     {"checks"},

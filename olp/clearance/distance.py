@@ -45,12 +45,9 @@ class Swept:
         return Swept(self.start[rows], self.way[rows], self.level[rows], self.radius[rows])
 
     def bounds(self) -> tuple[Array, Array]:
-        """(n, 3) lowest and highest corner of the box about each."""
+        """(n, 3) lowest and highest corner of the box about the way of each axis, without the radius."""
         low = np.minimum(self.start, self.start + self.way)
         high = np.maximum(self.start, self.start + self.way)
-        wide = self.radius.max(axis=1)
-        low[:, :2] -= wide[:, None]
-        high[:, :2] += wide[:, None]
         low[:, 2] += self.level[:, 0]
         high[:, 2] += self.level[:, 1]
         return low, high

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.clearance.distance import Array, Index, Swept
+from olp.clearance.distance import Array, Index, Mask, Swept
 from olp.clearance.parts import Part
-from olp.geometry import arc_points
+from olp.geometry import PLANES, arc_points
 from olp.toolpath import Toolpath
 
 #: how far a chord may leave its arc, in mm
@@ -25,7 +25,7 @@ class Ways:
     way: Array
     move: Index
 
-    def of_moves(self, moves: Array) -> Ways:
+    def of_moves(self, moves: Mask) -> Ways:
         """Those of the moves marked in (n,) `moves`."""
         rows = np.flatnonzero(moves[self.move])
         return Ways(self.start[rows], self.way[rows], self.move[rows])
@@ -42,7 +42,7 @@ class Ways:
 def ways_of(path: Toolpath, start_mm: Array, end_mm: Array) -> Ways:
     """The ways of the moves of a path whose tip goes from `start_mm` to `end_mm` (n, 3); NaN where that is not known,
     and such moves are left out. Arcs keep the shape that they have in the path, in chords within `CHORD_MM`."""
-    known = np.isfinite(start_mm).all(axis=1) & np.isfinite(end_mm).all(axis=1)
+    known: Mask = np.asarray(np.isfinite(start_mm + end_mm).all(axis=1))
     length = np.zeros(len(path))
     length[known] = np.sqrt(((end_mm - start_mm)[known] ** 2).sum(axis=1))
     steps = np.where(known, np.maximum(np.ceil(length / _LONG_MM), 1), 0).astype(np.int64)
@@ -50,7 +50,7 @@ def ways_of(path: Toolpath, start_mm: Array, end_mm: Array) -> Ways:
     bulge = path.starts_mm()
     if len(arcs):
         away = bulge[at] - arcs.centre_mm
-        away[np.arange(len(at)), _normal(arcs.plane)] = 0.0
+        away[np.arange(len(at)), np.array([axes[2] for axes in PLANES])[arcs.plane]] = 0.0
         radius = np.sqrt((away * away).sum(axis=1))
         turn = 2 * np.arccos(np.clip(1.0 - CHORD_MM / np.maximum(radius, CHORD_MM), -1.0, 1.0))
         chords = np.ceil(np.abs(arcs.sweep_rad) / np.maximum(turn, 1e-6))
@@ -70,7 +70,3 @@ def ways_of(path: Toolpath, start_mm: Array, end_mm: Array) -> Ways:
             # the tip is off the commanded arc by what it is off at both ends, in proportion
             end[rows] += on - (bulge[own] + s[rows, None] * (path.end_mm[own] - bulge[own]))
     return Ways(ends[0], ends[1] - ends[0], move)
-
-
-def _normal(plane: Array | Index) -> Index:
-    return np.array((2, 1, 0))[plane]

@@ -46,7 +46,11 @@ class Tree:
         return Tree(sorted_, index, tuple(low), tuple(high))
 
 
-def box_distance(low: Array, high: Array, other_low: Array, other_high: Array) -> Array:
-    """(n,) distances between boxes."""
-    gap = np.maximum(np.maximum(low - other_high, other_low - high), 0.0)
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", gap, gap)), float)
+def box_distance(low: Array, high: Array, wide: Array, other_low: Array, other_high: Array) -> Array:
+    """(n,) bounds of the distance between what is round about Z, within a box widened by `wide` (n,), and other
+    boxes: no more than the distance."""
+    gap = np.maximum(low - other_high, other_low - high)
+    np.maximum(gap, 0.0, out=gap)
+    x, y, z = gap[:, 0], gap[:, 1], gap[:, 2]
+    aside = np.maximum(np.sqrt(x * x + y * y) - wide, 0.0)
+    return np.asarray(np.sqrt(aside * aside + z * z), float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from pathlib import Path
 
 import click
 
@@ -70,6 +71,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     show_default=True,
     help="Outside the calibrated box: an error (OLP405), or a warning (OLP403) and the error at the face.",
 )
+@click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 def command(
@@ -85,6 +87,7 @@ def command(
     date: datetime.datetime | None,
     tolerance_um: float,
     outside_box: str,
+    clearances: str | None,
     contour: bool,
     force: bool,
 ) -> None:
@@ -97,10 +100,15 @@ def command(
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")
     inputs = (*call.inputs, *files_of(nominal), *(mesh.file for mesh in call.setup.job.meshes))
-    refuse_early(files_of(output), inputs, force=force)
+    if clearances is not None and not call.setup.job.meshes:
+        raise UsageError("--clearances needs meshes; name them in the job file, a table [[meshes]] each")
+    if clearances == output == STREAM:
+        raise UsageError("findings and --clearances cannot both go to stdout; name a file for one of them")
+    refuse_early(files_of(output, clearances), inputs, force=force)
 
+    from olp.files.write import write_files
     from olp.gate import check
-    from olp.report_check import FORMATS
+    from olp.report_check import FORMATS, to_csv
 
     with progress(form != "text") as show:
         try:
@@ -118,12 +126,12 @@ def command(
             )
         except OlpError as error:
             raise (error.in_file("<stdin>") if error.line is not None else error) from None
-    text = FORMATS[form](result.report, fail_on)
-    if output == STREAM:
-        put(text)
-    else:
-        from olp.files.write import write_bytes
-
-        write_bytes(output, text.encode(), force=force, inputs=inputs)
-        talk(f"wrote {output}: {len(result.findings)} findings")
+    parts = {output: FORMATS[form](result.report, fail_on).encode()}
+    if clearances is not None and result.clearances is not None:
+        parts[clearances] = to_csv(result.clearances.rows())
+    write_files({Path(name): parts[name] for name in files_of(*parts)}, force=force, inputs=inputs)
+    if STREAM in parts:
+        put(parts[STREAM])
+    for name in files_of(*parts):
+        talk(f"wrote {name}")
     exit_for(result.findings, fail_on)
