@@ -42,8 +42,8 @@ _DOES_NOT_PROVE = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A correction, or a verification of one: the corrected text and both programs as read, the proof, the report
-    ("olp-report-1") and the findings."""
+    """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
+    report ("olp-report-1") and the findings."""
 
     text: bytes
     nominal: Program
@@ -141,8 +141,8 @@ def verify_programs(
     contour: bool,
     date: datetime.date | None,
 ) -> Run:
-    """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError where the
-    second is no correction of the first."""
+    """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError
+    where the second is no correction of the first."""
     (first, name), (second, other) = nominal, corrected
     limits = Limits(tolerance_um * MM_PER_UM, refuse_outside=False)
     rows = plan(first.toolpath, loaded.model, limits)
@@ -164,7 +164,8 @@ def verify_programs(
 
 
 def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
-    """Travel, and the calibrated box under the code `outside`, of the corrected path, with the nominal lines."""
+    """Travel, and the calibrated box under the code `outside`, of the corrected path, with the nominal
+    lines."""
     path = replace(proof.written, line=proof.nominal.line[proof.owner()])
     found = state.travel_findings(path, loaded.setup.machine)
     return found if outside is None else [*found, *state.box_findings(path, loaded.model.box_mm, outside)]

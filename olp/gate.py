@@ -26,6 +26,7 @@ from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.proof import Proof
+from olp.toolpath import Flag
 from olp.units import MM_PER_UM, RAD_PER_URAD
 
 #: blocks with the least clearance that a report names
@@ -44,8 +45,8 @@ class Check:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
-    """The program as it would run, `run` where a nominal one is known; findings carry the lines of `named`: the
-    nominal program where that was given alone, else the corrected one."""
+    """The program as it would run, `run` where a nominal one is known; findings carry the lines of `named`:
+    the nominal program where that was given alone, else the corrected one."""
 
     name: str
     data: bytes
@@ -87,11 +88,11 @@ def check(
 ) -> Check:
     """May this program run on this machine?
 
-    With `nominal`, `program` is the correction of it, whoever wrote it, and is proved against it. Alone and without
-    the stamp of a correction it is the nominal program: it is corrected here, and what that gives is checked.
-    Alone and with a stamp it is checked as it is, without what needs the nominal one. Lines are those of `program`.
-    `select` and `ignore` are codes or their beginnings (OLP4). Outside the calibrated box nothing is refused here:
-    that is finding OLP405, or OLP403 with `outside_box` "hold".
+    With `nominal`, `program` is the correction of it, whoever wrote it, and is proved against it. Alone and
+    without the stamp of a correction it is the nominal program: it is corrected here, and what that gives
+    is checked. Alone and with a stamp it is checked as it is, without what needs the nominal one. Lines are
+    those of `program`. `select` and `ignore` are codes or their beginnings (OLP4). Outside the calibrated
+    box nothing is refused here: that is finding OLP405, or OLP403 with `outside_box` "hold".
 
     Raises UsageError for a code that does not exist, InputError for what cannot be read, or corrected, at all
     (ProgramError with its line), and CannotCompute.
@@ -125,13 +126,17 @@ def check(
 
 
 def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
-    """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises UsageError
-    for what begins no code."""
+    """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises
+    UsageError for what begins no code."""
     for prefix in (*select, *ignore):
         if not any(code.startswith(prefix.upper()) for code in RULES):
-            raise UsageError(f"{prefix!r} is no code of a finding, nor how one begins; olp explain lists them all")
+            raise UsageError(
+                f"{prefix!r} is no code of a finding, nor how one begins; olp explain lists them all"
+            )
     wanted, unwanted = (tuple(prefix.upper() for prefix in prefixes) for prefixes in (select, ignore))
-    return [c for c in RULES if (not wanted or c.startswith(wanted)) and not (unwanted and c.startswith(unwanted))]
+    return [
+        c for c in RULES if (not wanted or c.startswith(wanted)) and not (unwanted and c.startswith(unwanted))
+    ]
 
 
 def _case(
@@ -194,11 +199,13 @@ def _findings(
     found += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
     found += motion.reversal_findings(path, loaded.model)
     speeds = motion.Feeds.of(case.worded(case.written))
-    found += speeds.findings() if run is None or case.data is run.text else motion.Feeds.of(program).findings()
+    found += (
+        speeds.findings() if run is None or case.data is run.text else motion.Feeds.of(program).findings()
+    )
     if speeds.mm_s is not None:
         found += motion.demand_findings(path, speeds.mm_s, machine)
     if run is not None:
-        correction = _corrections(run.nominal, proof)
+        correction = _corrections(run.nominal, case.written, proof)
         found += state.sanity_findings(proof.nominal, correction, sanity)
         found += motion.low_findings(proof, loaded.model)
         before = motion.Feeds.of(case.worded(run.nominal))
@@ -224,12 +231,14 @@ def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | N
     return clearances(path, case.loaded.model, setup, solids)
 
 
-def _corrections(nominal: Program, proof: Proof) -> Array:
-    """(n, 3) how far each way-point was moved, 0 where that is not known; strokes of canned cycles count across
-    alone, for a corrected depth may take other pecks."""
+def _corrections(nominal: Program, written: Program, proof: Proof) -> Array:
+    """(n, 3) how far each way-point was moved, 0 where that is not known; of canned cycles the place and
+    the bottom of each hole, for a corrected depth may take other pecks."""
     out = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
-    for hole in nominal.holes:
-        out[hole.first : hole.last, PLANES[hole.plane][2]] = 0.0
+    out[(proof.nominal.flag & np.uint8(Flag.CYCLE)) != 0] = 0.0
+    for mine, other in zip(nominal.holes, written.holes, strict=False):
+        moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
+        out[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
     return np.asarray(out, float)
 
 
@@ -238,7 +247,11 @@ def _stamps(case: _Case) -> list[Finding]:
     out = []
     first = find_stamp(case.data)
     if first is not None and find_stamp(case.data[first.end() :]) is not None:
-        out.append(finding("OLP311", "the program carries two stamps of a correction", [_line(case.data, first.start())]))
+        out.append(
+            finding(
+                "OLP311", "the program carries two stamps of a correction", [_line(case.data, first.start())]
+            )
+        )
     if case.run is not None and case.data is case.run.text and find_stamp(case.run.nominal.data) is not None:
         out.append(finding("OLP311", "the program given as nominal carries the stamp of a correction"))
     own = case.loaded.digest[:12]

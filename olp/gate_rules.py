@@ -9,9 +9,9 @@ GATE = (
         "OLP204",
         "reversal-heavy passage",
         Severity.WARNING,
-        "An axis with lost motion turns round again and again after ways that are hardly longer than its lost "
-        "motion. There the tip follows the play more than the command, and small faults of the measured lost "
-        "motion add up.",
+        "An axis with lost motion turns round again and again after ways that are hardly longer than its "
+        "lost motion. There the tip follows the play more than the command, and small faults of the "
+        "measured lost motion add up.",
         "Smooth the passage in the source (fewer points, a larger tolerance of the CAM chords).",
         "`[backlash] X_um = 20`, and X10.00 X10.05 X10.00 X10.05 in a row.",
     ),
@@ -28,8 +28,9 @@ GATE = (
         "OLP206",
         "acceleration beyond an axis",
         Severity.WARNING,
-        "At the programmed feed, an arc or a run of short blocks asks an axis for more than acceleration_mm_s2, "
-        "so the control slows down, or leaves the path. Of short blocks a correction can make more.",
+        "At the programmed feed, an arc or a run of short blocks asks an axis for more than "
+        "acceleration_mm_s2, so the control slows down, or leaves the path. Of short blocks a correction "
+        "can make more.",
         "Lower F there; `olp retime --slow` lists where and why.",
         "`G2 I0.5 F6000`: 100 mm/s about a radius of 0.5 mm asks for 20 m/s2.",
     ),
@@ -37,8 +38,8 @@ GATE = (
         "OLP307",
         "no feed",
         Severity.ERROR,
-        "A feed move has no feed, or one that cannot be read for sure, so the control stops with an alarm, or "
-        "moves at the last feed of the program before.",
+        "A feed move has no feed, or one that cannot be read for sure, so the control stops with an "
+        "alarm, or moves at the last feed of the program before.",
         "Write an F word in the first feed move, and in every block of G93.",
         "`G1 X100` with no F before it.",
     ),
@@ -110,8 +111,8 @@ GATE = (
         "OLP407",
         "temperature unlike that of the calibration",
         Severity.WARNING,
-        "A temperature of the job is farther from temperature_degC of the calibration than temperature_within_K "
-        "of [check]. Expansion is only what [thermal] says; bending is not in it.",
+        "A temperature of the job is farther from temperature_degC of the calibration than "
+        "temperature_within_K of [check]. Expansion is only what [thermal] says; bending is not in it.",
         "Wait until the machine is back in its range, or measure it warm.",
         "temperature_degC = 20, X_scale = 28 in the job file.",
     ),
@@ -127,8 +128,8 @@ GATE = (
         "OLP409",
         "correction larger than the sanity limit",
         Severity.ERROR,
-        "A way-point was moved by more than largest_correction_um of [check]. Either the machine is that bad, "
-        "or an input is wrong: a sign, a unit, an offset, another machine.",
+        "A way-point was moved by more than largest_correction_um of [check]. Either the machine is that "
+        "bad, or an input is wrong: a sign, a unit, an offset, another machine.",
         "Look at `olp inspect machine.toml --at` of that place; raise the limit where the figure is right.",
         "EXX written in mm into a column EXX_um of a thousand times the value.",
     ),
@@ -154,8 +155,8 @@ GATE = (
         "OLP701",
         "contact",
         Severity.ERROR,
-        "Tool or holder touches a mesh of the job where it must not: a fixture or the machine at any time, the "
-        "workpiece in a rapid, or with what does not cut.",
+        "Tool or holder touches a mesh of the job where it must not: a fixture or the machine at any "
+        "time, the workpiece in a rapid, or with what does not cut.",
         "Look at the line and the place named; change the approach, the stickout or the set-up.",
         "`G0 X200` at Z5 through a clamp that is 20 mm high.",
     ),

@@ -57,8 +57,8 @@ class WorkOffset:
 
 @dataclass(frozen=True, slots=True)
 class HolderPart:
-    """A part of a tool holder, round about the tool's axis: `radius_mm` at its lower end, `top_radius_mm` at its
-    upper one."""
+    """A part of a tool holder, round about the tool's axis: `radius_mm` at its lower end, `top_radius_mm`
+    at its upper one."""
 
     length_mm: float
     radius_mm: float
@@ -67,9 +67,9 @@ class HolderPart:
 
 @dataclass(frozen=True, slots=True)
 class Sanity:
-    """What a check before deployment takes for sane: the largest correction, how far a tool may differ from those
-    measured with, temperatures from that of the calibration, the age of a calibration without an end of its own,
-    and the clearance of tool and holder."""
+    """What a check before deployment takes for sane: the largest correction, how far a tool may differ from
+    those measured with, temperatures from that of the calibration, the age of a calibration without an end
+    of its own, and the clearance of tool and holder."""
 
     largest_correction_mm: float = 1.0
     tool_within_mm: float = 100.0
@@ -143,8 +143,8 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh that a review shows: a file, what it stands for, the work offset that places it or "machine", and the
-    length of its unit."""
+    """A mesh that a review shows: a file, what it stands for, the work offset that places it or "machine",
+    and the length of its unit."""
 
     file: str
     role: Literal["workpiece", "fixture", "machine"]

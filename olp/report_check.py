@@ -23,7 +23,12 @@ _NEAREST = 8
 
 def to_text(report: Report, fail_on: str) -> str:
     """Plain text of at most 100 columns."""
-    sections = (_heads(report), _clearance(report), findings_text(report["findings"]), _verdict(report, fail_on))
+    sections = (
+        _heads(report),
+        _clearance(report),
+        findings_text(report["findings"]),
+        _verdict(report, fail_on),
+    )
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
@@ -32,7 +37,7 @@ def _heads(report: Report) -> Iterator[str]:
     yield from pairs([
         ("Program", printable(f"{program['name'] or 'stdin'}, {program['lines']} lines")),
         ("Checked", report["checked"]),
-        ("Machine", printable(f"{machine['name']}, chain {machine['chain']}, control {machine['controller']}")),
+        ("Machine", printable("{name}, chain {chain}, control {controller}".format(**machine))),
         ("Codes", f"{len(report['rules'])} of {len(RULES)} checked"),
     ])  # fmt: skip
 
@@ -128,14 +133,19 @@ def to_junit(report: Report, fail_on: str) -> str:
     name = report["program"]["name"] or "stdin"
     failed = {f["code"] for f in report["findings"] if id(f) in failing}
     suite = ElementTree.Element(
-        "testsuite", name="olp check", timestamp=f"{report['date'] or '1970-01-01'}T00:00:00",
-        hostname="localhost", tests=str(len(report["rules"])), failures=str(len(failed)), errors="0", time="0",
+        "testsuite", name="olp check", package="olp", id="0", hostname="localhost",
+        timestamp=f"{report['date'] or '1970-01-01'}T00:00:00", tests=str(len(report["rules"])),
+        failures=str(len(failed)), errors="0", time="0",
     )  # fmt: skip
     ElementTree.SubElement(suite, "properties")
     mild = []
     for code in report["rules"]:
         case = ElementTree.SubElement(
-            suite, "testcase", name=f"{code} {RULES[code].title}", classname=f"olp.check.{printable(name)}", time="0"
+            suite,
+            "testcase",
+            name=f"{code} {RULES[code].title}",
+            classname=f"olp.check.{printable(name)}",
+            time="0",
         )
         found = [f for f in report["findings"] if f["code"] == code]
         texts = [printable(_sentence(f, name)) for f in found]
@@ -158,7 +168,8 @@ def _sentence(finding: Mapping[str, Any], name: str) -> str:
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the place in the frame named."""
+    """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the place in the frame
+    named."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"])

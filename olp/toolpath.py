@@ -102,8 +102,8 @@ class Toolpath:
         return out
 
     def reach_mm(self) -> tuple[Array, Array]:
-        """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, on the way there; NaN
-        where an axis is not known. Both ends of a line in a box hold all of it."""
+        """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, on the way there;
+        NaN where an axis is not known. Both ends of a line in a box hold all of it."""
         if not len(self.arcs):
             return self.end_mm, self.end_mm
         arcs, move = self.arcs, self.arcs.move

@@ -207,7 +207,10 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     "OLP408": (Call(options={"date": None}), Call()),
     "OLP409": (Call(**scaled(1011.0)), Call(**scaled(1009.0))),
-    "OLP410": (Call(keys='compensated_by_controller = "all"\n'), Call(keys="compensated_by_controller = []\n")),
+    "OLP410": (
+        Call(keys='compensated_by_controller = "all"\n'),
+        Call(keys="compensated_by_controller = []\n"),
+    ),
     "OLP411": (
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),

@@ -1,12 +1,12 @@
 """Clearance of tool and holder along a path, against the meshes of a job.
 
-Everything is seen from the workpiece. A mesh of a work offset stands where the program sees it: the tip is there
-at the axis position less the active tool length. One of the frame "machine" counts in axis positions: the tip is at
-the axis position plus its tool vector; a mesh of role machine stands still while axes before F carry the workpiece.
+Everything is seen from the workpiece. A mesh of a work offset stands where the program sees it: the tip is
+there at the axis position less the active tool length. One of the frame "machine" counts in axis positions:
+the tip is at the axis position plus its tool vector; a mesh of role machine stands still while axes before
+F carry the workpiece.
 
-What cuts may touch the workpiece in feed moves. In a rapid that begins or ends at one, it leaves or reaches what it
-cuts: there it counts less `SLACK_MM` all around, and only contact counts.
-"""
+What cuts may touch the workpiece in feed moves. In a rapid that begins or ends at one, it leaves or reaches
+what it cuts: there it counts less `SLACK_MM` all around, and only contact counts. """
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearances:
-    """Of b blocks: (b,) `line`, `clearance_mm` (0: contact), (b, 3) the nearest `point_mm` of a mesh in its own frame;
-    (b,) `part` and `solid`, what is nearest, as indices of `parts` and `solids`. `unknown` are lines that could
-    not be looked at."""
+    """Of b blocks: (b,) `line`, `clearance_mm` (0: contact), (b, 3) the nearest `point_mm` of a mesh in its
+    own frame; (b,) `part` and `solid`, what is nearest, as indices of `parts` and `solids`. `unknown` are
+    lines that could not be looked at."""
 
     line: Index
     clearance_mm: Array
@@ -93,7 +93,9 @@ class Clearances:
             first = int(np.flatnonzero(rows)[self.clearance_mm[rows].argmin()])
             solid = self.solids[self.solid[first]]
             place = ", ".join(f"{v:.3f}" for v in self.point_mm[first].tolist())
-            text = f"the {self.parts[self.part[first]]} {what} {solid.name} at ({place}) in {solid.mesh.frame}"
+            text = (
+                f"the {self.parts[self.part[first]]} {what} {solid.name} at ({place}) in {solid.mesh.frame}"
+            )
             if code == "OLP702":
                 text += f": {self.clearance_mm[first]:.4g} mm, {limit_mm:g} mm are asked for"
             text += f", line {int(self.line[first])}"
@@ -107,9 +109,8 @@ class Clearances:
 def clearances(path: Toolpath, model: ErrorModel, setup: Setup, solids: Sequence[Solid]) -> Clearances:
     """The least clearance of each block of a path, with its place.
 
-    Distances are exact to `CLOSE_MM` along the straight ways between way-points and along arcs (`CHORD_MM`), for the
-    tip that the error model gives at the way-points.
-    """
+    Distances are exact to `CLOSE_MM` along the straight ways between way-points and along arcs
+    (`CHORD_MM`), for the tip that the error model gives at the way-points. """
     names: list[str] = []
     best = Best.of(len(path))
     seen = np.zeros(len(path), bool)
@@ -171,8 +172,8 @@ def _tools(path: Toolpath, setup: Setup) -> list[tuple[tuple[Part, ...], Mask]]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tips:
-    """Where the tip really is, relative to the workpiece: (n, 3) at the start and the end of each move, in axis
-    positions; and what is to be added to that, per move."""
+    """Where the tip really is, relative to the workpiece: (n, 3) at the start and the end of each move, in
+    axis positions; and what is to be added to that, per move."""
 
     start: Array
     end: Array
@@ -214,7 +215,8 @@ def _placed(solid: Solid, setup: Setup) -> Array:
 
 
 def rotation(offset: WorkOffset) -> Array:
-    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C about Z."""
+    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C
+    about Z."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_euler("xyz", offset.rotation_deg, degrees=True).as_matrix(), float)

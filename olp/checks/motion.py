@@ -1,4 +1,5 @@
-"""Checks of what a program asks of the axes: feeds, accelerations, reversals, and rapids that come too low."""
+"""Checks of what a program asks of the axes: feeds, accelerations, reversals, and rapids that come too
+low."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from olp.machine import Machine
 from olp.program.feeds import Scan, feeds, lengths_mm
 from olp.program.program import Program
 from olp.proof import Proof
-from olp.toolpath import Index, Kind, Toolpath
+from olp.toolpath import Flag, Index, Kind, Toolpath
 
 #: a corner is sharper than this: every control slows down there, and nobody asks it not to
 _SMOOTH_RAD = 0.35
@@ -71,9 +72,8 @@ class Feeds:
 def demand_findings(path: Toolpath, feed_mm_s: Array, machine: Machine) -> list[Finding]:
     """Velocities and accelerations of an axis that the programmed feed asks for, beyond its limits.
 
-    On arcs v^2 / r towards the centre; at joints of feed moves that turn by less than 20 degrees the change of
-    velocity over half the time of both moves.
-    """
+    On arcs v^2 / r towards the centre; at joints of feed moves that turn by less than 20 degrees the change
+    of velocity over half the time of both moves. """
     axes = [machine.axes[name] for name in "XYZ"]
     velocity, acceleration = _demands(path, feed_mm_s)
     out = []
@@ -87,7 +87,7 @@ def demand_findings(path: Toolpath, feed_mm_s: Array, machine: Machine) -> list[
             share = np.where(beyond, asked / np.array(limit), 0.0)
             move, axis = np.unravel_index(int(share.argmax()), share.shape)
             most = f"{asked[move, axis]:.4g} {unit} of {'XYZ'[axis]}, whose limit is {limit[axis]:g} {unit}"
-            text = f"the feed asks for a {what} beyond an axis' limit in {int(moves.sum())} moves, at most {most}"
+            text = f"{int(moves.sum())} moves ask for a {what} beyond the limit of an axis, at most {most}"
             out.append(finding(code, text, lines_of(path, moves)))
     return out
 
@@ -108,7 +108,7 @@ def _demands(path: Toolpath, feed_mm_s: Array) -> tuple[Array, Array]:
         begin, end, most, radius, climb = _arc_ways(path, length)
         first[rows], last[rows] = begin, end
         velocity[rows] = np.where(usable[rows, None], most * speed[rows, None], 0.0)
-        # towards the centre: where the way is along one axis of the plane, the acceleration is along the other
+        # towards the centre: at most what the way to it has of an axis
         normal = _normals(path) * (speed[rows] * climb)[:, None] ** 2 / radius[:, None]
         acceleration[rows] = np.where(usable[rows, None], normal, 0.0)
     joint = _joints(first, last, speed, length, usable & cutting_moves(path))
@@ -187,8 +187,8 @@ def changed_findings(proof: Proof, nominal_mm_s: Array, written_mm_s: Array) -> 
         return []
     worst = int(np.where(moves, change, 0.0).argmax())
     what = (
-        f"{int(moves.sum())} moves have another feed than in the nominal program: {written_mm_s[worst] * 60:.4g} "
-        f"mm/min for {before[worst] * 60:.4g} mm/min"
+        f"{int(moves.sum())} moves have another feed than in the nominal program: "
+        f"{written_mm_s[worst] * 60:.4g} mm/min for {before[worst] * 60:.4g} mm/min"
     )
     return [finding("OLP309", what, lines_of(proof.nominal, owner[moves]))]
 
@@ -211,7 +211,8 @@ def reversal_findings(path: Toolpath, model: ErrorModel) -> list[Finding]:
 
 
 def _heavy(command: Array, short_mm: float) -> Index:
-    """The moves at whose ends an axis turns, in rows of at least so many short ways; unknown places end a row."""
+    """The moves at whose ends an axis turns, in rows of at least so many short ways; unknown places end a
+    row."""
     known = np.flatnonzero(np.isfinite(command))
     step = np.diff(command[known])
     moving = np.flatnonzero(step != 0)
@@ -227,7 +228,9 @@ def _heavy(command: Array, short_mm: float) -> Index:
 def low_findings(proof: Proof, model: ErrorModel) -> list[Finding]:
     """First moves and rapids that take the tip lower in Z than the nominal program means to and does."""
     path, written = proof.nominal, proof.written
-    rapid = path.kind == Kind.RAPID
+    # how many strokes a canned cycle makes is the control's
+    ours, theirs = ((p.flag & np.uint8(Flag.CYCLE)) == 0 for p in (path, written))
+    rapid = (path.kind == Kind.RAPID) & ours
     if len(rapid):
         rapid[int(np.isfinite(path.end_mm[:, 2]).argmax())] = True
     shift = zero_shifts(path.frames, model)
@@ -236,7 +239,7 @@ def low_findings(proof: Proof, model: ErrorModel) -> list[Finding]:
     # what is meant lies on the straight way between way-points; what is done is seen in between, too
     low = np.fmin(np.fmin(meant[:, 2], goal[:, 2]), _lowest(path, model))
     reached = np.full(len(path), np.inf)
-    np.fmin.at(reached, proof.owner(), _lowest(written, model))
+    np.fmin.at(reached, proof.owner()[theirs], _lowest(written, model)[theirs])
     play = model.lost_motion_mm(path.end_mm)
     loose = 0.0 if play is None else float(np.nanmax(np.nan_to_num(play[:, 2]), initial=0.0)) / 2
     with np.errstate(invalid="ignore"):
@@ -245,7 +248,9 @@ def low_findings(proof: Proof, model: ErrorModel) -> list[Finding]:
     if not moves.any():
         return []
     deep = float((low - reached)[moves].max())
-    what = f"{int(moves.sum())} first moves or rapids come up to {deep:.4g} mm lower than in the nominal program"
+    what = (
+        f"{int(moves.sum())} first moves or rapids come up to {deep:.4g} mm lower than in the nominal program"
+    )
     return [finding("OLP310", what, lines_of(path, moves))]
 
 

@@ -123,5 +123,7 @@ def orientation_findings(
     off = largest_rad * radius
     if off <= tolerance_mm:
         return []
-    what = f"the tool leans by up to {largest_rad * 1e6:.3g} urad, which is {off * 1e3:.3g} um at a radius of "
+    what = (
+        f"the tool leans by up to {largest_rad * 1e6:.3g} urad, which is {off * 1e3:.3g} um at a radius of "
+    )
     return [finding("OLP106", f"{what}{radius:g} mm")]

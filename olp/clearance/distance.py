@@ -1,10 +1,9 @@
 """Distance between a cone frustum that is swept along a straight way and a triangle, for many pairs at once.
 
-Both are convex, and so is what all differences of their points make: its point nearest to the origin is searched
-with the algorithm of Gilbert, Johnson and Keerthi (IEEE Journal of Robotics and Automation 4, 1988, 193-203), with
-support points of the true round shape. Each step gives an upper bound, the point found, and a lower one, the
-plane through its support point: the search ends where they meet.
-"""
+Both are convex, and so is what all differences of their points make: its point nearest to the origin is
+searched with the algorithm of Gilbert, Johnson and Keerthi (IEEE Journal of Robotics and Automation 4,
+1988, 193-203), with support points of the true round shape. Each step gives an upper bound, the point
+found, and a lower one, the plane through its support point: the search ends where they meet. """
 
 from __future__ import annotations
 
@@ -30,8 +29,8 @@ _PAIRS = ((0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Swept:
-    """n frusta about axes parallel to Z, swept along straight ways: tip at (n, 3) `start`, moved by (n, 3) `way`;
-    (n, 2) `level` of lower and upper end above the tip, (n, 2) `radius` there. All mm."""
+    """n frusta about axes parallel to Z, swept along straight ways: tip at (n, 3) `start`, moved by (n, 3)
+    `way`; (n, 2) `level` of lower and upper end above the tip, (n, 2) `radius` there. All mm."""
 
     start: Array
     way: Array
@@ -75,9 +74,9 @@ class Swept:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from the swept
-    part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it is only known to be
-    at least that: inf."""
+    """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from
+    the swept part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it
+    is only known to be at least that: inf."""
 
     distance_mm: Array
     point_mm: Array
@@ -125,7 +124,9 @@ def _batch(swept: Swept, triangle: Array, bound: Array, rows: Index, out: Neares
         order = np.argsort(-weight, axis=1, kind="stable")[:, :3]
         at = np.arange(len(rows))[:, None]
         kept = weight[at, order] > 0
-        found = np.concatenate((new[:, None], np.where(kept[..., None], found[at, order], new[:, None])), axis=1)
+        found = np.concatenate(
+            (new[:, None], np.where(kept[..., None], found[at, order], new[:, None])), axis=1
+        )
         source = np.concatenate(
             (near[:, None], np.where(kept[..., None], source[at, order], near[:, None])), axis=1
         )
@@ -158,11 +159,11 @@ def _done(
 
 
 def _weights(found: Array) -> Array:
-    """(n, 4) weights of the point nearest to the origin in simplices (n, 4, 3) whose first corner is the newest.
+    """(n, 4) weights of the point nearest to the origin in simplices (n, 4, 3) whose first corner is the
+    newest.
 
-    That corner takes part, so its own faces are all that is looked at: 3 edges, 3 triangles, the whole. Corners
-    may coincide.
-    """
+    That corner takes part, so its own faces are all that is looked at: 3 edges, 3 triangles, the whole.
+    Corners may coincide. """
     first = found[:, 0]
     edge = found[:, 1:] - first[:, None]
     gram = np.einsum("nik,njk->nij", edge, edge)

@@ -1,4 +1,5 @@
-"""The nearest triangle to each of many swept parts: boxes first, then planes known to separate, then distances."""
+"""The nearest triangle to each of many swept parts: boxes first, then planes known to separate, then
+distances."""
 
 from __future__ import annotations
 
@@ -23,9 +24,9 @@ _WIDE = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Best:
-    """The nearest found so far of n blocks: (n,) `distance_mm`, inf where there is none yet; (n, 3) `point_mm` of
-    a `triangle` (n, 3, 3); (n, 3) `away` towards it; (n,) `tag`, a number that the caller gives to what was
-    nearest."""
+    """The nearest found so far of n blocks: (n,) `distance_mm`, inf where there is none yet; (n, 3)
+    `point_mm` of a `triangle` (n, 3, 3); (n, 3) `away` towards it; (n,) `tag`, a number that the caller
+    gives to what was nearest."""
 
     distance_mm: Array
     point_mm: Array
@@ -58,8 +59,8 @@ class Best:
 
 
 def search(tree: Tree, swept: Swept, block: Index, best: Best, tag: int) -> None:
-    """Put into `best` what of a tree is nearest to n swept parts, each of the block (n,) it belongs to; parts that
-    follow one another in the arrays are best near one another.
+    """Put into `best` what of a tree is nearest to n swept parts, each of the block (n,) it belongs to;
+    parts that follow one another in the arrays are best near one another.
 
     The distances are those of the nearest triangle, or more than that by at most `CLOSE_MM`.
     """
@@ -150,7 +151,8 @@ class _Group:
         self.best.take(self.swept.take(part), self.block[part], self.tree.triangle[LEAF * node], self.tag)
 
     def _planes(self) -> tuple[Array, Array]:
-        """Of each part (n, 3) the way towards the nearest known of its block, and (n,) how far it reaches there."""
+        """Of each part (n, 3) the way towards the nearest known of its block, and (n,) how far it reaches
+        there."""
         away = self.best.away[self.block]
         point = self.swept.start + self.swept.support(away)
         return away, np.einsum("ij,ij->i", point, away)
@@ -159,7 +161,9 @@ class _Group:
         """Measure triangles that may be nearer, the likeliest first."""
         best = self.best
         corner = self.tree.triangle[face]
-        far = box_distance(self.low[part], self.high[part], self.wide[part], corner.min(axis=1), corner.max(axis=1))
+        far = box_distance(
+            self.low[part], self.high[part], self.wide[part], corner.min(axis=1), corner.max(axis=1)
+        )
         take = 1
         while part.size:
             keep = np.flatnonzero(far < best.limit(self.block[part]))

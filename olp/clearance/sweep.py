@@ -40,8 +40,9 @@ class Ways:
 
 
 def ways_of(path: Toolpath, start_mm: Array, end_mm: Array) -> Ways:
-    """The ways of the moves of a path whose tip goes from `start_mm` to `end_mm` (n, 3); NaN where that is not known,
-    and such moves are left out. Arcs keep the shape that they have in the path, in chords within `CHORD_MM`."""
+    """The ways of the moves of a path whose tip goes from `start_mm` to `end_mm` (n, 3); NaN where that is
+    not known, and such moves are left out. Arcs keep the shape that they have in the path, in chords within
+    `CHORD_MM`."""
     known: Mask = np.asarray(np.isfinite(start_mm + end_mm).all(axis=1))
     length = np.zeros(len(path))
     length[known] = np.sqrt(((end_mm - start_mm)[known] ** 2).sum(axis=1))
@@ -57,7 +58,9 @@ def ways_of(path: Toolpath, start_mm: Array, end_mm: Array) -> Ways:
         steps[at] = np.where(known[at], np.maximum(chords, steps[at]), 0).astype(np.int64)
     move = np.repeat(np.arange(len(path)), steps)
     share = (np.arange(len(move)) - np.repeat(np.cumsum(steps) - steps, steps)) / np.maximum(steps[move], 1)
-    ends = [start_mm[move] + s[:, None] * (end_mm - start_mm)[move] for s in (share, share + 1.0 / steps[move])]
+    ends = [
+        start_mm[move] + s[:, None] * (end_mm - start_mm)[move] for s in (share, share + 1.0 / steps[move])
+    ]
     if len(arcs):
         which = np.full(len(path), -1)
         which[at] = np.arange(len(at))
@@ -65,7 +68,12 @@ def ways_of(path: Toolpath, start_mm: Array, end_mm: Array) -> Ways:
         arc, own = which[move[rows]], move[rows]
         for end, s in zip(ends, (share, share + 1.0 / steps[move]), strict=True):
             on = arc_points(
-                bulge[own], path.end_mm[own], arcs.centre_mm[arc], arcs.plane[arc], arcs.sweep_rad[arc], s[rows]
+                bulge[own],
+                path.end_mm[own],
+                arcs.centre_mm[arc],
+                arcs.plane[arc],
+                arcs.sweep_rad[arc],
+                s[rows],
             )
             # the tip is off the commanded arc by what it is off at both ends, in proportion
             end[rows] += on - (bulge[own] + s[rows, None] * (path.end_mm[own] - bulge[own]))

@@ -1,4 +1,5 @@
-"""Triangles as a complete binary tree of boxes, in flat arrays: each level halves the groups of the one before."""
+"""Triangles as a complete binary tree of boxes, in flat arrays: each level halves the groups of the one
+before."""
 
 from __future__ import annotations
 
@@ -14,9 +15,9 @@ LEAF = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
-    """`triangle` (k, 3, 3) in the order of the leaves, `LEAF` to each, the last ones repeated to fill it; `index`
-    (k,) their numbers in the mesh. `low`, `high`: a (2^l, 3) array of box corners for each level l, the root first;
-    the children of node i are 2 i and 2 i + 1."""
+    """`triangle` (k, 3, 3) in the order of the leaves, `LEAF` to each, the last ones repeated to fill it;
+    `index` (k,) their numbers in the mesh. `low`, `high`: a (2^l, 3) array of box corners for each level l,
+    the root first; the children of node i are 2 i and 2 i + 1."""
 
     triangle: Array
     index: Index
@@ -47,8 +48,8 @@ class Tree:
 
 
 def box_distance(low: Array, high: Array, wide: Array, other_low: Array, other_high: Array) -> Array:
-    """(n,) bounds of the distance between what is round about Z, within a box widened by `wide` (n,), and other
-    boxes: no more than the distance."""
+    """(n,) bounds of the distance between what is round about Z, within a box widened by `wide` (n,), and
+    other boxes: no more than the distance."""
     gap = np.maximum(low - other_high, other_low - high)
     np.maximum(gap, 0.0, out=gap)
     x, y, z = gap[:, 0], gap[:, 1], gap[:, 2]

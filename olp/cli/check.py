@@ -30,7 +30,9 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @click.command("check")
 @click.argument("program", required=False)
 @setup_options
-@click.option("--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is the correction of it.")
+@click.option(
+    "--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is the correction of it."
+)
 @click.option(
     "--select", multiple=True, callback=_codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
 )
@@ -93,9 +95,8 @@ def command(
 ) -> None:
     """May this program run on this machine? A gate before deployment.
 
-    A nominal PROGRAM is corrected, and what that gives is checked; a corrected one is checked as it is, and against
-    NOMINAL where that is given.
-    """
+    A nominal PROGRAM is corrected, and what that gives is checked; a corrected one is checked as it is, and
+    against NOMINAL where that is given. """
     call = given(program, machine, job)
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")

@@ -34,5 +34,7 @@ def read_triangles(path: PathLike) -> Array:
             file=str(path),
         ) from None
     if not len(corners) or not np.isfinite(corners).all():
-        raise InputError("holds no triangles, or corners that are not finite; expected a mesh", file=str(path))
+        raise InputError(
+            "holds no triangles, or corners that are not finite; expected a mesh", file=str(path)
+        )
     return np.asarray(corners, float)

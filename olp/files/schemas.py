@@ -147,8 +147,8 @@ class ToolTable(Table):
     )
     holder: list[HolderTable] = Field(
         default=[],
-        description="tables [[tools.NUMBER.holder]], the parts of the holder from its lower end up to the gauge "
-        "point",
+        description="tables [[tools.NUMBER.holder]], the parts of the holder from its lower end up to the "
+        "gauge point",
     )
 
     @field_validator("holder")
@@ -159,8 +159,8 @@ class ToolTable(Table):
         total = sum(part.length_mm for part in value)
         if value and total >= reach:
             raise refusal(
-                f"is {total:g} mm long, and the tip is {reach:g} mm below the gauge point; expected a holder that "
-                "leaves the tip free"
+                f"is {total:g} mm long, and the tip is {reach:g} mm below the gauge point; expected a holder "
+                "that leaves the tip free"
             )
         return value
 
@@ -201,7 +201,7 @@ class CheckTable(Table):
     )
     temperature_within_K: Positive = Field(
         default=5.0,
-        description="how far a temperature of the job may be from that of the calibration, in K; 5 if left out",
+        description="how far a temperature may be from that of the calibration, in K; 5 if left out",
     )
     calibration_days: Annotated[int, Field(ge=1)] = Field(
         default=365, description="how old a calibration without valid_until may be, in days; 365 if left out"
@@ -390,7 +390,8 @@ class MeshTable(Table):
         default="machine", description='the work offset that places the mesh, such as "G54", or "machine"'
     )
     unit_mm: Positive = Field(
-        default=1.0, description="the length of the unit of the mesh, in mm: 25.4 for inches, 1000.0 for metres"
+        default=1.0,
+        description="the length of the unit of the mesh, in mm: 25.4 for inches, 1000.0 for metres",
     )
 
 

@@ -27,9 +27,9 @@ ROUNDING_SHARE = 0.87
 class Proof:
     """Deviations of the nominal program (`before`) and of the corrected one (`after`), per nominal move.
 
-    `written` is the path of the corrected program, and `groups` (n,) the last of its moves that belongs to each
-    nominal one. `digit_mm` is the coarsest last digit written. `allowed_mm` is tolerance plus rounding.
-    """
+    `written` is the path of the corrected program, and `groups` (n,) the last of its moves that belongs to
+    each nominal one. `digit_mm` is the coarsest last digit written. `allowed_mm` is tolerance plus
+    rounding. """
 
     nominal: Toolpath
     written: Toolpath

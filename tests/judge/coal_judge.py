@@ -38,7 +38,7 @@ class Scene:
         for one in triangle:
             mesh.addTriangle(*one)
         mesh.endModel()
-        level = np.sort(rng.uniform(0.0, 60.0, (count, 2)), axis=1) + [[0.0, 1.0]]
+        level = np.sort(rng.uniform(0.0, 60.0, (count, 2)), axis=1) + np.array([0.0, 1.0])
         start = rng.uniform((-80.0, -80.0, 0.0), (80.0, 80.0, 60.0), (count, 3))
         way = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-2.0, 1.5, (count, 1))
         return Scene(triangle, start, way, level, rng.uniform(0.1, 12.0, count), shape, mesh)
