@@ -74,9 +74,9 @@ class Swept:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from
-    the swept part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it
-    is only known to be at least that: inf."""
+    """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from the
+    swept part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it is
+    only known to be at least that: inf, with `away` across a plane that separates the two by about so much."""
 
     distance_mm: Array
     point_mm: Array
@@ -151,11 +151,12 @@ def _done(
 ) -> None:  # fmt: skip
     """Write the pairs that are done; those beyond their bound stay at infinity."""
     ours = met & ((low < bound) | (size <= TOUCH_MM))
+    out.away[rows[met]] = point[met] / size[met, None]
     to = rows[ours]
     touching = size[ours] <= TOUCH_MM
     out.distance_mm[to] = np.where(touching, 0.0, size[ours])
     out.point_mm[to] = seen[ours] + start[ours]
-    out.away[to] = np.where(touching[:, None], 0.0, point[ours] / size[ours, None])
+    out.away[to[touching]] = 0.0
 
 
 def _weights(found: Array) -> Array:

@@ -16,8 +16,10 @@ CLOSE_MM = 1e-4
 _CHUNK = 1 << 12
 #: of so many swept parts one is searched first, for a guess at the others
 _STRIDE = 16
+#: planes that are tried before a distance is measured
+_PLANES = 4
 #: leaves that are looked at together; memory goes with it
-_MOST = 1 << 19
+_MOST = 1 << 18
 #: more boxes than this for each swept part, and the guesses were bad
 _WIDE = 6
 
@@ -46,8 +48,8 @@ class Best:
         """What a pair has to be nearer than to matter."""
         return self.distance_mm[block] - CLOSE_MM
 
-    def take(self, swept: Swept, block: Index, triangle: Array, tag: int) -> None:
-        """Measure pairs and keep what is nearer."""
+    def take(self, swept: Swept, block: Index, triangle: Array, tag: int) -> Array:
+        """Measure pairs and keep what is nearer; (n, 3) ways across planes that separate them."""
         found = nearest(swept, triangle, self.limit(block))
         order = np.argsort(-found.distance_mm, kind="stable")
         order = order[found.distance_mm[order] < self.distance_mm[block[order]]]
@@ -56,6 +58,7 @@ class Best:
         self.distance_mm[to] = found.distance_mm[order]
         self.point_mm[to], self.away[to] = found.point_mm[order], found.away[order]
         self.triangle[to], self.tag[to] = triangle[order], tag
+        return found.away
 
 
 def search(tree: Tree, swept: Swept, block: Index, best: Best, tag: int) -> None:
@@ -178,8 +181,17 @@ class _Group:
             part, face, far, owner = part[order], face[order], far[order], owner[order]
             begin = np.flatnonzero(np.diff(owner, prepend=-1))
             rank = np.arange(len(owner)) - np.repeat(begin, np.diff(np.append(begin, len(owner))))
-            now = np.flatnonzero(rank < take)
-            best.take(self.swept.take(part[now]), owner[now], self.tree.triangle[face[now]], self.tag)
-            later = np.flatnonzero(rank >= take)
+            now, later = np.flatnonzero(rank < take), np.flatnonzero(rank >= take)
+            planes = np.zeros((len(owner), 3))
+            planes[now] = best.take(
+                self.swept.take(part[now]), owner[now], self.tree.triangle[face[now]], self.tag
+            )
+            first = (np.arange(len(owner)) - rank)[later]
             part, face, far = part[later], face[later], far[later]
+            # planes that separate others of the block, the last measured first: often one of the same face
+            for back in range(min(take, _PLANES) if part.size else 0):
+                gap = self.swept.take(part).gap(self.tree.triangle[face], planes[first + take - 1 - back])
+                far = np.maximum(far, gap)
+                keep = np.flatnonzero(far < best.limit(self.block[part]))
+                part, face, far, first = part[keep], face[keep], far[keep], first[keep]
             take *= 2

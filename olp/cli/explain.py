@@ -30,7 +30,8 @@ def command(code: str | None, as_json: bool) -> None:
 def _rule(code: str) -> Rule:
     rule = RULES.get(code.upper())
     if rule is None:
-        near = difflib.get_close_matches(code.upper(), RULES, 1)
+        longer = [other for other in RULES if other.startswith(code.upper())]
+        near = longer or difflib.get_close_matches(code.upper(), RULES, 1)
         hint = f"did you mean {near[0]}?" if near else "olp explain lists them all"
         raise UsageError(f"{code!r} is no code of a finding; {hint}")
     return rule
