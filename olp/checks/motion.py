@@ -87,7 +87,7 @@ def demand_findings(path: Toolpath, feed_mm_s: Array, machine: Machine) -> list[
             share = np.where(beyond, asked / np.array(limit), 0.0)
             move, axis = np.unravel_index(int(share.argmax()), share.shape)
             most = f"{asked[move, axis]:.4g} {unit} of {'XYZ'[axis]}, whose limit is {limit[axis]:g} {unit}"
-            text = f"{int(moves.sum())} moves ask for a {what} beyond the limit of an axis, at most {most}"
+            text = f"{int(moves.sum())} moves ask an axis for more {what} than it has, at most {most}"
             out.append(finding(code, text, lines_of(path, moves)))
     return out
 

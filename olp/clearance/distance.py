@@ -76,7 +76,7 @@ class Swept:
 class Nearest:
     """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from the
     swept part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it is
-    only known to be at least that: inf, with `away` across a plane that separates the two by about so much."""
+    only known to be at least that: inf, with `away` across a plane that separates them by about so much."""
 
     distance_mm: Array
     point_mm: Array
