@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.trajectory import ramps
-from olp.trajectory.ceilings import ceilings as ceilings
+from olp.trajectory.ceilings import ceilings
 from olp.trajectory.growing import Growing
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import Array, AxisLimits, Index
