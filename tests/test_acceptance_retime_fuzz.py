@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from judge import linuxcnc, retime_fuzz
+import retime_fuzz
+from judge import linuxcnc
 from test_acceptance_linuxcnc import samples, spacious
 from test_programs_folder import FOLDER, JOBS
 
