@@ -164,3 +164,12 @@ def test_when_is_the_inverse_of_the_cubic(v: float, j: float, t: float, share: f
     u = share * t_
     got = ramps.when(u * (v_ + j_ * u * u / 6.0), v_, np.zeros(1), j_, t_)
     assert got == pytest.approx(u, rel=1e-9, abs=1e-12 * t)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.floats(0.0, 1e3), st.floats(1e-9, 1e5), st.floats(1e-1, 1e5), st.floats(1e-1, 1e8)
+)  # fmt: skip
+def test_one_reach_is_that_of_arrays(v0: float, way: float, acceleration: float, jerk: float) -> None:
+    arrays = ramps.reach(*(np.array([e]) for e in (v0, way, acceleration, jerk)))
+    assert ramps.reach_one(v0, way, acceleration, jerk) == pytest.approx(float(arrays[0]), rel=1e-12)
