@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -19,8 +20,9 @@ PERIOD_NS = 1_000_000
 SPEED_MM_S, ACCELERATION_MM_S2 = 500.0, 2000.0
 #: kinds of motion as the planner names them
 TRAVERSE, FEED, ARC = 1, 2, 3
-#: starts that are tried: on a busy machine modules fail to load, before the program is looked at
+#: starts that are tried: on a busy machine modules fail to load or come late, before the program is looked at
 _STARTS = 3
+_LATE = re.compile("not within .* s: (machine on|homed|started)")
 _DRIVER = Path(__file__).with_name("controller_driver.py")
 _NETS = {
     "joint.0.pos-cmd": "sampler.0.pin.0",
@@ -92,7 +94,7 @@ def run(program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0) 
                 )  # fmt: skip
             finally:
                 _end_realtime(folder)
-            if said.exists():
+            if said.exists() and not _LATE.search(said.read_text()):
                 break
     if not said.exists() or said.read_text() != "ended\n":
         debug = folder / "linuxcnc_debug.txt"
