@@ -200,7 +200,7 @@
       const best = new Map();
       for (let i = 1; i < values.length; i++) {
         const sample = layer.index ? layer.index[i] : i, size = Math.abs(values[i]);
-        if (!(size > 0) || this.kind[sample]) continue;
+        if (!(size > 0)) continue;
         const row = this.rows[sample], known = best.get(row);
         if (!known || size > known.size) best.set(row, {sample, size, value: values[i]});
       }

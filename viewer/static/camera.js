@@ -1,7 +1,8 @@
 "use strict";
 // Orthographic and perspective camera on the viewer's own controls; standard views that fit the path tightly.
 (() => {
-  const T = MeshCat.THREE, FOV = 30, MARGIN = 1.16;
+  const T = MeshCat.THREE, FOV = 30, MARGIN = 1.1;
+  const KEPT = {left: 122, right: 10, top: 44, bottom: 84};     // px at the edges of the picture that panels cover
   const VIEWS = {iso: [-1, -1.5, 1.05], top: [0, -1e-4, 1], front: [0, -1, 1e-4], side: [1, 0, 1e-4]};
   // The viewer turns its scene: machine (x, y, z) mm is world (x, z, -y) m.
   const world = ([x, y, z]) => new T.Vector3(x, z, -y).multiplyScalar(0.001);
@@ -13,6 +14,12 @@
       this.middle = [0, 1, 2].map(j => (box[0][j] + box[1][j]) / 2);
       this.perspective = new T.PerspectiveCamera(FOV, 1, 0.01, 100);
       this.parallel = new T.OrthographicCamera(-1, 1, 1, -1, 0, 100);
+      // Hung below a node that undoes the scene's turn, as the viewer hangs its own.
+      for (const [name, camera] of [["parallel", this.parallel], ["perspective", this.perspective]]) {
+        const path = ["Cameras", name, "rotated"];
+        this.viewer.set_transform(path, new T.Matrix4().makeRotationX(Math.PI / 2).toArray());
+        this.viewer.set_object(path, camera);
+      }
       this.half = 1;                           // half height of the orthographic view, m
       this.use(this.parallel);
     }
@@ -25,7 +32,6 @@
       const target = this.viewer.controls.target.clone();
       this.viewer.controls.dispose();
       this.active = camera;
-      this.viewer.set_object(["Cameras", "default", "rotated"], camera);
       this.viewer.set_camera(camera);
       this.viewer.scene.updateMatrixWorld(true);
       const controls = this.viewer.controls;
@@ -52,6 +58,9 @@
     resized() {
       const aspect = this.aspect;
       this.perspective.aspect = aspect;
+      const {clientWidth: w, clientHeight: h} = this.app.scene.pane;
+      // What is looked at lies in the middle of what the panels leave free.
+      if (w && h) for (const camera of [this.perspective, this.parallel]) camera.setViewOffset(w, h, (KEPT.right - KEPT.left) / 2, (KEPT.bottom - KEPT.top) / 2, w, h);
       Object.assign(this.parallel, {left: -this.half * aspect, right: this.half * aspect, top: this.half, bottom: -this.half});
       this.active.updateProjectionMatrix();
     }
@@ -83,7 +92,8 @@
         high = Math.max(high, Math.abs(offset.dot(up)));
         deep = Math.max(deep, Math.abs(offset.dot(from)));
       }
-      this.half = Math.max(high, wide / this.aspect, 1e-6) * MARGIN;
+      const {clientWidth: w, clientHeight: h} = this.app.scene.pane, free = [w - KEPT.left - KEPT.right, h - KEPT.top - KEPT.bottom].map(v => Math.max(v, h / 4));
+      this.half = Math.max(high * h / free[1], wide * h / free[0], 1e-6) * MARGIN;
       this.parallel.zoom = 1;
       const distance = this.half / Math.tan(FOV / 2 * Math.PI / 180) + deep;
       this.active.position.copy(target).addScaledVector(from, distance);

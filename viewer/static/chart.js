@@ -1,6 +1,7 @@
 "use strict";
 // A line chart on a canvas: any number of points as one minimum and maximum per pixel column, so no peak is lost.
 (() => {
+  const CORNER = 130;                               // px that a choice takes at the top right
   const EDGE = {left: 54, right: 12, top: 24, bottom: 22};
 
   // Index of the first x that is not below `value`, in an ascending array.
@@ -19,8 +20,8 @@
     constructor(host, events) {
       this.host = host;
       this.events = events;
-      this.base = host.appendChild(document.createElement("canvas"));
-      this.top = host.appendChild(document.createElement("canvas"));
+      [this.top, this.base] = [0, 1].map(() => document.createElement("canvas"));
+      host.prepend(this.base, this.top);
       Object.assign(this, {series: [], limits: [], range: null, extent: [0, 1], marks: {now: null, hover: null}, readout: null});
       new ResizeObserver(() => this.draw()).observe(host);
       this.listen();
@@ -161,16 +162,16 @@
       c.font = "600 " + bold;
       const title = this.unit ? `${this.title}, ${this.unit}` : this.title;
       c.fillText(title, 10, 12);
-      let x = 10 + c.measureText(title).width + 16;
+      let x = Math.ceil(10 + c.measureText(title).width) + 16;
       c.font = bold;
       for (const {label, colour} of this.series) {
         const wide = c.measureText(label).width;
-        if (x + wide + 30 > this.host.clientWidth) break;
+        if (x + wide + 30 > this.host.clientWidth - CORNER) break;
         c.fillStyle = colour;
         c.fillRect(x, 11, 12, 3);
         c.fillStyle = this.look.soft;
         c.fillText(label, x + 16, 12);
-        x += wide + 30;
+        x += Math.ceil(wide) + 30;
       }
     }
 
@@ -223,6 +224,7 @@
       let held = null;
       host.addEventListener("pointermove", e => {
         const px = inside(e);
+        if (e.target.closest("select")) return;
         if (held && Math.abs(px - held.px) > 3) held.moved = true;
         if (held?.moved && this.range) {
           const shift = (held.px - px) / this.wide * (held.range[1] - held.range[0]);
@@ -231,7 +233,7 @@
         events.hover(px >= EDGE.left && px <= EDGE.left + this.wide ? this.x_at(px) : null);
       });
       host.addEventListener("pointerleave", () => events.hover(null));
-      host.addEventListener("pointerdown", e => { held = {px: inside(e), range: this.window.slice(), moved: false}; host.setPointerCapture(e.pointerId); });
+      host.addEventListener("pointerdown", e => { if (e.target.closest("select")) return; held = {px: inside(e), range: this.window.slice(), moved: false}; host.setPointerCapture(e.pointerId); });
       host.addEventListener("pointerup", e => { if (held && !held.moved) events.click(this.x_at(inside(e))); held = null; });
       host.addEventListener("dblclick", () => events.zoom(null));
       host.addEventListener("wheel", e => {

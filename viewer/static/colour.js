@@ -4,9 +4,9 @@
   // Control points in OKLCH (lightness, chroma, hue in degrees): lightness runs one way in every sequential map, and
   // to one side from the middle in every diverging one; hues keep off the red-green pair.
   const MAPS = {
-    ember: {label: "blue – violet – amber", light: [[0.38, 0.17, 264], [0.50, 0.20, 300], [0.61, 0.20, 352], [0.72, 0.17, 40], [0.82, 0.16, 80]]},
-    lagoon: {label: "violet – teal – lime", light: [[0.34, 0.13, 300], [0.47, 0.10, 250], [0.60, 0.10, 190], [0.72, 0.14, 150], [0.84, 0.17, 118]]},
-    slate: {label: "blue – grey – yellow", light: [[0.34, 0.12, 262], [0.47, 0.05, 262], [0.59, 0.01, 110], [0.71, 0.08, 95], [0.84, 0.15, 95]]},
+    ember: {label: "blue – violet – amber", stops: [[0.38, 0.17, 264], [0.50, 0.20, 300], [0.61, 0.20, 352], [0.72, 0.17, 40], [0.82, 0.16, 80]]},
+    lagoon: {label: "violet – teal – lime", stops: [[0.34, 0.13, 300], [0.47, 0.10, 250], [0.60, 0.10, 190], [0.72, 0.14, 150], [0.84, 0.17, 118]]},
+    slate: {label: "blue – grey – yellow", stops: [[0.34, 0.12, 262], [0.47, 0.05, 262], [0.59, 0.01, 110], [0.71, 0.08, 95], [0.84, 0.15, 95]]},
   };
   const DIVERGING = {
     light: [[0.42, 0.15, 258], [0.62, 0.13, 246], [0.83, 0.01, 250], [0.66, 0.15, 58], [0.47, 0.13, 48]],
@@ -42,7 +42,10 @@
       return hex_rgb(BANDS[scale.theme][share <= 0.5 ? 0 : share <= 1 ? 1 : 2]);
     }
     const at = scale.mode === "steps" ? (Math.min(9, Math.floor(x * 10)) + 0.5) / 10 : x;
-    return along(scale.kind === "diverging" ? DIVERGING[scale.theme] : MAPS[scale.map].light, at);
+    if (scale.kind === "diverging") return along(DIVERGING[scale.theme], at);
+    const {stops} = MAPS[scale.map];
+    // On a dark ground the dark end is lifted off it; the steps stay even.
+    return along(scale.theme === "dark" ? stops.map(([L, C, h]) => [0.5 + 0.8 * (L - 0.34), C, h]) : stops, at);
   }
 
   // Table of SIZE + 1 colours as RGBA bytes: the last is for values nobody knows.

@@ -20,6 +20,8 @@
       this.top = 0;                                  // first row in sight, may be a part
       this.rows = [];
       this.current = this.selected = -1;
+      const digits = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length;
+      document.getElementById("right").style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
       this.box.classList.toggle("single", !this.texts[1]);
       this.heading();
       this.listen();
@@ -33,7 +35,7 @@
     heading() {
       const head = document.getElementById("listing-head"), two = Boolean(this.texts[1]);
       head.classList.toggle("single", !two);
-      const titles = two ? ["line", this.app.manifest.program, "line", this.app.manifest.corrected ?? "corrected", "µm"] : ["line", this.app.manifest.program, "µm"];
+      const titles = two ? ["line", this.app.manifest.program, "line", this.app.manifest.corrected || "corrected", "µm"] : ["line", this.app.manifest.program, "µm"];
       head.replaceChildren(...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})));
       head.lastChild.title = this.errors[1] ? "Largest deviation of the line, before → after the correction" : "Largest deviation of the line";
     }

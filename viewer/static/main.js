@@ -2,6 +2,7 @@
 // Puts the page together; what goes wrong is told in the page itself.
 (() => {
   const $ = id => document.getElementById(id);
+  const NEUTRAL = "#77818d";
   const SHARE = 0.03;                               // of the size of the job that the largest deviation is enlarged to
 
   // Corners of what the feed moves of the base path span, and the radius round their middle that holds all else.
@@ -22,9 +23,10 @@
   // A round factor at which the largest deviation shown is a small share of the job's size.
   function exaggeration(app, size) {
     let largest = 0;
-    for (const path of app.layers.values()) if (path.D && path.visible) for (const v of path.spread) largest = Math.max(largest, v);
+    const metric = app.plot_metric();
+    for (const name of app.metrics.layers(metric)) if (app.layers.get(name).visible) largest = Math.max(largest, app.metrics.summary(metric, name, 1)?.largest ?? 0);
     if (!(largest > 0)) return 1;
-    const wanted = SHARE * size / largest, unit = 10 ** Math.floor(Math.log10(wanted));
+    const wanted = SHARE * size / (1e-3 * largest), unit = 10 ** Math.floor(Math.log10(wanted));
     return Math.max(1, Math.min(1e5, [5, 2, 1].find(m => m * unit <= wanted) * unit));
   }
 
@@ -83,7 +85,7 @@
     const app = new OLP.App(manifest, await OLP.unpack(manifest, $("olp-data").textContent.trim()));
     app.scene = new OLP.Scene(app, $("pane"));
     [...app.layers.values()].forEach((path, order) => {
-      path.given = path.colour;
+      path.given = path.D ? path.colour : NEUTRAL;         // the palette owns the colours
       app.state.layers[path.name] = path.visible;
       app.scene.add_path(path, order);
     });

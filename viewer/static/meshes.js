@@ -3,6 +3,17 @@
 (() => {
   const T = MeshCat.THREE;
 
+  const MOST_EDGED = 300000;                      // corners of faces; edges of finer meshes are noise
+
+  const FAINT = 0.13;                              // of the machine, which stands before the path
+
+  // Sharp edges: they tell the shape of what is seen through.
+  function edges(geometry, {colour, opacity}) {
+    const lines = new T.LineSegments(new T.EdgesGeometry(geometry, 25), new T.LineBasicMaterial({color: colour, transparent: true, opacity: Math.min(1, opacity + 0.3), depthWrite: false}));
+    lines.renderOrder = 1;
+    return lines;
+  }
+
   class Meshes {
     constructor(app) {
       this.app = app;
@@ -13,12 +24,13 @@
         const vertices = arrays.get(mesh.vertices), geometry = new T.BufferGeometry();
         geometry.setAttribute("position", new T.BufferAttribute(Float32Array.from(vertices), 3));
         geometry.setIndex(new T.BufferAttribute(Uint32Array.from(arrays.get(mesh.faces)), 1));
-        const clear = mesh.opacity < 1;
+        const opacity = mesh.role === "machine" ? Math.min(mesh.opacity, FAINT) : mesh.opacity, clear = opacity < 1;
         // Pushed back a little: paths on a face stay in front of it.
-        const material = new T.MeshLambertMaterial({color: mesh.colour, transparent: clear, opacity: mesh.opacity, side: T.DoubleSide, depthWrite: !clear, flatShading: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2});
+        const material = new T.MeshPhongMaterial({color: mesh.colour, specular: "#000000", transparent: clear, opacity, side: T.DoubleSide, depthWrite: !clear, flatShading: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2});
         const object = new T.Mesh(geometry, material);
         object.userData.solid = true;
         object.renderOrder = clear ? 1 : 0;
+        if (geometry.index.count < MOST_EDGED) object.add(edges(geometry, mesh));
         const role = mesh.role;
         scene.viewer.set_object(["olp", ...(mesh.path?.length ? mesh.path : [role]), "mesh-" + mesh.name], object);
         (this.shown[role] ??= {objects: [], labels: [], visible: true}).objects.push(object);

@@ -11,13 +11,16 @@
 
     layers(metric) { return metric ? Object.keys(metric.by_layer).filter(name => this.app.layers.has(name)) : []; }
 
-    // (n) values in the metric's unit for a layer, NaN where unknown; null where the metric does not speak of the layer.
+    // (n) values in the metric's unit for a layer, NaN where unknown and in rapids, which cut nothing; null where the
+    // metric does not speak of the layer.
     values(metric, name) {
       if (!metric || !(name in metric.by_layer) || !this.app.layers.has(name)) return null;
       const key = metric.name + "\n" + name;
       if (!this.known.has(key)) {
-        const packed = metric.by_layer[name];
-        this.known.set(key, packed === null ? this.derive(metric.of, this.app.layers.get(name)) : this.app.arrays.get(packed));
+        const packed = metric.by_layer[name], {kind} = this.app.layers.get(name);
+        const values = packed === null ? this.derive(metric.of, this.app.layers.get(name)) : Float32Array.from(this.app.arrays.get(packed));
+        if (kind) for (let i = 0; i < values.length; i++) if (kind[i]) values[i] = NaN;
+        this.known.set(key, values);
       }
       return this.known.get(key);
     }
@@ -52,15 +55,14 @@
       }
     }
 
-    // Largest |value|, mean, rms, standard deviation and share within the tolerance over the feed moves of a layer.
+    // Largest |value|, mean, rms, standard deviation and share within the tolerance of a layer.
     summary(metric, name, tolerance) {
       const values = this.values(metric, name);
       if (!values) return null;
-      const {index, kind} = this.app.layers.get(name);
       let count = 0, sum = 0, squares = 0, low = Infinity, high = -Infinity, inside = 0;
       for (let i = 0; i < values.length; i++) {
         const v = values[i];
-        if (Number.isNaN(v) || (kind && kind[index ? index[i] : i])) continue;
+        if (Number.isNaN(v)) continue;
         count++;
         sum += v;
         squares += v * v;

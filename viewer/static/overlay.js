@@ -1,6 +1,18 @@
 "use strict";
 // What lies over the picture: tool ring, current points, triad, scale, notes and measured lines. Redrawn with each picture.
 (() => {
+  const KEEP_OFF = ["legend", "readout", "views"], WIDEST = 40;
+
+  // Lines of at most WIDEST characters, broken at spaces where there are some.
+  function wrapped(text) {
+    const lines = [""];
+    for (const word of text.split(" ")) {
+      if (lines.at(-1) && lines.at(-1).length + word.length >= WIDEST) lines.push("");
+      lines.push(((lines.pop() + " " + word).trim()).slice(0, WIDEST));
+    }
+    return lines;
+  }
+
   class Overlay {
     constructor(app) {
       this.app = app;
@@ -23,6 +35,8 @@
       this.accent = colour("--accent");
       c.font = "12px " + colour("--font");
       this.view = app.scene.view(0);
+      const box = canvas.getBoundingClientRect();
+      this.taken = KEEP_OFF.map(id => document.getElementById(id).getBoundingClientRect()).map(r => [r.left - box.left, r.top - box.top, r.right - box.left, r.bottom - box.top]);
       this.points();
       this.notes();
       this.measure();
@@ -63,9 +77,27 @@
       c.stroke();
     }
 
-    label(text, x, y, border) {
-      const c = this.context, lines = text.split("\n").map(s => s.length > 44 ? s.slice(0, 43) + "…" : s).slice(0, 4), wide = Math.max(...lines.map(s => c.measureText(s).width)) + 14, high = 16 * lines.length + 8;
-      const left = Math.min(Math.max(4, x), this.view.w - wide - 4), top = Math.min(Math.max(4, y), this.view.h - high - 4);
+    // Corner nearest to (x, y) for a box that hides neither a panel nor another label.
+    free(x, y, wide, high) {
+      const clash = (a, b) => this.taken.some(r => a < r[2] && a + wide > r[0] && b < r[3] && b + high > r[1]);
+      const within = (v, size, whole) => Math.min(Math.max(4, v), Math.max(4, whole - size - 4));
+      const places = [0, -1, 1, -2, 2, -3, 3, -4, 4].flatMap(down => [0, -0.5, 0.5, -1, 1].map(aside => [within(x + aside * (wide + 24), wide, this.view.w), within(y + down * (high + 8), high, this.view.h)]));
+      places.sort((p, q) => Math.hypot(p[0] - x, p[1] - y) - Math.hypot(q[0] - x, q[1] - y));
+      const [left, top] = places.find(([a, b]) => !clash(a, b)) ?? places[0];
+      this.taken.push([left, top, left + wide, top + high]);
+      return [left, top];
+    }
+
+    label(text, x, y, border, from = null) {
+      const c = this.context, lines = text.split("\n").flatMap(wrapped).slice(0, 4), wide = Math.max(...lines.map(s => c.measureText(s).width)) + 14, high = 16 * lines.length + 8;
+      const [left, top] = this.free(x, y, wide, high);
+      if (from) {
+        Object.assign(c, {strokeStyle: border, lineWidth: 1.5});
+        c.beginPath();
+        c.moveTo(...from);
+        c.lineTo(Math.min(Math.max(from[0], left), left + wide), Math.min(Math.max(from[1], top), top + high));
+        c.stroke();
+      }
       Object.assign(c, {fillStyle: this.paper, strokeStyle: border, lineWidth: 1.2, textBaseline: "middle", textAlign: "left"});
       c.beginPath();
       c.roundRect(left, top, wide, high, 4);
@@ -76,18 +108,14 @@
     }
 
     notes() {
-      const {app, context: c} = this;
+      const {app} = this;
       app.state.callouts.forEach((note, i) => {
         const p = this.at(app.point_of(note.sample, note.layer));
         if (!p) return;
-        const x = p[0] + 28, y = p[1] - 46;
-        Object.assign(c, {strokeStyle: this.accent, lineWidth: 1.5});
-        c.beginPath();
-        c.moveTo(...p);
-        c.lineTo(x, y + 12);
-        c.stroke();
+        // Outwards, away from the path.
+        const left = p[0] < this.view.w / 2, above = p[1] < this.view.h / 2;
+        this.label(`${i + 1}  ${note.text}`, left ? p[0] - 250 : p[0] + 30, above ? p[1] - 75 : p[1] + 35, this.accent, p);
         this.dot(p, 4, this.accent);
-        this.label(`${i + 1}  ${note.text}`, x, y, this.accent);
       });
     }
 

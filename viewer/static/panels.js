@@ -7,6 +7,7 @@
     element.append(...children);
     return element;
   };
+  const OWN = new Set(["largest", "mean", "rms", "std. deviation", "within tolerance"]);      // the page works these out for any metric
   const ROLES = {workpiece: "Workpiece", fixture: "Fixture", machine: "Machine", tool: "Tool"};
 
   class Panels {
@@ -56,27 +57,31 @@
       if (metric?.unit === "um") rows.push(["in tolerance", p => `${number(100 * p.inside, p.inside < 1 && p.inside > 0.99 ? 4 : 3)} %`]);
       const table = make("table", {}, make("caption", {textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, feed moves` : ""}), make("tr", {}, make("th"), ...names.map(n => make("th", {}, this.key(app.layers.get(n))))));
       for (const [label, show] of rows) table.append(make("tr", {}, make("th", {textContent: label}), ...parts.map(p => make("td", {textContent: p ? show(p) : "–"}))));
-      $("statistics").replaceChildren(table, ...this.packed_statistics());
+      if (metric === app.plot_metric()) this.packed_rows(table, names);
+      $("statistics").replaceChildren(table, ...this.facts());
     }
 
     key(layer) {
-      const mark = make("span", {className: "key", title: layer.label, textContent: layer.label.split(/[ ,(]/)[0]});
+      const mark = make("span", {className: "key", title: layer.label, textContent: layer.name});
       mark.style.borderColor = layer.colour;
       return mark;
     }
 
-    // The packer's own figures: one row a label, one column a layer.
-    packed_statistics() {
-      const {statistics = []} = this.app.manifest, number = OLP.colour.number, labels = new Map();
-      for (const s of statistics) labels.set(s.label, [...(labels.get(s.label) ?? []), s]);
-      if (!labels.size) return [];
-      const table = make("table", {className: "facts"});
-      const show = s => `${typeof s.value === "number" ? number(s.value, 4) : s.value} ${OLP.colour.unit_label(s.unit)}`.trim();
-      for (const [label, list] of labels) {
-        if (list.length === 1 && !list[0].layer) table.append(make("tr", {}, make("th", {textContent: label}), make("td", {textContent: show(list[0])})));
-        else for (const s of list) table.append(make("tr", {}, make("th", {textContent: `${label}, ${this.app.layers.get(s.layer)?.label ?? s.layer ?? ""}`}), make("td", {textContent: show(s)})));
+    // The file's own figures of layers that this page does not work out: a row a label.
+    packed_rows(table, names) {
+      const rows = new Map(), {number} = OLP.colour;
+      for (const s of this.app.manifest.statistics ?? []) if (s.layer && !OWN.has(s.label)) rows.set(s.label, {...rows.get(s.label), [s.layer]: s});
+      for (const [label, by] of rows) {
+        if (!names.some(n => by[n])) continue;
+        table.append(make("tr", {}, make("th", {textContent: label}), ...names.map(n => make("td", {textContent: by[n] ? number(by[n].value) + (by[n].unit === "um" ? "" : ` ${by[n].unit ?? ""}`) : "–"}))));
       }
-      return [table];
+    }
+
+    // Figures of the whole job.
+    facts() {
+      const list = (this.app.manifest.statistics ?? []).filter(s => !s.layer), table = make("table", {className: "facts"});
+      for (const {label, value, unit} of list) table.append(make("tr", {}, make("th", {textContent: label}), make("td", {textContent: `${typeof value === "number" ? OLP.colour.number(value, 4) : value} ${OLP.colour.unit_label(unit)}`.trim()})));
+      return list.length ? [table] : [];
     }
 
     findings() {
@@ -107,7 +112,7 @@
     }
 
     readout() {
-      const {app} = this, {state, manifest} = app, nominal = app.layers.get("nominal") ?? app.layers.values().next().value, p = nominal.at(state.sample_at, 0), number = v => (v < 0 ? "−" : "") + Math.abs(v).toFixed(1);
+      const {app} = this, {state, manifest} = app, nominal = app.layers.get("nominal") ?? app.layers.values().next().value, p = nominal.at(state.sample_at, 0), number = v => (v <= -0.05 ? "−" : "") + Math.abs(v).toFixed(1);
       const line = app.listing?.number(state.row, 0), table = make("table");
       table.append(make("tr", {}, make("th", {textContent: line ? `line ${line}` : ""}), ...["X", "Y", "Z", ""].map(a => make("th", {textContent: a}))));
       table.append(make("tr", {}, make("th", {textContent: "nominal, mm"}), ...p.map((v, j) => make("td", {textContent: (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")})), make("td")));

@@ -12,22 +12,22 @@
       this.abscissa = "time";
       this.motion = app.manifest.motion ? "speed" : null;
       this.cache = new Map();
-      const host = document.getElementById("plots"), make = () => host.appendChild(Object.assign(document.createElement("div"), {className: "plot"}));
+      const hosts = document.querySelectorAll("#plots .plot");
       const events = {
         hover: x => this.hover(x),
         click: x => { app.set_time(this.time_at(x)); app.select_row(app.row_at(), true); },
         zoom: range => this.charts.forEach(c => c.set_range(range)),
       };
-      this.deviation = new OLP.Chart(make(), events);
+      this.deviation = new OLP.Chart(hosts[0], events);
       this.charts = [this.deviation];
       const select = document.getElementById("motion");
       if (this.motion) {
-        this.movement = new OLP.Chart(make(), events);
+        this.movement = new OLP.Chart(hosts[1], events);
         this.charts.push(this.movement);
         for (const [value, label] of MOTIONS) select.append(new Option(label, value));
         select.value = this.motion;
         select.onchange = () => { this.motion = select.value; this.draw_motion(); };
-      } else select.hidden = true;
+      } else hosts[1].hidden = true;
       document.getElementById("abscissa").onchange = e => { this.abscissa = e.target.value; this.draw(); };
       OLP.on("time", () => this.mark());
       OLP.on("theme", () => this.draw());
@@ -59,7 +59,7 @@
         const layer = app.layers.get(name);
         if (!layer.visible) continue;
         const x = layer.index ? this.cached(`${name} ${this.abscissa}`, () => Float64Array.from(layer.index, i => this.axis[i])) : this.axis;
-        series.push({label: layer.label, colour: layer.colour, x, y: app.metrics.values(metric, name)});
+        series.push({label: name, colour: layer.colour, x, y: app.metrics.values(metric, name)});
       }
       const t = app.scale.tolerance, limits = metric?.unit === "um" && t > 0 ? (metric.kind === "diverging" ? [t, -t] : [t]).map(value => ({value})) : [];
       this.deviation.set({title: metric?.label ?? "Deviation", unit: OLP.colour.unit_label(metric?.unit), x_label: this.x_label, series, limits});
@@ -71,8 +71,8 @@
       const x = this.abscissa === "time" ? time : this.cached("motion way", () => Float64Array.from(time, t => this.x_of(t)));
       let series, limits = [];
       if (kind === "speed") {
-        series = [{label: "tool path", colour: this.app.axis_colour(2), x, y: arrays.get(motion.speed)}];
-        if (motion.feed) series.unshift({label: "programmed feed", colour: this.app.axis_colour(0), x, y: arrays.get(motion.feed)});
+        series = [{label: "path", colour: this.app.axis_colour(2), x, y: arrays.get(motion.speed)}];
+        if (motion.feed) series.push({label: "programmed", colour: this.app.axis_colour(0), x, y: arrays.get(motion.feed)});
       } else if (kind === "share") {
         series = motion.axes.map((axis, i) => ({label: axis.name, colour: this.app.axis_colour(i), x, y: this.cached("share " + axis.name, () => this.share(axis))}));
         limits = [{value: 100}];
