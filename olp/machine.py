@@ -115,8 +115,8 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh that a review shows: a file, what it stands for, the work offset that places it or "machine", and the
-    length of its unit."""
+    """A mesh that a review shows: a file, what it stands for, the work offset that places it or "machine",
+    and the length of its unit."""
 
     file: str
     role: Literal["workpiece", "fixture", "machine"]

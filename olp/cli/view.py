@@ -23,18 +23,22 @@ from olp.cli.progress import progress
 from olp.exceptions import OlpError, UsageError
 
 if TYPE_CHECKING:
-    from olp.review import Review
+    from olp.review.job import Review
 
 
 @click.command("view")
 @click.argument("program", required=False)
 @setup_options
-@click.option("--corrected", metavar="FILE", help="The corrected program. Default: PROGRAM is corrected here.")
+@click.option(
+    "--corrected", metavar="FILE", help="The corrected program. Default: PROGRAM is corrected here."
+)
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
 )
 @click.option("-o", "--output", metavar="review.html", help="Default: PROGRAM.review.html beside PROGRAM.")
-@click.option("--live", is_flag=True, help="Serve the page on this machine, until Ctrl-C, and keep it up to date.")
+@click.option(
+    "--live", is_flag=True, help="Serve the page on this machine, until Ctrl-C, and keep it up to date."
+)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: one that is free."
 )
@@ -55,10 +59,16 @@ if TYPE_CHECKING:
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
 @click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
 @click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
-@click.option("--peck-clearance-mm", type=Length(), help="Clearance above the last peck, for --expand-cycles.")
-@click.option("--no-time", is_flag=True, help="Do not plan the motion; times are those of the programmed feed.")
 @click.option(
-    "--step-mm", type=Length(), help="Distance between points of the path. Default: about 100,000 points in all."
+    "--peck-clearance-mm", type=Length(), help="Clearance above the last peck, for --expand-cycles."
+)
+@click.option(
+    "--no-time", is_flag=True, help="Do not plan the motion; times are those of the programmed feed."
+)
+@click.option(
+    "--step-mm",
+    type=Length(),
+    help="Distance between points of the path. Default: about 100,000 points in all.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no talk.")
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
@@ -92,7 +102,9 @@ def command(
     if port and not live:
         raise UsageError("--port belongs to --live")
     if corrected is not None and (flatten or expand_cycles):
-        raise UsageError("--flatten and --expand-cycles change the nominal program, so they go without --corrected")
+        raise UsageError(
+            "--flatten and --expand-cycles change the nominal program, so they go without --corrected"
+        )
     if STREAM in (corrected, *measured):
         raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
     inputs = (*call.inputs, *files_of(corrected, *measured), *(mesh.file for mesh in call.setup.job.meshes))
@@ -100,7 +112,7 @@ def command(
     if not live:
         refuse_early(files_of(output), inputs, force=force)
 
-    from olp.review import view
+    from olp.review.job import view
 
     def make() -> Review:
         # files may have changed since
@@ -108,10 +120,10 @@ def command(
         with progress(quiet) as show:
             try:
                 return view(
-                    source(call.program), setup, corrected=corrected, measured=measured, tolerance_um=tolerance_um,
-                    outside_box="hold" if outside_box == "hold" else "refuse", contour=contour, flatten=flatten,
-                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, time=not no_time,
-                    step_mm=step_mm, progress=show,
+                    source(call.program), setup, corrected=corrected, measured=measured,
+                    tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
+                    contour=contour, flatten=flatten, expand_cycles=expand_cycles,
+                    peck_clearance_mm=peck_clearance_mm, time=not no_time, step_mm=step_mm, progress=show,
                 )  # fmt: skip
             except OlpError as error:
                 raise (error.in_file("<stdin>") if error.line is not None else error) from None

@@ -22,9 +22,9 @@ _FRAME = re.compile(r"\s*#\s*frame\s*=\s*(.*?)\s*", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """(n, 3) positions of the tip in mm in the work offset `frame` ("machine": axis positions less active tool
-    lengths), in the order of time, and the line of the file that each stands in (n,); (n,) `time_s` where the file
-    has it."""
+    """(n, 3) positions of the tip in mm in the work offset `frame` ("machine": axis positions less active
+    tool lengths), in the order of time, and the line of the file that each stands in (n,); (n,) `time_s`
+    where the file has it."""
 
     file: str
     frame: str
@@ -34,7 +34,8 @@ class Measured:
 
 
 def read_measured(path: PathLike) -> Measured:
-    """Read `X_mm,Y_mm,Z_mm[,t_s]` with a line `# frame=G54` before it. Raises InputError with file and line."""
+    """Read `X_mm,Y_mm,Z_mm[,t_s]` with a line `# frame=G54` before it. Raises InputError with file and
+    line."""
     return parse_measured(read_bytes(path), str(path))
 
 
@@ -61,8 +62,8 @@ def parse_measured(data: bytes, file: str) -> Measured:
                 numbers.append(number)
     if frame is None or not frame:
         raise InputError(
-            "names no frame; expected a line such as `# frame=G54`, the work offset that the positions count in, or "
-            "`# frame=machine`",
+            "names no frame; expected a line such as `# frame=G54`, the work offset that the positions count "
+            "in, or `# frame=machine`",
             file=file, line=1,
         )  # fmt: skip
     if header is None or not rows:
@@ -73,7 +74,9 @@ def parse_measured(data: bytes, file: str) -> Measured:
     line_of = np.array(numbers, np.int64)
     if time is not None and (np.diff(time) < 0).any():
         back = int(np.flatnonzero(np.diff(time) < 0)[0]) + 1
-        raise InputError("t_s runs backwards; expected positions in the order of time", file=file, line=numbers[back])
+        raise InputError(
+            "t_s runs backwards; expected positions in the order of time", file=file, line=numbers[back]
+        )
     return Measured(file, frame, values[:, place], line_of, time)
 
 
@@ -99,7 +102,9 @@ def _values(rows: list[str], numbers: list[int], header: list[str], file: str) -
         cells = row.split(",")
         if len(cells) != len(header):
             raise InputError(
-                f"{len(cells)} values under {len(header)} columns; expected one value a column", file=file, line=number
+                f"{len(cells)} values under {len(header)} columns; expected one value a column",
+                file=file,
+                line=number,
             )
         for name, cell in zip(header, cells, strict=True):
             try:

@@ -336,7 +336,8 @@ class MeshTable(Table):
         default="machine", description='the work offset that places the mesh, such as "G54", or "machine"'
     )
     unit_mm: Positive = Field(
-        default=1.0, description="the length of the unit of the mesh, in mm: 25.4 for inches, 1000.0 for metres"
+        default=1.0,
+        description="the length of the unit of the mesh, in mm: 25.4 for inches, 1000.0 for metres",
     )
 
 

@@ -1,7 +1,7 @@
 """The texts of both programs side by side, by the line numbers of their files.
 
-A row pairs a line with what stands for it in the corrected program; a block that was inserted has a row of its own.
-Lines end where the reader of programs ends them.
+A row pairs a line with what stands for it in the corrected program; a block that was inserted has a row of
+its own. Lines end where the reader of programs ends them.
 """
 
 from __future__ import annotations
@@ -24,15 +24,18 @@ Single = npt.NDArray[np.float32]
 LONGEST = 2000
 
 _END = re.compile(r"\r\n|\r")
-#: what would act on a terminal, hide text, or turn its direction: everything of that kind but tab and line feed
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]")
+#: what would act on a terminal, hide text, or turn its direction: everything of that kind but tab and line
+#: feed
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
+)
 _LONG = re.compile(rf"[^\n]{{{LONGEST + 1},}}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listing:
-    """Texts with one line of the file a line, made harmless; (r,) `row_nominal` and `row_corrected`, line numbers
-    counted from 1, 0 where a row has no such line."""
+    """Texts with one line of the file a line, made harmless; (r,) `row_nominal` and `row_corrected`, line
+    numbers counted from 1, 0 where a row has no such line."""
 
     nominal: str
     corrected: str
@@ -51,8 +54,8 @@ class Listing:
 
 
 def shown(data: bytes) -> str:
-    """The text of a program as people see it: lines end with a line feed, controls are pictures of themselves, and
-    what is too long is cut. Bytes that are no UTF-8 are taken as Latin-1."""
+    """The text of a program as people see it: lines end with a line feed, controls are pictures of
+    themselves, and what is too long is cut. Bytes that are no UTF-8 are taken as Latin-1."""
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     try:
@@ -106,7 +109,9 @@ def _anchors(nominal: Program, corrected: Program, groups: Index) -> tuple[Index
     return mine[rising], theirs[rising]
 
 
-def _pairs(first: str, second: str, mine: Index, theirs: Index, count: int, other: int) -> tuple[Small, Small]:
+def _pairs(
+    first: str, second: str, mine: Index, theirs: Index, count: int, other: int
+) -> tuple[Small, Small]:
     """Rows of line numbers from 1: lines between anchors go side by side where there are as many in both."""
     begin = np.concatenate(([0], mine + 1))
     begin_other = np.concatenate(([0], theirs + 1))
@@ -126,8 +131,8 @@ def _pairs(first: str, second: str, mine: Index, theirs: Index, count: int, othe
 
 
 def _without_partner(some: list[str], more: list[str]) -> Iterator[int]:
-    """Which of the lines that are more have no partner: those behind the equal ones in front, and before the equal
-    ones at the end."""
+    """Which of the lines that are more have no partner: those behind the equal ones in front, and before the
+    equal ones at the end."""
     spare = len(more) - len(some)
     if spare <= 0:
         return
@@ -148,10 +153,10 @@ def _woven(count: int, other: int, inserted: Index, left_out: Index) -> tuple[Sm
     key_other = np.cumsum(~single_other) - ~single_other
     own = np.flatnonzero(single)
     place = np.concatenate((key[~single], key[own], key_other[inserted]))
-    kind = np.concatenate((np.full(int((~single).sum()), 2), np.zeros(len(own), int), np.ones(len(inserted), int)))
-    line = np.concatenate((np.flatnonzero(~single) + 1, own + 1, np.zeros(len(inserted), int)))
-    line_other = np.concatenate(
-        (np.flatnonzero(~single_other) + 1, np.zeros(len(own), int), inserted + 1)
+    kind = np.concatenate(
+        (np.full(int((~single).sum()), 2), np.zeros(len(own), int), np.ones(len(inserted), int))
     )
+    line = np.concatenate((np.flatnonzero(~single) + 1, own + 1, np.zeros(len(inserted), int)))
+    line_other = np.concatenate((np.flatnonzero(~single_other) + 1, np.zeros(len(own), int), inserted + 1))
     order = np.lexsort((kind, place))
     return line[order].astype(np.int32), line_other[order].astype(np.int32)

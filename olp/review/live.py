@@ -9,7 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 from olp.exceptions import OlpError
-from olp.review import Review
+from olp.review.job import Review
 
 #: never another address: a page holds the job
 LOOPBACK = "127.0.0.1"

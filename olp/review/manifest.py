@@ -18,13 +18,13 @@ from olp.toolpath import Kind
 from olp.units import AXES, UM_PER_MM
 
 #: colours that stay apart for eyes that take red for green, on dark and on light
-_LAYERS = (
-    ("nominal", "nominal", "#4477aa", 1.5),
-    ("uncorrected", "machine as it is", "#ee7733", 2.0),
-    ("corrected", "corrected command", "#009988", 2.0),
-    ("result", "machine, corrected", "#33bbee", 2.0),
+LAYERS = (
+    ("nominal", "nominal path", "#4477aa", 1.5),
+    ("uncorrected", "uncorrected machine", "#ee7733", 2.0),
+    ("corrected", "command, corrected", "#009988", 2.0),
+    ("result", "corrected, predicted", "#33bbee", 2.0),
 )
-_MEASURED = ("#cc3377", "#ddaa33", "#997700", "#bbbbbb")
+MEASURED = ("#cc3377", "#ddaa33", "#997700", "#bbbbbb")
 _PARTS = (
     ("magnitude", "distance", "sequential"),
     ("x", "X", "diverging"),
@@ -33,8 +33,10 @@ _PARTS = (
     ("along", "along the path", "diverging"),
     ("normal", "across the path", "sequential"),
 )
-#: steps of an error source over its range: colours show no more
-_SOURCE_LEVELS, _FINEST_UM = 1000, 0.001
+#: steps of an error source over its range, at the least: colours show no more
+_SOURCE_LEVELS, _FINEST_UM = 200, 0.001
+#: bits of the largest error of a line that are kept: a part in a thousand, and far smaller than all of them
+_ERROR_BITS = 9
 #: of motion, relative to the largest value of the column
 _MOTION_LEVELS = 20_000
 
@@ -46,7 +48,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     base = arrays.quantised("P", scene.position_mm - origin, POSITION_MM, keep=True)
     axes_origin = scene.samples.axis_mm[0]
     arrays.quantised("Q", scene.samples.axis_mm - axes_origin, POSITION_MM, plus=[base])
-    row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move])
+    row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", _rapid(scene), "u1")
     arrays.quantised("t", scene.time_s, TIME_S)
@@ -92,9 +94,9 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
 
 def _rapid(scene: Scene) -> npt.NDArray[np.uint8]:
     samples = scene.samples
-    rapid = (scene.nominal.toolpath.kind[samples.move] == Kind.RAPID).astype(np.uint8)
+    rapid = np.where(scene.nominal.toolpath.kind[samples.move] == Kind.RAPID, np.uint8(1), np.uint8(0))
     rapid[~samples.joined] = 2
-    return rapid
+    return np.asarray(rapid)
 
 
 def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]:
@@ -108,7 +110,7 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
         ),
     }
     out = [
-        _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in _LAYERS
+        _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in LAYERS
     ]
     for k, measured in enumerate(scene.measured):
         name = "measured" if len(scene.measured) == 1 else f"measured-{k + 1}"
@@ -116,7 +118,7 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
         label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
-        out.append(_layer(name, label, base, delta, index, _MEASURED[k % len(_MEASURED)], 2.0))
+        out.append(_layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0))
     return out
 
 
@@ -124,8 +126,8 @@ def _layer(
     name: str, label: str, base: str, delta: str | None, index: str | None, colour: str, width: float
 ) -> dict[str, Any]:
     return {
-        "name": name, "label": label, "base": base, "delta": delta, "index": index, "colour": colour, "width": width,
-        "visible": name != "corrected", "exaggerate": True,
+        "name": name, "label": label, "base": base, "delta": delta, "index": index, "colour": colour,
+        "width": width, "visible": name != "corrected", "exaggerate": True,
     }  # fmt: skip
 
 
@@ -200,16 +202,23 @@ def _listing(scene: Scene, arrays: Arrays, row: npt.NDArray[np.int64]) -> dict[s
         "corrected": "text_corrected",
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
-        "error_um": arrays.raw("error_um", largest(row, before, rows), "f4"),
-        "result_um": arrays.raw("result_um", largest(row, after, rows), "f4"),
+        "error_um": arrays.raw("error_um", _rounded(largest(row, before, rows)), "f4"),
+        "result_um": arrays.raw("result_um", _rounded(largest(row, after, rows)), "f4"),
     }
 
 
 def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """An inserted block resembles the nominal line of the block that it was split from, which comes after it."""
+    """An inserted block resembles the nominal line of the block that it was split from, which comes after
+    it."""
     known = np.where(like >= 0, np.arange(len(like)), len(like) - 1)
     after = np.minimum.accumulate(known[::-1])[::-1]
     return np.asarray(like[after])
+
+
+def _rounded(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Values to _ERROR_BITS bits; NaN stays NaN."""
+    fraction, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.rint(np.ldexp(fraction, _ERROR_BITS)), exponent - _ERROR_BITS), np.float32)
 
 
 def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, Any]]:
@@ -227,7 +236,7 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
 
 
 def _size(delta: Array) -> Array:
-    return np.sqrt(np.einsum("ij,ij->i", delta, delta))
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", delta, delta)), float)
 
 
 def _deviations(scene: Scene) -> Iterator[tuple[str, Array, npt.NDArray[np.bool_]]]:
@@ -293,7 +302,7 @@ def _callouts(scene: Scene) -> Iterator[dict[str, Any]]:
             continue
         worst = int(np.where(feed, value, -1.0).argmax())
         when = "before correction" if layer == "uncorrected" else "after correction"
-        text = f"largest {when}: {value[worst]:.2f} um, line {int(lines[worst])}"
+        text = f"largest {when}: {value[worst]:.2f} µm, line {int(lines[worst])}"
         yield {"sample": worst, "text": text, "layer": layer}
 
 
@@ -304,4 +313,4 @@ def _verdict(scene: Scene) -> dict[str, Any] | None:
     good = bool(deviation["holds"])
     most, allowed = float(deviation["path_max_um"]), float(deviation["allowed_um"])
     word = "within tolerance" if good else "above tolerance"
-    return {"ok": good, "text": f"{word}: at most {most:.2f} um, {allowed:.2f} um allowed"}
+    return {"ok": good, "text": f"{word}: at most {most:.2f} µm, {allowed:.2f} µm allowed"}

@@ -1,4 +1,5 @@
-"""Measured points on the nominal path: each to the place that it was measured at, in the order of the path."""
+"""Measured points on the nominal path: each to the place that it was measured at, in the order of the
+path."""
 
 from __future__ import annotations
 
@@ -24,8 +25,8 @@ _REACH_MM, _REACH_SHARE = 2.0, 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matched:
-    """Of n measured points: (n, 3) `base_mm`, the nearest place of the path, `delta_mm` from there, and (n,) the
-    `index` of the sample next to it."""
+    """Of n measured points: (n, 3) `base_mm`, the nearest place of the path, `delta_mm` from there, and (n,)
+    the `index` of the sample next to it."""
 
     label: str
     base_mm: Array
@@ -36,8 +37,8 @@ class Matched:
 def match(measured: Measured, position_mm: Array, joined: Mask, shift_mm: Array) -> Matched:
     """Match points, moved by `shift_mm` into the frame of the path, to (n, 3) samples of it.
 
-    The points have to follow the path in order; they may leave out parts of it. Raises InputError with the line of
-    the first point that is nowhere near what is still ahead.
+    The points have to follow the path in order; they may leave out parts of it. Raises InputError with the
+    line of the first point that is nowhere near what is still ahead.
     """
     points = measured.position_mm + shift_mm
     path = _Path.of(position_mm, joined)
@@ -63,8 +64,8 @@ def match(measured: Measured, position_mm: Array, joined: Mask, shift_mm: Array)
             if path.distance(points[a : a + 1], np.array([there]))[0] > GATE_MM:
                 gap = float(path.distance(points[a : a + 1], np.array([there]))[0])
                 raise InputError(
-                    f"the point is {gap:.3g} mm from all of the path that is still ahead; expected points within "
-                    f"{GATE_MM:g} mm of it and in its order, in frame {measured.frame}",
+                    f"the point is {gap:.3g} mm from all of the path that is still ahead; expected points "
+                    f"within {GATE_MM:g} mm of it and in its order, in frame {measured.frame}",
                     file=measured.file, line=int(measured.line[a]),
                 )  # fmt: skip
             place[a], at = there, there
@@ -156,7 +157,11 @@ class _Path:
         along = self.point[end] - self.point[begin]
         length = self.way[end] - self.way[begin]
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.einsum("ij,ij->i", points - self.point[begin], along) / np.einsum("ij,ij->i", along, along)
-        exact = np.where(length > 0.0, self.way[begin] + np.clip(np.nan_to_num(share, nan=1.0), 0.0, 1.0) * length, way)
+            share = np.einsum("ij,ij->i", points - self.point[begin], along) / np.einsum(
+                "ij,ij->i", along, along
+            )
+        exact = np.where(
+            length > 0.0, self.way[begin] + np.clip(np.nan_to_num(share, nan=1.0), 0.0, 1.0) * length, way
+        )
         way = np.where(self.distance(points, exact) <= self.distance(points, way), exact, way)
         return way, self.distance(points, way)

@@ -1,7 +1,8 @@
 """Bodies beside the path: meshes that the job file names, and a simple machine drawn from the machine file.
 
-Everything is shown from the workpiece. Along the chain from workpiece to tool every axis moves what comes after it,
-whether it carries the workpiece or the tool: so the machine is a tree of nodes that follow the axis positions.
+Everything is shown from the workpiece. Along the chain from workpiece to tool every axis moves what comes
+after it, whether it carries the workpiece or the tool: so the machine is a tree of nodes that follow the axis
+positions.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ MOST_FACES = 150_000
 _COLOURS = {"workpiece": "#9aa7b5", "fixture": "#7d8f69", "machine": "#5f7a96", "tool": "#b0803a"}
 _OPACITY = {"workpiece": 0.55, "fixture": 0.5, "machine": 0.25, "tool": 0.8}
 _FACES = np.array(
-    [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6],
-     [1, 3, 5], [3, 7, 5]], np.int64,
+    [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2],
+     [2, 4, 6], [1, 3, 5], [3, 7, 5]], np.int64,
 )  # fmt: skip
 
 
@@ -52,7 +53,8 @@ class Body:
 
 
 def of_job(setup: Setup, origin_mm: Array) -> list[Body]:
-    """The meshes of the job, placed by their frames; `origin_mm` is what the frame shown counts from on the machine.
+    """The meshes of the job, placed by their frames; `origin_mm` is what the frame shown counts from on the
+    machine.
 
     Raises InputError for a file that is no mesh.
     """
@@ -70,7 +72,8 @@ def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array) -> Body:
 
 
 def rotation(offset: WorkOffset) -> Array:
-    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C about Z."""
+    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C about
+    Z."""
     out = np.eye(3)
     for axis, degrees in enumerate(offset.rotation_deg):
         first, second = (axis + 1) % 3, (axis + 2) % 3
@@ -123,9 +126,11 @@ def nodes(machine: Machine) -> list[tuple[tuple[str, ...], int]]:
     return [(("machine", *order[: k + 1]), AXES.index(axis)) for k, axis in enumerate(order)]
 
 
-def of_machine(machine: Machine, axes_mm: Array, gauge_mm: Array, tip_mm: Array, radius_mm: float) -> Iterator[Body]:
-    """A machine of boxes where its axes stand at `axes_mm`; `gauge_mm` and `tip_mm` (3,) is where the gauge point and
-    the tip of the tool are then in the frame shown. Nothing of it is to scale but the travels."""
+def of_machine(
+    machine: Machine, axes_mm: Array, gauge_mm: Array, tip_mm: Array, radius_mm: float
+) -> Iterator[Body]:
+    """A machine of boxes where its axes stand at `axes_mm`; `gauge_mm` and `tip_mm` (3,) is where the gauge
+    point and the tip of the tool are then in the frame shown. Nothing of it is to scale but the travels."""
     travel = np.array([machine.axes[axis].travel_mm for axis in AXES])
     # the gauge point at both ends of all axes, in the frame shown
     low, high = gauge_mm + (travel[:, 0] - axes_mm), gauge_mm + (travel[:, 1] - axes_mm)
@@ -144,10 +149,8 @@ def of_machine(machine: Machine, axes_mm: Array, gauge_mm: Array, tip_mm: Array,
     if radius_mm > 0.0:
         reach = np.array([radius_mm, radius_mm, 0.0])
         ends = np.sort([gauge_mm[2], tip_mm[2]])
-        yield _box(
-            "tool", "tool", np.array([*tip_mm[:2], ends[0]]) - reach, np.array([*tip_mm[:2], ends[1]]) + reach,
-            ("machine", *order),
-        )  # fmt: skip
+        begin, end = (np.array([*tip_mm[:2], height]) for height in ends)
+        yield _box("tool", "tool", begin - reach, end + reach, ("machine", *order))
 
 
 def _carrier(
@@ -179,7 +182,9 @@ def _carrier(
     begin[2], end[2] = top - thick, top
     yield _box(f"{axis}-beam", "machine", begin, end, path)
     if on_floor:
-        for side, (a, b) in enumerate(((begin[guide], begin[guide] + 0.6 * thick), (end[guide] - 0.6 * thick, end[guide]))):
+        for side, (a, b) in enumerate(
+            ((begin[guide], begin[guide] + 0.6 * thick), (end[guide] - 0.6 * thick, end[guide]))
+        ):
             leg_low, leg_high = begin.copy(), end.copy()
             leg_low[guide], leg_high[guide] = a, b
             leg_low[2], leg_high[2] = floor, top - thick

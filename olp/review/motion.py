@@ -31,9 +31,9 @@ _PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTable:
-    """Of m times in order: (m,) `time_s`, `line` of the corrected program, `speed_mm_s`, and `feed_mm_s`, NaN in
-    rapids; (m, 3) axis positions mm, velocities mm/s, accelerations mm/s2 and jerks mm/s3. What was left out lies
-    between neighbours that are there, for each of the columns."""
+    """Of m times in order: (m,) `time_s`, `line` of the corrected program, `speed_mm_s`, and `feed_mm_s`, NaN
+    in rapids; (m, 3) axis positions mm, velocities mm/s, accelerations mm/s2 and jerks mm/s3. What was left
+    out lies between neighbours that are there, for each of the columns."""
 
     time_s: Array
     line: Index
@@ -47,8 +47,8 @@ class MotionTable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Runs:
-    """Runs of one line: (r,) `line` of each, how often the line had a run before (`again`), and (k,) which run
-    each of k moves or pieces belongs to."""
+    """Runs of one line: (r,) `line` of each, how often the line had a run before (`again`), and (k,) which
+    run each of k moves or pieces belongs to."""
 
     line: Index
     again: Index
@@ -80,7 +80,8 @@ class _Runs:
 def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajectory]) -> Array:
     """(n,) s at which the motion of the corrected program passes each sample; stretches follow one another.
 
-    Along each line the way that is done tells the time: a motion that rounds corners meets no way-point itself.
+    Along each line the way that is done tells the time: a motion that rounds corners meets no way-point
+    itself.
     """
     length = lengths_mm(corrected)
     way = ~(length <= SHORTEST_MM)
@@ -131,7 +132,7 @@ def _along(
 
 def _spans(of: Index, size: Array, done: Array) -> tuple[Array, Array]:
     """Of each run the way before it, and its length."""
-    total = np.bincount(of, size)
+    total = np.bincount(of, size).astype(float)
     first = np.searchsorted(of, np.arange(len(total)), "left")
     return done[first], total
 
@@ -150,7 +151,11 @@ def _travel(motion: Motion) -> tuple[Array, Array, Index]:
         step = np.diff(at.reshape(len(some), len(_PLACES), 3), axis=1)
         way[a * count : (a + len(some)) * count] = np.sqrt((step * step).sum(axis=2)).ravel()
     time = motion.start_s[piece] - motion.start_s[0] + u
-    return np.concatenate(([0.0], time)), np.concatenate(([0.0], np.cumsum(way))), np.concatenate((piece[:1], piece))
+    return (
+        np.concatenate(([0.0], time)),
+        np.concatenate(([0.0], np.cumsum(way))),
+        np.concatenate((piece[:1], piece)),
+    )
 
 
 def _filled(time: Array) -> Array:
@@ -159,8 +164,8 @@ def _filled(time: Array) -> Array:
 
 
 def by_feed(program: Program, samples: Samples, machine: Machine) -> Array:
-    """(n,) s at which the nominal program passes each sample, at the programmed feed, or where there is none and
-    in rapids at the limits of velocity, as if nothing took time to speed up."""
+    """(n,) s at which the nominal program passes each sample, at the programmed feed, or where there is none
+    and in rapids at the limits of velocity, as if nothing took time to speed up."""
     path = program.toolpath
     try:
         feed = timing(program).feed_mm_s

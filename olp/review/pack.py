@@ -1,21 +1,21 @@
 """Arrays and texts as the page takes them: quantised, differenced, in byte planes, deflated, base64.
 
-Positions are exact to half of 0.1 um and deviations to half of 1 nm, wherever on the axis they are: integers are
-summed, never floats.
+Positions are exact to half of 0.1 um and deviations to half of 1 nm, wherever on the axis they are: integers
+are summed, never floats.
 """
 
 from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel.base import Array
 from olp.exceptions import CannotCompute
 
 #: steps of what is stored, in mm and s
@@ -40,8 +40,8 @@ class Arrays:
     def quantised(
         self, name: str, values: npt.ArrayLike, step: float, *, plus: Sequence[str] = (), keep: bool = False
     ) -> str:
-        """Store (n,) or (n, c) finite values in whole steps (a power of ten), less what the arrays `plus` have
-        there. `keep` allows for an array to be named in a later `plus`. Returns the name.
+        """Store (n,) or (n, c) finite values in whole steps (a power of ten), less what the arrays `plus`
+        have there. `keep` allows for an array to be named in a later `plus`. Returns the name.
 
         Raises CannotCompute where neighbours are so far apart that their difference does not fit.
         """
@@ -54,8 +54,10 @@ class Arrays:
             whole = whole - self._integers[other]
         change = np.diff(whole, axis=0, prepend=0)
         small = change.T.astype("<i4")
-        if (small.T != change).any():
-            raise CannotCompute(f"neighbouring values of {name!r} are too far apart to be stored in steps of {step:g}")
+        if (change != small.T).any():
+            raise CannotCompute(
+                f"neighbouring values of {name!r} are too far apart to be stored in steps of {step:g}"
+            )
         planes = np.ascontiguousarray(small.reshape(-1).view(np.uint8).reshape(-1, 4).T)
         spec = {"enc": "qd", "q": step, "n": len(rows), "c": rows.shape[1]}
         self._put(name, spec | ({"plus": list(plus)} if plus else {}), planes.tobytes())
@@ -76,8 +78,8 @@ class Arrays:
         return name
 
     def patch(self, name: str, text: str, of: str, original: str, line: npt.NDArray[np.int64]) -> str:
-        """Store a text as what differs from the text `original`, stored as `of`; (n,) `line` is the line there,
-        counted from 0, that each of its lines resembles, -1 for none."""
+        """Store a text as what differs from the text `original`, stored as `of`; (n,) `line` is the line
+        there, counted from 0, that each of its lines resembles, -1 for none."""
         lines, others = text.split("\n"), original.split("\n")
         old = ["" if i < 0 else others[i] for i in line.tolist()]
         prefix, suffix = _in_common(lines, old)
@@ -126,25 +128,25 @@ def _in_common(lines: list[str], others: list[str]) -> tuple[npt.NDArray[np.int6
     most = np.minimum(a.length, b.length)
     prefix = np.zeros(len(lines), np.int64)
     suffix = np.zeros(len(lines), np.int64)
-    for count, room, at in (
-        (prefix, lambda rows: most[rows], lambda t, rows, k: t.start[rows] + k),
-        (suffix, lambda rows: (most - prefix)[rows], lambda t, rows, k: t.start[rows] + t.length[rows] - 1 - k),
-    ):
-        active = np.arange(len(lines))
+    for count, backwards in ((prefix, False), (suffix, True)):
+        room = most - prefix
+        active = np.flatnonzero(room > 0)
         k = 0
         while active.size:
-            active = active[room(active) > k]
-            same = a.code[at(a, active, k)] == b.code[at(b, active, k)]
+            same = a.at(active, k, backwards=backwards) == b.at(active, k, backwards=backwards)
             active = active[same]
             count[active] = k = k + 1
+            active = active[room[active] > k]
     return prefix, suffix
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _Table:
     """Lines as one array of code points; (n,) `start` and `length` of each."""
 
-    def __init__(self, code: npt.NDArray[np.uint32], start: npt.NDArray[np.int64], length: npt.NDArray[np.int64]):
-        self.code, self.start, self.length = code, start, length
+    code: npt.NDArray[np.uint8] | npt.NDArray[np.uint32]
+    start: npt.NDArray[np.int64]
+    length: npt.NDArray[np.int64]
 
     @staticmethod
     def of(lines: list[str]) -> _Table:
@@ -156,18 +158,17 @@ class _Table:
         length = np.fromiter(map(len, lines), np.int64, len(lines))
         return _Table(code, np.cumsum(length) - length, length)
 
+    def at(
+        self, rows: npt.NDArray[np.int64], k: int, *, backwards: bool
+    ) -> npt.NDArray[np.unsignedinteger[Any]]:
+        """(n,) code points number k of lines, from their front or from their end."""
+        return np.asarray(self.code[self.start[rows] + (self.length[rows] - 1 - k if backwards else k)])
+
 
 def resolution(peak: float, finest: float, levels: int) -> float:
-    """The power of ten that shows a range up to `peak` in no fewer than so many levels, no finer than needed."""
-    if not peak > 0.0:
+    """The power of ten that shows a range up to `peak` in no fewer than so many levels: 1 at most, and not
+    below `finest`."""
+    step = peak / levels
+    if not step > finest:
         return finest
-    return float(max(10.0 ** np.floor(np.log10(peak / levels)), finest)) if peak / levels < 1.0 else 1.0
-
-
-def pieces(data: bytes, size: int = 1 << 20) -> Iterator[bytes]:
-    """A long string of bytes part by part."""
-    for a in range(0, len(data), size):
-        yield data[a : a + size]
-
-
-__all__ = ["DEVIATION_MM", "POSITION_MM", "TIME_S", "WAY_MM", "Array", "Arrays", "pieces", "resolution"]
+    return float(10.0 ** min(np.floor(np.log10(step)), 0.0))

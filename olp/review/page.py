@@ -1,4 +1,5 @@
-"""The page: our template with the packed data and meshcat's bundle in it, one file that needs nothing else."""
+"""The page: our template with the packed data and meshcat's bundle in it, one file that needs nothing
+else."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ _BREAKS_OUT = re.compile(r"</script|<!--", re.IGNORECASE)
 
 
 def page(manifest: Mapping[str, Any], data: bytes, *, live: bool = False) -> Iterator[bytes]:
-    """The page in parts. `data` is the base64 of the arrays, `live` lets it ask its own server, and nothing else, for
-    changes."""
+    """The page in parts. `data` is the base64 of the arrays, `live` lets it ask its own server, and nothing
+    else, for changes."""
     values: dict[str, bytes] = {
         "TITLE": html.escape(str(manifest["title"])).encode(),
         "CONNECT": b"'self'" if live else b"'none'",
@@ -55,7 +56,9 @@ def _modules() -> Iterator[bytes]:
 
 def _script(text: str, name: str) -> bytes:
     if _BREAKS_OUT.search(text):
-        raise CannotCompute("holds what would end its script element, so it cannot be put into a page", file=name)
+        raise CannotCompute(
+            "holds what would end its script element, so it cannot be put into a page", file=name
+        )
     return text.encode()
 
 
@@ -72,7 +75,9 @@ def _bundle() -> tuple[str, str]:
     """meshcat's viewer, and its path. The package is found and not imported: that would load a server."""
     found = importlib.util.find_spec("meshcat")
     if found is None or not found.submodule_search_locations:
-        raise CannotCompute("the page needs meshcat, which is not installed; install it with pip install meshcat")
+        raise CannotCompute(
+            "the page needs meshcat, which is not installed; install it with pip install meshcat"
+        )
     path = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
     return read_bytes(path).decode("utf-8"), str(path)
 
@@ -84,5 +89,5 @@ def _licence() -> str:
     except PackageNotFoundError:
         listed = []
     wanted = (".dist-info/LICENSE", "viewer/dist/main.min.js.LICENSE.txt", ".dist-info/licenses")
-    texts = [f.read_text() for f in listed if any(part in f.as_posix() for part in wanted)]
-    return "\n\n".join(text.strip() for text in texts)
+    found = [Path(str(f.locate())) for f in listed if any(part in f.as_posix() for part in wanted)]
+    return "\n\n".join(read_bytes(path).decode("utf-8", "replace").strip() for path in found)

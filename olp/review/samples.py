@@ -1,7 +1,7 @@
 """The nominal path in samples, and beside each what the machine would do with either program.
 
-A sample lies at a share of a nominal move. The moves of the corrected program that stand for it are cut where the
-tip is at that place, so that a deviation is the distance from the place that the tip should be at.
+A sample lies at a share of a nominal move. The moves of the corrected program that stand for it are cut where
+the tip is at that place, so that a deviation is the distance from the place that the tip should be at.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from olp.toolpath import Kind, Toolpath
 
 Index = npt.NDArray[np.int64]
 
-#: samples that a path is given unless its length asks for fewer, and the shortest and longest step between them
+#: samples that a path is given unless its length asks for fewer, and the shortest and longest step between
+#: them
 SAMPLES, FINEST_MM, COARSEST_MM = 100_000, 0.5, 10.0
 #: between two samples of a feed move the error bends by less than this
 BEND_MM = 1e-4
@@ -37,11 +38,11 @@ _BLOCK = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Of n samples in program order: (n,) nominal `move` and `share` of it; (n,) `part`, the move of the corrected
-    program, and the share of it as `within`; (n, 3) `axis_mm` and `command_mm`, nominal and corrected axis
-    positions; (n, 3) deviations of the tip from its nominal place in mm, `uncorrected` and `result`; (n,) `joined`,
-    whether the path leads here from the sample before; (n,) `way_mm` along the path. `play` (n, 3) is that of the
-    nominal commands, None where no axis has lost motion."""
+    """Of n samples in program order: (n,) nominal `move` and `share` of it; (n,) `part`, the move of the
+    corrected program, and the share of it as `within`; (n, 3) `axis_mm` and `command_mm`, nominal and
+    corrected axis positions; (n, 3) deviations of the tip from its nominal place in mm, `uncorrected` and
+    `result`; (n,) `joined`, whether the path leads here from the sample before; (n,) `way_mm` along the path.
+    `play` (n, 3) is that of the nominal commands, None where no axis has lost motion."""
 
     move: Index
     share: Array
@@ -70,8 +71,8 @@ def sample(
     """Samples every `step_mm`, or finer where the error asks for it.
 
     `groups` (n,) is the last corrected move of each nominal move. Between way-points the tip of the corrected
-    program is taken where it is beside the sample, at way-points where it ends up. Raises CannotCompute for a path
-    without any known position.
+    program is taken where it is beside the sample, at way-points where it ends up. Raises CannotCompute for a
+    path without any known position.
     """
     path, written = nominal.toolpath, corrected.toolpath
     shift = zero_shifts(path.frames, model) if path.frames else np.zeros((1, 3))
@@ -93,20 +94,25 @@ def sample(
     keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(result).all(axis=1)
     if not keep.any():
         raise CannotCompute(
-            "the program brings the tip to no known position, so there is nothing to show; give start_mm in the "
-            "job file, or command X, Y and Z first"
+            "the program brings the tip to no known position, so there is nothing to show; give start_mm in "
+            "the job file, or command X, Y and Z first"
         )
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)
     way = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
     joined = (started & (share > 0.0))[keep]
     joined[0] = False
-    rows = tuple(a[keep] for a in (move, share, part, within, axis, command, uncorrected, result))
-    return Samples(*rows, joined, way[keep], None if play is None else play[keep])
+    return Samples(
+        move[keep], share[keep], part[keep], within[keep], axis[keep], command[keep], uncorrected[keep],
+        result[keep], joined, way[keep], None if play is None else play[keep],
+    )  # fmt: skip
 
 
-def by_source(path: Toolpath, samples: Samples, model: ErrorModel) -> Iterator[tuple[str, npt.NDArray[np.float32]]]:
-    """(name, (n,) mm) of each source of error: the size of what it alone does to the tip of the nominal program."""
+def by_source(
+    path: Toolpath, samples: Samples, model: ErrorModel
+) -> Iterator[tuple[str, npt.NDArray[np.float32]]]:
+    """(name, (n,) mm) of each source of error: the size of what it alone does to the tip of the nominal
+    program."""
     tool = path.per_frame([f.tool_mm for f in path.frames])
     found: dict[str, npt.NDArray[np.float32]] = {}
     for a in range(0, len(samples), _BLOCK):
@@ -135,7 +141,8 @@ class _Ends:
         return _Ends(path, path.starts_mm(), arc, lengths_mm(path))
 
     def at(self, move: Index, share: Array) -> Array:
-        """(m, 3) axis positions at shares of moves; at a share of 1 that is the end, also of unknown starts."""
+        """(m, 3) axis positions at shares of moves; at a share of 1 that is the end, also of unknown
+        starts."""
         end = self.path.end_mm[move]
         start = self.start[move]
         out = start + share[:, None] * (end - start)
@@ -156,7 +163,7 @@ class _Ends:
         first = np.minimum(share, 1.0 - step)
         out = self.at(move, first + step) - self.at(move, first)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.nan_to_num(out / np.sqrt(np.einsum("ij,ij->i", out, out))[:, None])
+            return np.asarray(np.nan_to_num(out / np.sqrt(np.einsum("ij,ij->i", out, out))[:, None]))
 
 
 def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:
@@ -180,7 +187,9 @@ def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:
         turn = np.abs(arcs.sweep_rad)
         radius = np.maximum(length[arcs.move] / np.maximum(turn, 1e-12), 1e-6)
         chord = np.minimum(2.0 * np.arccos(np.clip(1.0 - _SAGITTA_MM / radius, -1.0, 1.0)), _TURN)
-        steps[arcs.move] = np.maximum(steps[arcs.move], np.ceil(turn / np.maximum(chord, 1e-3)).astype(np.int64))
+        steps[arcs.move] = np.maximum(
+            steps[arcs.move], np.ceil(turn / np.maximum(chord, 1e-3)).astype(np.int64)
+        )
     return steps
 
 
@@ -244,8 +253,8 @@ def _beside(
 
 
 def _in_holes(nominal: Program, corrected: Program, move: Index, axis: Array, command: Array) -> None:
-    """Strokes of canned cycles: a hole may take one peck more or less than before, so pecks have no partners; what
-    stands for a place of the stroke is the same place of the corrected hole."""
+    """Strokes of canned cycles: a hole may take one peck more or less than before, so pecks have no partners;
+    what stands for a place of the stroke is the same place of the corrected hole."""
     holes = nominal.holes
     if not holes or len(holes) != len(corrected.holes):
         return
@@ -254,7 +263,9 @@ def _in_holes(nominal: Program, corrected: Program, move: Index, axis: Array, co
     for k, hole in enumerate(holes):
         of[hole.first : hole.last] = k
     axes = np.array([PLANES[h.plane] for h in holes])
-    mine, theirs = (np.array([(*h.place_mm, h.r_mm, h.z_mm) for h in some]) for some in (holes, corrected.holes))
+    mine, theirs = (
+        np.array([(*h.place_mm, h.r_mm, h.z_mm) for h in some]) for some in (holes, corrected.holes)
+    )
     rows = np.flatnonzero(of[move] >= 0)
     which = of[move[rows]]
     first, second, third = (axes[which, i] for i in range(3))
@@ -288,8 +299,8 @@ def _arc_share(ends: _Ends, move: Index, tip: Array, guess: Array) -> Array:
 
 
 def _merged(steps: Index, owner: Index, cut: Array, *, start: bool) -> tuple[Index, Array, Index, Array]:
-    """Samples at equal steps and at the ends of corrected moves, in order: nominal move and share, corrected move
-    and share."""
+    """Samples at equal steps and at the ends of corrected moves, in order: nominal move and share, corrected
+    move and share."""
     count = steps - 1
     move = np.repeat(np.arange(len(steps)), count)
     first = np.cumsum(count) - count

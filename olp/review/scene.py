@@ -24,8 +24,8 @@ Single = npt.NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What positions are shown in: `label` for people, `offset` the work offset or "machine", `origin_mm` where that
-    is on the machine, no tool length active."""
+    """What positions are shown in: `label` for people, `offset` the work offset or "machine", `origin_mm`
+    where that is on the machine, no tool length active."""
 
     label: str
     offset: str
@@ -35,9 +35,7 @@ class Frame:
     def of(path: Toolpath) -> Frame:
         """The work offset of a program that has one and the same all through, else the machine."""
         used = [path.frames[k] for k in np.unique(path.frame).tolist()]
-        places = {
-            (f.work_offset, *np.round(np.subtract(f.offset_mm, f.length_mm), 9).tolist()) for f in used
-        }
+        places = {(f.work_offset, *np.round(np.subtract(f.offset_mm, f.length_mm), 9).tolist()) for f in used}
         if len(places) == 1:
             name, x, y, z = places.pop()
             return Frame(f"{name}, as programmed", str(name), (x, y, z))
@@ -46,14 +44,15 @@ class Frame:
     def positions(self, path: Toolpath, move: npt.NDArray[np.int64], axis_mm: Array) -> Array:
         """(n, 3) the tip at axis positions (n, 3), reached in moves (n,)."""
         length = path.per_frame([f.length_mm for f in path.frames])
-        return axis_mm - (length if length.ndim == 1 else length[move]) - np.array(self.origin_mm)
+        tip = axis_mm - (length if length.ndim == 1 else length[move])
+        return np.asarray(tip - np.array(self.origin_mm), float)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) when they are passed, by the re-timed motion
-    where there is one and else by the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
-    correction or verification ("olp-report-1")."""
+    """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) when they are passed, by the re-timed
+    motion where there is one and else by the feed. `sources` are (name, (n,) mm) by size; `report` is that of
+    the correction or verification ("olp-report-1")."""
 
     name: str
     corrected_name: str
