@@ -45,8 +45,7 @@ class Arrays:
 
         Raises CannotCompute where neighbours are so far apart that their difference does not fit.
         """
-        rows = np.asarray(values, float)
-        rows = rows.reshape(len(rows), -1)
+        rows = _rows(np.asarray(values, float))
         whole = np.rint(rows * round(1.0 / step)).astype(np.int64)
         if keep:
             self._integers[name] = whole
@@ -65,8 +64,7 @@ class Arrays:
 
     def raw(self, name: str, values: npt.ArrayLike, dtype: str) -> str:
         """Store (n,) or (n, c) values as they are."""
-        rows = np.asarray(values)
-        rows = rows.reshape(len(rows), -1)
+        rows = _rows(np.asarray(values))
         data = np.ascontiguousarray(rows, _TYPES[dtype]).tobytes()
         self._put(name, {"enc": "raw", "dtype": dtype, "n": len(rows), "c": rows.shape[1]}, data)
         return name
@@ -120,6 +118,11 @@ class Arrays:
         pad = -len(data) % _ALIGN
         self._chunks.append(data + bytes(pad))
         self._size += len(data) + pad
+
+
+def _rows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """(n, c) also of (n,)."""
+    return values if values.ndim == 2 else values[:, None]
 
 
 def _in_common(lines: list[str], others: list[str]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
