@@ -32,6 +32,7 @@ BEND_MM = 1e-4
 #: chords of arcs turn by no more than this, and leave the arc by no more than that
 _TURN, _SAGITTA_MM = np.pi / 36, 0.01
 _MOST_STEPS = 1 << 12
+_STRAIGHT = (Kind.RAPID, Kind.LINE, Kind.PROBE)
 #: samples that are evaluated at once
 _BLOCK = 1 << 16
 
@@ -83,7 +84,7 @@ def sample(
     move, share, part, within = _merged(steps, owner, cut, start=bool(np.isfinite(path.start_mm).all()))
     axis = ends.at(move, share)
     tool = path.per_frame([f.tool_mm for f in path.frames])
-    held = shift[path.frame[move]]
+    held = _held(path, shift, move, share)
     play = _plays(model, axis)
     uncorrected = _error(model, axis, tool, move, play) - held
     command, play_there = _beside(ends, other, move, share, part, within, model, tool, held)
@@ -100,7 +101,7 @@ def sample(
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)
     way = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
-    joined = (started & (share > 0.0))[keep]
+    joined = started[keep]
     joined[0] = False
     return Samples(
         move[keep], share[keep], part[keep], within[keep], axis[keep], command[keep], uncorrected[keep],
@@ -208,8 +209,10 @@ def _cuts(ends: _Ends, other: _Ends, owner: Index, groups: Index, shift: Array, 
     command = corrected.end_mm[rows]
     play = _plays(model, corrected.end_mm)
     error = _error(model, command, tool, move, None if play is None else play[rows])
-    tip = command + error - shift[nominal.frame[move]]
+    nothing = np.zeros(len(rows))
+    tip = command + error - _held(nominal, shift, move, nothing)
     start, along = ends.start[move], nominal.end_mm[move] - ends.start[move]
+    along += _held(nominal, shift, move, nothing + 1.0) - _held(nominal, shift, move, nothing)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.einsum("ij,ij->i", tip - start, along) / np.einsum("ij,ij->i", along, along)
     curved = np.flatnonzero(ends.arc[move] >= 0)
@@ -323,6 +326,16 @@ def _merged(steps: Index, owner: Index, cut: Array, *, start: bool) -> tuple[Ind
     if start and len(steps):
         within[0] = 0.0
     return both, at, part, within
+
+
+def _held(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:
+    """(m, 3) where the part lies from where the offsets say, at shares of moves: a line that begins in one
+    frame and ends in another goes from the one to the other, an arc is all of its own."""
+    own = path.frame[move]
+    before = np.where(
+        (move > 0) & np.isin(path.kind[move], _STRAIGHT), path.frame[np.maximum(move - 1, 0)], own
+    )
+    return np.asarray(shift[before] + share[:, None] * (shift[own] - shift[before]))
 
 
 def _plays(model: ErrorModel, points: Array) -> Array | None:
