@@ -30,7 +30,8 @@ from olp.review.measured import Matched, match
 from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, retimed, table
 from olp.review.page import page
-from olp.review.samples import Index, Samples, by_source, sample
+from olp.review.parts import Index
+from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene
 from olp.units import MM_PER_UM
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from olp.errormodel.base import Array
 from olp.program.program import Program
-from olp.review.samples import Index
+from olp.review.parts import Index
 
 Small = npt.NDArray[np.int32]
 Single = npt.NDArray[np.float32]

@@ -11,7 +11,7 @@ import numpy as np
 from olp.errormodel.base import Array, Mask
 from olp.exceptions import InputError
 from olp.files.measured import Measured
-from olp.review.samples import Index
+from olp.review.parts import Index
 
 #: a measured point is taken as one of the path within this
 GATE_MM = 1.0

@@ -15,7 +15,8 @@ from olp.machine import Machine
 from olp.program.feeds import lengths_mm
 from olp.program.program import Program
 from olp.program.timing import timing
-from olp.review.samples import Index, Samples
+from olp.review.parts import Index
+from olp.review.samples import Samples
 from olp.toolpath import Toolpath
 from olp.trajectory.from_program import SHORTEST_MM, axis_limits
 from olp.trajectory.motion import Motion
