@@ -91,8 +91,7 @@
 
   OLP.flat_drawing = scene => (context, w, h, ratio) => {
     context.setTransform(1, 0, 0, 1, 0, 0);
-    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--scene-low").trim();
-    context.fillRect(0, 0, w, h);
+    context.clearRect(0, 0, w, h);
     const camera = scene.viewer.camera;
     scene.viewer.scene.updateMatrixWorld(true);
     const base = new T.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);

@@ -43,9 +43,7 @@
     };
     app.set_theme = theme => {
       app.state.theme = document.documentElement.dataset.theme = theme;
-      const style = getComputedStyle(document.documentElement), rgb = name => OLP.colour.hex_rgb(style.getPropertyValue(name).trim()).map(v => v / 255);
-      app.scene.viewer.set_property(["Background"], "top_color", rgb("--scene-high"));
-      app.scene.viewer.set_property(["Background"], "bottom_color", rgb("--scene-low"));
+      const style = getComputedStyle(document.documentElement);
       for (const {path, uniforms} of app.scene.lines.values()) uniforms.colour.value.set(path.colour = OLP.colour.readable(path.given, theme));
       for (const {uniforms} of app.scene.lines.values()) {
         uniforms.faint.value.set(style.getPropertyValue("--rapid").trim());

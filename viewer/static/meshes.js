@@ -7,6 +7,15 @@
 
   const FAINT = 0.13;                              // of the machine, which stands before the path
 
+  // Faces with corners of their own, so that each has its own normal.
+  function flat(vertices, faces) {
+    const geometry = new T.BufferGeometry(), corners = new Float32Array(3 * faces.length);
+    for (let i = 0; i < faces.length; i++) for (let j = 0; j < 3; j++) corners[3 * i + j] = vertices[3 * faces[i] + j];
+    geometry.setAttribute("position", new T.BufferAttribute(corners, 3));
+    geometry.computeVertexNormals();
+    return geometry;
+  }
+
   // Sharp edges: they tell the shape of what is seen through.
   function edges(geometry, {colour, opacity}) {
     const lines = new T.LineSegments(new T.EdgesGeometry(geometry, 25), new T.LineBasicMaterial({color: colour, transparent: true, opacity: Math.min(1, opacity + 0.3), depthWrite: false}));
@@ -21,16 +30,15 @@
       this.shown = {};
       this.reach = [];
       for (const mesh of manifest.meshes ?? []) {
-        const vertices = arrays.get(mesh.vertices), geometry = new T.BufferGeometry();
-        geometry.setAttribute("position", new T.BufferAttribute(Float32Array.from(vertices), 3));
-        geometry.setIndex(new T.BufferAttribute(Uint32Array.from(arrays.get(mesh.faces)), 1));
+        const geometry = flat(arrays.get(mesh.vertices), arrays.get(mesh.faces));
         const opacity = mesh.role === "machine" ? Math.min(mesh.opacity, FAINT) : mesh.opacity, clear = opacity < 1;
-        // Pushed back a little: paths on a face stay in front of it.
-        const material = new T.MeshPhongMaterial({color: mesh.colour, specular: "#000000", transparent: clear, opacity, side: T.DoubleSide, depthWrite: !clear, flatShading: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2});
+        // Pushed back a little: paths on a face stay in front of it. Lit by corner, and what is clear from the front only:
+        // large clear faces are what costs software GL most.
+        const material = new T.MeshLambertMaterial({color: mesh.colour, transparent: clear, opacity, side: clear ? T.FrontSide : T.DoubleSide, depthWrite: !clear, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2});
         const object = new T.Mesh(geometry, material);
         object.userData.solid = true;
         object.renderOrder = clear ? 1 : 0;
-        if (geometry.index.count < MOST_EDGED) object.add(edges(geometry, mesh));
+        if (geometry.attributes.position.count < MOST_EDGED) object.add(edges(geometry, mesh));
         const role = mesh.role;
         scene.viewer.set_object(["olp", ...(mesh.path?.length ? mesh.path : [role]), "mesh-" + mesh.name], object);
         (this.shown[role] ??= {objects: [], labels: [], visible: true}).objects.push(object);

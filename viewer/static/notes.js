@@ -15,6 +15,7 @@
       });
       window.addEventListener("hashchange", () => this.restore());
       this.list();
+      $("callouts-box").open = app.state.callouts.length > 0;
     }
 
     ask() {

@@ -3,6 +3,7 @@
 (() => {
   const BLOCK = 256, FLOATS = 16;       // floats of one vertex: a0 a1 d0 d1 (3 each), side, scalar, sample, kind
   const RAPID = 1, GAP = 2;
+  const CHORD = 2;                      // px of a drawn segment, at the least
 
   class Path {
     // spec: the manifest's layer; P (n,3) mm; D (n,3) mm or null; index (n) nominal samples or null; kind (N) of the segment ending in a sample
@@ -69,7 +70,7 @@
         if (!ortho && W < -reach * 0.001) continue;
         if (Math.abs(x) > depth + reach * scale / w * 2 || Math.abs(y) > depth + reach * scale / h * 2) continue;
         const count = Math.min(BLOCK, this.n - 1 - b * BLOCK);
-        this.need[b] = Math.min(count, Math.max(1, (this.length[b] + 2 * k * this.spread[b]) * scale / near / 1.5));
+        this.need[b] = Math.min(count, Math.max(1, (this.length[b] + 2 * k * this.spread[b]) * scale / near / CHORD));
         total += this.need[b];
       }
       return total;

@@ -11,6 +11,7 @@
       this.viewer = OLP.has_webgl() ? new MeshCat.Viewer(pane) : new MeshCat.Viewer(pane, true, OLP.flat_renderer(pane));
       this.flat = Boolean(this.viewer.renderer.flat);
       this.viewer.gui.domElement.hidden = true;   // its scene tree goes on writing to it
+      this.viewer.set_property(["Background"], "visible", false);        // the page's own shows through, at no cost
       window.onload = null;                     // the viewer takes it over to size itself by the window
       for (const path of [["Grid"], ["Axes"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"]]) this.viewer.set_property(path, "visible", false);
       const light = new T.DirectionalLight(0xffffff, 0.55);
