@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from judge import browser
 
 import olp
 from olp.review.job import Review, view
+from olp.review.live import Server
 from olp.review.pack import Arrays
 from olp.review.page import page as packed
 
@@ -849,6 +852,62 @@ def test_a_million_points_keep_their_peak_in_sight(chromium: Any, tmp_path: Path
             }"""
         )
         assert largest == 1000
+
+
+def test_measured_paths_and_workpieces_stand_beside_the_rest(chromium: Any, tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_bytes(PROGRAM)
+    trimesh.creation.box((440, 340, 20)).export(tmp_path / "part.stl")
+    (tmp_path / "job.toml").write_text(
+        f'schema = "olp-job-1"\nprogram = "part.ngc"\nmachine = "{GANTRY.as_posix()}"\n'
+        '[[meshes]]\nfile = "part.stl"\nrole = "workpiece"\nframe = "G54"\n'
+    )
+    (tmp_path / "tip.csv").write_bytes(olp.simulate(PROGRAM, GANTRY, step_mm=2.0).to_csv())
+    found = view(
+        tmp_path / "part.ngc", GANTRY, tmp_path / "job.toml", measured=[tmp_path / "tip.csv"], time=False
+    )
+    found.write(tmp_path / "measured.html")
+    with browser.opened(chromium, tmp_path / "measured.html") as page:
+        assert page.evaluate("olp.drawn.measured") > 100
+        uncorrected, measured = page.evaluate(
+            "['uncorrected', 'measured']"
+            ".map(n => olp.app.metrics.summary(olp.app.plot_metric(), n, 1).largest)"
+        )
+        # across the path the measured points are those of the machine as it is
+        assert 0.2 * uncorrected < measured < 1.2 * uncorrected
+        for name in ("nominal", "uncorrected", "result", "rapids"):
+            page.evaluate("name => olp.set_layer(name, false)", name)
+        page.click("#view-top")
+        x, y = page.evaluate("(n => olp.project(olp.app.samples >> 1, n))('measured')")
+        hit = page.evaluate("p => olp.pick(...p)", [x, y])
+        assert hit["layer"] == "measured"
+        page.mouse.click(x, y)
+        assert page.evaluate("olp.state.row") == page.evaluate("olp.app.row_at()")
+        still(page)
+        before = browser.picture(page)
+        page.uncheck("#layer-workpiece")
+        still(page)
+        assert (browser.picture(page) != before).any(axis=2).mean() > 0.05
+        assert page.evaluate("olp.worst()")["layer"] == "measured"
+
+
+def test_a_live_page_follows_its_inputs_and_keeps_its_view(chromium: Any, tmp_path: Path) -> None:
+    path = tmp_path / "part.ngc"
+    path.write_bytes(PROGRAM)
+    server = Server(lambda: view(path, GANTRY, time=False), [str(path)], lambda text: None)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        with browser.opened(chromium, server.address) as page:
+            page.evaluate("() => { olp.set_exaggeration(432); olp.set_metric('y'); }")
+            digest = page.evaluate("olp.manifest.digest")
+            path.write_bytes(PROGRAM.replace(b"G1 X10\r", b"G1 X12\r"))
+            other = f"window.olp && olp.manifest.digest !== '{digest}'"
+            browser.until(page, f"{other} && document.documentElement.dataset.ready === '1'")
+            assert page.evaluate("[olp.state.exaggeration, olp.state.metric]") == [432, "y"]
+            assert page.evaluate("olp.app.listing.text(olp.app.listing.row_of_line(18), 0)") == "G1 X12"
+    finally:
+        server.stop()
+        thread.join()
 
 
 @pytest.mark.parametrize(

@@ -66,20 +66,23 @@ def launched(play: Any, *arguments: str) -> Iterator[Any]:
 @contextmanager
 def opened(
     chromium: Any,
-    page_file: Path,
+    source: Path | str,
     *,
     size: tuple[int, int] = (1280, 720),
     theme: str = "light",
     view: str = "",
 ) -> Iterator[Any]:
-    """The page of a file, ready, with the network off; `view` follows its address.
+    """The page of a file, ready, with the network off, or that of a server; `view` follows its address.
 
-    Fails at the end where the console showed an error, a script failed, or anything but the file itself was asked
-    for.
+    Fails at the end where the console showed an error, a script failed, or anything but the file or the
+    server itself was asked for.
     """
     width, height = size
     context = chromium.new_context(
-        viewport={"width": width, "height": height}, color_scheme=theme, offline=True, accept_downloads=True
+        viewport={"width": width, "height": height},
+        color_scheme=theme,
+        offline=isinstance(source, Path),
+        accept_downloads=True,
     )
     page = context.new_page()
     trouble: list[str] = []
@@ -88,13 +91,15 @@ def opened(
     page.on("console", lambda message: trouble.append(message.text) if message.type == "error" else None)
     page.on("dialog", lambda dialog: (trouble.append(f"dialog: {dialog.message}"), dialog.dismiss()))
     page.on("request", lambda request: asked.append(request.url))
-    page.goto(page_file.as_uri() + view)
+    page.goto((source.as_uri() if isinstance(source, Path) else source) + view)
     page.wait_for_selector("html[data-ready],html[data-error]", state="attached", timeout=120_000)
     assert page.evaluate("document.documentElement.dataset.error ?? null") is None, trouble
     try:
         yield page
         assert not trouble, trouble
-        assert all(url.startswith(LOCAL) for url in asked), asked
+        assert all(
+            url.startswith(LOCAL if isinstance(source, Path) else (source, "data:", "blob:")) for url in asked
+        ), asked
     finally:
         context.close()
 
@@ -102,12 +107,20 @@ def opened(
 def until(page: Any, expression: str, seconds: float = 30.0) -> None:
     """Waits until an expression of the page is true.
 
-    Asked from outside: the page's policy forbids that it evaluates text itself.
+    Asked from outside: the policy of the page forbids that it evaluates text. It may load itself anew meanwhile.
     """
+    from playwright.sync_api import Error
+
     end = time.monotonic() + seconds
-    while not page.evaluate(expression):
-        assert time.monotonic() < end, f"never true: {expression}"
+    while time.monotonic() < end:
+        try:
+            if page.evaluate(expression):
+                return
+        except Error as error:
+            if "context was destroyed" not in str(error):
+                raise
         page.wait_for_timeout(30)
+    pytest.fail(f"never true: {expression}")
 
 
 def picture(page: Any, selector: str = "#pane") -> Any:

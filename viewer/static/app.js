@@ -118,18 +118,29 @@
       if (layer) {
         layer.visible = this.state.layers[name] = Boolean(on);
         this.scene.viewer.set_property(["olp", name], "visible", layer.visible);
+        this.show_rapids();
         this.scene.schedule(0);
         this.state.worst = -1;
         OLP.emit("layers");
       } else if (name === "rapids") {
         this.state.rapids = this.state.layers.rapids = Boolean(on);
-        this.scene.set_uniform("rapids", on ? 1 : 0);
+        this.show_rapids();
         OLP.emit("layers");
       } else if (this.meshes.shown[name]) {
         this.state.layers[name] = Boolean(on);
         this.meshes.set_visible(name, Boolean(on));
         OLP.emit("layers");
       }
+    }
+
+    // Rapids once: several layers of them would only hide the path.
+    show_rapids() {
+      let free = this.state.rapids;
+      for (const {path, uniforms} of this.scene.lines.values()) {
+        uniforms.rapids.value = free && path.visible && path.kind ? 1 : 0;
+        if (uniforms.rapids.value) free = false;
+      }
+      this.scene.viewer.set_dirty();
     }
 
     set_metric(name) {

@@ -104,6 +104,7 @@
     if (app.scene.flat) app.scene.viewer.renderer.draw = OLP.flat_drawing(app.scene);
     app.scene.viewer.set_3d_pane_size();
     app.set_theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    app.show_rapids();
     app.set_exaggeration(exaggeration(app, size));
     app.set_metric(app.plot_metric()?.name ?? "");
     app.set_view("iso");

@@ -1,10 +1,11 @@
 "use strict";
 // The two linked plots: deviation along the path, and the motion of each axis against its limits.
 (() => {
+  // [name, title, unit, what the choice says]
   const MOTIONS = [
-    ["speed", "Speed and feed"], ["velocity", "Axis velocity"], ["acceleration", "Axis acceleration"], ["jerk", "Axis jerk"], ["share", "Share of the limits"],
+    ["speed", "Speed", "mm/s", "path and feed"], ["velocity", "Velocity", "mm/s", "velocity"], ["acceleration", "Acceleration", "mm/s²", "acceleration"], ["jerk", "Jerk", "mm/s³", "jerk"],
+    ["share", "Use of limits", "%", "use of limits"],
   ];
-  const UNITS = {speed: "mm/s", velocity: "mm/s", acceleration: "mm/s²", jerk: "mm/s³", share: "%"};
 
   class Plots {
     constructor(app) {
@@ -24,7 +25,7 @@
       if (this.motion) {
         this.movement = new OLP.Chart(hosts[1], events);
         this.charts.push(this.movement);
-        for (const [value, label] of MOTIONS) select.append(new Option(label, value));
+        for (const [value, , , label] of MOTIONS) select.append(new Option(label, value));
         select.value = this.motion;
         select.onchange = () => { this.motion = select.value; this.draw_motion(); };
       } else hosts[1].hidden = true;
@@ -80,7 +81,8 @@
         series = motion.axes.map((axis, i) => ({label: axis.name, colour: this.app.axis_colour(i), x, y: arrays.get(axis[kind])}));
         limits = motion.axes.flatMap((axis, i) => [1, -1].map(sign => ({value: sign * axis[kind + "_limit"], colour: this.app.axis_colour(i)}))).filter(l => Number.isFinite(l.value));
       }
-      this.movement.set({title: MOTIONS.find(m => m[0] === kind)[1], unit: UNITS[kind], x_label: this.x_label, series, limits, include: true});
+      const [, title, unit] = MOTIONS.find(m => m[0] === kind);
+      this.movement.set({title, unit, x_label: this.x_label, series, limits, include: true});
     }
 
     // Largest of velocity, acceleration and jerk of an axis as a share of its limits, %.
