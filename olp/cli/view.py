@@ -150,8 +150,8 @@ def _serve(make: Callable[[], Review], inputs: tuple[str, ...], port: int, quiet
     from olp.review.live import Server
 
     server = Server(make, inputs, (lambda message: None) if quiet else talk, port)
-    talk(f"serving {server.address} until Ctrl-C")
     try:
+        talk(f"serving {server.address} until Ctrl-C")
         server.run()
     except KeyboardInterrupt:
         # the way to end it

@@ -30,10 +30,13 @@ from olp.review.measured import Matched, match
 from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, retimed, table
 from olp.review.page import page
-from olp.review.parts import Index
+from olp.review.parts import Ends, Index
 from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene
 from olp.units import MM_PER_UM
+
+#: shorter stays at a sample are none
+_REST_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,12 +120,12 @@ def view(
         samples = sample(nominal, second, groups, loaded.model, step_mm)
         plan = retime(other, setup, contour=contour, progress=progress) if time else None
     tell("pack", 0.0)
-    frame = Frame.of(nominal.toolpath)
-    position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
     if plan is None:
         moment = by_feed(nominal, samples, setup.machine)
     else:
-        moment = retimed(second.toolpath, samples, plan.trajectories)
+        samples, moment = _resting(samples, *retimed(second.toolpath, samples, plan.trajectories))
+    frame = Frame.of(nominal.toolpath)
+    position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
     scene = Scene(
         name=Path(name).name or "program",
         corrected_name=Path(corrected_name).name,
@@ -138,7 +141,7 @@ def view(
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
         listing=aligned(nominal, second, groups),
         bodies=tuple(_bodies(setup, nominal, samples, frame, position)),
-        measured=tuple(_matched(path, frame, position, samples, setup) for path in measured),
+        measured=tuple(_matched(path, frame, position, samples, nominal, setup) for path in measured),
         report=report,
         tolerance_um=tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
@@ -153,6 +156,16 @@ def _in_file(name: str) -> Iterator[None]:
         yield
     except OlpError as error:
         raise (error.in_file(name) if name and error.line is not None else error) from None
+
+
+def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples, Array]:
+    """Samples at which the motion rests are there twice, when it comes and when it leaves; and the times."""
+    rests = np.flatnonzero(leaving - arrival > _REST_S)
+    order = np.sort(np.concatenate((np.arange(len(samples)), rests)), kind="stable")
+    again = np.diff(order, prepend=-1) == 0
+    twice = samples.take(order)
+    twice.joined[again] = True
+    return twice, np.where(again, leaving[order], arrival[order])
 
 
 def _digest(data: bytes, other: bytes, loaded: Loaded, files: Sequence[PathLike]) -> str:
@@ -170,7 +183,9 @@ def _groups(nominal: Program, second: Program, loaded: Loaded, tolerance_um: flo
     return match_moves(nominal, target, second, loaded.model, near)
 
 
-def _matched(path: PathLike, frame: Frame, position: Array, samples: Samples, setup: Setup) -> Matched:
+def _matched(
+    path: PathLike, frame: Frame, position: Array, samples: Samples, nominal: Program, setup: Setup
+) -> Matched:
     measured = read_measured(path)
     origin = np.zeros(3)
     if measured.frame == frame.offset:
@@ -184,7 +199,8 @@ def _matched(path: PathLike, frame: Frame, position: Array, samples: Samples, se
                 file=measured.file,
             )  # fmt: skip
         origin = np.array(offset.offset_mm)
-    return match(measured, position, samples.joined, origin - np.array(frame.origin_mm))
+    ends = Ends.of(nominal.toolpath)
+    return match(measured, samples, ends, position, origin - np.array(frame.origin_mm))
 
 
 def _bodies(

@@ -26,6 +26,8 @@ from olp.trajectory.route import Route
 #: rows of a table of motion, and of what is thinned to them at once
 MOST_ROWS = 20_000
 _BLOCK = 1 << 16
+#: shares of a run that are the same
+_ROUNDING = 1e-9
 #: where a piece of a motion is looked at: a polynomial of time has its peaks at or near one of these
 _PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
@@ -78,8 +80,9 @@ class _Runs:
         return mine[ahead], theirs[ahead]
 
 
-def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajectory]) -> Array:
-    """(n,) s at which the motion of the corrected program passes each sample; stretches follow one another.
+def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajectory]) -> tuple[Array, Array]:
+    """(n,) s at which the motion of the corrected program comes to each sample, and at which it leaves it;
+    stretches follow one another.
 
     Along each line the way that is done tells the time: a motion that rounds corners meets no way-point
     itself.
@@ -89,7 +92,7 @@ def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajec
     driven = np.isfinite(length) & way
     moves = np.flatnonzero(way)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], driven[moves], [False])).astype(np.int8)))
-    time = np.full(len(samples), np.nan)
+    arrival, leaving = np.full((2, len(samples)), np.nan)
     begin = 0.0
     for (first, stop), trajectory in zip(
         zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True), trajectories, strict=True
@@ -97,15 +100,17 @@ def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajec
         mine = moves[first:stop]
         a = int(np.searchsorted(samples.part, mine[0], "left"))
         b = int(np.searchsorted(samples.part, mine[-1], "right"))
-        time[a:b] = begin + _along(corrected, length, mine, samples, a, b, trajectory.motion)
+        found = _along(corrected, length, mine, samples, a, b, trajectory.motion)
+        arrival[a:b], leaving[a:b] = begin + found[0], begin + found[1]
         begin += trajectory.duration_s
-    return _filled(time)
+    arrival = _filled(arrival)
+    return arrival, np.maximum(_filled(leaving), arrival)
 
 
 def _along(
     path: Toolpath, length: Array, moves: Index, samples: Samples, a: int, b: int, motion: Motion
-) -> Array:
-    """Times of samples a..b within the motion of the stretch that `moves` drive."""
+) -> tuple[Array, Array]:
+    """Times at which samples a..b are reached and left, in the motion of the stretch that `moves` drive."""
     runs = _Runs.find(path.line[moves].astype(np.int64))
     size = length[moves]
     done = np.concatenate(([0.0], np.cumsum(size)))
@@ -127,8 +132,28 @@ def _along(
     steps = np.bincount(of, np.diff(travelled, prepend=0.0), minlength=len(pieces.line))
     begin = np.concatenate(([0.0], np.cumsum(steps)))[:-1]
     known = at[of] >= 0
-    progress = at[of] + np.clip((travelled - begin[of]) / np.maximum(steps[of], 1e-12), 0.0, 1.0)
-    return np.interp(run + np.clip(share, 0.0, 1.0), np.maximum.accumulate(progress[known]), time[known])
+    done_share = np.clip((travelled - begin[of]) / np.maximum(steps[of], 1e-12), 0.0, 1.0)
+    progress = np.maximum.accumulate(_snapped(np.asarray(at[of] + done_share, float)[known]))
+    wanted = _snapped(np.asarray(run + np.clip(share, 0.0, 1.0), float))
+    return _passing(wanted, progress, time[known])
+
+
+def _snapped(place: Array) -> Array:
+    """What is an end of a run but for rounding is one: there the motion may rest."""
+    whole = np.rint(place)
+    return np.where(np.abs(place - whole) < _ROUNDING, whole, place)
+
+
+def _passing(place: Array, progress: Array, time: Array) -> tuple[Array, Array]:
+    """First and last time at which a progress that never falls is at each place."""
+    after = np.clip(np.searchsorted(progress, place, "left"), 0, len(progress) - 1)
+    before = np.maximum(after - 1, 0)
+    gap = progress[after] - progress[before]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(gap > 0.0, (place - progress[before]) / gap, 1.0)
+    first = time[before] + np.clip(share, 0.0, 1.0) * (time[after] - time[before])
+    last = np.clip(np.searchsorted(progress, place, "right") - 1, 0, len(progress) - 1)
+    return first, np.where(progress[last] == place, np.maximum(time[last], first), first)
 
 
 def _spans(of: Index, size: Array, done: Array) -> tuple[Array, Array]:
@@ -196,7 +221,9 @@ def table(trajectories: Sequence[Trajectory], routes: Sequence[Route]) -> Motion
         begin += trajectory.duration_s
     if not parts:
         return _split(np.zeros((0, 16)))
-    return _split(np.concatenate(parts))
+    rows = np.concatenate(parts)
+    rows[:, 0] = np.maximum.accumulate(rows[:, 0])
+    return _split(rows)
 
 
 def _feeds(route: Route) -> tuple[Index, Array]:

@@ -55,6 +55,14 @@ class Samples:
     def __len__(self) -> int:
         return len(self.move)
 
+    def take(self, which: Index) -> Samples:
+        """Some of them, one or several times."""
+        return Samples(
+            self.move[which], self.share[which], self.part[which], self.within[which], self.axis_mm[which],
+            self.command_mm[which], self.uncorrected[which], self.result[which], self.joined[which],
+            self.way_mm[which], None if self.play is None else self.play[which],
+        )  # fmt: skip
+
     @property
     def correction(self) -> Array:
         """(n, 3) command written less nominal command."""
@@ -98,12 +106,11 @@ def sample(
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)
     way = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
-    joined = started[keep]
-    joined[0] = False
-    return Samples(
-        move[keep], share[keep], part[keep], within[keep], axis[keep], command[keep], uncorrected[keep],
-        result[keep], joined, way[keep], None if play is None else play[keep],
-    )  # fmt: skip
+    every = Samples(move, share, part, within, axis, command, uncorrected, result, started, way, play).take(
+        np.flatnonzero(keep)
+    )
+    every.joined[0] = False
+    return every
 
 
 def by_source(
