@@ -136,7 +136,9 @@ def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:
     known = np.isfinite(length)
     length[~known] = 0.0
     if step_mm is None:
-        step_mm = float(np.clip(length.sum() / SAMPLES, FINEST_MM, COARSEST_MM))
+        # every move has a sample at its end; what is left goes to the long ones
+        spare = max(SAMPLES - len(path), SAMPLES // 10)
+        step_mm = float(np.clip(length.sum() / spare, FINEST_MM, COARSEST_MM))
     steps = np.maximum(np.ceil(length / step_mm - 1e-9), 1).astype(np.int64)
     delta = path.end_mm - path.starts_mm()
     which = longer(delta, clear_length_mm(model, path.tools_mm(), BEND_MM))
