@@ -107,7 +107,7 @@ def opened(
 def until(page: Any, expression: str, seconds: float = 30.0) -> None:
     """Waits until an expression of the page is true.
 
-    Asked from outside: the policy of the page forbids that it evaluates text. It may load itself anew meanwhile.
+    Asked from outside, as the policy of the page forbids to evaluate text; it may load itself anew meanwhile.
     """
     from playwright.sync_api import Error
 

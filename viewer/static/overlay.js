@@ -82,6 +82,7 @@
       const clash = (a, b) => this.taken.some(r => a < r[2] && a + wide > r[0] && b < r[3] && b + high > r[1]);
       const within = (v, size, whole) => Math.min(Math.max(4, v), Math.max(4, whole - size - 4));
       const places = [0, -1, 1, -2, 2, -3, 3, -4, 4].flatMap(down => [0, -0.5, 0.5, -1, 1].map(aside => [within(x + aside * (wide + 24), wide, this.view.w), within(y + down * (high + 8), high, this.view.h)]));
+      // Nearest first; the point itself stays in sight.
       places.sort((p, q) => Math.hypot(p[0] - x, p[1] - y) - Math.hypot(q[0] - x, q[1] - y));
       const [left, top] = places.find(([a, b]) => !clash(a, b)) ?? places[0];
       this.taken.push([left, top, left + wide, top + high]);
@@ -108,9 +109,10 @@
     }
 
     notes() {
-      const {app} = this;
+      const {app} = this, ends = app.state.callouts.map(note => this.at(app.point_of(note.sample, note.layer))), tool = this.at(app.tool_point());
+      for (const p of [...ends, tool]) if (p) this.taken.push([p[0] - 10, p[1] - 10, p[0] + 10, p[1] + 10]);
       app.state.callouts.forEach((note, i) => {
-        const p = this.at(app.point_of(note.sample, note.layer));
+        const p = ends[i];
         if (!p) return;
         // Outwards, away from the path.
         const left = p[0] < this.view.w / 2, above = p[1] < this.view.h / 2;

@@ -54,7 +54,7 @@
       const {app} = this, metric = app.metrics.find(app.state.metric) ?? app.plot_metric(), names = app.metrics.layers(metric).filter(n => app.layers.get(n).visible);
       const parts = names.map(n => app.metrics.summary(metric, n, app.scale.tolerance)), number = OLP.colour.number, unit = OLP.colour.unit_label(metric?.unit);
       const rows = [["largest", p => number(p.largest)], ["mean", p => number(p.mean)], ["rms", p => number(p.rms)], ["σ", p => number(p.sigma)]];
-      if (metric?.unit === "um") rows.push(["in tolerance", p => `${number(100 * p.inside, p.inside < 1 && p.inside > 0.99 ? 4 : 3)} %`]);
+      if (metric?.unit === "um") rows.push(["in tolerance", p => `${number(100 * p.inside, p.inside < 1 && p.inside > 0.999 ? 4 : 3)} %`]);
       const table = make("table", {}, make("caption", {textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, feed moves` : ""}), make("tr", {}, make("th"), ...names.map(n => make("th", {}, this.key(app.layers.get(n))))));
       for (const [label, show] of rows) table.append(make("tr", {}, make("th", {textContent: label}), ...parts.map(p => make("td", {textContent: p ? show(p) : "–"}))));
       if (metric === app.plot_metric()) this.packed_rows(table, names);

@@ -8,7 +8,8 @@
     constructor(app, pane) {
       this.app = app;
       this.pane = pane;
-      this.viewer = OLP.has_webgl() ? new MeshCat.Viewer(pane) : new MeshCat.Viewer(pane, true, OLP.flat_renderer(pane));
+      const graphics = OLP.graphics();
+      this.viewer = new MeshCat.Viewer(pane, true, graphics === "none" ? OLP.flat_renderer(pane) : OLP.gl_renderer(pane, graphics === "hardware"));
       this.flat = Boolean(this.viewer.renderer.flat);
       this.viewer.gui.domElement.hidden = true;   // its scene tree goes on writing to it
       this.viewer.set_property(["Background"], "visible", false);        // the page's own shows through, at no cost

@@ -1,14 +1,22 @@
 "use strict";
-// Without WebGL (remote desktops, locked-down computers): the same scene and camera drawn on a 2-D canvas.
+// What draws the scene: WebGL, or without it (remote desktops, locked-down computers) a 2-D canvas with the same camera.
 (() => {
   const T = MeshCat.THREE, SHADES = 24;
 
-  OLP.has_webgl = () => {
+  // What draws: "none", "software" or "hardware".
+  OLP.graphics = () => {
     try {
-      const context = document.createElement("canvas").getContext("webgl2");
-      context?.getExtension("WEBGL_lose_context")?.loseContext();
-      return Boolean(context);
-    } catch { return false; }
+      const context = document.createElement("canvas").getContext("webgl2"), named = context.getExtension("WEBGL_debug_renderer_info");
+      const name = String(context.getParameter(named?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER));
+      context.getExtension("WEBGL_lose_context")?.loseContext();
+      return /swiftshader|llvmpipe|software|basic render/i.test(name) ? "software" : "hardware";
+    } catch { return "none"; }
+  };
+
+  OLP.gl_renderer = (pane, antialias) => {
+    const renderer = new T.WebGLRenderer({antialias, alpha: true});
+    pane.append(renderer.domElement);
+    return renderer;
   };
 
   // Stands in for three's renderer; `draw(context, width, height, ratio)` is set once the scene is there.
