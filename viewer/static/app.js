@@ -22,13 +22,35 @@
       this.end = this.time[this.samples - 1];
       this.layers = new Map();
       for (const spec of manifest.layers) {
-        const own = spec.base && spec.base !== manifest.base, index = spec.index ? get(spec.index) : null;
-        this.layers.set(spec.name, new OLP.Path(spec, get(spec.base ?? manifest.base), spec.delta ? get(spec.delta) : null, index, own || index ? null : this.kind));
+        const own = spec.base && spec.base !== manifest.base,
+          index = spec.index ? get(spec.index) : null;
+        this.layers.set(
+          spec.name,
+          new OLP.Path(
+            spec,
+            get(spec.base ?? manifest.base),
+            spec.delta ? get(spec.delta) : null,
+            index,
+            own || index ? null : this.kind,
+          ),
+        );
       }
       this.metrics = new OLP.Metrics(this);
       this.state = {
-        time: this.time[0], sample_at: 0, sample: 0, row: this.rows[0], exaggeration: 1, metric: "", layers: {}, theme: "light", view: "iso", playing: false, rapids: true,
-        span: [-1, -1], callouts: (manifest.callouts ?? []).map(c => ({...c})), worst: -1,
+        time: this.time[0],
+        sample_at: 0,
+        sample: 0,
+        row: this.rows[0],
+        exaggeration: 1,
+        metric: "",
+        layers: {},
+        theme: "light",
+        view: "iso",
+        playing: false,
+        rapids: true,
+        span: [-1, -1],
+        callouts: (manifest.callouts ?? []).map(c => ({...c})),
+        worst: -1,
       };
       this.runs();
     }
@@ -42,7 +64,7 @@
 
     // Samples [a, b] of the run of a row that holds `near`, or else of its first run; null where it moves nothing.
     run(row, near = -1) {
-      let a = near > 0 && this.rows[near] === row ? near : this.first[row] ?? -1;
+      let a = near > 0 && this.rows[near] === row ? near : (this.first[row] ?? -1);
       if (a < 0) return null;
       let b = a;
       while (a > 1 && this.rows[a - 1] === row) a--;
@@ -52,12 +74,15 @@
 
     // Sample (may be between two) at a time; held where nothing is known between.
     sample_of(time) {
-      const i = OLP.find(this.time, time), j = Math.min(this.samples - 1, i + 1), span = this.time[j] - this.time[i];
+      const i = OLP.find(this.time, time),
+        j = Math.min(this.samples - 1, i + 1),
+        span = this.time[j] - this.time[i];
       return i + (span > 0 && this.kind[j] !== OLP.GAP ? Math.min(1, Math.max(0, (time - this.time[i]) / span)) : 0);
     }
 
     time_of(sample) {
-      const i = Math.max(0, Math.min(this.samples - 1, Math.floor(sample))), j = Math.min(this.samples - 1, i + 1);
+      const i = Math.max(0, Math.min(this.samples - 1, Math.floor(sample))),
+        j = Math.min(this.samples - 1, i + 1);
       return this.time[i] + (sample - i) * (this.time[j] - this.time[i]);
     }
 
@@ -72,8 +97,12 @@
       OLP.emit("time");
     }
 
-    set_sample(sample) { this.set_time(this.time_of(sample), sample); }
-    row_at() { return this.rows[this.state.sample]; }
+    set_sample(sample) {
+      this.set_time(this.time_of(sample), sample);
+    }
+    row_at() {
+      return this.rows[this.state.sample];
+    }
 
     set_span(span) {
       if (span[0] === this.state.span[0] && span[1] === this.state.span[1]) return;
@@ -100,7 +129,12 @@
 
     step(direction) {
       const run = this.run(this.row_at(), this.state.sample) ?? [this.state.sample, this.state.sample];
-      const to = direction > 0 ? (this.state.sample_at < run[1] - 1e-9 ? run[1] : this.run(this.rows[Math.min(this.samples - 1, run[1] + 1)], run[1] + 1)?.[1] ?? run[1]) : run[0] - 1;
+      const to =
+        direction > 0
+          ? this.state.sample_at < run[1] - 1e-9
+            ? run[1]
+            : (this.run(this.rows[Math.min(this.samples - 1, run[1] + 1)], run[1] + 1)?.[1] ?? run[1])
+          : run[0] - 1;
       this.set_sample(Math.max(0, Math.min(this.samples - 1, to)));
       OLP.emit("row");
     }
@@ -158,10 +192,16 @@
     }
 
     // What the plots show while paths have the colours of their layers.
-    plot_metric() { return this.metrics.find("magnitude") ?? this.manifest.metrics[0] ?? null; }
+    plot_metric() {
+      return this.metrics.find("magnitude") ?? this.manifest.metrics[0] ?? null;
+    }
 
     // Layer that the tool runs on, and where it is (mm, enlarged).
-    tool_layer() { return ["result", "corrected", "nominal"].map(n => this.layers.get(n)).find(l => l?.visible) ?? this.layers.values().next().value; }
+    tool_layer() {
+      return (
+        ["result", "corrected", "nominal"].map(n => this.layers.get(n)).find(l => l?.visible) ?? this.layers.values().next().value
+      );
+    }
     tool_point() {
       const layer = this.tool_layer();
       return layer.at(layer.own(this.state.sample_at), this.state.exaggeration);
@@ -183,7 +223,9 @@
       this.scene.set_uniform("cut", on ? this.state.sample_at : 1e9);
     }
 
-    axis_colour(i) { return AXES[this.state.theme][i % 3]; }
+    axis_colour(i) {
+      return AXES[this.state.theme][i % 3];
+    }
 
     // Layer whose errors are to be judged: the last state that is shown.
     judged(metric) {
@@ -193,12 +235,16 @@
 
     // Goes round the rows by their largest value; returns {rank, count, sample, value, layer} or null.
     worst(step = 1) {
-      const metric = this.metrics.find(this.state.metric) ?? this.plot_metric(), name = this.judged(metric), key = `${metric?.name} ${name}`;
+      const metric = this.metrics.find(this.state.metric) ?? this.plot_metric(),
+        name = this.judged(metric),
+        key = `${metric?.name} ${name}`;
       if (!name) return null;
-      if (this.ranking?.key !== key) this.ranking = {key, list: this.rank(this.metrics.values(metric, name), this.layers.get(name))};
+      if (this.ranking?.key !== key)
+        this.ranking = {key, list: this.rank(this.metrics.values(metric, name), this.layers.get(name))};
       const {list} = this.ranking;
       if (!list.length) return null;
-      this.state.worst = this.state.worst < 0 ? (step > 0 ? 0 : list.length - 1) : (this.state.worst + step + list.length) % list.length;
+      this.state.worst =
+        this.state.worst < 0 ? (step > 0 ? 0 : list.length - 1) : (this.state.worst + step + list.length) % list.length;
       const {sample, value} = list[this.state.worst];
       this.set_sample(sample);
       this.select_row(this.row_at(), true);
@@ -210,9 +256,11 @@
     rank(values, layer) {
       const best = new Map();
       for (let i = 1; i < values.length; i++) {
-        const sample = layer.index ? layer.index[i] : i, size = Math.abs(values[i]);
+        const sample = layer.index ? layer.index[i] : i,
+          size = Math.abs(values[i]);
         if (!(size > 0)) continue;
-        const row = this.rows[sample], known = best.get(row);
+        const row = this.rows[sample],
+          known = best.get(row);
         if (!known || size > known.size) best.set(row, {sample, size, value: values[i]});
       }
       return [...best.values()].sort((p, q) => q.size - p.size).slice(0, RANKED);

@@ -1,14 +1,15 @@
 "use strict";
 // A line chart on a canvas: any number of points as one minimum and maximum per pixel column, so no peak is lost.
 (() => {
-  const CORNER = 130;                               // px that a choice takes at the top right
+  const CORNER = 130; // px that a choice takes at the top right
   const EDGE = {left: 54, right: 12, top: 24, bottom: 22};
 
   // Index of the first x that is not below `value`, in an ascending array.
   function lower(x, value) {
-    let lo = 0, hi = x.length;
+    let lo = 0,
+      hi = x.length;
     while (lo < hi) {
-      const mid = lo + hi >> 1;
+      const mid = (lo + hi) >> 1;
       if (x[mid] < value) lo = mid + 1;
       else hi = mid;
     }
@@ -24,7 +25,7 @@
       host.prepend(this.base, this.top);
       Object.assign(this, {series: [], limits: [], range: null, extent: [0, 1], marks: {now: null, hover: null}, readout: null});
       new ResizeObserver(() => this.draw()).observe(host);
-      this.listen();
+      OLP.zoom(this, events);
     }
 
     // series: [{label, colour, x, y}], limits: [{value, label, colour}]; x ascending, NaN in y is a gap
@@ -41,19 +42,36 @@
       this.draw();
     }
 
-    get window() { return this.range ?? this.extent; }
-    get wide() { return Math.max(1, this.host.clientWidth - EDGE.left - EDGE.right); }
-    get high() { return Math.max(1, this.host.clientHeight - EDGE.top - EDGE.bottom); }
-    px(x) { return EDGE.left + (x - this.window[0]) / (this.window[1] - this.window[0]) * this.wide; }
-    py(y) { return EDGE.top + (1 - (y - this.low) / (this.up - this.low)) * this.high; }
-    x_at(px) { return this.window[0] + (px - EDGE.left) / this.wide * (this.window[1] - this.window[0]); }
+    get window() {
+      return this.range ?? this.extent;
+    }
+    get wide() {
+      return Math.max(1, this.host.clientWidth - EDGE.left - EDGE.right);
+    }
+    get high() {
+      return Math.max(1, this.host.clientHeight - EDGE.top - EDGE.bottom);
+    }
+    px(x) {
+      return EDGE.left + ((x - this.window[0]) / (this.window[1] - this.window[0])) * this.wide;
+    }
+    py(y) {
+      return EDGE.top + (1 - (y - this.low) / (this.up - this.low)) * this.high;
+    }
+    x_at(px) {
+      return this.window[0] + ((px - EDGE.left) / this.wide) * (this.window[1] - this.window[0]);
+    }
 
     prepare(canvas) {
-      const ratio = window.devicePixelRatio || 1, w = this.host.clientWidth, h = this.host.clientHeight, c = canvas.getContext("2d");
-      if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) Object.assign(canvas, {width: Math.round(w * ratio), height: Math.round(h * ratio)});
+      const ratio = window.devicePixelRatio || 1,
+        w = this.host.clientWidth,
+        h = this.host.clientHeight,
+        c = canvas.getContext("2d");
+      if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio))
+        Object.assign(canvas, {width: Math.round(w * ratio), height: Math.round(h * ratio)});
       c.setTransform(ratio, 0, 0, ratio, 0, 0);
       c.clearRect(0, 0, w, h);
-      const style = getComputedStyle(document.documentElement), get = name => style.getPropertyValue(name).trim();
+      const style = getComputedStyle(document.documentElement),
+        get = name => style.getPropertyValue(name).trim();
       this.look = {ink: get("--ink"), soft: get("--soft"), rule: get("--rule"), panel: get("--panel"), accent: get("--accent")};
       c.font = "11px " + get("--font");
       return c;
@@ -61,21 +79,29 @@
 
     // One [column, low, high] per pixel column that holds points, or the points themselves where they are few.
     columns({x, y}) {
-      const [a, b] = this.window, first = Math.max(0, lower(x, a) - 1), last = Math.min(x.length, lower(x, b) + 1), out = [];
+      const [a, b] = this.window,
+        first = Math.max(0, lower(x, a) - 1),
+        last = Math.min(x.length, lower(x, b) + 1),
+        out = [];
       if (last - first <= 2 * this.wide) {
         for (let i = first; i < last; i++) out.push([this.px(x[i]), y[i], y[i]]);
         return out;
       }
-      let column = -Infinity, low = NaN, high = NaN;
+      let column = -Infinity,
+        low = NaN,
+        high = NaN;
       const scale = this.wide / (b - a);
       for (let i = first; i < last; i++) {
-        const at = Math.floor((x[i] - a) * scale), v = y[i];
+        const at = Math.floor((x[i] - a) * scale),
+          v = y[i];
         if (at !== column) {
           if (column > -Infinity) out.push([EDGE.left + column + 0.5, low, high]);
           column = at;
           low = high = v;
-        } else if (v < low || low !== low) { low = v; if (high !== high) high = v; }
-        else if (v > high) high = v;
+        } else if (v < low || low !== low) {
+          low = v;
+          if (high !== high) high = v;
+        } else if (v > high) high = v;
       }
       out.push([EDGE.left + column + 0.5, low, high]);
       return out;
@@ -83,13 +109,20 @@
 
     draw() {
       if (!this.host.clientWidth || !this.host.clientHeight) return;
-      const c = this.prepare(this.base), drawn = this.series.map(s => this.columns(s));
-      let low = 0, up = 0;
-      for (const columns of drawn) for (const [, a, b] of columns) {
-        if (a < low) low = a;
-        if (b > up) up = b;
-      }
-      for (const {value} of this.limits) if (this.include || (value <= 1.6 * up && value >= 1.6 * low)) { low = Math.min(low, value); up = Math.max(up, value); }
+      const c = this.prepare(this.base),
+        drawn = this.series.map(s => this.columns(s));
+      let low = 0,
+        up = 0;
+      for (const columns of drawn)
+        for (const [, a, b] of columns) {
+          if (a < low) low = a;
+          if (b > up) up = b;
+        }
+      for (const {value} of this.limits)
+        if (this.include || (value <= 1.6 * up && value >= 1.6 * low)) {
+          low = Math.min(low, value);
+          up = Math.max(up, value);
+        }
       if (!(up > low)) up = low + 1;
       Object.assign(this, {low: low - (low < 0 ? 0.06 * (up - low) : 0), up: up + 0.08 * (up - low)});
       this.axes(c);
@@ -105,8 +138,15 @@
     }
 
     axes(c) {
-      const {ticks, number} = OLP.colour, bottom = EDGE.top + this.high;
-      Object.assign(c, {strokeStyle: this.look.rule, fillStyle: this.look.soft, lineWidth: 1, textAlign: "right", textBaseline: "middle"});
+      const {ticks, number} = OLP.colour,
+        bottom = EDGE.top + this.high;
+      Object.assign(c, {
+        strokeStyle: this.look.rule,
+        fillStyle: this.look.soft,
+        lineWidth: 1,
+        textAlign: "right",
+        textBaseline: "middle",
+      });
       for (const y of ticks(this.low, this.up, this.high / 28)) {
         const at = Math.round(this.py(y)) + 0.5;
         c.beginPath();
@@ -147,7 +187,10 @@
       c.beginPath();
       let pen = false;
       for (const [x, a, b] of columns) {
-        if (Number.isNaN(a)) { pen = false; continue; }
+        if (Number.isNaN(a)) {
+          pen = false;
+          continue;
+        }
         if (pen) c.lineTo(x, this.py(a));
         else c.moveTo(x, this.py(a));
         if (b > a) c.lineTo(x, this.py(b));
@@ -183,8 +226,12 @@
 
     draw_marks() {
       if (!this.host.clientWidth || this.up === undefined) return;
-      const c = this.prepare(this.top), {now, hover} = this.marks;
-      for (const [x, colour, dash] of [[now, this.look.accent, []], [hover, this.look.soft, [3, 3]]]) {
+      const c = this.prepare(this.top),
+        {now, hover} = this.marks;
+      for (const [x, colour, dash] of [
+        [now, this.look.accent, []],
+        [hover, this.look.soft, [3, 3]],
+      ]) {
         if (x === null || x < this.window[0] || x > this.window[1]) continue;
         const at = Math.round(this.px(x)) + 0.5;
         c.strokeStyle = colour;
@@ -199,9 +246,14 @@
     }
 
     values(c, x) {
-      const {number} = OLP.colour, rows = this.series.map(s => [s.label, s.y[Math.max(0, Math.min(s.x.length - 1, OLP.find(s.x, x)))], s.colour]).filter(r => r[1] !== undefined);
+      const {number} = OLP.colour,
+        rows = this.series
+          .map(s => [s.label, s.y[Math.max(0, Math.min(s.x.length - 1, OLP.find(s.x, x)))], s.colour])
+          .filter(r => r[1] !== undefined);
       if (!rows.length) return;
-      const wide = Math.max(...rows.map(r => c.measureText(`${r[0]}  ${number(r[1], 4)}`).width)) + 28, high = 15 * rows.length + 8, at = this.px(x);
+      const wide = Math.max(...rows.map(r => c.measureText(`${r[0]}  ${number(r[1], 4)}`).width)) + 28,
+        high = 15 * rows.length + 8,
+        at = this.px(x);
       const left = at + 10 + wide > this.host.clientWidth ? at - wide - 10 : at + 10;
       Object.assign(c, {fillStyle: this.look.panel, strokeStyle: this.look.rule, textBaseline: "middle"});
       c.beginPath();
@@ -217,36 +269,6 @@
         c.textAlign = "right";
         c.fillText(number(value, 4), left + wide - 7, y);
       });
-    }
-
-    listen() {
-      const {host, events} = this, inside = e => e.clientX - host.getBoundingClientRect().left;
-      let held = null;
-      host.addEventListener("pointermove", e => {
-        const px = inside(e);
-        if (e.target.closest("select")) return;
-        if (held && Math.abs(px - held.px) > 3) held.moved = true;
-        if (held?.moved && this.range) {
-          const shift = (held.px - px) / this.wide * (held.range[1] - held.range[0]);
-          events.zoom(this.within(held.range.map(v => v + shift)));
-        }
-        events.hover(px >= EDGE.left && px <= EDGE.left + this.wide ? this.x_at(px) : null);
-      });
-      host.addEventListener("pointerleave", () => events.hover(null));
-      host.addEventListener("pointerdown", e => { if (e.target.closest("select")) return; held = {px: inside(e), range: this.window.slice(), moved: false}; host.setPointerCapture(e.pointerId); });
-      host.addEventListener("pointerup", e => { if (held && !held.moved) events.click(this.x_at(inside(e))); held = null; });
-      host.addEventListener("dblclick", () => events.zoom(null));
-      host.addEventListener("wheel", e => {
-        e.preventDefault();
-        const x = this.x_at(inside(e)), factor = Math.exp(Math.max(-1, Math.min(1, e.deltaY / 240))), [a, b] = this.window;
-        const next = [x + (a - x) * factor, x + (b - x) * factor], whole = this.extent[1] - this.extent[0];
-        if (next[1] - next[0] > whole * 1e-7) events.zoom(next[1] - next[0] >= whole ? null : this.within(next));
-      }, {passive: false});
-    }
-
-    within([a, b]) {
-      const shift = Math.max(0, this.extent[0] - a) + Math.min(0, this.extent[1] - b);
-      return [a + shift, b + shift];
     }
   }
 

@@ -60,14 +60,39 @@ void main() {
   class Lines {
     constructor(path, order, colours) {
       this.path = path;
-      const u = this.uniforms = {};
-      const start = {size: new T.Vector2(1, 1), width: path.width, k: 0, low: 0, high: 1, cut: 1e9, first: -1, last: -1, lift: 1.5 + 1.5 * order, coloured: 0, rapids: 1, ratio: 1,
-        whole: new T.Matrix4(), colour: new T.Color(path.colour), faint: new T.Color("#999999"), accent: new T.Color("#ffb000"), colours};
+      const u = (this.uniforms = {});
+      const start = {
+        size: new T.Vector2(1, 1),
+        width: path.width,
+        k: 0,
+        low: 0,
+        high: 1,
+        cut: 1e9,
+        first: -1,
+        last: -1,
+        lift: 1.5 + 1.5 * order,
+        coloured: 0,
+        rapids: 1,
+        ratio: 1,
+        whole: new T.Matrix4(),
+        colour: new T.Color(path.colour),
+        faint: new T.Color("#999999"),
+        accent: new T.Color("#ffb000"),
+        colours,
+      };
       for (const [name, value] of Object.entries(start)) u[name] = {value};
-      this.material = new T.ShaderMaterial({glslVersion: T.GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: u, side: T.DoubleSide, transparent: true});
+      this.material = new T.ShaderMaterial({
+        glslVersion: T.GLSL3,
+        vertexShader: VERTEX,
+        fragmentShader: FRAGMENT,
+        uniforms: u,
+        side: T.DoubleSide,
+        transparent: true,
+      });
       this.mesh = new T.Mesh(new T.BufferGeometry(), this.material);
       this.mesh.frustumCulled = false;
-      this.mesh.onBeforeRender = (renderer, scene, camera) => u.whole.value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(this.mesh.matrixWorld);
+      this.mesh.onBeforeRender = (renderer, scene, camera) =>
+        u.whole.value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(this.mesh.matrixWorld);
       this.mesh.renderOrder = 10 + order;
     }
 
@@ -77,18 +102,26 @@ void main() {
       if (this.source !== path.buffer) this.allocate();
       // The range was renamed in later releases of the library; pages are built with whichever is installed.
       if (this.shared.updateRange) Object.assign(this.shared.updateRange, {offset: 0, count: path.drawn * 4 * OLP.FLOATS});
-      else { this.shared.clearUpdateRanges(); this.shared.addUpdateRange(0, path.drawn * 4 * OLP.FLOATS); }
+      else {
+        this.shared.clearUpdateRanges();
+        this.shared.addUpdateRange(0, path.drawn * 4 * OLP.FLOATS);
+      }
       this.shared.needsUpdate = true;
       mesh.geometry.setDrawRange(0, 6 * path.drawn);
       mesh.position.set(...origin);
     }
 
     allocate() {
-      const {path, mesh} = this, room = path.buffer.length / (4 * OLP.FLOATS), faces = new Uint32Array(6 * room), geometry = new T.BufferGeometry();
+      const {path, mesh} = this,
+        room = path.buffer.length / (4 * OLP.FLOATS),
+        faces = new Uint32Array(6 * room),
+        geometry = new T.BufferGeometry();
       for (let i = 0, o = 0, v = 0; i < room; i++, o += 6, v += 4) faces.set([v, v + 2, v + 1, v + 1, v + 2, v + 3], o);
       geometry.setIndex(new T.BufferAttribute(faces, 1));
       this.shared = new T.InterleavedBuffer(path.buffer, OLP.FLOATS).setUsage(T.DynamicDrawUsage);
-      ["a0", "a1", "d0", "d1"].forEach((name, j) => geometry.setAttribute(name, new T.InterleavedBufferAttribute(this.shared, 3, 3 * j)));
+      ["a0", "a1", "d0", "d1"].forEach((name, j) =>
+        geometry.setAttribute(name, new T.InterleavedBufferAttribute(this.shared, 3, 3 * j)),
+      );
       geometry.setAttribute("aux", new T.InterleavedBufferAttribute(this.shared, 4, 12));
       geometry.setAttribute("position", geometry.attributes.a0);
       mesh.geometry.dispose();

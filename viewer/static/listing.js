@@ -2,11 +2,14 @@
 // Program text, nominal beside corrected, with the file's own line numbers. Only the rows in sight exist, and the scroll
 // is scaled where a million rows would be higher than a browser can lay out. Text enters by textContent alone.
 (() => {
-  const ROW = 19, TALLEST = 8e6, SHOWN = 400;      // px, px, characters of a line in the list
+  const ROW = 19,
+    TALLEST = 8e6,
+    SHOWN = 400; // px, px, characters of a line in the list
 
   class Listing {
     constructor(app) {
-      const {listing} = app.manifest, get = name => name == null ? null : app.arrays.get(name);
+      const {listing} = app.manifest,
+        get = name => (name == null ? null : app.arrays.get(name));
       this.app = app;
       this.texts = [get(listing.nominal), get(listing.corrected)];
       this.numbers = [get(listing.row_nominal), get(listing.row_corrected)];
@@ -17,7 +20,7 @@
       this.host = document.getElementById("listing-rows");
       this.height = Math.min(this.n * ROW, TALLEST);
       this.inner.style.height = this.height + "px";
-      this.top = 0;                                  // first row in sight, may be a part
+      this.top = 0; // first row in sight, may be a part
       this.rows = [];
       this.current = this.selected = -1;
       const digits = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length;
@@ -28,16 +31,29 @@
       new ResizeObserver(() => this.paint()).observe(this.box);
     }
 
-    get scaled() { return this.n * ROW > TALLEST; }
-    get room() { return this.box.clientHeight / ROW; }
-    get highest() { return Math.max(0, this.n - this.room); }
+    get scaled() {
+      return this.n * ROW > TALLEST;
+    }
+    get room() {
+      return this.box.clientHeight / ROW;
+    }
+    get highest() {
+      return Math.max(0, this.n - this.room);
+    }
 
     heading() {
-      const head = document.getElementById("listing-head"), two = Boolean(this.texts[1]);
+      const head = document.getElementById("listing-head"),
+        two = Boolean(this.texts[1]);
       head.classList.toggle("single", !two);
-      const titles = two ? ["line", this.app.manifest.program, "line", this.app.manifest.corrected || "corrected", "µm"] : ["line", this.app.manifest.program, "µm"];
-      head.replaceChildren(...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})));
-      head.lastChild.title = this.errors[1] ? "Largest deviation of the line, before → after the correction" : "Largest deviation of the line";
+      const titles = two
+        ? ["line", this.app.manifest.program, "line", this.app.manifest.corrected || "corrected", "µm"]
+        : ["line", this.app.manifest.program, "µm"];
+      head.replaceChildren(
+        ...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})),
+      );
+      head.lastChild.title = this.errors[1]
+        ? "Largest deviation of the line, before → after the correction"
+        : "Largest deviation of the line";
     }
 
     // Line of the file at a row: side 0 nominal, 1 corrected; "" where that side has none.
@@ -46,12 +62,15 @@
       return line > 0 && this.texts[side] ? this.texts[side].line(line - 1) : "";
     }
 
-    number(row, side) { return this.numbers[side]?.[row] || ""; }
+    number(row, side) {
+      return this.numbers[side]?.[row] || "";
+    }
 
     error(row) {
-      const [before, after] = this.errors.map(e => e ? e[row] : NaN), known = v => !Number.isNaN(v) && v !== undefined;
+      const [before, after] = this.errors.map(e => (e ? e[row] : NaN)),
+        known = v => !Number.isNaN(v) && v !== undefined;
       if (!known(before) && !known(after)) return "";
-      const n = v => known(v) ? OLP.colour.number(v, v < 10 ? 2 : 3) : "–";
+      const n = v => (known(v) ? OLP.colour.number(v, v < 10 ? 2 : 3) : "–");
       return this.errors[1] ? `${n(before)} → ${n(after)}` : n(before);
     }
 
@@ -59,24 +78,29 @@
       const row = document.createElement("div");
       row.className = "row";
       row.setAttribute("role", "option");
-      row.cells = ["number", "code", "number", "code", "error"].map(name => row.appendChild(Object.assign(document.createElement("span"), {className: name})));
+      row.cells = ["number", "code", "number", "code", "error"].map(name =>
+        row.appendChild(Object.assign(document.createElement("span"), {className: name})),
+      );
       if (!this.texts[1]) row.cells[2].hidden = row.cells[3].hidden = true;
       this.host.append(row);
       return row;
     }
 
     paint() {
-      const first = Math.max(0, Math.floor(this.top)), count = Math.min(this.n - first, Math.ceil(this.room) + 1);
+      const first = Math.max(0, Math.floor(this.top)),
+        count = Math.min(this.n - first, Math.ceil(this.room) + 1);
       while (this.rows.length < count) this.rows.push(this.make_row());
       this.rows.forEach((row, i) => {
         row.hidden = i >= count;
         if (row.hidden) return;
-        const k = first + i, [a, b, c, d, e] = row.cells;
+        const k = first + i,
+          [a, b, c, d, e] = row.cells;
         row.style.transform = `translateY(${(k - this.top) * ROW}px)`;
         if (row.k !== k) {
           row.k = k;
           row.dataset.row = k;
-          const nominal = this.text(k, 0), corrected = this.texts[1] ? this.text(k, 1) : "";
+          const nominal = this.text(k, 0),
+            corrected = this.texts[1] ? this.text(k, 1) : "";
           a.textContent = this.number(k, 0);
           b.textContent = nominal.slice(0, SHOWN);
           if (this.texts[1]) {
@@ -101,9 +125,13 @@
 
     // The corrected line with what differs from the nominal one marked.
     show_change(cell, nominal, corrected) {
-      const old = nominal.slice(0, SHOWN), text = corrected.slice(0, SHOWN);
+      const old = nominal.slice(0, SHOWN),
+        text = corrected.slice(0, SHOWN);
       cell.textContent = "";
-      if (old === text || !old) { cell.textContent = text; return; }
+      if (old === text || !old) {
+        cell.textContent = text;
+        return;
+      }
       const words = new Set(old.split(/(?<=\S)\s+|(?=[A-Z(;])/).map(w => w.trim()));
       for (const part of text.split(/(?=\s)|(?=[A-Z(;])/)) {
         const changed = part.trim() && !words.has(part.trim());
@@ -114,7 +142,7 @@
     scroll_to(top) {
       this.top = Math.max(0, Math.min(this.highest, top));
       const span = this.height - this.box.clientHeight;
-      this.told = this.scaled ? this.top / Math.max(1e-9, this.highest) * span : this.top * ROW;
+      this.told = this.scaled ? (this.top / Math.max(1e-9, this.highest)) * span : this.top * ROW;
       this.box.scrollTop = this.told;
       this.told = this.box.scrollTop;
       this.paint();
@@ -130,20 +158,31 @@
       this.box.addEventListener("scroll", () => {
         if (this.box.scrollTop === this.told) return;
         const span = this.height - this.box.clientHeight;
-        this.top = this.scaled ? this.box.scrollTop / Math.max(1, span) * this.highest : this.box.scrollTop / ROW;
+        this.top = this.scaled ? (this.box.scrollTop / Math.max(1, span)) * this.highest : this.box.scrollTop / ROW;
         this.paint();
       });
-      this.box.addEventListener("wheel", e => {
-        if (!this.scaled) return;                    // a scaled scroll would leap over thousands of rows
-        e.preventDefault();
-        this.scroll_to(this.top + e.deltaY / ROW);
-      }, {passive: false});
+      this.box.addEventListener(
+        "wheel",
+        e => {
+          if (!this.scaled) return; // a scaled scroll would leap over thousands of rows
+          e.preventDefault();
+          this.scroll_to(this.top + e.deltaY / ROW);
+        },
+        {passive: false},
+      );
       this.host.addEventListener("click", e => {
         const row = e.target.closest(".row");
         if (row) this.app.select_row(+row.dataset.row);
       });
       this.box.addEventListener("keydown", e => {
-        const step = {ArrowDown: 1, ArrowUp: -1, PageDown: Math.floor(this.room), PageUp: -Math.floor(this.room), Home: -this.n, End: this.n}[e.key];
+        const step = {
+          ArrowDown: 1,
+          ArrowUp: -1,
+          PageDown: Math.floor(this.room),
+          PageUp: -Math.floor(this.room),
+          Home: -this.n,
+          End: this.n,
+        }[e.key];
         if (!step) return;
         e.preventDefault();
         e.stopPropagation();
@@ -152,14 +191,20 @@
     }
 
     // Row of a 1-based line of the nominal (0) or corrected (1) file, or -1.
-    row_of_line(line, side = 0) { return this.numbers[side] ? this.numbers[side].indexOf(line) : -1; }
+    row_of_line(line, side = 0) {
+      return this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
+    }
 
     // Next row after `from` with the text on either side, going round; -1 where there is none.
     search(text, from) {
       const wanted = text.toLowerCase();
       for (let step = 1; step <= this.n; step++) {
         const row = (from + step + this.n) % this.n;
-        if (this.text(row, 0).toLowerCase().includes(wanted) || (this.texts[1] && this.text(row, 1).toLowerCase().includes(wanted))) return row;
+        if (
+          this.text(row, 0).toLowerCase().includes(wanted) ||
+          (this.texts[1] && this.text(row, 1).toLowerCase().includes(wanted))
+        )
+          return row;
       }
       return -1;
     }

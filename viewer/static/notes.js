@@ -1,7 +1,8 @@
 "use strict";
 // Notes on points of the path; saving the page with them; a view in the address.
 (() => {
-  const $ = id => document.getElementById(id), make = (...a) => OLP.make(...a);
+  const $ = id => document.getElementById(id),
+    make = (...a) => OLP.make(...a);
 
   class Notes {
     constructor(app) {
@@ -19,7 +20,8 @@
     }
 
     ask() {
-      const {app} = this, line = app.listing.number(app.state.row, 0);
+      const {app} = this,
+        line = app.listing.number(app.state.row, 0);
       $("note-where").textContent = `${line ? `line ${line}, ` : ""}${app.state.time.toFixed(3)} s`;
       $("note-text").value = "";
       $("note").returnValue = "";
@@ -43,27 +45,55 @@
     }
 
     list() {
-      const {app} = this, {callouts} = app.state;
+      const {app} = this,
+        {callouts} = app.state;
       $("callouts-count").textContent = callouts.length || "";
-      $("callouts").replaceChildren(...callouts.map((note, i) => {
-        const go = make("button", {className: "finding info", onclick: () => { app.set_sample(note.sample); app.select_row(app.row_at(), true); app.camera.reveal(app.tool_point()); }}, make("b", {textContent: i + 1}), make("span", {textContent: note.text}));
-        return make("div", {className: "note"}, go, make("button", {className: "icon", title: "Remove", textContent: "✕", onclick: () => this.remove(i)}));
-      }));
-      if (!callouts.length) $("callouts").append(make("p", {className: "empty", textContent: "None yet. C writes one on the current point; Save keeps them in the file."}));
+      $("callouts").replaceChildren(
+        ...callouts.map((note, i) => {
+          const go = make(
+            "button",
+            {
+              className: "finding info",
+              onclick: () => {
+                app.set_sample(note.sample);
+                app.select_row(app.row_at(), true);
+                app.camera.reveal(app.tool_point());
+              },
+            },
+            make("b", {textContent: i + 1}),
+            make("span", {textContent: note.text}),
+          );
+          return make(
+            "div",
+            {className: "note"},
+            go,
+            make("button", {className: "icon", title: "Remove", textContent: "✕", onclick: () => this.remove(i)}),
+          );
+        }),
+      );
+      if (!callouts.length)
+        $("callouts").append(
+          make("p", {
+            className: "empty",
+            textContent: "None yet. C writes one on the current point; Save keeps them in the file.",
+          }),
+        );
     }
 
     // The page as it was sent, with the notes of now in its manifest.
     html() {
-      const {head, body} = OLP.shell, scripts = [...document.querySelectorAll("body > script")].slice(1);
+      const {head, body} = OLP.shell,
+        scripts = [...document.querySelectorAll("body > script")].slice(1);
       const manifest = JSON.stringify({...this.app.manifest, callouts: this.app.state.callouts}).replaceAll("<", "\\u003c");
       const open = '<script type="application/json" id="olp-manifest">';
-      const parts = scripts.map(s => s.id === "olp-manifest" ? open + manifest + "</" + "script>" : s.outerHTML);
+      const parts = scripts.map(s => (s.id === "olp-manifest" ? open + manifest + "</" + "script>" : s.outerHTML));
       return `<!DOCTYPE html>\n<html lang="en">\n${head}\n<body>${body}\n${parts.join("\n")}\n</body>\n</html>\n`;
     }
 
     save() {
       const name = `${(this.app.manifest.program || "review").replace(/[^\w.-]+/g, "-").replace(/\.\w+$/, "")}-review.html`;
-      const address = URL.createObjectURL(new Blob([this.html()], {type: "text/html"})), link = make("a", {href: address, download: name});
+      const address = URL.createObjectURL(new Blob([this.html()], {type: "text/html"})),
+        link = make("a", {href: address, download: name});
       link.click();
       setTimeout(() => URL.revokeObjectURL(address), 10000);
       this.app.toast(`Saved as ${name}`, 4000);
@@ -72,14 +102,27 @@
     view() {
       const {state, scale, camera} = this.app;
       return {
-        time: state.time, span: state.span, exaggeration: state.exaggeration, metric: state.metric, layers: state.layers, theme: state.theme, callouts: state.callouts, camera: camera.save(),
+        time: state.time,
+        span: state.span,
+        exaggeration: state.exaggeration,
+        metric: state.metric,
+        layers: state.layers,
+        theme: state.theme,
+        callouts: state.callouts,
+        camera: camera.save(),
         scale: {min: scale.min, max: scale.max, mode: scale.mode, map: scale.map, tolerance: scale.tolerance},
       };
     }
 
     hash() {
       const bytes = new TextEncoder().encode(JSON.stringify(this.view()));
-      return "#view=" + btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+      return (
+        "#view=" +
+        btoa(String.fromCharCode(...bytes))
+          .replaceAll("+", "-")
+          .replaceAll("/", "_")
+          .replaceAll("=", "")
+      );
     }
 
     share() {

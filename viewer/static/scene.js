@@ -1,20 +1,26 @@
 "use strict";
 // MeshCat's viewer with our paths in it: what is drawn, when, and where a point lands on the screen.
 (() => {
-  const T = MeshCat.THREE, MM = 0.001;          // the viewer's scene is in metres
-  const BUDGET = {start: 90000, least: 20000, most: 400000, slow: 140, fast: 40};     // segments of all layers; ms of a frame
+  const T = MeshCat.THREE,
+    MM = 0.001; // the viewer's scene is in metres
+  const BUDGET = {start: 90000, least: 20000, most: 400000, slow: 140, fast: 40}; // segments of all layers; ms of a frame
 
   class Scene {
     constructor(app, pane) {
       this.app = app;
       this.pane = pane;
       const graphics = OLP.graphics();
-      this.viewer = new MeshCat.Viewer(pane, true, graphics === "none" ? OLP.flat_renderer(pane) : OLP.gl_renderer(pane, graphics === "hardware"));
+      this.viewer = new MeshCat.Viewer(
+        pane,
+        true,
+        graphics === "none" ? OLP.flat_renderer(pane) : OLP.gl_renderer(pane, graphics === "hardware"),
+      );
       this.flat = Boolean(this.viewer.renderer.flat);
-      this.viewer.gui.domElement.hidden = true;   // its scene tree goes on writing to it
-      this.viewer.set_property(["Background"], "visible", false);        // the page's own shows through, at no cost
-      window.onload = null;                     // the viewer takes it over to size itself by the window
-      for (const path of [["Grid"], ["Axes"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"]]) this.viewer.set_property(path, "visible", false);
+      this.viewer.gui.domElement.hidden = true; // its scene tree goes on writing to it
+      this.viewer.set_property(["Background"], "visible", false); // the page's own shows through, at no cost
+      window.onload = null; // the viewer takes it over to size itself by the window
+      for (const path of [["Grid"], ["Axes"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"]])
+        this.viewer.set_property(path, "visible", false);
       const light = new T.DirectionalLight(0xffffff, 0.55);
       light.position.set(1, -2, 3);
       this.viewer.set_object(["Lights", "olp"], light);
@@ -75,18 +81,31 @@
 
     // What projects a point (mm) to the pane: clip matrix, pane size, px per (mm / depth), exaggeration.
     view(k) {
-      const camera = this.viewer.camera, {clientWidth: w, clientHeight: h} = this.pane;
+      const camera = this.viewer.camera,
+        {clientWidth: w, clientHeight: h} = this.pane;
       this.root.updateWorldMatrix(true, false);
       camera.updateMatrixWorld();
-      const clip = new T.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(this.root.matrixWorld).elements;
-      return {clip, w, h, k, scale: camera.projectionMatrix.elements[5] * h / 2 * MM, ortho: Boolean(camera.isOrthographicCamera)};
+      const clip = new T.Matrix4()
+        .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
+        .multiply(this.root.matrixWorld).elements;
+      return {
+        clip,
+        w,
+        h,
+        k,
+        scale: ((camera.projectionMatrix.elements[5] * h) / 2) * MM,
+        ortho: Boolean(camera.isOrthographicCamera),
+      };
     }
 
     // Pixel of the pane where the point (mm) lands, or null behind the eye.
     project([x, y, z], {clip: e, w, h} = this.view(0)) {
       const v = e[3] * x + e[7] * y + e[11] * z + e[15];
       if (v < 1e-6) return null;
-      return [((e[0] * x + e[4] * y + e[8] * z + e[12]) / v + 1) / 2 * w, (1 - (e[1] * x + e[5] * y + e[9] * z + e[13]) / v) / 2 * h];
+      return [
+        (((e[0] * x + e[4] * y + e[8] * z + e[12]) / v + 1) / 2) * w,
+        ((1 - (e[1] * x + e[5] * y + e[9] * z + e[13]) / v) / 2) * h,
+      ];
     }
 
     // Nearest place on a drawn path to a pixel of the pane; layers above win ties.
@@ -113,9 +132,10 @@
       if (!this.pane.clientWidth || !this.app.camera) return;
       this.origin = this.app.camera.target_mm();
       const shown = [...this.lines.values()].filter(l => l.path.visible);
-      const wanted = shown.map(l => l.path.demand(this.view(l.uniforms.k.value))), all = wanted.reduce((a, b) => a + b, 0);
+      const wanted = shown.map(l => l.path.demand(this.view(l.uniforms.k.value))),
+        all = wanted.reduce((a, b) => a + b, 0);
       shown.forEach((lines, i) => {
-        const cap = Math.max(256, all > this.budget ? Math.floor(this.budget * wanted[i] / all) : Math.ceil(wanted[i] * 1.1));
+        const cap = Math.max(256, all > this.budget ? Math.floor((this.budget * wanted[i]) / all) : Math.ceil(wanted[i] * 1.1));
         lines.path.fill(cap, wanted[i], this.origin, this.app.state.span);
         lines.send(this.origin);
       });
@@ -147,7 +167,9 @@
       return performance.now() - start;
     }
 
-    get drawn() { return Object.fromEntries([...this.lines].map(([name, {path}]) => [name, path.visible ? path.drawn : 0])); }
+    get drawn() {
+      return Object.fromEntries([...this.lines].map(([name, {path}]) => [name, path.visible ? path.drawn : 0]));
+    }
   }
 
   OLP.Scene = Scene;

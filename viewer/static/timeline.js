@@ -2,10 +2,12 @@
 // Play, scrub, rate and steps on the re-timed time.
 (() => {
   const $ = id => document.getElementById(id);
-  const LONGEST_FRAME = 0.25;                       // s: a page that slept does not leap
+  const LONGEST_FRAME = 0.25; // s: a page that slept does not leap
 
   function clock(s) {
-    const minutes = Math.floor(s / 60), hours = Math.floor(minutes / 60), seconds = (s - 60 * minutes).toFixed(3).padStart(6, "0");
+    const minutes = Math.floor(s / 60),
+      hours = Math.floor(minutes / 60),
+      seconds = (s - 60 * minutes).toFixed(3).padStart(6, "0");
     return hours ? `${hours}:${String(minutes % 60).padStart(2, "0")}:${seconds}` : `${minutes}:${seconds}`;
   }
 
@@ -46,7 +48,10 @@
     show() {
       const {state, end} = this.app;
       this.bar.value = state.time;
-      this.bar.style.setProperty("--done", `${100 * (state.time - this.app.time[0]) / Math.max(1e-9, end - this.app.time[0])}%`);
+      this.bar.style.setProperty(
+        "--done",
+        `${(100 * (state.time - this.app.time[0])) / Math.max(1e-9, end - this.app.time[0])}%`,
+      );
       $("time-value").textContent = `${clock(state.time)} / ${clock(end)}`;
     }
   }

@@ -18,14 +18,17 @@
   // Quantised, differenced along each column, byte planes; `plus` are arrays whose values come on top. Sums are whole
   // numbers in float64: exact, and free to pass the range of int32.
   function undifference({n, c, q, off}, bytes, plus) {
-    const m = n * c, out = new Float64Array(m);
-    const p0 = bytes.subarray(off, off + m), p1 = bytes.subarray(off + m, off + 2 * m);
-    const p2 = bytes.subarray(off + 2 * m, off + 3 * m), p3 = bytes.subarray(off + 3 * m, off + 4 * m);
-    const steps = Math.round(1 / q);        // a power of ten: dividing by it gives the double nearest the decimal value
+    const m = n * c,
+      out = new Float64Array(m);
+    const p0 = bytes.subarray(off, off + m),
+      p1 = bytes.subarray(off + m, off + 2 * m);
+    const p2 = bytes.subarray(off + 2 * m, off + 3 * m),
+      p3 = bytes.subarray(off + 3 * m, off + 4 * m);
+    const steps = Math.round(1 / q); // a power of ten: dividing by it gives the double nearest the decimal value
     for (let j = 0, k = 0; j < c; j++) {
       let sum = 0;
       for (let i = 0, o = j; i < n; i++, k++, o += c) {
-        sum += p0[k] | p1[k] << 8 | p2[k] << 16 | p3[k] << 24;
+        sum += p0[k] | (p1[k] << 8) | (p2[k] << 16) | (p3[k] << 24);
         let whole = sum;
         for (const other of plus) whole += Math.round(other[o] * steps);
         out[o] = whole / steps;
@@ -45,18 +48,22 @@
       this.starts.fill(bytes.length + 1, row);
       this.decoder = new TextDecoder();
     }
-    line(i) { return i < 0 || i >= this.n ? "" : this.decoder.decode(this.bytes.subarray(this.starts[i], this.starts[i + 1] - 1)); }
+    line(i) {
+      return i < 0 || i >= this.n ? "" : this.decoder.decode(this.bytes.subarray(this.starts[i], this.starts[i + 1] - 1));
+    }
   }
 
-  const points = text => /[\ud800-\udfff]/.test(text) ? Array.from(text) : text;
-  const joined = part => typeof part === "string" ? part : part.join("");
+  const points = text => (/[\ud800-\udfff]/.test(text) ? Array.from(text) : text);
+  const joined = part => (typeof part === "string" ? part : part.join(""));
 
   // Lines of a second text as changes to the lines of a first.
   class Patch {
     constructor(arrays, spec) {
       this.n = spec.n;
       this.base = arrays.get(spec.of);
-      [this.from, this.prefix, this.suffix, this.middle] = [spec.from, spec.prefix, spec.suffix, spec.middle].map(a => arrays.get(a));
+      [this.from, this.prefix, this.suffix, this.middle] = [spec.from, spec.prefix, spec.suffix, spec.middle].map(a =>
+        arrays.get(a),
+      );
     }
     line(i) {
       if (i < 0 || i >= this.n) return "";
@@ -72,14 +79,21 @@
       this.bytes = bytes;
       this.known = new Map();
     }
-    has(name) { return name != null && Object.hasOwn(this.specs, name); }
+    has(name) {
+      return name != null && Object.hasOwn(this.specs, name);
+    }
     get(name) {
       if (!this.has(name)) throw new Error(`no array ${name} in this page`);
       if (!this.known.has(name)) this.known.set(name, this.decode(this.specs[name]));
       return this.known.get(name);
     }
     decode(spec) {
-      if (spec.enc === "qd") return undifference(spec, this.bytes, (spec.plus ?? []).map(name => this.get(name)));
+      if (spec.enc === "qd")
+        return undifference(
+          spec,
+          this.bytes,
+          (spec.plus ?? []).map(name => this.get(name)),
+        );
       if (spec.enc === "raw") return new TYPES[spec.dtype](this.bytes.buffer, this.bytes.byteOffset + spec.off, spec.n * spec.c);
       if (spec.enc === "patch") return new Patch(this, spec);
       if (spec.enc === "text") return new Lines(this.bytes.subarray(spec.off, spec.off + spec.bytes), spec.n);
