@@ -6,6 +6,7 @@
   OLP.emit = event => (listeners.get(event) ?? []).forEach(call => call());
 
   const AXES = {light: ["#c8500a", "#00805d", "#0068a8"], dark: ["#ff9a5c", "#4fd0a5", "#6cbcf5"]};
+  OLP.NEUTRAL = "#77818d";
   const JUDGED = ["measured", "result", "uncorrected", "corrected"];
   const RANKED = 500;
 
@@ -186,9 +187,18 @@
         path.values = this.metrics.values(metric, path.name);
         uniforms.coloured.value = path.values ? 1 : 0;
       }
+      this.paint();
       this.scale.use(metric);
       this.scene.schedule(0);
       OLP.emit("metric");
+    }
+
+    // Layers have colours of their own only while no metric has the say: then those without its values step back.
+    paint() {
+      const metric = this.metrics.find(this.state.metric);
+      for (const {path, uniforms} of this.scene.lines.values())
+        uniforms.colour.value.set(metric && !path.values ? OLP.colour.readable(OLP.NEUTRAL, this.state.theme) : path.colour);
+      this.scene.viewer.set_dirty();
     }
 
     // What the plots show while paths have the colours of their layers.

@@ -2,7 +2,6 @@
 // Puts the page together; what goes wrong is told in the page itself.
 (() => {
   const $ = id => document.getElementById(id);
-  const NEUTRAL = "#77818d";
   const SHARE = 0.03; // of the size of the job that the largest deviation is enlarged to
 
   // Corners of what the feed moves of the base path span, and the radius round their middle that holds all else.
@@ -75,8 +74,8 @@
     app.set_theme = theme => {
       app.state.theme = document.documentElement.dataset.theme = theme;
       const style = getComputedStyle(document.documentElement);
-      for (const {path, uniforms} of app.scene.lines.values())
-        uniforms.colour.value.set((path.colour = OLP.colour.readable(path.given, theme)));
+      for (const path of app.layers.values()) path.colour = OLP.colour.readable(path.given, theme);
+      app.paint();
       for (const {uniforms} of app.scene.lines.values()) {
         uniforms.faint.value.set(style.getPropertyValue("--rapid").trim());
         uniforms.accent.value.set(style.getPropertyValue("--accent").trim());
@@ -133,7 +132,7 @@
     const app = new OLP.App(manifest, await OLP.unpack(manifest, $("olp-data").textContent.trim()));
     app.scene = new OLP.Scene(app, $("pane"));
     [...app.layers.values()].forEach((path, order) => {
-      path.given = path.D ? path.colour : NEUTRAL; // the palette owns the colours
+      path.given = path.D ? path.colour : OLP.NEUTRAL; // the palette owns the colours
       app.state.layers[path.name] = path.visible;
       app.scene.add_path(path, order);
     });
