@@ -127,16 +127,15 @@ def test_refusals_name_file_and_line(job: Path) -> None:
 
 def test_correct_writes_the_page_of_what_it_wrote(job: Path) -> None:
     out, page = job / "good.ngc", job / "review.html"
-    result = run("correct", "-j", job / "job.toml", "-o", out, "--review", page, "-q")
-    assert result.exit_code == 0, result.stderr
+    done = run("correct", "-j", job / "job.toml", "-o", out, "--review", page, "-q")
+    assert done.exit_code == 0, done.stderr
     found = Page(page.read_bytes())
     assert found.manifest["corrected"] == "good.ngc"
     assert found.manifest["time_source"] == "retimed"
     assert found.array("text_corrected") == out.read_text().rstrip("\n").split("\n")
-    expected = olp.view(
-        job / "modal.ngc", olp.load_setup(None, job / "job.toml"), correction=olp.correct(job / "modal.ngc", job / "machine.toml"),
-        corrected_name=str(out),
-    )  # fmt: skip
+    setup = olp.load_setup(None, job / "job.toml")
+    result = olp.correct(job / "modal.ngc", setup)
+    expected = olp.view(job / "modal.ngc", setup, correction=result, corrected_name=str(out))
     assert page.read_bytes() == expected.html()
 
 

@@ -119,7 +119,7 @@ def test_a_fine_mesh_is_drawn_coarser(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 @pytest.mark.parametrize("chain", CHAINS)
 def test_nodes_bring_the_tool_to_the_tip(chain: str, tmp_path: Path) -> None:
-    """Whatever carries what: the tool's body, moved by the nodes above it, ends at the tip, wherever that is."""
+    """Whatever carries what: the tool's body, moved by the nodes above it, ends at the tip."""
     tools = {1: {"Z_mm": 120.0, "radius_mm": 5.0}}
     machine = zero_machine(tmp_path / "m", Recipe(chain=chain, tools=tools))
     page = page_of(tmp_path, machine)

@@ -1,4 +1,4 @@
-"""The page: one file under a strict policy, in which no program becomes script; its size; what it says of the job."""
+"""The page: one file under a strict policy, in which no program becomes script; its size; what it says."""
 
 from __future__ import annotations
 

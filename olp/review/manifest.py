@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.deviation import cutting_moves
 from olp.errormodel.base import Array
 from olp.findings import RULES
 from olp.review.listing import largest
@@ -240,9 +241,9 @@ def _size(delta: Array) -> Array:
 
 
 def _deviations(scene: Scene) -> Iterator[tuple[str, Array, npt.NDArray[np.bool_]]]:
-    """(layer, (n,) um, (n,) whether the sample is on a feed move) of what the tip does."""
+    """(layer, (n,) um, (n,) whether the sample is on a move whose path counts) of what the tip does."""
     samples = scene.samples
-    feed = scene.nominal.toolpath.kind[samples.move] != Kind.RAPID
+    feed = cutting_moves(scene.nominal.toolpath)[samples.move]
     yield "uncorrected", _size(samples.uncorrected) * UM_PER_MM, feed
     yield "result", _size(samples.result) * UM_PER_MM, feed
     for k, measured in enumerate(scene.measured):
@@ -295,7 +296,7 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _callouts(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The worst point before and after, on feed moves."""
+    """The worst point before and after, on moves whose path counts."""
     lines = scene.nominal.toolpath.line[scene.samples.move]
     for layer, value, feed in _deviations(scene):
         if layer not in ("uncorrected", "result") or not feed.any():

@@ -1,4 +1,4 @@
-"""Measured points on the nominal path, each at the place that it was measured at, in the order of the path."""
+"""Measured points on the nominal path: each to the place where it was taken, in the order of the path."""
 
 from __future__ import annotations
 
