@@ -114,6 +114,17 @@ class Machine:
 
 
 @dataclass(frozen=True, slots=True)
+class Mesh:
+    """A mesh that a review shows: a file, what it stands for, the work offset that places it or "machine",
+    and the length of its unit."""
+
+    file: str
+    role: Literal["workpiece", "fixture", "machine"]
+    frame: str = "machine"
+    unit_mm: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """What changes per job. `work_offsets` and `tools` override the machine's, one by one."""
 
@@ -124,6 +135,7 @@ class Job:
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
+    meshes: tuple[Mesh, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

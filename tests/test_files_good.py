@@ -17,7 +17,7 @@ from olp.files.fields import CONTROLLERS
 from olp.files.starter import machine_toml, starter_machine, starter_set, write_starter
 from olp.files.tables import parse_curves
 from olp.files.toml_text import key_lines, read_toml, toml_value
-from olp.machine import CHAINS, COMPONENTS, SQUARENESS, Axis, Job, Machine, Setup, Tool, WorkOffset
+from olp.machine import CHAINS, COMPONENTS, SQUARENESS, Axis, Job, Machine, Mesh, Setup, Tool, WorkOffset
 from olp.program.profiles import PROFILES
 
 GOOD = Path(__file__).parent / "broken" / "good"
@@ -60,6 +60,7 @@ def test_job_file_fills_every_value() -> None:
         temperatures_degC={"X_scale": 21.4, "workpiece": 22.0},
         work_offsets={"G54": WorkOffset("G54", (101.0, 0.0, 0.0), touch_tool=7)},
         tools={7: Tool(7, (0.0, 0.0, 121.2))},
+        meshes=(Mesh(str(GOOD / "fixture.stl"), "fixture", "G54"),),
     )
 
 

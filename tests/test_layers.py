@@ -27,11 +27,11 @@ LAYERS = (
     {"report", "plots"},
     {"report_time", "plots_time"},
     {"files"},
-    {"review"},
     {"loading"},
     {"replanning"},
     {"correction", "retiming"},
     {"api"},
+    {"review"},
     {"cli"},
 )
 ROW = {name: row for row, names in enumerate(LAYERS) for name in names}

@@ -16,6 +16,7 @@ LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "retime", "inspect", "error_at", "flatten", "load_setup"),
     *("Correction", "Verification", "Simulation", "Retiming", "Finding"),
+    *("view", "Review", "add_layers"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

@@ -6,16 +6,16 @@ ConfigError with all problems of the file where it is wrong; both end the comman
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path as FilePath
 
 from olp.exceptions import UsageError
 from olp.files.calibration import load_calibration
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schemas import JobFile, MachineFile, MeshTable, Tools, WorkOffsets
+from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.machine import Axis, Job, Machine, Setup, Tool, Vector, WorkOffset
+from olp.machine import Axis, Job, Machine, Mesh, Setup, Tool, Vector, WorkOffset
 from olp.units import AXES
 
 __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
@@ -27,7 +27,7 @@ def load_machine(path: PathLike) -> Machine:
 
 
 def load_job(path: PathLike) -> Job:
-    """The job of an olp-job-1 file; `program` and `machine` become paths that can be opened."""
+    """The job of an olp-job-1 file; `program`, `machine` and meshes become paths that can be opened."""
     return _read_job(path)[0]
 
 
@@ -37,7 +37,7 @@ def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None =
     Refuses names that neither file defines: the tool at the start, touch tools, frames of meshes. Raises
     UsageError where no machine file is named anywhere.
     """
-    job, meshes, job_lines = _read_job(job_path) if job_path is not None else (Job(), (), {})
+    job, job_lines = _read_job(job_path) if job_path is not None else (Job(), {})
     machine_path = machine_path if machine_path is not None else job.machine
     if machine_path is None:
         what = f"{job_path} names no machine" if job_path is not None else "no machine file is given"
@@ -50,7 +50,7 @@ def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None =
     if found:
         raise config_error(found, str(machine_path))
     found = _undefined_tools(setup, job.work_offsets, job_lines)
-    for index, mesh in enumerate(meshes):
+    for index, mesh in enumerate(job.meshes):
         if mesh.frame != "machine" and setup.work_offset(mesh.frame) is None:
             key: Path = ("meshes", index, "frame")
             sentence = (
@@ -104,13 +104,15 @@ def _compliance(stated: float | Vector, axis: int) -> Vector:
     return (own[0], own[1], own[2])
 
 
-def _read_job(path: PathLike) -> tuple[Job, Sequence[MeshTable], Mapping[Path, int]]:
+def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
     values, lines = read_toml(read_bytes(path), str(path))
     file = validate(JobFile, values, lines, str(path))
     missing: list[Problem] = []
+    meshes = []
     for index, mesh in enumerate(file.meshes):
-        where = beside(path, mesh.file)
-        if where is None or not FilePath(where).is_file():
+        where = str(beside(path, mesh.file))
+        meshes.append(Mesh(where, mesh.role, mesh.frame, mesh.unit_mm))
+        if not FilePath(where).is_file():
             key: Path = ("meshes", index, "file")
             sentence = (
                 f'{dotted(key)} = "{mesh.file}" is no file here; expected a path relative to the job file'
@@ -126,8 +128,9 @@ def _read_job(path: PathLike) -> tuple[Job, Sequence[MeshTable], Mapping[Path, i
         temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
+        meshes=tuple(meshes),
     )
-    return job, file.meshes, lines
+    return job, lines
 
 
 def _work_offsets(tables: WorkOffsets) -> dict[str, WorkOffset]:

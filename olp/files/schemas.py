@@ -335,6 +335,10 @@ class MeshTable(Table):
     frame: Text = Field(
         default="machine", description='the work offset that places the mesh, such as "G54", or "machine"'
     )
+    unit_mm: Positive = Field(
+        default=1.0,
+        description="the length of the unit of the mesh, in mm: 25.4 for inches, 1000.0 for metres",
+    )
 
 
 class JobFile(Table):
