@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from olp.gate import check as check
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
+    from olp.review.job import Review as Review
+    from olp.review.job import view as view
+    from olp.review.notebook import add_layers as add_layers
 
 _HOME = {
     "Check": "olp.gate",
@@ -47,6 +50,9 @@ _HOME = {
     "flatten": "olp.api",
     "inspect": "olp.api",
     "retime": "olp.retiming",
+    "Review": "olp.review.job",
+    "view": "olp.review.job",
+    "add_layers": "olp.review.notebook",
     "Retiming": "olp.retiming",
     "simulate": "olp.api",
     "verify": "olp.api",

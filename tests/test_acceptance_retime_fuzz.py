@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from judge import linuxcnc, retime_fuzz
+import retime_fuzz
+from judge import linuxcnc
 from test_acceptance_linuxcnc import samples, spacious
 from test_programs_folder import FOLDER, JOBS
 
@@ -18,17 +20,18 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> olp.Setup:
     return retime_fuzz.setup(tmp_path_factory.mktemp("fuzz"))
 
 
-def faults(seeds: range, base: olp.Setup) -> dict[int, tuple[str, ...]]:
+def faults(seeds: Iterable[int], base: olp.Setup) -> dict[int, tuple[str, ...]]:
     found = {seed: retime_fuzz.outcome(seed, base).wrong for seed in seeds}
     return {seed: wrong for seed, wrong in found.items() if wrong}
 
 
 def test_random_programs_keep_every_limit(base: olp.Setup) -> None:
-    assert faults(range(10), base) == {}
+    # three whose optimum once ran out of digits
+    assert faults([*range(8), 13, 323, 331], base) == {}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(12))
+@pytest.mark.parametrize("block", range(6))
 def test_random_programs_keep_every_limit_at_length(block: int, base: olp.Setup) -> None:
     """More of them: tests/benchmarks/fuzz_retime.py."""
     assert faults(range(100 + 25 * block, 125 + 25 * block), base) == {}

@@ -29,12 +29,12 @@ LAYERS = (
     {"report", "plots"},
     {"report_time", "plots_time", "report_check"},
     {"files"},
-    {"review"},
     {"loading"},
     {"replanning"},
     {"correction", "retiming"},
     {"gate"},
     {"api"},
+    {"review"},
     {"cli"},
 )
 ROW = {name: row for row, names in enumerate(LAYERS) for name in names}

@@ -16,6 +16,7 @@ LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "inspect", "error_at", "flatten", "load_setup"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Finding"),
+    *("view", "Review", "add_layers"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from trajectory_cases import far_from
 
 from olp.exceptions import UsageError
 from olp.trajectory.audit import audit, slowing
+from olp.trajectory.critical import critical
 from olp.trajectory.deviation import deviation_bound, path_deviation
 from olp.trajectory.extremes import largest, nodes
 from olp.trajectory.motion import Motion
 from olp.trajectory.overlap import overlap_parts
 from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.smooth import smooth
 
 LIMITS = AxisLimits(np.array([50.0, 40.0, 30.0]), np.array([500.0, 300.0, 200.0]), np.array([5e3, 4e3, 3e3]))
 number = st.floats(-10.0, 10.0)
@@ -150,6 +153,40 @@ def test_a_search_finds_no_less_than_the_known_segments(seed, count):
     near = np.full(len(parts.motion), 0.05 * (1 + 1e-6))
     assert np.all(deviation_bound(parts.motion, route, parts.segment, near) <= near)
     assert path_deviation(parts.motion, route).max() <= 0.05 * (1 + 1e-6)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 10**6), st.integers(3, 60))
+def test_no_place_is_farther_than_the_bound(seed, count):
+    random = np.random.default_rng(seed)
+    points = np.cumsum(random.normal(0.0, 1.0, (count, 3)) * random.choice([1.0, 0.1], (count, 1)), axis=0)
+    route = route_of(points)
+    parts = overlap_parts(route, LIMITS)
+    bent = critical(smooth(route, LIMITS), LIMITS)
+    for motion, segment in ((parts.motion, parts.segment), (bent, bent.line)):
+        near = random.choice([0.0, 0.02, 0.05], len(motion))
+        bound = deviation_bound(motion, route, segment, near)
+        piece = np.repeat(np.arange(len(motion)), 11)
+        share = np.tile(np.linspace(0.0, 1.0, 11), len(motion))
+        place = motion.of(piece, share * np.diff(motion.start_s)[piece])[0]
+        away = far_from(points, place, segment[piece], around=2)
+        assert np.all(away <= bound[piece] + 1e-12)
+        # halves and eighths are held against segments as wholes: a bound is no guess far off
+        assert np.all(bound <= 0.05 * (1 + 1e-6))
+
+
+def test_motions_are_joined():
+    one = motion_of([[0, 1, 0, 0]], np.ones((1, 4, 3)), [2.0])
+    high = motion_of([[0, 1, 0, 0, 0.5, 0.25]], 2 * np.ones((1, 4, 3)), [1.0])
+    whole = Motion.joined([one.shifted(3.0), high, one])
+    assert whole.start_s.tolist() == [0.0, 2.0, 3.0, 5.0]
+    for start, part in ((0.0, one), (2.0, high), (3.0, one)):
+        for u in (0.25, 0.75):
+            for a, b in zip(whole.at(np.array([start + u])), part.at(np.array([u])), strict=True):
+                assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
+    assert Motion.joined([one]) is one
+    assert Motion.joined([one.shifted(1.0)]).start_s.tolist() == [0.0, 2.0]
+    assert len(Motion.joined([])) == 0
 
 
 def test_a_path_driven_back_and_forth():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -10,6 +12,7 @@ from trajectory_cases import CASES, LIMITS, excess, random_route, route
 
 from olp.trajectory import ramps
 from olp.trajectory.critical import critical
+from olp.trajectory.forecast import expected_s
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import SmoothPath, smooth
@@ -71,6 +74,45 @@ def test_one_line_takes_the_least_time() -> None:
     assert len(motion) == 7
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_lone_corners_take_what_is_forecast(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    step = r.normal(size=(6, 3))
+    step *= (r.uniform(20.0, 60.0, 6) / np.linalg.norm(step, axis=1))[:, None]
+    given_route = route(np.cumsum(step, axis=0), 10.0 ** r.uniform(0.5, 2.5), 10.0 ** r.uniform(-3, -1))
+    taken = critical(smooth(given_route, LIMITS), LIMITS).duration_s
+    assert 0.85 * taken <= expected_s(given_route, LIMITS).sum() <= 1.01 * taken
+
+
+def test_between_rests_the_profile_is_that_of_the_run_alone() -> None:
+    given_route, limits = CASES["noise 0.2"]()
+    given_route.tolerance_mm[[20, 21, 77]] = 0.0
+    whole = critical(smooth(given_route, limits), limits)
+    edges = [0, 20, 21, 77, len(given_route) - 1]
+    alone = 0.0
+    for a, b in pairwise(edges):
+        run = Route(
+            given_route.point_mm[a : b + 1], given_route.feed_mm_s[a:b], given_route.line[a:b],
+            given_route.tolerance_mm[a : b + 1], given_route.dwell_s[a : b + 1],
+        )  # fmt: skip
+        alone += critical(smooth(run, limits), limits).duration_s
+    assert whole.duration_s == pytest.approx(alone, rel=1e-9)
+
+
+@pytest.mark.parametrize("spans", [1, 3])
+def test_a_motion_driven_in_blocks_is_the_same(spans: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    given_route, limits = CASES["noise 0.2"]()
+    path = smooth(given_route, limits)
+    whole = critical(path, limits)
+    monkeypatch.setattr("olp.trajectory.critical._SPANS", spans)
+    split = critical(path, limits)
+    assert split.duration_s == pytest.approx(whole.duration_s, rel=1e-12)
+    times = np.linspace(0.0, min(whole.duration_s, split.duration_s), 5000)
+    for one, other, size in zip(whole.at(times), split.at(times), (1.0, 1e2, 1e4), strict=False):
+        assert np.abs(one - other).max() <= 1e-10 * size
+
+
 def test_nothing_to_drive_takes_no_time() -> None:
     motion = critical(smooth(route(np.zeros((3, 3)), 1.0, 0.1), LIMITS), LIMITS)
     assert motion.duration_s == 0.0
@@ -122,3 +164,12 @@ def test_when_is_the_inverse_of_the_cubic(v: float, j: float, t: float, share: f
     u = share * t_
     got = ramps.when(u * (v_ + j_ * u * u / 6.0), v_, np.zeros(1), j_, t_)
     assert got == pytest.approx(u, rel=1e-9, abs=1e-12 * t)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.floats(0.0, 1e3), st.floats(1e-9, 1e5), st.floats(1e-1, 1e5), st.floats(1e-1, 1e8)
+)  # fmt: skip
+def test_one_reach_is_that_of_arrays(v0: float, way: float, acceleration: float, jerk: float) -> None:
+    arrays = ramps.reach(*(np.array([e]) for e in (v0, way, acceleration, jerk)))
+    assert ramps.reach_one(v0, way, acceleration, jerk) == pytest.approx(float(arrays[0]), rel=1e-12)

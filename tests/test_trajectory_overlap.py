@@ -13,7 +13,7 @@ from olp.exceptions import UsageError
 from olp.trajectory import ruckig_moves
 from olp.trajectory.audit import audit, slowing
 from olp.trajectory.deviation import deviation_bound
-from olp.trajectory.overlap import overlap, overlap_parts
+from olp.trajectory.overlap import least_s, overlap, overlap_parts
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.same import groups_of_same
 
@@ -34,6 +34,7 @@ def check(route: Route, limits: AxisLimits = LIMITS, *, differences: bool = True
     """Every law that holds for any route of two way-points and more."""
     parts = overlap_parts(route, limits)
     motion = parts.motion
+    assert least_s(route, limits).sum() <= (motion.duration_s - route.dwell_s.sum()) * (1 + 1e-8) + 1e-12
     assert len(motion) == len(parts.segment) and np.all(np.diff(motion.start_s) >= 0.0)
     assert np.array_equal(motion.line, route.line[parts.segment])
     assert np.all(np.diff(parts.segment) >= 0)

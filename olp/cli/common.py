@@ -134,6 +134,16 @@ def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) 
             raise UsageError("exists already; name another file, or overwrite it with --force", file=name)
 
 
+def refuse_twice(names: Iterable[str]) -> None:
+    """Raise where two outputs are one file."""
+    seen: set[Path] = set()
+    for name in names:
+        path = Path(name).resolve()
+        if path in seen:
+            raise UsageError("is named as output twice; name two files", file=name)
+        seen.add(path)
+
+
 def talk(message: str) -> None:
     """Say something to the person, on stderr."""
     click.echo(_encodable(message, sys.stderr.encoding), err=True)

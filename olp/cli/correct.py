@@ -18,6 +18,7 @@ from olp.cli.common import (
     proof_options,
     put,
     refuse_early,
+    refuse_twice,
     setup_options,
     source,
     talk,
@@ -27,6 +28,7 @@ from olp.exceptions import ProgramError, UsageError
 
 if TYPE_CHECKING:
     from olp.api import Correction
+    from olp.files.write import Content
     from olp.machine import Machine
 
 #: What rounding adds to a correction, at most.
@@ -54,6 +56,9 @@ LAST_DIGITS_UM = 10.0
 )
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
+@click.option(
+    "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
+)
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
@@ -73,6 +78,7 @@ def command(
     peck_clearance_mm: float | None,
     split_rapids: bool,
     report_file: str | None,
+    review_file: str | None,
     show_diff: bool,
     quiet: bool,
     force: bool,
@@ -85,11 +91,16 @@ def command(
     call = given(program, machine, job)
     output = output or _default_output(call.program)
     as_json = as_json or report_file == STREAM
+    if review_file == STREAM:
+        raise UsageError("the page of --review goes to a file; olp view writes one to stdout")
     if as_json and (output == STREAM or show_diff):
         raise UsageError(
             "JSON on stdout goes with neither -o - nor --diff; write the report to a file with --report"
         )
-    refuse_early(files_of(output, report_file), call.inputs, force=force)
+    inputs = (*call.inputs, *(mesh.file for mesh in call.setup.job.meshes))
+    outputs = files_of(output, report_file, review_file)
+    refuse_early(outputs, inputs, force=force)
+    refuse_twice(outputs)
 
     from olp import api, report
     from olp.files.write import write_files
@@ -110,12 +121,21 @@ def command(
                 date=date.date() if date else None,
                 progress=show,
             )
+            written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
+            written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
+            if review_file is not None:
+                from olp.review.job import view
+
+                written[Path(review_file)] = view(
+                    nominal, call.setup, correction=result, corrected_name="" if output == STREAM else output,
+                    tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
+                    contour=contour, flatten=flatten, expand_cycles=expand_cycles,
+                    peck_clearance_mm=peck_clearance_mm, progress=show,
+                ).parts()  # fmt: skip
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
-    written = {Path(name): result.data for name in files_of(output)}
-    written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
-    write_files(written, force=force, inputs=call.inputs)
+    write_files(written, force=force, inputs=inputs)
     on_stderr = output == STREAM
     if on_stderr:
         put(result.data)

@@ -15,6 +15,7 @@ from olp.cli.common import (
     given,
     put,
     refuse_early,
+    refuse_twice,
     setup_options,
     silence_stdout,
     source,
@@ -123,7 +124,7 @@ def command(
     inputs = (*call.inputs, *files_of(nominal, proof))
     outputs = files_of(output, lines, slow, plot, write_feed, report_file)
     refuse_early(outputs, inputs, force=force)
-    _refuse_twice(outputs)
+    refuse_twice(outputs)
 
     from olp import report, report_time
     from olp.files import trajectory as tables
@@ -201,12 +202,3 @@ def _stream(parts: Iterable[bytes]) -> None:
         silence_stdout()
     except OSError as error:
         raise OlpError(f"cannot be written ({error.strerror})", file="<stdout>") from error
-
-
-def _refuse_twice(names: list[str]) -> None:
-    seen: set[Path] = set()
-    for name in names:
-        path = Path(name).resolve()
-        if path in seen:
-            raise UsageError("is named as output twice; name two files", file=name)
-        seen.add(path)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.trajectory import ramps
-from olp.trajectory.ceilings import ceilings as ceilings
+from olp.trajectory.ceilings import ceilings
 from olp.trajectory.growing import Growing
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import Array, AxisLimits, Index
@@ -30,7 +30,8 @@ _LEVEL = 1.02
 _BINDS, _TOO_FAST, _PATIENT = 1e-6, 1e-8, 40
 #: pieces of the path, and spans of a profile, worked on at a time
 _BLOCK, _SPANS = 1 << 17, 1 << 15
-_ALONE = 64
+#: chains of nodes that are followed one by one rather than all at once
+_ALONE, _TINY = 24, 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,6 +110,9 @@ def _scan(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
     speed = ceiling.copy()
     todo = np.flatnonzero(speed[1:] > speed[:-1])
     while todo.size:
+        if todo.size < _ALONE:
+            _follow(speed, todo, way, a, j)
+            break
         most = ramps.reach(speed[todo], way[todo], a[todo], j[todo])
         lower = most < speed[todo + 1]
         todo = todo[lower] + 1
@@ -116,6 +120,19 @@ def _scan(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
         todo = todo[todo < len(way)]
         todo = todo[speed[todo + 1] > speed[todo]]
     return speed
+
+
+def _follow(speed: Array, starts: Index, way: Array, a: Array, j: Array) -> None:
+    """The scan from few nodes on, each until its chain ends."""
+    last = len(way)
+    for k in starts.tolist():
+        v = float(speed[k])
+        while k < last and speed[k + 1] > v:
+            v = ramps.reach_one(v, float(way[k]), float(a[k]), float(j[k]))
+            if v >= speed[k + 1]:
+                break
+            k += 1
+            speed[k] = v
 
 
 def _too_fast(x: Array, top: Array, found: Profile, everywhere: bool) -> Index:
@@ -162,7 +179,20 @@ def _too_fast_of(x: Array, top: Array, found: Profile, spans: Index, everywhere:
     ratio = np.minimum(rising, falling) / top[piece] ** 2
     order = np.lexsort((-ratio, span))
     head = np.concatenate(([True], span[order][1:] != span[order][:-1]))
-    worst: Index = piece[order][head]
+    # how far a node at the worst place slows the profile beside it: places farther away need their own
+    rank = np.cumsum(np.concatenate(([True], span[1:] != span[:-1]))) - 1
+    slowest = order[head][rank]
+    reach = ramps.distance(np.minimum(top[piece[slowest]], peak), peak, a, j)
+    cell = np.floor(left / np.maximum(2.0 * reach, _TINY))
+    order = np.lexsort((-ratio, cell, span))
+    change = (span[order][1:] != span[order][:-1]) | (cell[order][1:] != cell[order][:-1])
+    best = order[np.concatenate(([True], change))]
+    beside = (span[best][1:] == span[best][:-1]) & (cell[best][1:] - cell[best][:-1] <= 1.0)
+    less = ratio[best][1:] < ratio[best][:-1]
+    keep = np.ones(len(best), bool)
+    keep[1:] &= ~(beside & less)
+    keep[:-1] &= ~(beside & ~less)
+    worst: Index = piece[best[keep]]
     return worst
 
 

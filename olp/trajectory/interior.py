@@ -317,6 +317,8 @@ def _banded(
 
 def _solved(band: Array, gradient: Array) -> Array:
     """Newton's step, by rows and columns scaled to a unit diagonal."""
+    if not (band[2] > 0.0).all():
+        raise LinAlgError("the matrix of a window is not positive")
     scale = 1.0 / np.sqrt(band[2])
     matrix = band.copy()
     matrix[2] = 1.0

@@ -7,6 +7,8 @@ being point-symmetric covers (v0 + v1)/2 of that. All functions take and give ar
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from olp.trajectory.route import Array, Index
@@ -56,6 +58,21 @@ def reach(v0: Array, way: Array, acceleration: Array, jerk: Array) -> Array:
     v1[rest] = v + y * y
     # a change near the rounding of the speed has no digits left to time it by
     return np.where(v1 - v0 < _NO_CHANGE * v0, v0, v0 + (v1 - v0) * (1.0 - 1e-12))
+
+
+def reach_one(v0: float, way: float, acceleration: float, jerk: float) -> float:
+    """`reach` of one ramp, without the cost of arrays."""
+    full = acceleration * acceleration / jerk
+    if way >= (v0 + 0.5 * full) * 2.0 * acceleration / jerk:
+        c = 2.0 * acceleration * way + v0 * v0 - v0 * full
+        v1 = 2.0 * c / (full + math.sqrt(full * full + 4.0 * c))
+    else:
+        d = way * math.sqrt(jerk)
+        k = math.sqrt(v0 / 1.5)
+        z = 1.5 * d / (2.0 * v0 * k) if v0 > 0.0 and v0 * k > 0.0 else math.inf
+        y = 2.0 * k * math.sinh(math.asinh(z) / 3.0) if z < 1e100 else math.cbrt(d)
+        v1 = v0 + y * y
+    return v0 if v1 - v0 < _NO_CHANGE * v0 else v0 + (v1 - v0) * (1.0 - 1e-12)
 
 
 def peak(v0: Array, v1: Array, way: Array, top: Array, acceleration: Array, jerk: Array) -> Array:

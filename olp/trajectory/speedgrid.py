@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from olp.trajectory import ramps
-from olp.trajectory.critical import Profile, Timeline, ceilings, free_speeds
+from olp.trajectory.ceilings import ceilings
+from olp.trajectory.critical import Profile, Timeline, free_speeds
 from olp.trajectory.route import Array, AxisLimits, Index
 from olp.trajectory.smooth import SmoothPath
 

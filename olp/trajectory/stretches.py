@@ -46,7 +46,8 @@ class Stretch:
         """About how many pieces there are to optimise."""
         if not self.bends:
             return 0.0
-        return _CALL + _PIECES * self.segments + max(rival.least_s for rival in self.rivals) / CELL_S
+        seconds = max(rival.least_s for rival in self.rivals if rival.solver.bends)
+        return _CALL + _PIECES * self.segments + seconds / CELL_S
 
 
 def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:

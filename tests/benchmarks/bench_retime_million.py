@@ -1,7 +1,6 @@
 """Time and memory of planning a million way-points: python tests/benchmarks/bench_retime_million.py [job ...]
 
     --points N     way-points of each job (default 1e6)
-    --toppra N     TOPP-RA beside our solvers, in one run, on N way-points (needs toppra)
 
 Each job runs in a process of its own, so that its peak of memory is its own.
 """
@@ -25,10 +24,7 @@ import retime_paths
 
 from olp.trajectory import contest, solvers, stretches
 from olp.trajectory import plan as planner
-from olp.trajectory.critical import critical
-from olp.trajectory.overlap import overlap
 from olp.trajectory.route import Route
-from olp.trajectory.smooth import SmoothPath, smooth
 
 #: what the planner calls, in the order of a report
 STAGES = (
@@ -36,8 +32,6 @@ STAGES = (
     (contest, "optimised"), (solvers, "overlap"), (contest, "ratios"), (contest, "deviation_bound"),
     (planner, "with_jumps"),
 )  # fmt: skip
-#: grid points that TOPP-RA gets for each way-point
-GRID = 3
 
 
 def _route(points: np.ndarray, feed: float, tolerance: float) -> Route:
@@ -130,78 +124,12 @@ def one(job: str, count: int) -> None:
     print(f"         user s: {stages}", flush=True)
 
 
-def beside_toppra(count: int) -> None:
-    """Way-points a second of TOPP-RA on the smooth path, and of our solvers, user CPU."""
-    import toppra
-    import toppra.algorithm
-    import toppra.constraint
-    from toppra.interpolator import AbstractGeometricPath
-
-    toppra.setup_logging("ERROR")
-    limits = retime_paths.LIMITS
-
-    class Path3(AbstractGeometricPath):
-        """A smooth path, and the way as a fourth axis, whose velocity is the feed."""
-
-        def __init__(self, path: SmoothPath) -> None:
-            self.path = path
-
-        def __call__(self, way: Any, order: int = 0) -> np.ndarray:
-            way = np.atleast_1d(np.asarray(way, float))
-            own = (way, np.ones_like(way), np.zeros_like(way))[order]
-            return np.column_stack((self.path.at(way)[order], own))
-
-        @property
-        def dof(self) -> int:
-            return 4
-
-        @property
-        def path_interval(self) -> np.ndarray:
-            return self.path.break_mm[[0, -1]]
-
-    print("path        way-points   TOPP-RA/s   critical points/s   ratio   overlapped moves/s   ratio")
-    for job in ("raster", "lines", "strokes"):
-        route = JOBS[job](count)
-        path = smooth(route, limits)
-        grid = np.interp(
-            np.linspace(0.0, 1.0, GRID * len(route)), np.linspace(0.0, 1.0, len(path.break_mm)), path.break_mm
-        )
-        velocity, acceleration = np.append(limits.velocity, route.feed_mm_s[0]), limits.acceleration
-        start = _user()
-        solver = toppra.algorithm.TOPPRA(
-            [
-                toppra.constraint.JointVelocityConstraint(np.column_stack((-velocity, velocity))),
-                toppra.constraint.JointAccelerationConstraint(
-                    np.column_stack((-np.append(acceleration, 1e6), np.append(acceleration, 1e6)))
-                ),
-            ],
-            Path3(path), gridpoints=grid, solver_wrapper="seidel",
-        )  # fmt: skip
-        solved = solver.compute_parameterization(0, 0)[1] is not None
-        theirs = len(route) / (_user() - start) if solved else np.nan
-        start = _user()
-        critical(smooth(route, limits), limits)
-        ours = len(route) / (_user() - start)
-        start = _user()
-        overlap(route, limits)
-        moves = len(route) / (_user() - start)
-        print(
-            f"{job:10s}{len(route):12d}{theirs:12.0f}{ours:20.0f}{ours / theirs:8.1f}{moves:21.0f}"
-            f"{moves / theirs:8.1f}",
-            flush=True,
-        )
-
-
 def main() -> None:
     ask = argparse.ArgumentParser()
     ask.add_argument("jobs", nargs="*", default=list(JOBS))
     ask.add_argument("--points", type=float, default=1e6)
-    ask.add_argument("--toppra", type=float)
     ask.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     given = ask.parse_args()
-    if given.toppra:
-        beside_toppra(int(given.toppra))
-        return
     if given.here:
         one(given.jobs[0], int(given.points))
         return

@@ -15,7 +15,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from judge import retime_fuzz, retime_programs
+import retime_fuzz
+from judge import retime_programs
 
 RATIOS = ("velocity", "acceleration", "jerk", "feed", "differences", "tolerance")
 

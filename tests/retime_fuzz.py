@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import olp
 from judge import machines, retime_programs
 from judge.machines import Recipe
 from judge.retiming import Verdict, judge
+
+import olp
 
 _ZERO = {axis + "_mm": 0.0 for axis in "XYZ"}
 _RECIPE = Recipe(

@@ -1,0 +1,158 @@
+"""`olp view`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from olp.cli.common import (
+    STREAM,
+    Length,
+    files_of,
+    given,
+    put,
+    refuse_early,
+    setup_options,
+    source,
+    talk,
+)
+from olp.cli.progress import progress
+from olp.exceptions import OlpError, UsageError
+
+if TYPE_CHECKING:
+    from olp.review.job import Review
+
+
+@click.command("view")
+@click.argument("program", required=False)
+@setup_options
+@click.option(
+    "--corrected", metavar="FILE", help="The corrected program. Default: PROGRAM is corrected here."
+)
+@click.option(
+    "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
+)
+@click.option("-o", "--output", metavar="review.html", help="Default: PROGRAM.review.html beside PROGRAM.")
+@click.option(
+    "--live", is_flag=True, help="Serve the page on this machine, until Ctrl-C, and keep it up to date."
+)
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: one that is free."
+)
+@click.option(
+    "--tolerance-um",
+    type=Length(),
+    default=1.0,
+    show_default=True,
+    help="How far the corrected path may be from the nominal one, rounding apart.",
+)
+@click.option(
+    "--outside-box",
+    type=click.Choice(["refuse", "hold"]),
+    default="refuse",
+    show_default=True,
+    help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
+)
+@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
+@click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
+@click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
+@click.option(
+    "--peck-clearance-mm", type=Length(), help="Clearance above the last peck, for --expand-cycles."
+)
+@click.option(
+    "--no-time", is_flag=True, help="Do not plan the motion; times are those of the programmed feed."
+)
+@click.option(
+    "--step-mm",
+    type=Length(),
+    help="Distance between points of the path. Default: about 100,000 points in all.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="No progress and no talk.")
+@click.option("--force", is_flag=True, help="Overwrite the output file.")
+def command(
+    program: str | None,
+    machine: str | None,
+    job: str | None,
+    corrected: str | None,
+    measured: tuple[str, ...],
+    output: str | None,
+    live: bool,
+    port: int,
+    tolerance_um: float,
+    outside_box: str,
+    contour: bool,
+    flatten: bool,
+    expand_cycles: bool,
+    peck_clearance_mm: float | None,
+    no_time: bool,
+    step_mm: float | None,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """Show a job in the browser: nominal, corrected and measured path, their errors enlarged.
+
+    The page is one file that needs no network. PROGRAM and the machine file may come from the job file.
+    """
+    call = given(program, machine, job)
+    if live and (output is not None or call.program == STREAM):
+        raise UsageError("--live serves files as they are: it goes with neither -o nor a program from stdin")
+    if port and not live:
+        raise UsageError("--port belongs to --live")
+    if corrected is not None and (flatten or expand_cycles):
+        raise UsageError(
+            "--flatten and --expand-cycles change the nominal program, so they go without --corrected"
+        )
+    if STREAM in (corrected, *measured):
+        raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
+    inputs = (*call.inputs, *files_of(corrected, *measured), *(mesh.file for mesh in call.setup.job.meshes))
+    output = output or _default_output(call.program)
+    if not live:
+        refuse_early(files_of(output), inputs, force=force)
+
+    from olp.review.job import view
+
+    def make() -> Review:
+        # files may have changed since
+        setup = given(program, machine, job).setup if live else call.setup
+        with progress(quiet) as show:
+            try:
+                return view(
+                    source(call.program), setup, corrected=corrected, measured=measured,
+                    tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
+                    contour=contour, flatten=flatten, expand_cycles=expand_cycles,
+                    peck_clearance_mm=peck_clearance_mm, time=not no_time, step_mm=step_mm, progress=show,
+                )  # fmt: skip
+            except OlpError as error:
+                raise (error.in_file("<stdin>") if error.line is not None else error) from None
+
+    if live:
+        _serve(make, inputs, port, quiet)
+        return
+    page = make()
+    if output == STREAM:
+        put(page.html())
+        return
+    from olp.files.write import write_bytes
+
+    write_bytes(output, page.parts(), force=force, inputs=inputs)
+    if not quiet:
+        talk(f"wrote {output}: {len(page.scene.samples)} points, {Path(output).stat().st_size / 1e6:.1f} MB")
+
+
+def _default_output(program: str) -> str:
+    return STREAM if program == STREAM else str(Path(program).with_suffix(".review.html"))
+
+
+def _serve(make: Callable[[], Review], inputs: tuple[str, ...], port: int, quiet: bool) -> None:
+    from olp.review.live import Server
+
+    server = Server(make, inputs, (lambda message: None) if quiet else talk, port)
+    try:
+        talk(f"serving {server.address} until Ctrl-C")
+        server.run()
+    except KeyboardInterrupt:
+        # the way to end it
+        talk("ended")

@@ -1,0 +1,225 @@
+"""From the files of a job to its review."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from olp import api
+from olp.compensation.plan import targets, zero_shifts
+from olp.correction import Progress, last_digit_mm
+from olp.errormodel.base import Array
+from olp.exceptions import ConfigError, OlpError
+from olp.files.measured import read_measured
+from olp.files.write import read_bytes, write_bytes
+from olp.loading import Loaded, PathLike, load, source_of, unrolled
+from olp.machine import Setup
+from olp.program.program import Program
+from olp.program.reader import Options, read
+from olp.proof.matching import match as match_moves
+from olp.retiming import retime
+from olp.review.listing import aligned
+from olp.review.manifest import manifest_of
+from olp.review.measured import Matched, match
+from olp.review.meshes import Body, of_job, of_machine
+from olp.review.motion import by_feed, retimed, table
+from olp.review.page import page
+from olp.review.parts import Ends, Index
+from olp.review.samples import Samples, by_source, sample
+from olp.review.scene import Frame, Scene
+from olp.units import MM_PER_UM
+
+#: shorter stays at a sample are none
+_REST_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Review:
+    """A job ready to be looked at. `scene` is what the page shows, as plain arrays."""
+
+    scene: Scene
+    _packed: list[tuple[dict[str, Any], bytes]] = field(default_factory=list, init=False, repr=False)
+
+    def parts(self, live: str | None = None) -> Iterator[bytes]:
+        """The page in parts; `live` is the address, relative to the page, that answers with the digest of the
+        inputs of the day."""
+        if not self._packed:
+            manifest, arrays = manifest_of(self.scene)
+            self._packed.append((manifest, arrays.encoded()))
+        manifest, data = self._packed[0]
+        return page(manifest | {"live": live}, data, live=live is not None)
+
+    def html(self) -> bytes:
+        """The page: one file, which needs nothing else and asks no network."""
+        return b"".join(self.parts())
+
+    def write(self, path: PathLike, *, force: bool = False) -> None:
+        """Write the page, whole or not at all. Raises as `olp.files.write.write_files`."""
+        write_bytes(path, self.parts(), force=force)
+
+
+def view(
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    corrected: PathLike | bytes | None = None,
+    measured: Sequence[PathLike] = (),
+    correction: api.Correction | None = None,
+    corrected_name: str = "",
+    tolerance_um: float = 1.0,
+    outside_box: Literal["refuse", "hold"] = "refuse",
+    contour: bool = False,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
+    time: bool = True,
+    step_mm: float | None = None,
+    progress: Progress | None = None,
+) -> Review:
+    """A program, its correction and measurements of it, to be looked at in a browser.
+
+    `corrected` is the corrected program, which is proved as `verify` does; without it the program is
+    corrected as `correct` does, or `correction` is what that gave, to be called `corrected_name`. `measured`
+    are CSV files of positions of the tip. Without `time` the motion is not planned: times are those of the
+    programmed feed. `step_mm` is the distance between samples. Raises InputError (ProgramError with its line,
+    ConfigError) and CannotCompute.
+    """
+    tell = progress or _silent
+    data, name = source_of(program)
+    loaded = load(machine, job, "hold" if corrected is not None else outside_box)
+    setup, options = loaded.setup, Options(contour=contour)
+    if flatten or expand_cycles:
+        with _in_file(name):
+            data = unrolled(data, name, loaded.profile, expand_cycles, peck_clearance_mm)
+    if corrected is not None:
+        other, corrected_name = source_of(corrected)
+        report = api.verify(
+            program, corrected, setup, tolerance_um=tolerance_um, contour=contour, progress=progress
+        ).report
+    else:
+        if correction is None:
+            with _in_file(name):
+                correction = api.correct(
+                    data, setup, tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
+                    progress=progress,
+                )  # fmt: skip
+        other, report = correction.data, correction.report
+    with _in_file(name):
+        nominal = read(data, setup, loaded.profile, options)
+    with _in_file(corrected_name):
+        second = read(other, setup, loaded.profile, options)
+        groups = _groups(nominal, second, loaded, tolerance_um)
+        tell("sample", 0.0)
+        samples = sample(nominal, second, groups, loaded.model, step_mm)
+        plan = retime(other, setup, contour=contour, progress=progress) if time else None
+    tell("pack", 0.0)
+    if plan is None:
+        moment = by_feed(nominal, samples, setup.machine)
+    else:
+        samples, moment = _resting(samples, *retimed(second.toolpath, samples, plan.trajectories))
+    frame = Frame.of(nominal.toolpath)
+    position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
+    scene = Scene(
+        name=Path(name).name or "program",
+        corrected_name=Path(corrected_name).name,
+        digest=_digest(data, other, loaded, (*measured, *(mesh.file for mesh in setup.job.meshes))),
+        machine=setup.machine,
+        nominal=nominal,
+        frame=frame,
+        samples=samples,
+        position_mm=position,
+        time_s=moment,
+        motion=None if plan is None else table(plan.trajectories, plan.routes),
+        duration_s=float(moment[-1]) if plan is None else plan.duration_s,
+        sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
+        listing=aligned(nominal, second, groups),
+        bodies=tuple(_bodies(setup, nominal, samples, frame, position)),
+        measured=tuple(_matched(path, frame, position, samples, nominal, setup) for path in measured),
+        report=report,
+        tolerance_um=tolerance_um,
+        tool_radius_mm=_radius(setup, nominal),
+    )
+    return Review(scene)
+
+
+@contextlib.contextmanager
+def _in_file(name: str) -> Iterator[None]:
+    """Errors with a line are of this file."""
+    try:
+        yield
+    except OlpError as error:
+        raise (error.in_file(name) if name and error.line is not None else error) from None
+
+
+def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples, Array]:
+    """Samples at which the motion rests are there twice, when it comes and when it leaves; and the times."""
+    rests = np.flatnonzero(leaving - arrival > _REST_S)
+    order = np.sort(np.concatenate((np.arange(len(samples)), rests)), kind="stable")
+    again = np.diff(order, prepend=-1) == 0
+    twice = samples.take(order)
+    twice.joined[again] = True
+    return twice, np.where(again, leaving[order], arrival[order])
+
+
+def _digest(data: bytes, other: bytes, loaded: Loaded, files: Sequence[PathLike]) -> str:
+    """12 digits that change with whatever the page is made of."""
+    found = hashlib.sha256(b"\0".join((data, other, loaded.digest.encode(), repr(loaded.setup).encode())))
+    for path in files:
+        found.update(hashlib.sha256(read_bytes(path)).digest())
+    return found.hexdigest()[:12]
+
+
+def _groups(nominal: Program, second: Program, loaded: Loaded, tolerance_um: float) -> Index:
+    path = nominal.toolpath
+    target = targets(path, zero_shifts(path.frames, loaded.model))
+    near = tolerance_um * MM_PER_UM + last_digit_mm(second, loaded.setup)
+    return match_moves(nominal, target, second, loaded.model, near)
+
+
+def _matched(
+    path: PathLike, frame: Frame, position: Array, samples: Samples, nominal: Program, setup: Setup
+) -> Matched:
+    measured = read_measured(path)
+    origin = np.zeros(3)
+    if measured.frame == frame.offset:
+        origin = np.array(frame.origin_mm)
+    elif measured.frame != "machine":
+        offset = setup.work_offset(measured.frame)
+        if offset is None or any(offset.rotation_deg):
+            raise ConfigError(
+                f"frame {measured.frame!r} is no work offset without rotation of machine or job; expected "
+                f"{frame.offset!r} or \"machine\"",
+                file=measured.file,
+            )  # fmt: skip
+        origin = np.array(offset.offset_mm)
+    ends = Ends.of(nominal.toolpath)
+    return match(measured, samples, ends, position, origin - np.array(frame.origin_mm))
+
+
+def _bodies(
+    setup: Setup, nominal: Program, samples: Samples, frame: Frame, position: Array
+) -> Iterator[Body]:
+    yield from of_job(setup, np.array(frame.origin_mm))
+    first = nominal.toolpath.frames[int(nominal.toolpath.frame[samples.move[0]])]
+    tip = position[0]
+    gauge = tip - np.array(first.tool_mm)
+    same = len({f.tool_mm for f in nominal.toolpath.frames}) == 1
+    radius = _radius(setup, nominal) if same else 0.0
+    yield from of_machine(setup.machine, samples.axis_mm[0], gauge, tip, radius)
+
+
+def _radius(setup: Setup, nominal: Program) -> float:
+    numbers = [f.tool for f in nominal.toolpath.frames if f.tool is not None]
+    tools = [setup.tool(number) for number in numbers]
+    return max((tool.radius_mm for tool in tools if tool is not None), default=0.0)
+
+
+def _silent(what: str, share: float) -> None:
+    return None

@@ -1,0 +1,162 @@
+"""The texts of both programs side by side, by the line numbers of their files.
+
+A row pairs a line with what stands for it in the corrected program; a block that was inserted has a row of
+its own. Lines end where the reader of programs ends them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.program.program import Program
+from olp.review.parts import Index
+
+Small = npt.NDArray[np.int32]
+Single = npt.NDArray[np.float32]
+
+#: a longer line is cut: nobody reads on, and a browser would choke on it
+LONGEST = 2000
+
+_END = re.compile(r"\r\n|\r")
+#: what would act on a terminal, hide text, or turn its direction: everything of that kind but tab and line
+#: feed
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
+)
+_LONG = re.compile(rf"[^\n]{{{LONGEST + 1},}}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Listing:
+    """Texts with one line of the file a line, made harmless; (r,) `row_nominal` and `row_corrected`, line
+    numbers counted from 1, 0 where a row has no such line."""
+
+    nominal: str
+    corrected: str
+    row_nominal: Small
+    row_corrected: Small
+
+    def row_of(self, line: Index) -> Index:
+        """Rows of lines of the nominal program."""
+        have = np.flatnonzero(self.row_nominal)
+        return have[np.searchsorted(self.row_nominal[have], line)]
+
+    def row_of_corrected(self, line: Index) -> Index:
+        """Rows of lines of the corrected program."""
+        have = np.flatnonzero(self.row_corrected)
+        return have[np.searchsorted(self.row_corrected[have], line)]
+
+
+def shown(data: bytes) -> str:
+    """The text of a program as people see it: lines end with a line feed, controls are pictures of
+    themselves, and what is too long is cut. Bytes that are no UTF-8 are taken as Latin-1."""
+    if data.startswith(b"\xef\xbb\xbf"):
+        data = data[3:]
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    if "\r" in text:
+        text = _END.sub("\n", text)
+    if _CONTROL.search(text):
+        text = _CONTROL.sub(_picture, text)
+    text = _LONG.sub(lambda m: f"{m[0][:LONGEST]} … ({len(m[0])} characters)", text)
+    # what ends the last line begins no other
+    return text.removesuffix("\n")
+
+
+def _picture(match: re.Match[str]) -> str:
+    code = ord(match[0])
+    return chr(0x2400 + code) if code < 0x20 else "␡" if code == 0x7F else "�"
+
+
+def aligned(nominal: Program, corrected: Program, groups: Index) -> Listing:
+    """Both texts, their lines paired: by the moves that they make, and between those by what they say."""
+    first, second = shown(nominal.data), shown(corrected.data)
+    mine, theirs = _anchors(nominal, corrected, groups)
+    count, other = nominal.lines, corrected.lines
+    rows = _pairs(first, second, mine, theirs, count, other)
+    return Listing(first, second, *rows)
+
+
+def alone(program: Program) -> Listing:
+    """The text of one program."""
+    row = np.arange(1, program.lines + 1, dtype=np.int32)
+    return Listing(shown(program.data), "", row, np.zeros_like(row))
+
+
+def largest(rows: Index, values: Array, count: int) -> Single:
+    """(count,) the largest of the values of each row, NaN where it has none."""
+    out = np.full(count, np.nan, np.float32)
+    np.fmax.at(out, rows, values.astype(np.float32))
+    return out
+
+
+def _anchors(nominal: Program, corrected: Program, groups: Index) -> tuple[Index, Index]:
+    """Lines, counted from 0, that make the same last move in both texts."""
+    path, other = nominal.toolpath, corrected.toolpath
+    last = np.flatnonzero(np.diff(path.line, append=-1))
+    mine, theirs = path.line[last].astype(np.int64) - 1, other.line[groups[last]].astype(np.int64) - 1
+    rising = (mine > np.concatenate(([-1], np.maximum.accumulate(mine)[:-1]))) & (
+        theirs > np.concatenate(([-1], np.maximum.accumulate(theirs)[:-1]))
+    )
+    return mine[rising], theirs[rising]
+
+
+def _pairs(
+    first: str, second: str, mine: Index, theirs: Index, count: int, other: int
+) -> tuple[Small, Small]:
+    """Rows of line numbers from 1: lines between anchors go side by side where there are as many in both."""
+    begin = np.concatenate(([0], mine + 1))
+    begin_other = np.concatenate(([0], theirs + 1))
+    gap = np.append(mine, count) - begin
+    gap_other = np.append(theirs, other) - begin_other
+    inserted: list[int] = []
+    left_out: list[int] = []
+    uneven = np.flatnonzero(gap != gap_other).tolist()
+    if uneven:
+        lines, others = first.split("\n"), second.split("\n")
+        for k in uneven:
+            a, b = int(begin[k]), int(begin_other[k])
+            some, more = lines[a : a + int(gap[k])], others[b : b + int(gap_other[k])]
+            inserted += (b + i for i in _without_partner(some, more))
+            left_out += (a + i for i in _without_partner(more, some))
+    return _woven(count, other, np.array(inserted, np.int64), np.array(left_out, np.int64))
+
+
+def _without_partner(some: list[str], more: list[str]) -> Iterator[int]:
+    """Which of the lines that are more have no partner: those behind the equal ones in front, and before the
+    equal ones at the end."""
+    spare = len(more) - len(some)
+    if spare <= 0:
+        return
+    same = 0
+    while same < len(some) and some[same] == more[same]:
+        same += 1
+    yield from range(same, same + spare)
+
+
+def _woven(count: int, other: int, inserted: Index, left_out: Index) -> tuple[Small, Small]:
+    """Rows of all lines: a pair each, and those without a partner by themselves."""
+    single = np.zeros(count, bool)
+    single[left_out] = True
+    single_other = np.zeros(other, bool)
+    single_other[inserted] = True
+    # a row is placed by how many pairs stand before it
+    key = np.cumsum(~single) - ~single
+    key_other = np.cumsum(~single_other) - ~single_other
+    own = np.flatnonzero(single)
+    place = np.concatenate((key[~single], key[own], key_other[inserted]))
+    kind = np.concatenate(
+        (np.full(int((~single).sum()), 2), np.zeros(len(own), int), np.ones(len(inserted), int))
+    )
+    line = np.concatenate((np.flatnonzero(~single) + 1, own + 1, np.zeros(len(inserted), int)))
+    line_other = np.concatenate((np.flatnonzero(~single_other) + 1, np.zeros(len(own), int), inserted + 1))
+    order = np.lexsort((kind, place))
+    return line[order].astype(np.int32), line_other[order].astype(np.int32)

@@ -1,0 +1,317 @@
+"""From a scene to what the page reads: a manifest ("olp-review-1") and packed arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.deviation import cutting_moves
+from olp.errormodel.base import Array
+from olp.findings import RULES
+from olp.review.listing import largest
+from olp.review.meshes import nodes
+from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, WAY_MM, Arrays, resolution
+from olp.review.scene import Scene
+from olp.toolpath import Kind
+from olp.units import AXES, UM_PER_MM
+
+#: colours that stay apart for eyes that take red for green, on dark and on light
+LAYERS = (
+    ("nominal", "nominal path", "#4477aa", 1.5),
+    ("uncorrected", "uncorrected machine", "#ee7733", 2.0),
+    ("corrected", "command, corrected", "#009988", 2.0),
+    ("result", "corrected, predicted", "#33bbee", 2.0),
+)
+MEASURED = ("#cc3377", "#ddaa33", "#997700", "#bbbbbb")
+_PARTS = (
+    ("magnitude", "distance", "sequential"),
+    ("x", "X", "diverging"),
+    ("y", "Y", "diverging"),
+    ("z", "Z", "diverging"),
+    ("along", "along the path", "diverging"),
+    ("normal", "across the path", "sequential"),
+)
+#: steps of an error source over its range, at the least: colours show no more
+_SOURCE_LEVELS, _FINEST_UM = 200, 0.001
+#: bits of the largest error of a line that are kept: a part in a thousand, and far smaller than all of them
+_ERROR_BITS = 9
+#: of motion, relative to the largest value of the column
+_MOTION_LEVELS = 20_000
+
+
+def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
+    """The manifest of a scene, and the arrays that it names."""
+    arrays = Arrays()
+    origin = np.round(scene.position_mm.mean(axis=0))
+    base = arrays.quantised("P", scene.position_mm - origin, POSITION_MM, keep=True)
+    axes_origin = scene.samples.axis_mm[0]
+    arrays.quantised("Q", scene.samples.axis_mm - axes_origin, POSITION_MM, plus=[base])
+    row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
+    arrays.quantised("line", row, 1.0)
+    arrays.raw("rapid", _rapid(scene), "u1")
+    arrays.quantised("t", scene.time_s, TIME_S)
+    arrays.quantised("s", scene.samples.way_mm, WAY_MM)
+    manifest = {
+        "schema": "olp-review-1",
+        "title": f"{scene.name} on {scene.machine.name}",
+        "program": scene.name,
+        "corrected": scene.corrected_name,
+        "machine": scene.machine.name,
+        "profile": scene.nominal.profile.name,
+        "digest": scene.digest,
+        "compression": "deflate",
+        "origin_mm": origin.tolist(),
+        "samples": len(scene.samples),
+        "tolerance_um": scene.tolerance_um,
+        "base": base,
+        "line": "line",
+        "rapid": "rapid",
+        "time": "t",
+        "way": "s",
+        "time_source": "retimed" if scene.motion is not None else "feed",
+        "duration_s": scene.duration_s,
+        "layers": _layers(scene, arrays, origin),
+        "metrics": _metrics(scene, arrays),
+        "sources": [f"source:{name}" for name, _ in scene.sources],
+        "motion": _motion(scene, arrays),
+        "listing": _listing(scene, arrays, row),
+        "meshes": list(_meshes(scene, arrays, origin)),
+        "nodes": [{"path": list(path), "axis": axis} for path, axis in nodes(scene.machine)],
+        "axes": "Q",
+        "axes_origin_mm": axes_origin.tolist(),
+        "statistics": list(_statistics(scene)),
+        "findings": _findings(scene),
+        "callouts": list(_callouts(scene)),
+        "verdict": _verdict(scene),
+        "frame": scene.frame.label,
+        "tool_radius_mm": scene.tool_radius_mm,
+        "live": None,
+    }
+    return manifest | {"arrays": arrays.specs}, arrays
+
+
+def _rapid(scene: Scene) -> npt.NDArray[np.uint8]:
+    samples = scene.samples
+    rapid = np.where(scene.nominal.toolpath.kind[samples.move] == Kind.RAPID, np.uint8(1), np.uint8(0))
+    rapid[~samples.joined] = 2
+    return np.asarray(rapid)
+
+
+def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]:
+    samples = scene.samples
+    deltas = {
+        "nominal": None,
+        "uncorrected": arrays.quantised("d_uncorrected", samples.uncorrected, DEVIATION_MM, keep=True),
+        "corrected": arrays.quantised("d_corrected", samples.correction, DEVIATION_MM, keep=True),
+        "result": arrays.quantised(
+            "d_result", samples.result, DEVIATION_MM, plus=["d_uncorrected", "d_corrected"]
+        ),
+    }
+    out = [
+        _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in LAYERS
+    ]
+    for k, measured in enumerate(scene.measured):
+        name = "measured" if len(scene.measured) == 1 else f"measured-{k + 1}"
+        base = arrays.quantised(f"P_{name}", measured.base_mm - origin, POSITION_MM)
+        delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
+        index = arrays.quantised(f"i_{name}", measured.index, 1.0)
+        label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
+        out.append(_layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0))
+    return out
+
+
+def _layer(
+    name: str, label: str, base: str, delta: str | None, index: str | None, colour: str, width: float
+) -> dict[str, Any]:
+    return {
+        "name": name, "label": label, "base": base, "delta": delta, "index": index, "colour": colour,
+        "width": width, "visible": name != "corrected", "exaggerate": True,
+    }  # fmt: skip
+
+
+def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
+    names = ["uncorrected", "corrected", "result"]
+    count = len(scene.measured)
+    names += ["measured"] if count == 1 else [f"measured-{k + 1}" for k in range(count)]
+    out: list[dict[str, Any]] = [
+        {
+            "name": part, "label": label, "unit": "um", "kind": kind, "of": part,
+            "by_layer": dict.fromkeys(names), "limit": scene.tolerance_um,
+        }
+        for part, label, kind in _PARTS
+    ]  # fmt: skip
+    for name, size in scene.sources:
+        value = size * UM_PER_MM
+        step = resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
+        array = arrays.quantised(f"source:{name}", value, step)
+        out.append(
+            {
+                "name": f"source:{name}", "label": f"share of {name}", "unit": "um", "kind": "sequential",
+                "by_layer": {"uncorrected": array}, "limit": None,
+            }
+        )  # fmt: skip
+    return out
+
+
+def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
+    table = scene.motion
+    if table is None:
+        return None
+
+    def column(name: str, values: Array) -> str:
+        step = resolution(float(np.abs(values).max(initial=0.0)), 1e-4, _MOTION_LEVELS)
+        return arrays.quantised(f"m_{name}", values, step)
+
+    axes = []
+    for i, axis in enumerate(AXES):
+        limits = scene.machine.axes[axis]
+        axes.append(
+            {
+                "name": axis,
+                "position": arrays.quantised(f"m_{axis}", table.position_mm[:, i], WAY_MM),
+                "velocity": column(f"V{axis}", table.velocity[:, i]),
+                "acceleration": column(f"A{axis}", table.acceleration[:, i]),
+                "jerk": column(f"J{axis}", table.jerk[:, i]),
+                "velocity_limit": limits.velocity_mm_s,
+                "acceleration_limit": limits.acceleration_mm_s2,
+                "jerk_limit": limits.jerk_mm_s3,
+            }
+        )
+    return {
+        "time": arrays.quantised("m_time", table.time_s, TIME_S),
+        "line": arrays.quantised("m_line", scene.listing.row_of_corrected(table.line), 1.0),
+        "speed": column("speed", table.speed_mm_s),
+        "feed": arrays.raw("m_feed", table.feed_mm_s, "f4"),
+        "axes": axes,
+    }
+
+
+def _listing(scene: Scene, arrays: Arrays, row: npt.NDArray[np.int64]) -> dict[str, Any]:
+    listing, samples = scene.listing, scene.samples
+    rows = len(listing.row_nominal)
+    arrays.text("text_nominal", listing.nominal)
+    lines = listing.row_corrected > 0
+    like = np.full(int(listing.row_corrected.max(initial=0)), -1, np.int64)
+    like[listing.row_corrected[lines] - 1] = listing.row_nominal[lines].astype(np.int64) - 1
+    arrays.patch("text_corrected", listing.corrected, "text_nominal", listing.nominal, _resembled(like))
+    before, after = (_size(delta) * UM_PER_MM for delta in (samples.uncorrected, samples.result))
+    return {
+        "nominal": "text_nominal",
+        "corrected": "text_corrected",
+        "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
+        "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
+        "error_um": arrays.raw("error_um", _rounded(largest(row, before, rows)), "f4"),
+        "result_um": arrays.raw("result_um", _rounded(largest(row, after, rows)), "f4"),
+    }
+
+
+def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """An inserted block resembles the nominal line of the block that it was split from, which comes after
+    it."""
+    known = np.where(like >= 0, np.arange(len(like)), len(like) - 1)
+    after = np.minimum.accumulate(known[::-1])[::-1]
+    return np.asarray(like[after])
+
+
+def _rounded(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Values to _ERROR_BITS bits; NaN stays NaN."""
+    fraction, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.rint(np.ldexp(fraction, _ERROR_BITS)), exponent - _ERROR_BITS), np.float32)
+
+
+def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, Any]]:
+    for body in scene.bodies:
+        yield {
+            "name": body.name,
+            "label": body.label,
+            "role": body.role,
+            "vertices": arrays.raw(f"v_{body.name}", body.vertices - origin, "f4"),
+            "faces": arrays.raw(f"f_{body.name}", body.faces, "u4"),
+            "colour": body.colour,
+            "opacity": body.opacity,
+            "path": list(body.path),
+        }
+
+
+def _size(delta: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", delta, delta)), float)
+
+
+def _deviations(scene: Scene) -> Iterator[tuple[str, Array, npt.NDArray[np.bool_]]]:
+    """(layer, (n,) um, (n,) whether the sample is on a move whose path counts) of what the tip does."""
+    samples = scene.samples
+    feed = cutting_moves(scene.nominal.toolpath)[samples.move]
+    yield "uncorrected", _size(samples.uncorrected) * UM_PER_MM, feed
+    yield "result", _size(samples.result) * UM_PER_MM, feed
+    for k, measured in enumerate(scene.measured):
+        name = "measured" if len(scene.measured) == 1 else f"measured-{k + 1}"
+        yield name, _size(measured.delta_mm) * UM_PER_MM, feed[measured.index]
+
+
+def _statistics(scene: Scene) -> Iterator[dict[str, Any]]:
+    for layer, value, feed in _deviations(scene):
+        cut = value[feed]
+        if not len(cut):
+            continue
+        mean = float(cut.mean())
+        figures = {
+            "largest": float(cut.max()),
+            "95 % below": float(np.percentile(cut, 95)),
+            "mean": mean,
+            "rms": float(np.sqrt(np.mean(cut * cut))),
+            "std. deviation": float(cut.std()),
+        }
+        for label, number in figures.items():
+            yield {"label": label, "value": number, "unit": "um", "layer": layer}
+        within = 100.0 * float((cut <= scene.tolerance_um).mean())
+        yield {"label": "within tolerance", "value": within, "unit": "%", "layer": layer}
+    deviation = scene.report.get("deviation") or {}
+    for side, layer in (("before", "uncorrected"), ("after", "result")):
+        for place, label in (("waypoints", "proof, at way-points"), ("between", "proof, between them")):
+            found = (deviation.get(side) or {}).get(place)
+            if found:
+                yield {"label": label, "value": float(found["max_um"]), "unit": "um", "layer": layer}
+    moves = scene.nominal.toolpath
+    yield {"label": "way", "value": float(scene.samples.way_mm[-1]) * 1e-3, "unit": "m", "layer": None}
+    yield {"label": "time", "value": scene.duration_s, "unit": "s", "layer": None}
+    yield {"label": "moves", "value": len(moves), "unit": "", "layer": None}
+    yield {"label": "lines", "value": scene.nominal.lines, "unit": "", "layer": None}
+
+
+def _findings(scene: Scene) -> list[dict[str, Any]]:
+    return [
+        {
+            "code": finding["code"],
+            "severity": finding["severity"],
+            "line": finding["line"],
+            "message": finding["message"],
+            "title": RULES[finding["code"]].title,
+            "count": finding["count"],
+        }
+        for finding in scene.report.get("findings", ())
+    ]
+
+
+def _callouts(scene: Scene) -> Iterator[dict[str, Any]]:
+    """The worst point before and after, on moves whose path counts."""
+    lines = scene.nominal.toolpath.line[scene.samples.move]
+    for layer, value, feed in _deviations(scene):
+        if layer not in ("uncorrected", "result") or not feed.any():
+            continue
+        worst = int(np.where(feed, value, -1.0).argmax())
+        when = "before correction" if layer == "uncorrected" else "after correction"
+        text = f"largest {when}: {value[worst]:.2f} µm, line {int(lines[worst])}"
+        yield {"sample": worst, "text": text, "layer": layer}
+
+
+def _verdict(scene: Scene) -> dict[str, Any] | None:
+    deviation = scene.report.get("deviation")
+    if not deviation:
+        return None
+    good = bool(deviation["holds"])
+    most, allowed = float(deviation["path_max_um"]), float(deviation["allowed_um"])
+    word = "within tolerance" if good else "above tolerance"
+    return {"ok": good, "text": f"{word}: at most {most:.2f} µm, {allowed:.2f} µm allowed"}

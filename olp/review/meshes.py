@@ -1,0 +1,196 @@
+"""Bodies beside the path: meshes that the job file names, and a simple machine drawn from the machine file.
+
+Everything is shown from the workpiece. Along the chain from workpiece to tool every axis moves what comes
+after it, whether it carries the workpiece or the tool: so the machine is a tree of nodes that follow the axis
+positions.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.exceptions import InputError
+from olp.files.write import read_bytes
+from olp.machine import Machine, Mesh, Setup, WorkOffset
+from olp.units import AXES
+
+#: more faces than this are drawn coarser
+MOST_FACES = 150_000
+_COLOURS = {"workpiece": "#9aa7b5", "fixture": "#7d8f69", "machine": "#5f7a96", "tool": "#b0803a"}
+_OPACITY = {"workpiece": 0.55, "fixture": 0.5, "machine": 0.25, "tool": 0.8}
+_FACES = np.array(
+    [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2],
+     [2, 4, 6], [1, 3, 5], [3, 7, 5]], np.int64,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """(v, 3) `vertices` in mm in the frame shown, (f, 3) `faces`; `path` names the nodes that carry it."""
+
+    name: str
+    label: str
+    role: str
+    vertices: Array
+    faces: npt.NDArray[np.int64]
+    path: tuple[str, ...] = ()
+
+    @property
+    def colour(self) -> str:
+        return _COLOURS[self.role]
+
+    @property
+    def opacity(self) -> float:
+        return _OPACITY[self.role]
+
+
+def of_job(setup: Setup, origin_mm: Array) -> list[Body]:
+    """The meshes of the job, placed by their frames; `origin_mm` is what the frame shown counts from on the
+    machine.
+
+    Raises InputError for a file that is no mesh.
+    """
+    return [_placed(mesh, k, setup, origin_mm) for k, mesh in enumerate(setup.job.meshes, 1)]
+
+
+def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array) -> Body:
+    vertices, faces = load(mesh.file)
+    vertices = vertices * mesh.unit_mm
+    offset = None if mesh.frame == "machine" else setup.work_offset(mesh.frame)
+    if offset is not None:
+        vertices = vertices @ rotation(offset).T + np.array(offset.offset_mm)
+    name = Path(mesh.file).stem
+    return Body(f"mesh-{number}", name, mesh.role, vertices - origin_mm, faces)
+
+
+def rotation(offset: WorkOffset) -> Array:
+    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C about
+    Z."""
+    out = np.eye(3)
+    for axis, degrees in enumerate(offset.rotation_deg):
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.eye(3)
+        cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        turn[first, first] = turn[second, second] = cosine
+        turn[first, second], turn[second, first] = -sine, sine
+        out = turn @ out
+    return out
+
+
+def load(path: str) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Vertices and triangles of a mesh file (STL, OBJ, PLY, GLB and what else trimesh reads)."""
+    import trimesh
+
+    data = read_bytes(path)
+    kind = Path(path).suffix.lower().removeprefix(".")
+    try:
+        loaded: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind).to_mesh()
+        vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
+    except Exception as error:  # readers of many formats raise what they like
+        raise InputError(
+            f"is no mesh that can be read ({type(error).__name__}); expected STL, OBJ, PLY or GLB", file=path
+        ) from None
+    if not len(faces) or not np.isfinite(vertices).all():
+        raise InputError("holds no triangles; expected a mesh", file=path)
+    return coarser(vertices, faces)
+
+
+def coarser(vertices: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, npt.NDArray[np.int64]]:
+    """A mesh of no more than MOST_FACES: vertices in one cell of a grid become their mean."""
+    size = float((vertices.max(axis=0) - vertices.min(axis=0)).max())
+    cells = 1024
+    small, few = vertices, faces
+    while len(few) > MOST_FACES:
+        cell = np.floor((vertices - vertices.min(axis=0)) / (size / cells)).astype(np.int64)
+        _, which, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+        which = which.ravel()
+        small = np.stack([np.bincount(which, vertices[:, i]) / count for i in range(3)], axis=1)
+        few = which[faces]
+        few = few[(few[:, 0] != few[:, 1]) & (few[:, 1] != few[:, 2]) & (few[:, 0] != few[:, 2])]
+        few = few[np.unique(np.sort(few, axis=1), axis=0, return_index=True)[1]]
+        cells //= 2
+    return small, few
+
+
+def nodes(machine: Machine) -> list[tuple[tuple[str, ...], int]]:
+    """(path, axis) of the nodes of a machine, each inside the one before it."""
+    order = machine.chain.replace("F", "")
+    return [(("machine", *order[: k + 1]), AXES.index(axis)) for k, axis in enumerate(order)]
+
+
+def of_machine(
+    machine: Machine, axes_mm: Array, gauge_mm: Array, tip_mm: Array, radius_mm: float
+) -> Iterator[Body]:
+    """A machine of boxes where its axes stand at `axes_mm`; `gauge_mm` and `tip_mm` (3,) is where the gauge
+    point and the tip of the tool are then in the frame shown. Nothing of it is to scale but the travels."""
+    travel = np.array([machine.axes[axis].travel_mm for axis in AXES])
+    # the gauge point at both ends of all axes, in the frame shown
+    low, high = gauge_mm + (travel[:, 0] - axes_mm), gauge_mm + (travel[:, 1] - axes_mm)
+    span = high - low
+    thick = float(np.clip(0.06 * span.max(), 20.0, 150.0))
+    order = machine.chain.replace("F", "")
+    frame = machine.chain.index("F")
+    floor = low[2] - thick - abs(tip_mm[2] - gauge_mm[2])
+    table_low = np.array([low[0] - thick, low[1] - thick, floor - thick])
+    table_high = np.array([high[0] + thick, high[1] + thick, floor])
+    yield _box("table", "machine", table_low, table_high, ())
+    for depth, axis in enumerate(order):
+        path = ("machine", *order[: depth + 1])
+        after = order[depth + 1] if depth + 1 < len(order) else None
+        yield from _carrier(axis, after, path, low, high, gauge_mm, thick, floor, on_floor=depth == frame)
+    if radius_mm > 0.0:
+        reach = np.array([radius_mm, radius_mm, 0.0])
+        ends = np.sort([gauge_mm[2], tip_mm[2]])
+        begin, end = (np.array([*tip_mm[:2], height]) for height in ends)
+        yield _box("tool", "tool", begin - reach, end + reach, ("machine", *order))
+
+
+def _carrier(
+    axis: str, after: str | None, path: tuple[str, ...], low: Array, high: Array, gauge: Array, thick: float,
+    floor: float, *, on_floor: bool,
+) -> Iterator[Body]:  # fmt: skip
+    """What an axis moves: a ram at the end of the chain, else the guide of the axis after it."""
+    top = high[2] + 2 * thick
+    if after is None:
+        i = AXES.index(axis)
+        half = np.full(3, 0.3 * thick)
+        begin, end = gauge - half, gauge + half
+        if axis == "Z":
+            begin[2], end[2] = gauge[2], top + thick - (high[2] - gauge[2])
+        else:
+            end[i] = gauge[i] + (high[i] - low[i])
+            begin[2], end[2] = gauge[2], gauge[2] + thick
+        yield _box(f"{axis}-ram", "machine", begin, end, path)
+        return
+    guide = AXES.index(after)
+    if after == "Z":
+        half = np.array([0.6, 0.6, 0.0]) * thick
+        begin, end = gauge - half, gauge + half
+        begin[2], end[2] = high[2] + 0.5 * thick, top + 0.5 * thick
+        yield _box(f"{axis}-carriage", "machine", begin, end, path)
+        return
+    begin, end = gauge - 0.4 * thick, gauge + 0.4 * thick
+    begin[guide], end[guide] = low[guide] - thick, high[guide] + thick
+    begin[2], end[2] = top - thick, top
+    yield _box(f"{axis}-beam", "machine", begin, end, path)
+    if on_floor:
+        for side, (a, b) in enumerate(
+            ((begin[guide], begin[guide] + 0.6 * thick), (end[guide] - 0.6 * thick, end[guide]))
+        ):
+            leg_low, leg_high = begin.copy(), end.copy()
+            leg_low[guide], leg_high[guide] = a, b
+            leg_low[2], leg_high[2] = floor, top - thick
+            yield _box(f"{axis}-leg-{side + 1}", "machine", leg_low, leg_high, path)
+
+
+def _box(name: str, role: str, low: Array, high: Array, path: tuple[str, ...]) -> Body:
+    corner = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+    return Body(name, name.replace("-", " "), role, np.where(corner == 1, high, low), _FACES, path)

@@ -1,0 +1,272 @@
+"""When the machine is where: times of samples on the re-timed motion, and its speeds beside their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.exceptions import ProgramError
+from olp.machine import Machine
+from olp.program.feeds import lengths_mm
+from olp.program.program import Program
+from olp.program.timing import timing
+from olp.review.parts import Index
+from olp.review.samples import Samples
+from olp.toolpath import Toolpath
+from olp.trajectory.from_program import SHORTEST_MM, axis_limits
+from olp.trajectory.motion import Motion
+from olp.trajectory.plan import Trajectory
+from olp.trajectory.route import Route
+
+#: rows of a table of motion, and of what is thinned to them at once
+MOST_ROWS = 20_000
+_BLOCK = 1 << 16
+#: shares of a run that are the same
+_ROUNDING = 1e-9
+#: where a piece of a motion is looked at: a polynomial of time has its peaks at or near one of these
+_PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionTable:
+    """Of m times in order: (m,) `time_s`, `line` of the corrected program, `speed_mm_s`, and `feed_mm_s`, NaN
+    in rapids; (m, 3) axis positions mm, velocities mm/s, accelerations mm/s2 and jerks mm/s3. What was left
+    out lies between neighbours that are there, for each of the columns."""
+
+    time_s: Array
+    line: Index
+    speed_mm_s: Array
+    feed_mm_s: Array
+    position_mm: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Runs:
+    """Runs of one line: (r,) `line` of each, how often the line had a run before (`again`), and (k,) which
+    run each of k moves or pieces belongs to."""
+
+    line: Index
+    again: Index
+    of: Index
+
+    @staticmethod
+    def find(line: Index) -> _Runs:
+        new = np.diff(line, prepend=-1) != 0
+        of = np.cumsum(new) - 1
+        lines = line[new]
+        order = np.argsort(lines, kind="stable")
+        first = np.searchsorted(lines[order], lines[order], "left")
+        again = np.empty(len(lines), np.int64)
+        again[order] = np.arange(len(lines)) - first
+        return _Runs(lines, again, of)
+
+    def partners(self, other: _Runs) -> tuple[Index, Index]:
+        """Runs that both have, in order in both."""
+        wide = max(int(self.again.max(initial=0)), int(other.again.max(initial=0))) + 1
+        _, mine, theirs = np.intersect1d(
+            self.line * wide + self.again, other.line * wide + other.again, return_indices=True
+        )
+        order = np.argsort(mine, kind="stable")
+        mine, theirs = mine[order], theirs[order]
+        ahead = theirs > np.concatenate(([-1], np.maximum.accumulate(theirs)[:-1]))
+        return mine[ahead], theirs[ahead]
+
+
+def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajectory]) -> tuple[Array, Array]:
+    """(n,) s at which the motion of the corrected program comes to each sample, and at which it leaves it;
+    stretches follow one another.
+
+    Along each line the way that is done tells the time: a motion that rounds corners meets no way-point
+    itself.
+    """
+    length = lengths_mm(corrected)
+    way = ~(length <= SHORTEST_MM)
+    driven = np.isfinite(length) & way
+    moves = np.flatnonzero(way)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], driven[moves], [False])).astype(np.int8)))
+    arrival, leaving = np.full((2, len(samples)), np.nan)
+    begin = 0.0
+    for (first, stop), trajectory in zip(
+        zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True), trajectories, strict=True
+    ):
+        mine = moves[first:stop]
+        a = int(np.searchsorted(samples.part, mine[0], "left"))
+        b = int(np.searchsorted(samples.part, mine[-1], "right"))
+        found = _along(corrected, length, mine, samples, a, b, trajectory.motion)
+        arrival[a:b], leaving[a:b] = begin + found[0], begin + found[1]
+        begin += trajectory.duration_s
+    arrival = _filled(arrival)
+    return arrival, np.maximum(_filled(leaving), arrival)
+
+
+def _along(
+    path: Toolpath, length: Array, moves: Index, samples: Samples, a: int, b: int, motion: Motion
+) -> tuple[Array, Array]:
+    """Times at which samples a..b are reached and left, in the motion of the stretch that `moves` drive."""
+    runs = _Runs.find(path.line[moves].astype(np.int64))
+    size = length[moves]
+    done = np.concatenate(([0.0], np.cumsum(size)))
+    # moves without a length stand where the one before them ended
+    rank = np.searchsorted(moves, samples.part[a:b], "right") - 1
+    exact = (rank >= 0) & (moves[np.maximum(rank, 0)] == samples.part[a:b])
+    rank = np.maximum(rank, 0)
+    place = done[rank] + np.where(exact, samples.within[a:b], 1.0) * size[rank]
+    run = runs.of[rank]
+    start, total = _spans(runs.of, size, done)
+    share = (place - start[run]) / np.maximum(total[run], 1e-12)
+
+    time, travelled, piece = _travel(motion)
+    pieces = _Runs.find(motion.line)
+    mine, theirs = runs.partners(pieces)
+    at = np.full(len(pieces.line), -1, np.int64)
+    at[theirs] = mine
+    of = pieces.of[piece]
+    steps = np.bincount(of, np.diff(travelled, prepend=0.0), minlength=len(pieces.line))
+    begin = np.concatenate(([0.0], np.cumsum(steps)))[:-1]
+    known = at[of] >= 0
+    done_share = np.clip((travelled - begin[of]) / np.maximum(steps[of], 1e-12), 0.0, 1.0)
+    progress = np.maximum.accumulate(_snapped(np.asarray(at[of] + done_share, float)[known]))
+    wanted = _snapped(np.asarray(run + np.clip(share, 0.0, 1.0), float))
+    return _passing(wanted, progress, time[known])
+
+
+def _snapped(place: Array) -> Array:
+    """What is an end of a run but for rounding is one: there the motion may rest."""
+    whole = np.rint(place)
+    return np.where(np.abs(place - whole) < _ROUNDING, whole, place)
+
+
+def _passing(place: Array, progress: Array, time: Array) -> tuple[Array, Array]:
+    """First and last time at which a progress that never falls is at each place."""
+    after = np.clip(np.searchsorted(progress, place, "left"), 0, len(progress) - 1)
+    before = np.maximum(after - 1, 0)
+    gap = progress[after] - progress[before]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(gap > 0.0, (place - progress[before]) / gap, 1.0)
+    first = time[before] + np.clip(share, 0.0, 1.0) * (time[after] - time[before])
+    last = np.clip(np.searchsorted(progress, place, "right") - 1, 0, len(progress) - 1)
+    return first, np.where(progress[last] == place, np.maximum(time[last], first), first)
+
+
+def _spans(of: Index, size: Array, done: Array) -> tuple[Array, Array]:
+    """Of each run the way before it, and its length."""
+    total = np.bincount(of, size).astype(float)
+    first = np.searchsorted(of, np.arange(len(total)), "left")
+    return done[first], total
+
+
+def _travel(motion: Motion) -> tuple[Array, Array, Index]:
+    """Times, the way travelled by then, and the piece, at several places of each piece of a motion."""
+    seconds = np.diff(motion.start_s)
+    count = len(_PLACES) - 1
+    piece = np.repeat(np.arange(len(motion)), count)
+    # each piece answers for the way from its start to its end
+    u = (seconds[:, None] * _PLACES[1:]).ravel()
+    way = np.empty(len(piece))
+    for a in range(0, len(motion), _BLOCK):
+        some = np.arange(a, min(a + _BLOCK, len(motion)))
+        at = motion.of(np.repeat(some, len(_PLACES)), (seconds[some, None] * _PLACES).ravel())[0]
+        step = np.diff(at.reshape(len(some), len(_PLACES), 3), axis=1)
+        way[a * count : (a + len(some)) * count] = np.sqrt((step * step).sum(axis=2)).ravel()
+    time = motion.start_s[piece] - motion.start_s[0] + u
+    return (
+        np.concatenate(([0.0], time)),
+        np.concatenate(([0.0], np.cumsum(way))),
+        np.concatenate((piece[:1], piece)),
+    )
+
+
+def _filled(time: Array) -> Array:
+    """Samples that no motion reaches take the time before them."""
+    return np.maximum.accumulate(np.nan_to_num(time, nan=0.0))
+
+
+def by_feed(program: Program, samples: Samples, machine: Machine) -> Array:
+    """(n,) s at which the nominal program passes each sample, at the programmed feed, or where there is none
+    and in rapids at the limits of velocity, as if nothing took time to speed up."""
+    path = program.toolpath
+    try:
+        feed = timing(program).feed_mm_s
+    except ProgramError:
+        feed = np.full(len(path), np.inf)
+    length = np.nan_to_num(lengths_mm(path))
+    step = np.abs(np.nan_to_num(path.end_mm - path.starts_mm()))
+    least = (step / axis_limits(machine).velocity).max(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        seconds = np.fmax(length / feed, least)
+    before = np.concatenate(([0.0], np.cumsum(seconds)))
+    return _filled(before[samples.move] + samples.share * seconds[samples.move])
+
+
+def table(trajectories: Sequence[Trajectory], routes: Sequence[Route]) -> MotionTable:
+    """The motion as at most about MOST_ROWS rows that keep every peak of what they show."""
+    parts = []
+    begin = 0.0
+    total = max(sum(len(t.motion) for t in trajectories), 1)
+    for trajectory, route in zip(trajectories, routes, strict=True):
+        motion = trajectory.motion
+        feed = _feeds(route)
+        room = max(MOST_ROWS * len(motion) // total, 200)
+        for a, b in pairwise([*range(0, len(motion), _BLOCK), len(motion)]):
+            rows = _rows(motion, a, b, begin, feed)
+            parts.append(_thinned(rows, max(room * (b - a) // len(motion), 100)))
+        begin += trajectory.duration_s
+    if not parts:
+        return _split(np.zeros((0, 16)))
+    rows = np.concatenate(parts)
+    rows[:, 0] = np.maximum.accumulate(rows[:, 0])
+    return _split(rows)
+
+
+def _feeds(route: Route) -> tuple[Index, Array]:
+    """Lines of a route and the feed that each has, NaN for rapids."""
+    line, first = np.unique(route.line, return_index=True)
+    feed = np.where(np.isfinite(route.feed_mm_s[first]), route.feed_mm_s[first], np.nan)
+    return line, feed
+
+
+def _rows(motion: Motion, a: int, b: int, begin: float, feed: tuple[Index, Array]) -> Array:
+    """Rows of pieces a..b: time, line, speed, feed, and the axes' positions and their three derivatives."""
+    count = len(_PLACES)
+    piece = np.repeat(np.arange(a, b), count)
+    seconds = np.diff(motion.start_s[a : b + 1])
+    u = (seconds[:, None] * _PLACES).ravel()
+    position, velocity, acceleration, jerk = motion.of(piece, u)
+    line = motion.line[piece]
+    place = np.minimum(np.searchsorted(feed[0], line), len(feed[0]) - 1)
+    speed = np.sqrt((velocity * velocity).sum(axis=1))
+    time = begin + motion.start_s[piece] - motion.start_s[0] + u
+    columns = (time, line, speed, feed[1][place])
+    return np.column_stack((*columns, position, velocity, acceleration, jerk))
+
+
+def _thinned(rows: Array, most: int) -> Array:
+    """Of blocks of rows those where a column has its least or largest value, and the first and last."""
+    watched = (2, *range(7, rows.shape[1]))
+    blocks = max(most // (2 * len(watched) + 2), 1)
+    wide = -(-len(rows) // blocks)
+    if wide <= 2 * len(watched) + 2:
+        return rows
+    edges = np.arange(0, len(rows), wide)
+    pad = len(edges) * wide - len(rows)
+    keep = [edges, np.minimum(edges + wide, len(rows)) - 1]
+    for column in watched:
+        values = np.pad(rows[:, column], (0, pad), mode="edge").reshape(len(edges), wide)
+        keep += [edges + values.argmin(axis=1), edges + values.argmax(axis=1)]
+    index = np.unique(np.minimum(np.concatenate(keep), len(rows) - 1))
+    return np.asarray(rows[index])
+
+
+def _split(rows: npt.NDArray[np.float64]) -> MotionTable:
+    return MotionTable(
+        rows[:, 0], rows[:, 1].astype(np.int64), rows[:, 2], rows[:, 3], rows[:, 4:7], rows[:, 7:10],
+        rows[:, 10:13], rows[:, 13:16],
+    )  # fmt: skip

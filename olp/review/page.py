@@ -1,0 +1,93 @@
+"""The page: our template with the packed data and meshcat's bundle in it, one file that needs nothing
+else."""
+
+from __future__ import annotations
+
+import html
+import importlib.util
+import json
+import re
+from collections.abc import Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+from typing import Any
+
+from olp.exceptions import CannotCompute
+from olp.files.write import read_bytes
+
+_MARK = re.compile(r"@@([A-Z]+)@@")
+#: what would end a script element, or change how the rest of it is read
+_BREAKS_OUT = re.compile(r"</script|<!--", re.IGNORECASE)
+
+
+def page(manifest: Mapping[str, Any], data: bytes, *, live: bool = False) -> Iterator[bytes]:
+    """The page in parts. `data` is the base64 of the arrays, `live` lets it ask its own server, and nothing
+    else, for changes."""
+    values: dict[str, bytes] = {
+        "TITLE": html.escape(str(manifest["title"])).encode(),
+        "CONNECT": b"'self'" if live else b"'none'",
+        "CSS": _asset("review.css").encode(),
+        "MESHCAT": _script(*_bundle()),
+        "LICENCE": html.escape(_licence()).encode(),
+        "MANIFEST": as_json(manifest),
+        "DATA": data,
+        "MODULES": b"\n".join(_modules()),
+    }
+    # the values are never searched for marks: a program may hold what looks like one
+    at = 0
+    template = _asset("review.html")
+    for mark in _MARK.finditer(template):
+        yield template[at : mark.start()].encode()
+        yield values[mark[1]]
+        at = mark.end()
+    yield template[at:].encode()
+
+
+def as_json(value: Mapping[str, Any]) -> bytes:
+    """JSON that can stand in a script element: no `<` in it, so nothing in a text can end the element."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.replace("<", "\\u003c").encode()
+
+
+def _modules() -> Iterator[bytes]:
+    for name in _asset("modules.txt").split():
+        yield b"<script>" + _script(_asset(name), name) + b"</script>"
+
+
+def _script(text: str, name: str) -> bytes:
+    if _BREAKS_OUT.search(text):
+        raise CannotCompute(
+            "holds what would end its script element, so it cannot be put into a page", file=name
+        )
+    return text.encode()
+
+
+def _asset(name: str) -> str:
+    """A file of the page: from the installed package, or from the checkout."""
+    here = Path(__file__).resolve().parents[1]
+    folder = here / "_viewer"
+    if not folder.is_dir():
+        folder = here.parent / "viewer" / "static"
+    return read_bytes(folder / name).decode("utf-8")
+
+
+def _bundle() -> tuple[str, str]:
+    """meshcat's viewer, and its path. The package is found and not imported: that would load a server."""
+    found = importlib.util.find_spec("meshcat")
+    if found is None or not found.submodule_search_locations:
+        raise CannotCompute(
+            "the page needs meshcat, which is not installed; install it with pip install meshcat"
+        )
+    path = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
+    return read_bytes(path).decode("utf-8"), str(path)
+
+
+def _licence() -> str:
+    """The terms of what is in the bundle."""
+    try:
+        listed = files("meshcat") or []
+    except PackageNotFoundError:
+        listed = []
+    wanted = (".dist-info/LICENSE", "viewer/dist/main.min.js.LICENSE.txt", ".dist-info/licenses")
+    found = [Path(str(f.locate())) for f in listed if any(part in f.as_posix() for part in wanted)]
+    return "\n\n".join(read_bytes(path).decode("utf-8", "replace").strip() for path in found)

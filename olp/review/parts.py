@@ -1,0 +1,215 @@
+"""How the moves of a corrected program lie along those of the nominal one, and where the tip is on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel import ErrorModel, play_states
+from olp.errormodel.base import Array
+from olp.geometry import PLANES, arc_points
+from olp.program.feeds import lengths_mm
+from olp.program.program import Program
+from olp.toolpath import Kind, Toolpath
+
+Index = npt.NDArray[np.int64]
+
+_STRAIGHT = (Kind.RAPID, Kind.LINE, Kind.PROBE)
+#: samples that are evaluated at once: their temporaries fit the cache
+BLOCK = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """The moves of a path from end to end; (n,) `arc` index or -1, (n,) `length` in mm."""
+
+    path: Toolpath
+    start: Array
+    arc: Index
+    length: Array
+
+    @staticmethod
+    def of(path: Toolpath) -> Ends:
+        arc = np.full(len(path), -1, np.int64)
+        arc[path.arcs.move] = np.arange(len(path.arcs))
+        return Ends(path, path.starts_mm(), arc, lengths_mm(path))
+
+    def at(self, move: Index, share: Array) -> Array:
+        """(m, 3) axis positions at shares of moves; at a share of 1 that is the end, also of unknown
+        starts."""
+        end = self.path.end_mm[move]
+        start = self.start[move]
+        out = start + share[:, None] * (end - start)
+        curved = np.flatnonzero((self.arc[move] >= 0) & (share < 1.0))
+        if curved.size:
+            arcs, which = self.path.arcs, self.arc[move[curved]]
+            out[curved] = arc_points(
+                start[curved], end[curved], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which],
+                share[curved],
+            )  # fmt: skip
+        whole = share == 1.0
+        out[whole] = end[whole]
+        return out
+
+    def directions(self, move: Index, share: Array) -> Array:
+        """(m, 3) unit tangents at shares of moves."""
+        step = 1e-6
+        first = np.minimum(share, 1.0 - step)
+        out = self.at(move, first + step) - self.at(move, first)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.nan_to_num(out / np.sqrt(np.einsum("ij,ij->i", out, out))[:, None]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """Of the m moves of a corrected program: (m,) `owner`, the nominal move, and the shares of it at which
+    they `begin` and end (`cut`)."""
+
+    owner: Index
+    begin: Array
+    cut: Array
+
+    @staticmethod
+    def of(ends: Ends, other: Ends, groups: Index, shift: Array, model: ErrorModel) -> Parts:
+        owner = np.searchsorted(groups, np.arange(len(other.path)))
+        cut = _cuts(ends, other, owner, groups, shift, model)
+        begin = np.zeros(len(cut))
+        begin[1:] = np.where(np.diff(owner) == 0, cut[:-1], 0.0)
+        return Parts(owner, begin, cut)
+
+
+def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, model: ErrorModel) -> Array:
+    """(m,) the share of its nominal move that is done where each corrected move ends."""
+    nominal, corrected = ends.path, other.path
+    cut = np.ones(len(corrected))
+    inner = np.ones(len(corrected), bool)
+    inner[groups] = False
+    inner &= np.isfinite(ends.length)[owner]
+    rows = np.flatnonzero(inner)
+    if not rows.size:
+        return cut
+    move = owner[rows]
+    tool = nominal.per_frame([f.tool_mm for f in nominal.frames])
+    command = corrected.end_mm[rows]
+    play = plays(model, corrected.end_mm)
+    error = error_mm(model, command, tool, move, None if play is None else play[rows])
+    nothing = np.zeros(len(rows))
+    tip = command + error - held_mm(nominal, shift, move, nothing)
+    start, along = ends.start[move], nominal.end_mm[move] - ends.start[move]
+    along += held_mm(nominal, shift, move, nothing + 1.0) - held_mm(nominal, shift, move, nothing)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.einsum("ij,ij->i", tip - start, along) / np.einsum("ij,ij->i", along, along)
+    curved = np.flatnonzero(ends.arc[move] >= 0)
+    if curved.size:
+        length = np.nan_to_num(other.length)
+        done = np.cumsum(length)
+        before = np.concatenate(([0.0], done[groups]))
+        total = np.diff(before)[move[curved]]
+        guess = (done[rows[curved]] - before[move[curved]]) / np.maximum(total, 1e-12)
+        share[curved] = _arc_share(ends, move[curved], tip[curved], guess)
+    share = np.clip(np.nan_to_num(share, nan=1.0), 0.0, 1.0)
+    cut[rows] = share
+    if (np.diff(cut) < 0.0)[np.diff(owner) == 0].any():
+        # a step back is one that only takes up lost motion: the tip stands still
+        rank = 2.0 * (np.cumsum(np.diff(move, prepend=-1) != 0) - 1)
+        cut[rows] = np.clip(np.maximum.accumulate(share + rank) - rank, 0.0, 1.0)
+    return cut
+
+
+def _arc_share(ends: Ends, move: Index, tip: Array, guess: Array) -> Array:
+    """Shares of arcs by the angle of points near them; `guess` says on which turn."""
+    arcs, which = ends.path.arcs, ends.arc[move]
+    rows = np.arange(len(move))
+    axes = np.array(PLANES)[arcs.plane[which]]
+    centre, sweep, start = arcs.centre_mm[which], arcs.sweep_rad[which], ends.start[move]
+
+    def angle(point: Array) -> Array:
+        first, second = (point[rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))
+        return np.asarray(np.arctan2(second, first))
+
+    turned = angle(tip) - angle(start)
+    turned += 2 * np.pi * np.rint((guess * sweep - turned) / (2 * np.pi))
+    return np.asarray(turned / sweep)
+
+
+def set_beside(
+    ends: Ends, other: Ends, parts: Parts, move: Index, share: Array, part: Index, within: Array,
+    command: Array, result: Array,
+) -> None:  # fmt: skip
+    """Shift commands (n, 3) along their moves, and `within` with them, until the tip is beside its sample.
+
+    Equal shares of a move and of what it became are not reached at one place: deviations `result` (n, 3) go
+    evenly from the beginning of a part to its end, and what they differ from that along the path is no
+    deviation of the path.
+    """
+    rows = np.flatnonzero((within < 1.0) & (within > 0.0) & np.isfinite(other.length[part]))
+    which = part[rows]
+    # the last sample of a part is its end
+    last = result[np.searchsorted(part, np.arange(len(parts.cut)), "right") - 1]
+    first = np.concatenate((last[:1], last[:-1]))
+    first = np.where(np.isfinite(first), first, last)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        even = (share[rows] - parts.begin[which]) / (parts.cut - parts.begin)[which]
+    even = np.clip(np.nan_to_num(even), 0.0, 1.0)[:, None]
+    extra = result[rows] - first[which] - even * (last - first)[which]
+    ahead = np.einsum("ij,ij->i", extra, ends.directions(move[rows], share[rows]))
+    step = np.nan_to_num(ahead) / np.maximum(other.length[which], 1e-9)
+    within[rows] = np.clip(within[rows] - step, 0.0, 1.0)
+    command[rows] = other.at(which, within[rows])
+
+
+def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array, command: Array) -> None:
+    """Strokes of canned cycles: a hole may take one peck more or less than before, so pecks have no partners;
+    what stands for a place of the stroke is the same place of the corrected hole."""
+    holes = nominal.holes
+    if not holes or len(holes) != len(corrected.holes):
+        return
+    path = nominal.toolpath
+    of = np.full(len(path), -1, np.int64)
+    for k, hole in enumerate(holes):
+        of[hole.first : hole.last] = k
+    axes = np.array([PLANES[h.plane] for h in holes])
+    mine, theirs = (
+        np.array([(*h.place_mm, h.r_mm, h.z_mm) for h in some]) for some in (holes, corrected.holes)
+    )
+    rows = np.flatnonzero(of[move] >= 0)
+    which = of[move[rows]]
+    first, second, third = (axes[which, i] for i in range(3))
+    there = axis[rows]
+    index = np.arange(len(rows))
+    change = (theirs - mine)[which]
+    on = np.abs(there[index, first] - mine[which, 0]) + np.abs(there[index, second] - mine[which, 1]) < 1e-9
+    depth = mine[which, 3] - mine[which, 2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.clip(np.nan_to_num((there[index, third] - mine[which, 2]) / depth), 0.0, 1.0)
+    there[index, first] += change[:, 0]
+    there[index, second] += change[:, 1]
+    there[index, third] += change[:, 2] + share * (change[:, 3] - change[:, 2])
+    command[rows[on]] = there[on]
+
+
+def held_mm(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:
+    """(m, 3) where the part lies from where the offsets say, at shares of moves: a line that begins in one
+    frame and ends in another goes from the one to the other, an arc is all of its own."""
+    own = path.frame[move]
+    before = np.where(
+        (move > 0) & np.isin(path.kind[move], _STRAIGHT), path.frame[np.maximum(move - 1, 0)], own
+    )
+    return np.asarray(shift[before] + share[:, None] * (shift[own] - shift[before]))
+
+
+def plays(model: ErrorModel, points: Array) -> Array | None:
+    width = model.lost_motion_mm(points)
+    return None if width is None else play_states(points, width)
+
+
+def error_mm(model: ErrorModel, points: Array, tool: Array, move: Index, play: Array | None) -> Array:
+    """(n, 3) error of the tip, a block at a time: the temporaries of all at once would not fit the cache."""
+    out = np.empty_like(points)
+    for a in range(0, len(points), BLOCK):
+        rows = slice(a, a + BLOCK)
+        lever = tool if tool.ndim == 1 else tool[move[rows]]
+        out[rows] = model.error(points[rows], lever, None if play is None else play[rows])
+    return out

@@ -1,0 +1,184 @@
+"""The nominal path in samples, and beside each what the machine would do with either program.
+
+A sample lies at a share of a nominal move. The moves of the corrected program that stand for it are cut where
+the tip is at that place, so that a deviation is the distance from the place that the tip should be at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.plan import zero_shifts
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array, Mask
+from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
+from olp.exceptions import CannotCompute
+from olp.program.feeds import lengths_mm
+from olp.program.program import Program
+from olp.review.parts import BLOCK, Ends, Index, Parts, error_mm, held_mm, plays, set_beside, set_in_holes
+from olp.toolpath import Kind, Toolpath
+
+#: samples that a path is given unless its length asks for fewer, and the shortest and longest step between
+#: them
+SAMPLES, FINEST_MM, COARSEST_MM = 100_000, 0.5, 10.0
+#: between two samples of a feed move the error bends by less than this
+BEND_MM = 1e-4
+#: chords of arcs turn by no more than this, and leave the arc by no more than that
+_TURN, _SAGITTA_MM = np.pi / 36, 0.01
+_MOST_STEPS = 1 << 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Of n samples in program order: (n,) nominal `move` and `share` of it; (n,) `part`, the move of the
+    corrected program, and the share of it as `within`; (n, 3) `axis_mm` and `command_mm`, nominal and
+    corrected axis positions; (n, 3) deviations of the tip from its nominal place in mm, `uncorrected` and
+    `result`; (n,) `joined`, whether the path leads here from the sample before; (n,) `way_mm` along the path.
+    `play` (n, 3) is that of the nominal commands, None where no axis has lost motion."""
+
+    move: Index
+    share: Array
+    part: Index
+    within: Array
+    axis_mm: Array
+    command_mm: Array
+    uncorrected: Array
+    result: Array
+    joined: Mask
+    way_mm: Array
+    play: Array | None
+
+    def __len__(self) -> int:
+        return len(self.move)
+
+    def take(self, which: Index) -> Samples:
+        """Some of them, one or several times."""
+        return Samples(
+            self.move[which], self.share[which], self.part[which], self.within[which], self.axis_mm[which],
+            self.command_mm[which], self.uncorrected[which], self.result[which], self.joined[which],
+            self.way_mm[which], None if self.play is None else self.play[which],
+        )  # fmt: skip
+
+    @property
+    def correction(self) -> Array:
+        """(n, 3) command written less nominal command."""
+        return self.command_mm - self.axis_mm
+
+
+def sample(
+    nominal: Program, corrected: Program, groups: Index, model: ErrorModel, step_mm: float | None = None
+) -> Samples:
+    """Samples every `step_mm`, or finer where the error asks for it.
+
+    `groups` (n,) is the last corrected move of each nominal move. Between way-points the tip of the corrected
+    program is taken where it is beside the sample, at way-points where it ends up. Raises CannotCompute for a
+    path without any known position.
+    """
+    path, written = nominal.toolpath, corrected.toolpath
+    shift = zero_shifts(path.frames, model) if path.frames else np.zeros((1, 3))
+    ends, other = Ends.of(path), Ends.of(written)
+    parts = Parts.of(ends, other, groups, shift, model)
+    steps = _steps(path, model, step_mm)
+    move, share, part, within = _merged(steps, parts, start=bool(np.isfinite(path.start_mm).all()))
+    axis = ends.at(move, share)
+    tool = path.per_frame([f.tool_mm for f in path.frames])
+    held = held_mm(path, shift, move, share)
+    play = plays(model, axis)
+    uncorrected = error_mm(model, axis, tool, move, play) - held
+    command = other.at(part, within)
+    play_there = plays(model, command)
+    result = error_mm(model, command, tool, move, play_there) - held + (command - axis)
+    set_beside(ends, other, parts, move, share, part, within, command, result)
+    set_in_holes(nominal, corrected, move, axis, command)
+    result = error_mm(model, command, tool, move, play_there) - held + (command - axis)
+    # of several samples at one place the last stands for all: what came before took up lost motion
+    keep = np.append((np.diff(move) != 0) | (np.diff(share) > 1e-12), True)
+    keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(result).all(axis=1)
+    if not keep.any():
+        raise CannotCompute(
+            "the program brings the tip to no known position, so there is nothing to show; give start_mm in "
+            "the job file, or command X, Y and Z first"
+        )
+    started = np.isfinite(ends.length)[move]
+    length = np.nan_to_num(ends.length)
+    way = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
+    every = Samples(move, share, part, within, axis, command, uncorrected, result, started, way, play).take(
+        np.flatnonzero(keep)
+    )
+    every.joined[0] = False
+    return every
+
+
+def by_source(
+    path: Toolpath, samples: Samples, model: ErrorModel
+) -> Iterator[tuple[str, npt.NDArray[np.float32]]]:
+    """(name, (n,) mm) of each source of error: the size of what it alone does to the tip of the nominal
+    program."""
+    tool = path.per_frame([f.tool_mm for f in path.frames])
+    found: dict[str, npt.NDArray[np.float32]] = {}
+    for a in range(0, len(samples), BLOCK):
+        rows = slice(a, a + BLOCK)
+        lever = tool if tool.ndim == 1 else tool[samples.move[rows]]
+        play = None if samples.play is None else samples.play[rows]
+        for name, value in model.contributions(samples.axis_mm[rows], lever, play):
+            size = found.setdefault(name, np.zeros(len(samples), np.float32))
+            size[rows] = np.sqrt(np.einsum("ij,ij->i", value, value))
+    yield from sorted(found.items(), key=lambda item: -float(item[1].max(initial=0.0)))
+
+
+def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:
+    """(n,) into how many equal steps each move goes."""
+    length = lengths_mm(path)
+    known = np.isfinite(length)
+    length[~known] = 0.0
+    if step_mm is None:
+        # every move has a sample at its end; what is left goes to the long ones
+        spare = max(SAMPLES - len(path), SAMPLES // 10)
+        step_mm = float(np.clip(length.sum() / spare, FINEST_MM, COARSEST_MM))
+    steps = np.maximum(np.ceil(length / step_mm - 1e-9), 1).astype(np.int64)
+    delta = path.end_mm - path.starts_mm()
+    which = longer(delta, clear_length_mm(model, path.tools_mm(), BEND_MM))
+    which = which[known[which] & (path.kind[which] != Kind.RAPID)]
+    if which.size:
+        tool = path.tool_mm()
+        lever = tool if tool.ndim == 1 else tool[which]
+        finer = steps_needed(model, delta[which], lever, BEND_MM, at_most=_MOST_STEPS)
+        steps[which] = np.maximum(steps[which], finer)
+    arcs = path.arcs
+    if len(arcs):
+        turn = np.abs(arcs.sweep_rad)
+        radius = np.maximum(length[arcs.move] / np.maximum(turn, 1e-12), 1e-6)
+        chord = np.minimum(2.0 * np.arccos(np.clip(1.0 - _SAGITTA_MM / radius, -1.0, 1.0)), _TURN)
+        steps[arcs.move] = np.maximum(
+            steps[arcs.move], np.ceil(turn / np.maximum(chord, 1e-3)).astype(np.int64)
+        )
+    return steps
+
+
+def _merged(steps: Index, parts: Parts, *, start: bool) -> tuple[Index, Array, Index, Array]:
+    """Samples at equal steps and at the ends of corrected moves, in order: nominal move and share, corrected
+    move and share."""
+    count = steps - 1
+    move = np.repeat(np.arange(len(steps)), count)
+    first = np.cumsum(count) - count
+    share = (np.arange(len(move)) - first[move] + 1) / steps[move]
+    if start and len(steps):
+        move, share = np.concatenate(([0], move)), np.concatenate(([0.0], share))
+    both = np.concatenate((move, parts.owner))
+    at = np.concatenate((share, parts.cut))
+    ends_part = np.zeros(len(both), bool)
+    ends_part[len(move) :] = True
+    # equal keys stay in the order of the corrected program
+    order = np.lexsort((ends_part, at, both))
+    both, at, ends_part = both[order], at[order], ends_part[order]
+    part = np.minimum(np.cumsum(ends_part) - ends_part, len(parts.owner) - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        within = (at - parts.begin[part]) / (parts.cut - parts.begin)[part]
+    within = np.clip(np.where(ends_part | ~np.isfinite(within), 1.0, within), 0.0, 1.0)
+    if start and len(steps):
+        within[0] = 0.0
+    return both, at, part, within

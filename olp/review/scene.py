@@ -1,0 +1,74 @@
+"""A job as pure data: all that its page shows, nothing packed yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.machine import Machine
+from olp.program.program import Program
+from olp.review.listing import Listing
+from olp.review.measured import Matched
+from olp.review.meshes import Body
+from olp.review.motion import MotionTable
+from olp.review.samples import Samples
+from olp.toolpath import Toolpath
+
+Single = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What positions are shown in: `label` for people, `offset` the work offset or "machine", `origin_mm`
+    where that is on the machine, no tool length active."""
+
+    label: str
+    offset: str
+    origin_mm: tuple[float, float, float]
+
+    @staticmethod
+    def of(path: Toolpath) -> Frame:
+        """The work offset of a program that has one and the same all through, else the machine."""
+        used = [path.frames[k] for k in np.unique(path.frame).tolist()]
+        places = {(f.work_offset, *np.round(np.subtract(f.offset_mm, f.length_mm), 9).tolist()) for f in used}
+        if len(places) == 1:
+            name, x, y, z = places.pop()
+            return Frame(f"{name}, as programmed", str(name), (x, y, z))
+        return Frame("machine, less tool lengths", "machine", (0.0, 0.0, 0.0))
+
+    def positions(self, path: Toolpath, move: npt.NDArray[np.int64], axis_mm: Array) -> Array:
+        """(n, 3) the tip at axis positions (n, 3), reached in moves (n,)."""
+        length = path.per_frame([f.length_mm for f in path.frames])
+        tip = axis_mm - (length if length.ndim == 1 else length[move])
+        return np.asarray(tip - np.array(self.origin_mm), float)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) when they are passed, by the re-timed
+    motion where there is one and else by the feed. `sources` are (name, (n,) mm) by size; `report` is that of
+    the correction or verification ("olp-report-1")."""
+
+    name: str
+    corrected_name: str
+    digest: str
+    machine: Machine
+    nominal: Program
+    frame: Frame
+    samples: Samples
+    position_mm: Array
+    time_s: Array
+    motion: MotionTable | None
+    duration_s: float
+    sources: tuple[tuple[str, Single], ...]
+    listing: Listing
+    bodies: tuple[Body, ...]
+    measured: tuple[Matched, ...]
+    report: Mapping[str, Any]
+    tolerance_um: float
+    tool_radius_mm: float

@@ -1,0 +1,214 @@
+"use strict";
+// Program text, nominal beside corrected, with the file's own line numbers. Only the rows in sight exist, and the scroll
+// is scaled where a million rows would be higher than a browser can lay out. Text enters by textContent alone.
+(() => {
+  const ROW = 19,
+    TALLEST = 8e6,
+    SHOWN = 400; // px, px, characters of a line in the list
+
+  class Listing {
+    constructor(app) {
+      const {listing} = app.manifest,
+        get = name => (name == null ? null : app.arrays.get(name));
+      this.app = app;
+      this.texts = [get(listing.nominal), get(listing.corrected)];
+      this.numbers = [get(listing.row_nominal), get(listing.row_corrected)];
+      this.errors = [get(listing.error_um), get(listing.result_um)];
+      this.n = this.numbers[0].length;
+      this.box = document.getElementById("listing");
+      this.inner = document.getElementById("listing-inner");
+      this.host = document.getElementById("listing-rows");
+      this.height = Math.min(this.n * ROW, TALLEST);
+      this.inner.style.height = this.height + "px";
+      this.top = 0; // first row in sight, may be a part
+      this.rows = [];
+      this.current = this.selected = -1;
+      const digits = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length;
+      document.getElementById("right").style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
+      this.box.classList.toggle("single", !this.texts[1]);
+      this.heading();
+      this.listen();
+      new ResizeObserver(() => this.paint()).observe(this.box);
+    }
+
+    get scaled() {
+      return this.n * ROW > TALLEST;
+    }
+    get room() {
+      return this.box.clientHeight / ROW;
+    }
+    get highest() {
+      return Math.max(0, this.n - this.room);
+    }
+
+    heading() {
+      const head = document.getElementById("listing-head"),
+        two = Boolean(this.texts[1]);
+      head.classList.toggle("single", !two);
+      const titles = two
+        ? ["line", this.app.manifest.program, "line", this.app.manifest.corrected || "corrected", "µm"]
+        : ["line", this.app.manifest.program, "µm"];
+      head.replaceChildren(
+        ...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})),
+      );
+      head.lastChild.title = this.errors[1]
+        ? "Largest deviation of the line, before → after the correction"
+        : "Largest deviation of the line";
+    }
+
+    // Line of the file at a row: side 0 nominal, 1 corrected; "" where that side has none.
+    text(row, side) {
+      const line = this.numbers[side]?.[row] ?? 0;
+      return line > 0 && this.texts[side] ? this.texts[side].line(line - 1) : "";
+    }
+
+    number(row, side) {
+      return this.numbers[side]?.[row] || "";
+    }
+
+    error(row) {
+      const [before, after] = this.errors.map(e => (e ? e[row] : NaN)),
+        known = v => !Number.isNaN(v) && v !== undefined;
+      if (!known(before) && !known(after)) return "";
+      const n = v => (known(v) ? OLP.colour.number(v, v < 10 ? 2 : 3) : "–");
+      return this.errors[1] ? `${n(before)} → ${n(after)}` : n(before);
+    }
+
+    make_row() {
+      const row = document.createElement("div");
+      row.className = "row";
+      row.setAttribute("role", "option");
+      row.cells = ["number", "code", "number", "code", "error"].map(name =>
+        row.appendChild(Object.assign(document.createElement("span"), {className: name})),
+      );
+      if (!this.texts[1]) row.cells[2].hidden = row.cells[3].hidden = true;
+      this.host.append(row);
+      return row;
+    }
+
+    paint() {
+      const first = Math.max(0, Math.floor(this.top)),
+        count = Math.min(this.n - first, Math.ceil(this.room) + 1);
+      while (this.rows.length < count) this.rows.push(this.make_row());
+      this.rows.forEach((row, i) => {
+        row.hidden = i >= count;
+        if (row.hidden) return;
+        const k = first + i,
+          [a, b, c, d, e] = row.cells;
+        row.style.transform = `translateY(${(k - this.top) * ROW}px)`;
+        if (row.k !== k) {
+          row.k = k;
+          row.dataset.row = k;
+          const nominal = this.text(k, 0),
+            corrected = this.texts[1] ? this.text(k, 1) : "";
+          a.textContent = this.number(k, 0);
+          b.textContent = nominal.slice(0, SHOWN);
+          if (this.texts[1]) {
+            c.textContent = this.number(k, 1);
+            this.show_change(d, nominal, corrected);
+          }
+          e.textContent = this.error(k);
+          const worst = this.errors[1] ?? this.errors[0];
+          e.classList.toggle("over", Boolean(worst) && worst[k] > this.app.scale.tolerance);
+          row.classList.toggle("inserted", !this.number(k, 0));
+        }
+        row.classList.toggle("selected", k === this.selected);
+        row.classList.toggle("current", k === this.current);
+        row.setAttribute("aria-selected", k === this.selected);
+      });
+    }
+
+    repaint() {
+      for (const row of this.rows) row.k = -1;
+      this.paint();
+    }
+
+    // The corrected line with what differs from the nominal one marked.
+    show_change(cell, nominal, corrected) {
+      const old = nominal.slice(0, SHOWN),
+        text = corrected.slice(0, SHOWN);
+      cell.textContent = "";
+      if (old === text || !old) {
+        cell.textContent = text;
+        return;
+      }
+      const words = new Set(old.split(/(?<=\S)\s+|(?=[A-Z(;])/).map(w => w.trim()));
+      for (const part of text.split(/(?=\s)|(?=[A-Z(;])/)) {
+        const changed = part.trim() && !words.has(part.trim());
+        cell.append(changed ? Object.assign(document.createElement("b"), {textContent: part}) : part);
+      }
+    }
+
+    scroll_to(top) {
+      this.top = Math.max(0, Math.min(this.highest, top));
+      const span = this.height - this.box.clientHeight;
+      this.told = this.scaled ? (this.top / Math.max(1e-9, this.highest)) * span : this.top * ROW;
+      this.box.scrollTop = this.told;
+      this.told = this.box.scrollTop;
+      this.paint();
+    }
+
+    // Brings a row into sight.
+    show(row) {
+      if (row < this.top + 1 || row > this.top + this.room - 2) this.scroll_to(row - this.room / 2 + 0.5);
+      else this.paint();
+    }
+
+    listen() {
+      this.box.addEventListener("scroll", () => {
+        if (this.box.scrollTop === this.told) return;
+        const span = this.height - this.box.clientHeight;
+        this.top = this.scaled ? (this.box.scrollTop / Math.max(1, span)) * this.highest : this.box.scrollTop / ROW;
+        this.paint();
+      });
+      this.box.addEventListener(
+        "wheel",
+        e => {
+          if (!this.scaled) return; // a scaled scroll would leap over thousands of rows
+          e.preventDefault();
+          this.scroll_to(this.top + e.deltaY / ROW);
+        },
+        {passive: false},
+      );
+      this.host.addEventListener("click", e => {
+        const row = e.target.closest(".row");
+        if (row) this.app.select_row(+row.dataset.row);
+      });
+      this.box.addEventListener("keydown", e => {
+        const step = {
+          ArrowDown: 1,
+          ArrowUp: -1,
+          PageDown: Math.floor(this.room),
+          PageUp: -Math.floor(this.room),
+          Home: -this.n,
+          End: this.n,
+        }[e.key];
+        if (!step) return;
+        e.preventDefault();
+        e.stopPropagation();
+        this.app.select_row(Math.max(0, Math.min(this.n - 1, Math.max(0, this.selected) + step)));
+      });
+    }
+
+    // Row of a 1-based line of the nominal (0) or corrected (1) file, or -1.
+    row_of_line(line, side = 0) {
+      return this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
+    }
+
+    // Next row after `from` with the text on either side, going round; -1 where there is none.
+    search(text, from) {
+      const wanted = text.toLowerCase();
+      for (let step = 1; step <= this.n; step++) {
+        const row = (from + step + this.n) % this.n;
+        if (
+          this.text(row, 0).toLowerCase().includes(wanted) ||
+          (this.texts[1] && this.text(row, 1).toLowerCase().includes(wanted))
+        )
+          return row;
+      }
+      return -1;
+    }
+  }
+
+  OLP.Listing = Listing;
+})();

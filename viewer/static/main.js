@@ -1,0 +1,202 @@
+"use strict";
+// Puts the page together; what goes wrong is told in the page itself.
+(() => {
+  const $ = id => document.getElementById(id);
+  const SHARE = 0.03; // of the size of the job that the largest deviation is enlarged to
+
+  // Corners of what the feed moves of the base path span, and the radius round their middle that holds all else.
+  function extent(app) {
+    const whole = [
+        [Infinity, Infinity, Infinity],
+        [-Infinity, -Infinity, -Infinity],
+      ],
+      cut = structuredClone(whole);
+    const widen = (box, i) => {
+      for (let j = 0; j < 3; j++) {
+        const v = app.base[3 * i + j];
+        if (v < box[0][j]) box[0][j] = v;
+        if (v > box[1][j]) box[1][j] = v;
+      }
+    };
+    for (let i = 0; i < app.samples; i++) {
+      widen(whole, i);
+      if (i > 0 && app.kind[i] === 0) {
+        widen(cut, i - 1);
+        widen(cut, i);
+      }
+    }
+    const box = cut[0][0] <= cut[1][0] ? cut : whole,
+      size = Math.hypot(...box[0].map((v, j) => box[1][j] - v)) || 10;
+    const middle = box[0].map((v, j) => (v + box[1][j]) / 2),
+      far = Math.max(
+        ...[0, 1].flatMap(a =>
+          [0, 1].flatMap(b =>
+            [0, 1].map(c => Math.hypot(whole[a][0] - middle[0], whole[b][1] - middle[1], whole[c][2] - middle[2])),
+          ),
+        ),
+      );
+    // machine nodes move with the axes, by no more than the path is wide
+    const meshes = app.meshes.reach.map(
+      ([centre, radius]) => Math.hypot(...centre.map((v, j) => v - middle[j])) + radius + 2 * far,
+    );
+    return {box, size, reach: Math.max(far, ...meshes, size) * 1.5};
+  }
+
+  // A round factor at which the largest deviation shown is a small share of the job's size.
+  function exaggeration(app, size) {
+    let largest = 0;
+    const metric = app.plot_metric();
+    for (const name of app.metrics.layers(metric))
+      if (app.layers.get(name).visible) largest = Math.max(largest, app.metrics.summary(metric, name, 1)?.largest ?? 0);
+    if (!(largest > 0)) return 1;
+    const wanted = (SHARE * size) / (1e-3 * largest),
+      unit = 10 ** Math.floor(Math.log10(wanted));
+    return Math.max(1, Math.min(1e5, [5, 2, 1].find(m => m * unit <= wanted) * unit));
+  }
+
+  function extend(app) {
+    let timer = 0;
+    // A line of talk at the foot of the picture; kind "lost" stays until it is taken back.
+    app.toast = (text, ms, kind = "") => {
+      const box = $("toast");
+      if (text === null) {
+        if (box.dataset.kind === kind) box.hidden = true;
+        return;
+      }
+      Object.assign(box, {textContent: text, hidden: false});
+      box.dataset.kind = kind;
+      clearTimeout(timer);
+      if (ms)
+        timer = setTimeout(() => {
+          box.hidden = true;
+        }, ms);
+    };
+    app.set_theme = theme => {
+      app.state.theme = document.documentElement.dataset.theme = theme;
+      const style = getComputedStyle(document.documentElement);
+      for (const path of app.layers.values()) path.colour = OLP.colour.readable(path.given, theme);
+      app.paint();
+      for (const {uniforms} of app.scene.lines.values()) {
+        uniforms.faint.value.set(style.getPropertyValue("--rapid").trim());
+        uniforms.accent.value.set(style.getPropertyValue("--accent").trim());
+      }
+      app.scale.apply();
+      OLP.emit("theme");
+    };
+    app.set_view = name => {
+      app.state.view = name;
+      app.camera.fit(name);
+    };
+    app.go_to_line = line => {
+      const row = app.listing.row_of_line(line);
+      if (row >= 0) app.select_row(row);
+    };
+    app.hover_sample = sample => {
+      const layer = app.tool_layer();
+      app.overlay.hover = sample === null ? null : {layer: layer.name, at: layer.own(sample)};
+      app.overlay.draw();
+    };
+  }
+
+  function follow_listing(app) {
+    const {listing} = app;
+    let kept = [-2, -2];
+    const show = () => {
+      const [a] = app.state.span;
+      listing.selected = app.state.row;
+      listing.current = app.row_at();
+      listing.show(app.state.row);
+      if (kept[0] === app.state.row && kept[1] === a) return;
+      kept = [app.state.row, a];
+      const line = (side, name) => {
+        const n = listing.number(app.state.row, side);
+        return n
+          ? [
+              OLP.make(
+                "p",
+                {},
+                OLP.make("b", {textContent: `${name} ${n}`}),
+                OLP.make("code", {textContent: listing.text(app.state.row, side)}),
+              ),
+            ]
+          : [];
+      };
+      $("detail").replaceChildren(...line(0, "nominal"), ...(listing.texts[1] ? line(1, "corrected") : []));
+    };
+    for (const event of ["time", "row", "span"]) OLP.on(event, show);
+    OLP.on("metric", () => listing.repaint());
+  }
+
+  async function start() {
+    const manifest = JSON.parse($("olp-manifest").textContent);
+    const app = new OLP.App(manifest, await OLP.unpack(manifest, $("olp-data").textContent.trim()));
+    app.scene = new OLP.Scene(app, $("pane"));
+    [...app.layers.values()].forEach((path, order) => {
+      path.given = path.D ? path.colour : OLP.NEUTRAL; // the palette owns the colours
+      app.state.layers[path.name] = path.visible;
+      app.scene.add_path(path, order);
+    });
+    app.meshes = new OLP.Meshes(app);
+    const {box, size, reach} = extent(app);
+    app.camera = new OLP.Camera(app, box, reach);
+    extend(app);
+    app.scale = new OLP.Scale(app);
+    app.panels = new OLP.Panels(app);
+    app.listing = new OLP.Listing(app);
+    app.overlay = new OLP.Overlay(app);
+    app.timeline = new OLP.Timeline(app);
+    app.plots = new OLP.Plots(app);
+    app.pointer = new OLP.Pointer(app);
+    app.notes = new OLP.Notes(app);
+    app.keys = new OLP.Keys(app);
+    follow_listing(app);
+    if (app.scene.flat) app.scene.viewer.renderer.draw = OLP.flat_drawing(app.scene);
+    app.scene.viewer.set_3d_pane_size();
+    app.set_theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    app.show_rapids();
+    app.set_exaggeration(exaggeration(app, size));
+    app.set_metric(app.plot_metric()?.name ?? "");
+    app.set_view("iso");
+    app.set_time(app.time[0]);
+    app.plots.draw();
+    app.notes.restore();
+    expose(app);
+    app.scene.refill();
+    app.scene.viewer.render();
+    OLP.watch(app);
+    document.documentElement.dataset.ready = "1";
+  }
+
+  // What scripts and tests may use.
+  function expose(app) {
+    const page = (sample, name = "nominal") => {
+      const at = app.scene.project(app.point_of(sample, name)),
+        pane = app.scene.pane.getBoundingClientRect();
+      return at && [at[0] + pane.left, at[1] + pane.top];
+    };
+    window.olp = {
+      app,
+      manifest: app.manifest,
+      arrays: app.arrays,
+      state: app.state,
+      set_time: t => app.set_time(t),
+      set_exaggeration: k => app.set_exaggeration(k),
+      set_metric: name => app.set_metric(name),
+      set_layer: (name, on) => app.set_layer(name, on),
+      select_row: row => app.select_row(row),
+      pick: (x, y) => app.pointer.pick(x, y),
+      project: page,
+      worst: (next = 1) => app.worst(next),
+      frame_ms: () => app.scene.frame_ms(),
+      get drawn() {
+        return app.scene.drawn;
+      },
+    };
+  }
+
+  start().catch(error => {
+    document.documentElement.dataset.error = error.message;
+    $("app").replaceChildren(OLP.make("p", {className: "broken", textContent: `This page cannot be shown: ${error.message}`}));
+    console.error(error);
+  });
+})();

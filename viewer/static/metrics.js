@@ -1,0 +1,109 @@
+"use strict";
+// Values of a metric for each layer: packed ones, and those that follow from a layer's deviation.
+(() => {
+  class Metrics {
+    constructor(app) {
+      this.app = app;
+      this.known = new Map();
+    }
+
+    find(name) {
+      return this.app.manifest.metrics.find(m => m.name === name) ?? null;
+    }
+
+    layers(metric) {
+      return metric ? Object.keys(metric.by_layer).filter(name => this.app.layers.has(name)) : [];
+    }
+
+    // (n) values in the metric's unit for a layer, NaN where unknown and in rapids, which cut nothing; null where the
+    // metric does not speak of the layer.
+    values(metric, name) {
+      if (!metric || !(name in metric.by_layer) || !this.app.layers.has(name)) return null;
+      const key = metric.name + "\n" + name;
+      if (!this.known.has(key)) {
+        const packed = metric.by_layer[name],
+          {kind} = this.app.layers.get(name);
+        const values =
+          packed === null ? this.derive(metric.of, this.app.layers.get(name)) : Float32Array.from(this.app.arrays.get(packed));
+        if (kind) for (let i = 0; i < values.length; i++) if (kind[i]) values[i] = NaN;
+        this.known.set(key, values);
+      }
+      return this.known.get(key);
+    }
+
+    // Metrics other than these are dropped from memory.
+    keep(metrics) {
+      const names = new Set(metrics.filter(Boolean).map(m => m.name));
+      for (const key of this.known.keys()) if (!names.has(key.split("\n")[0])) this.known.delete(key);
+    }
+
+    derive(part, layer) {
+      const {n, D} = layer,
+        out = new Float32Array(n);
+      if (!D) return out;
+      if (part === "magnitude")
+        for (let i = 0, k = 0; i < n; i++, k += 3)
+          out[i] = 1e3 * Math.sqrt(D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2]);
+      else if (part === "x" || part === "y" || part === "z")
+        for (let i = 0, k = "xyz".indexOf(part); i < n; i++, k += 3) out[i] = 1e3 * D[k];
+      else if (part === "along" || part === "normal") this.split(part, layer, out);
+      else throw new Error(`unknown metric part ${part}`);
+      return out;
+    }
+
+    // Parts along and across the direction of the nominal segment that ends in the sample.
+    split(part, {n, D, index}, out) {
+      const P = this.app.base;
+      for (let i = 0, k = 0, u = [0, 0, 0]; i < n; i++, k += 3) {
+        const s = index ? index[i] : i,
+          a = 3 * s;
+        if (s > 0) {
+          const x = P[a] - P[a - 3],
+            y = P[a + 1] - P[a - 2],
+            z = P[a + 2] - P[a - 1],
+            length = Math.hypot(x, y, z);
+          if (length > 0) u = [x / length, y / length, z / length];
+        }
+        const along = D[k] * u[0] + D[k + 1] * u[1] + D[k + 2] * u[2];
+        out[i] =
+          1e3 * (part === "along" ? along : Math.hypot(D[k] - along * u[0], D[k + 1] - along * u[1], D[k + 2] - along * u[2]));
+      }
+    }
+
+    // Largest |value|, mean, rms, standard deviation and share within the tolerance of a layer.
+    summary(metric, name, tolerance) {
+      const values = this.values(metric, name);
+      if (!values) return null;
+      let count = 0,
+        sum = 0,
+        squares = 0,
+        low = Infinity,
+        high = -Infinity,
+        inside = 0;
+      for (let i = 0; i < values.length; i++) {
+        const v = values[i];
+        if (Number.isNaN(v)) continue;
+        count++;
+        sum += v;
+        squares += v * v;
+        if (v < low) low = v;
+        if (v > high) high = v;
+        if (Math.abs(v) <= tolerance) inside++;
+      }
+      if (!count) return null;
+      const mean = sum / count;
+      return {
+        count,
+        low,
+        high,
+        largest: Math.max(Math.abs(low), Math.abs(high)),
+        mean,
+        rms: Math.sqrt(squares / count),
+        sigma: Math.sqrt(Math.max(0, squares / count - mean * mean)),
+        inside: inside / count,
+      };
+    }
+  }
+
+  OLP.Metrics = Metrics;
+})();

@@ -1,0 +1,176 @@
+"use strict";
+// MeshCat's viewer with our paths in it: what is drawn, when, and where a point lands on the screen.
+(() => {
+  const T = MeshCat.THREE,
+    MM = 0.001; // the viewer's scene is in metres
+  const BUDGET = {start: 90000, least: 20000, most: 400000, slow: 140, fast: 40}; // segments of all layers; ms of a frame
+
+  class Scene {
+    constructor(app, pane) {
+      this.app = app;
+      this.pane = pane;
+      const graphics = OLP.graphics();
+      this.viewer = new MeshCat.Viewer(
+        pane,
+        true,
+        graphics === "none" ? OLP.flat_renderer(pane) : OLP.gl_renderer(pane, graphics === "hardware"),
+      );
+      this.flat = Boolean(this.viewer.renderer.flat);
+      this.viewer.gui.domElement.hidden = true; // its scene tree goes on writing to it
+      this.viewer.set_property(["Background"], "visible", false); // the page's own shows through, at no cost
+      window.onload = null; // the viewer takes it over to size itself by the window
+      for (const path of [["Grid"], ["Axes"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"]])
+        this.viewer.set_property(path, "visible", false);
+      const light = new T.DirectionalLight(0xffffff, 0.55);
+      light.position.set(1, -2, 3);
+      this.viewer.set_object(["Lights", "olp"], light);
+      this.viewer.set_property(["olp"], "scale", [MM, MM, MM]);
+      this.root = this.viewer.scene_tree.find(["olp"]).object;
+      this.lines = new Map();
+      this.origin = [0, 0, 0];
+      this.budget = BUDGET.start;
+      const table = new T.DataTexture(new Uint8Array(4 * (OLP.colour.SIZE + 1)), OLP.colour.SIZE + 1, 1, T.RGBAFormat);
+      table.minFilter = table.magFilter = T.NearestFilter;
+      this.colours = {value: table};
+      this.size_by_pane();
+      const render = this.viewer.render;
+      this.viewer.render = () => {
+        this.app.camera?.clip();
+        const start = performance.now();
+        render.call(this.viewer);
+        if (this.refilled) this.adapt(start);
+        OLP.emit("drawn");
+      };
+    }
+
+    // The viewer sizes itself by the window's height: wrong for a pane.
+    size_by_pane() {
+      const resize = this.viewer.set_3d_pane_size;
+      this.viewer.set_3d_pane_size = () => {
+        const {clientWidth: w, clientHeight: h} = this.pane;
+        if (!w || !h) return;
+        resize.call(this.viewer, w, h);
+        this.app.camera?.resized();
+        for (const {uniforms} of this.lines.values()) {
+          uniforms.size.value.set(w, h);
+          uniforms.ratio.value = this.viewer.renderer.getPixelRatio();
+        }
+        this.schedule(60);
+      };
+      new ResizeObserver(() => this.viewer.set_3d_pane_size()).observe(this.pane);
+    }
+
+    add_path(path, order) {
+      const lines = new OLP.Lines(path, order, this.colours.value);
+      lines.uniforms.colours = this.colours;
+      this.lines.set(path.name, lines);
+      this.viewer.set_object(["olp", path.name], lines.mesh);
+      this.viewer.set_property(["olp", path.name], "visible", path.visible);
+    }
+
+    set_uniform(name, value) {
+      for (const {uniforms} of this.lines.values()) uniforms[name].value = value;
+      this.viewer.set_dirty();
+    }
+
+    set_colours(bytes) {
+      this.colours.value.image.data.set(bytes);
+      this.colours.value.needsUpdate = true;
+      this.viewer.set_dirty();
+    }
+
+    // What projects a point (mm) to the pane: clip matrix, pane size, px per (mm / depth), exaggeration.
+    view(k) {
+      const camera = this.viewer.camera,
+        {clientWidth: w, clientHeight: h} = this.pane;
+      this.root.updateWorldMatrix(true, false);
+      camera.updateMatrixWorld();
+      const clip = new T.Matrix4()
+        .multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
+        .multiply(this.root.matrixWorld).elements;
+      return {
+        clip,
+        w,
+        h,
+        k,
+        scale: ((camera.projectionMatrix.elements[5] * h) / 2) * MM,
+        ortho: Boolean(camera.isOrthographicCamera),
+      };
+    }
+
+    // Pixel of the pane where the point (mm) lands, or null behind the eye.
+    project([x, y, z], {clip: e, w, h} = this.view(0)) {
+      const v = e[3] * x + e[7] * y + e[11] * z + e[15];
+      if (v < 1e-6) return null;
+      return [
+        (((e[0] * x + e[4] * y + e[8] * z + e[12]) / v + 1) / 2) * w,
+        ((1 - (e[1] * x + e[5] * y + e[9] * z + e[13]) / v) / 2) * h,
+      ];
+    }
+
+    // Nearest place on a drawn path to a pixel of the pane; layers above win ties.
+    pick(x, y, limit = 8) {
+      let best = null;
+      for (const lines of [...this.lines.values()].reverse()) {
+        const {path, uniforms: u} = lines;
+        if (!path.visible) continue;
+        const hit = path.pick(this.view(u.k.value), x, y, best ? best.distance - 0.25 : limit, u.cut.value, u.rapids.value > 0.5);
+        if (hit) best = hit;
+        if (best && best.distance <= 0.25) break;
+      }
+      return best;
+    }
+
+    schedule(ms = 120) {
+      clearTimeout(this.timer);
+      this.timer = setTimeout(() => this.refill(), ms);
+    }
+
+    // Chooses anew what of each path is drawn, for the camera as it stands.
+    refill() {
+      clearTimeout(this.timer);
+      if (!this.pane.clientWidth || !this.app.camera) return;
+      this.origin = this.app.camera.target_mm();
+      const shown = [...this.lines.values()].filter(l => l.path.visible);
+      const wanted = shown.map(l => l.path.demand(this.view(l.uniforms.k.value))),
+        all = wanted.reduce((a, b) => a + b, 0);
+      shown.forEach((lines, i) => {
+        const cap = Math.max(256, all > this.budget ? Math.floor((this.budget * wanted[i]) / all) : Math.ceil(wanted[i] * 1.1));
+        lines.path.fill(cap, wanted[i], this.origin, this.app.state.span);
+        lines.send(this.origin);
+      });
+      this.refilled = true;
+      this.viewer.set_dirty();
+    }
+
+    // Spends more segments where the computer draws them quickly, fewer where it does not.
+    adapt(start) {
+      this.refilled = false;
+      const thinned = [...this.lines.values()].some(l => l.path.visible && l.path.thin > 1);
+      this.finish();
+      const ms = performance.now() - start;
+      if (ms > BUDGET.slow && thinned && this.budget > BUDGET.least) this.budget = Math.max(BUDGET.least, this.budget * 0.75);
+      else if (ms < BUDGET.fast && thinned && this.budget < BUDGET.most) this.budget = Math.min(BUDGET.most, this.budget * 1.6);
+    }
+
+    // Waits until the picture is really drawn.
+    finish() {
+      if (this.flat) return;
+      const gl = this.viewer.renderer.getContext();
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    }
+
+    frame_ms() {
+      const start = performance.now();
+      this.viewer.render();
+      this.finish();
+      return performance.now() - start;
+    }
+
+    get drawn() {
+      return Object.fromEntries([...this.lines].map(([name, {path}]) => [name, path.visible ? path.drawn : 0]));
+    }
+  }
+
+  OLP.Scene = Scene;
+})();
