@@ -18,7 +18,7 @@ from olp.compensation.stamp import find_stamp
 from olp.correction import Progress, Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import OlpError, UsageError
-from olp.files.meshes import read_triangles
+from olp.files.meshes import read_mesh
 from olp.findings import RULES, Finding
 from olp.geometry import PLANES
 from olp.loading import Loaded, PathLike, load, setup_of, source_of
@@ -223,9 +223,9 @@ def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | N
     if not setup.job.meshes or not any(code.startswith("OLP7") for code in codes):
         return None
     tell("clearance", 0.9)
+    read = ((mesh, *read_mesh(mesh.file)) for mesh in setup.job.meshes)
     solids = [
-        Solid(mesh, Path(mesh.file).name, read_triangles(mesh.file) * mesh.unit_mm)
-        for mesh in setup.job.meshes
+        Solid(mesh, Path(mesh.file).name, vertices[faces] * mesh.unit_mm) for mesh, vertices, faces in read
     ]
     path = case.written.toolpath if case.run is None else case.proof().written
     return clearances(path, case.loaded.model, setup, solids)
