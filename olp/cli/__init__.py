@@ -23,6 +23,7 @@ VERBS = {
     "verify": "Prove a corrected program from the two texts alone.",
     "simulate": "Write the path that the machine would really take, as CSV.",
     "retime": "Re-time a program within the limits of the axes, and say how long it takes.",
+    "compare": "Hold measured runs against a nominal path: deviations, ISO 9283 figures.",
     "schema": "Print the JSON Schema of a machine, calibration or job file.",
     "explain": "Explain the code of a finding, or list all codes.",
 }

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from olp.measured.pairing import Order, coarse, pair, thinned
+from olp.measured.pairing import Order, Pairing, coarse, pair, thinned
 from olp.measured.path import Array, Path
 from olp.measured.rigid import Rigid, fit_path, fit_points
 
@@ -18,6 +18,8 @@ _ROUNDS = 12
 _STILL = 1e-3
 #: residuals within this factor are equally good; the first one is taken
 _AS_GOOD = 1.5
+#: so much nearer the nearest places are, where the order of the points is none of the path
+_MUCH = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,40 +33,50 @@ class Alignment:
     rival: bool = False
 
 
-def order_of(path: Path, points_mm: Array, reach_mm: float) -> Order:
-    """In which order points (m, 3) in the nominal frame come: along the path, against it, or in none.
+def paired(
+    path: Path, points_mm: Array, order: Order | None, reach_mm: float
+) -> tuple[Order, Pairing]:
+    """Pair points (m, 3) in the nominal frame in their order, which is found where it is not given.
 
-    In order, unless that leaves most points farther than `reach_mm` and the nearest places do not.
+    Along or against the path, whichever costs less; in none, where order leaves many points farther than
+    `reach_mm` from their place and the nearest places do not.
     """
-    options: tuple[Order, ...] = ("forward", "backward")
-    few, _ = thinned(points_mm, _FEW)
-    typical = {order: _typical(path, few, order) for order in options}
-    best = min(options, key=lambda order: typical[order])
-    if typical[best] <= reach_mm:
-        return best
-    # means of points in no order are no points
-    some = points_mm[:: max(len(points_mm) // _FEW, 1)]
-    return "free" if _typical(path, some, "free") <= 0.1 * typical[best] else best
+    if order is not None:
+        return order, pair(path, points_mm, order)
+    found: Order = "forward" if _cost(path, points_mm) <= _cost(path.reversed(), points_mm) else "backward"
+    pairing = pair(path, points_mm, found)
+    typical = float(np.quantile(pairing.distance_mm, 0.75))
+    if typical > reach_mm:
+        some = points_mm[:: max(len(points_mm) // _FEW, 1)]
+        if _typical(path, some, "free") <= _MUCH * typical:
+            return "free", pair(path, points_mm, "free")
+    return found, pairing
+
+
+def _cost(path: Path, points: Array) -> float:
+    return coarse(path, points, _FIRST)[3]
 
 
 def _typical(path: Path, points: Array, order: Order) -> float:
     return float(np.quantile(pair(path, points, order).distance_mm, 0.75))
 
 
-def align(path: Path, points_mm: Array, reach_mm: float) -> Alignment:
-    """The best fit of points (m, 3) in an unknown frame, whatever their order.
+def align(path: Path, points_mm: Array, reach_mm: float, order: Order | None = None) -> Alignment:
+    """The best fit of points (m, 3) in an unknown frame, in the given order, or whatever theirs is.
 
     First places at equal shares of both lengths are laid on each other, then pairing and fitting alternate.
     Where that pairs nothing, principal axes are, and the points count as unordered. Residuals are distances
     across the path, all points alike, without those farther than `reach_mm`.
     """
     found = []
-    for order, start in _starts(path, points_mm):
+    for one, start in _starts(path, points_mm):
+        if order not in (None, one):
+            continue
         rigid = start
         for _ in range(3):
-            rigid = _match(path, points_mm, rigid, order)
-        found.append((_typical(path, _sample(rigid(points_mm), order, _FIRST), order), order, rigid))
-        if order == "backward" and min(f[0] for f in found) <= reach_mm:
+            rigid = _match(path, points_mm, rigid, one)
+        found.append((_typical(path, _sample(rigid(points_mm), one, _FIRST), one), one, rigid))
+        if one == "backward" and min(f[0] for f in found) <= reach_mm:
             break  # in order, it need not be tried without
     least = min(residual for residual, _, _ in found)
     good = [f for f in found if f[0] <= _AS_GOOD * least]
@@ -84,10 +96,13 @@ def align(path: Path, points_mm: Array, reach_mm: float) -> Alignment:
     return Alignment(step.after(rigid), order, loose, rival)
 
 
-def refit(path: Path, points_mm: Array, order: Order, reach_mm: float) -> Alignment:
-    """The best fit of points that lie near their places already."""
-    step, loose, _ = _step(path, points_mm, order, reach_mm)
-    return Alignment(step, order, loose)
+def refit(path: Path, runs: Sequence[Array], pairings: Sequence[Pairing], reach_mm: float) -> Alignment:
+    """One best fit of several runs (m, 3) that lie near their places already."""
+    points, foot = np.concatenate(runs), np.concatenate([p.foot_mm for p in pairings])
+    kept = np.concatenate([(p.distance_mm <= reach_mm) & ~p.beyond for p in pairings])
+    along = path.axes(np.concatenate([p.segment for p in pairings]))[0]
+    rigid, loose = fit_path(points[kept], foot[kept], along[kept])
+    return Alignment(rigid, "forward", loose)
 
 
 def _starts(path: Path, points: Array) -> Iterator[tuple[Order, Rigid]]:

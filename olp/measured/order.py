@@ -1,8 +1,9 @@
 """Matching in order along a path by dynamic programming (dynamic time warping, Sakoe and Chiba 1978).
 
-A row is a measured place, a column a node of the path. The way through the table goes down, right, or both,
-and pays the squared distance of every cell that it visits: passes that look alike are told apart by what
-came before and after, dwelling costs nothing, and leaving out a part of the path costs its distance.
+A row is a measured place, a column a node of the path. The way through the table goes down, right, or both. A
+place pays the squared distance of its node, and so does a node without a place of its own, up to a limit:
+passes that look alike are told apart by what came before and after, dwelling costs nothing, and a part of the
+path that was not measured costs little enough to be left out.
 """
 
 from __future__ import annotations
@@ -28,13 +29,14 @@ def whole(points_mm: Array, nodes_mm: Array) -> tuple[Index, float]:
     """
     count, width = len(points_mm), len(nodes_mm)
     step = np.diff(nodes_mm, axis=0)
-    idle = _UNVISITED * float((step * step).sum(axis=1).mean()) * np.arange(width)
+    most = float((step * step).sum(axis=1).mean())
+    idle = _UNVISITED * most * np.arange(width)
     moves = np.empty((count, 1, width), np.uint8)
     total = np.full((1, width), np.inf)
     for i in range(count):
         cost = _square(nodes_mm - points_mm[i])[None]
         start = idle[None] + cost if i == 0 else None
-        total, moves[i] = _row(total, cost, start)
+        total, moves[i] = _row(total, cost, most, start)
     end = total[0] + idle[::-1]
     last = int(end.argmin())
     first = np.zeros((count, 1), np.int64)
@@ -51,6 +53,7 @@ def banded(points_mm: Array, nodes_mm: Array, middle: Index, width: int) -> Inde
     count = len(points_mm)
     width = min(width, len(nodes_mm))
     low = np.clip(np.maximum.accumulate(middle) - width // 2, 0, len(nodes_mm) - width)
+    most = float(np.median(_square(points_mm - nodes_mm[middle])))
     out = np.empty(count, np.int64)
     starts = np.arange(0, count, _ROWS)
     for a in range(0, len(starts), _TOGETHER):
@@ -58,13 +61,13 @@ def banded(points_mm: Array, nodes_mm: Array, middle: Index, width: int) -> Inde
         rows = begin[None] - _OVERLAP + np.arange(min(_ROWS, count) + 2 * _OVERLAP)[:, None]
         # rows beyond the ends repeat the end: dwelling costs nothing
         rows = np.clip(rows, 0, count - 1)
-        near = _side_by_side(points_mm[rows], nodes_mm, low[rows], width)
+        near = _side_by_side(points_mm[rows], nodes_mm, low[rows], width, most)
         own = slice(_OVERLAP, len(rows) - _OVERLAP)
         out[rows[own].T.ravel()] = near[own].T.ravel()
     return out
 
 
-def _side_by_side(points: Array, nodes: Array, low: Index, width: int) -> Index:
+def _side_by_side(points: Array, nodes: Array, low: Index, width: int, most: float) -> Index:
     """(R, B) nodes of points (R, B, 3) of B stretches whose bands begin at `low` (R, B)."""
     rows, stretches = low.shape
     moves = np.empty((rows, stretches, width), np.uint8)
@@ -78,7 +81,7 @@ def _side_by_side(points: Array, nodes: Array, low: Index, width: int) -> Index:
             padded[:, :width] = total
             shift = (low[i] - low[i - 1])[:, None]
             total = np.take_along_axis(padded, np.minimum(column + shift, width), axis=1)
-        total, moves[i] = _row(total, cost, cost if i == 0 else None)
+        total, moves[i] = _row(total, cost, most, cost if i == 0 else None)
         best[i] = total.argmin(axis=1)
     return _back(moves, low, best[-1], best, points, nodes)
 
@@ -88,17 +91,18 @@ def _square(away: Array) -> Array:
     return np.asarray(x * x + y * y + z * z, float)
 
 
-def _row(before: Array, cost: Array, start: Array | None) -> tuple[Array, Moves]:
-    """Least costs (B, K) up to a row and the moves there, from those of the row before."""
+def _row(before: Array, cost: Array, most: float, start: Array | None) -> tuple[Array, Moves]:
+    """Least costs (B, K) up to a row and the moves there, from those of the row before. `most` is what a node
+    without a place costs at most."""
     if start is not None:
         return start, np.full(cost.shape, _ANEW)
     entered = before.copy()
     np.minimum(entered[:, 1:], before[:, :-1], out=entered[:, 1:])
     lost = ~np.isfinite(entered).any(axis=1)
     entered[lost] = 0.0
-    # total_j = cost_j + min(entered_j, total_{j-1}): with sums of costs it is a running minimum
-    summed = np.cumsum(cost, axis=1)
-    head = entered - summed + cost
+    # total_j = min(entered_j + cost_j, total_{j-1} + passed_j): with sums of passed it is a running minimum
+    summed = np.cumsum(np.minimum(cost, most), axis=1)
+    head = entered + cost - summed
     least = np.minimum.accumulate(head, axis=1)
     moves = np.where(before <= entered, _DOWN, _BOTH)
     moves[head > least] = _RIGHT

@@ -13,9 +13,9 @@ from olp.measured.path import Array, Index, Mask, Path
 Order = Literal["forward", "backward", "free"]
 
 #: nodes of the coarsest level, how much finer each next one is, and nodes of the finest at most
-COARSE, _FINER, _MOST = 1536, 16, 2_000_000
+COARSE, _FINER, _MOST = 3072, 8, 2_000_000
 #: half the width of a band, in nodes of the level before
-_HALF = 3
+_HALF = 4
 #: time's share in the measure by which measured points are thinned, beside the way travelled
 _TIME = 0.1
 #: means of so many points measure the way travelled, so that noise does not
@@ -71,8 +71,27 @@ def thinned(points_mm: Array, count: int) -> tuple[Array, Array]:
     middle = 0.5 * (edges[:-1] + edges[1:] - 1)
     measure = np.interp(np.arange(m), middle, way / max(way[-1], 1e-12) + _TIME * middle / m)
     cuts = np.searchsorted(measure, np.linspace(measure[0], measure[-1], count + 1)[1:-1])
-    cuts = np.unique(np.concatenate(([0], cuts, [m])))
+    # a mean of places on both sides of a gap would be a place on neither
+    cuts = np.unique(np.concatenate(([0], cuts, leaps(points_mm, count) + 1, [m])))
     return _means(points_mm, cuts), 0.5 * (cuts[:-1] + cuts[1:] - 1)
+
+
+def leaps(points_mm: Array, count: int) -> Index:
+    """Indices of points whose next one lies farther off than places do of which `count` make up the way."""
+    step = np.sqrt((np.diff(points_mm, axis=0) ** 2).sum(axis=1))
+    return np.flatnonzero(step > 2.0 * step.sum() / count)
+
+
+def _between(at: Array, index: Array, s: Array, gaps: Index) -> Array:
+    """Arc lengths at indices `at` between those of places; up to a gap they stay, and leap there."""
+    if len(gaps):
+        before = np.clip(np.searchsorted(index, gaps, side="right") - 1, 0, len(s) - 1)
+        after = np.clip(before + 1, 0, len(s) - 1)
+        index = np.concatenate((index, gaps, gaps + 1))
+        s = np.concatenate((s, s[before], s[after]))
+        order = np.argsort(index, kind="stable")
+        index, s = index[order], s[order]
+    return np.interp(at, index, s)
 
 
 def _means(points: Array, edges: Index) -> Array:
@@ -93,18 +112,19 @@ def _in_order(path: Path, points: Array) -> tuple[Array, float]:
     _, index, s, _ = coarse(path, points)
     finest = int(np.clip(max(len(path), m), COARSE, min(max(4 * m, COARSE), _MOST)))
     count = COARSE
+    gaps = leaps(points, COARSE) if m > COARSE else np.zeros(0, np.int64)
     while count < finest or len(s) < m:
         finer = min(_FINER, max(finest / count, 1.0))
         count = max(int(count * finer), count)
         last = count >= finest
         few, at = (points, np.arange(m, dtype=float)) if last else thinned(points, count)
         nodes_s = np.linspace(0.0, path.length_mm, count)
-        middle = np.rint(np.interp(at, index, s) / path.length_mm * (count - 1)).astype(np.int64)
+        middle = np.rint(_between(at, index, s, gaps) / path.length_mm * (count - 1)).astype(np.int64)
         near = banded(few, path.at(nodes_s)[0], middle, int(2 * _HALF * finer) + 16)
         index, s = at, nodes_s[near]
         if last:
             break
-    return np.interp(np.arange(m), index, s), path.length_mm / (count - 1)
+    return _between(np.arange(m), index, s, gaps), path.length_mm / (count - 1)
 
 
 def _project(path: Path, points: Array, s: Array, step: float) -> Pairing:

@@ -9,8 +9,11 @@ import numpy as np
 from olp.exceptions import CannotCompute
 from olp.measured.path import Array
 
-#: A direction of motion of the whole that moves no point off its path by more than this share of the motion.
-_LOOSE = 1e-3
+#: A motion of the whole that moves the points across their path by less than this share of it: noise would
+#: come back a hundredfold.
+_LOOSE = 1e-2
+#: Points that are narrower than this share of their length are on a line.
+_NARROW = 1e-3
 _DOF = ("shift in X", "shift in Y", "shift in Z", "turn about X", "turn about Y", "turn about Z")
 
 
@@ -82,7 +85,7 @@ def fit_frame(measured_mm: Array, nominal_mm: Array) -> Rigid:
     if len(measured_mm) < 3:
         raise CannotCompute(f"{len(measured_mm)} points make no frame; measure at least three")
     spread = np.linalg.svd(nominal_mm - nominal_mm.mean(axis=0), compute_uv=False)
-    if spread[1] <= _LOOSE * spread[0]:
+    if spread[1] <= _NARROW * spread[0]:
         raise CannotCompute("the points of a frame lie on one line; measure at least one beside it")
     return fit_points(measured_mm, nominal_mm)
 
