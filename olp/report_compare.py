@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -57,7 +58,7 @@ def table_rows(report: Report) -> list[tuple[str, Any, Any]]:
         (title, figure(report.get("before"), keys), figure(report.get("after"), keys))
         for title, keys in (*ACROSS, *ISO)
     ]
-    return [row for row in rows if isinstance(row[1], float) or isinstance(row[2], float)]
+    return [row for row in rows if any(isinstance(v, float) and math.isfinite(v) for v in row[1:])]
 
 
 def _heads(report: Report) -> Iterator[str]:

@@ -25,13 +25,15 @@ LAYERS = (
     {"checks", "nominal", "testpaths"},
     {"scene"},
     {"report", "plots"},
-    {"report_time", "plots_time", "report_compare", "plots_path"},
+    {"report_time", "plots_time", "report_compare", "plots_path", "document"},
+    {"report_document"},
     {"files"},
     {"review"},
     {"loading", "poses"},
     {"replanning"},
     {"correction", "retiming", "comparing"},
     {"api"},
+    {"report_files"},
     {"cli"},
 )
 ROW = {name: row for row, names in enumerate(LAYERS) for name in names}

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 STREAM = "-"
 FINDINGS_EXIT = 1
+REPORT_ENDINGS = (".html", ".json", ".md")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -132,6 +133,14 @@ def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) 
             raise UsageError(what, file=name)
         if path.is_file() and not force:
             raise UsageError("exists already; name another file, or overwrite it with --force", file=name)
+
+
+def report_ending(name: str) -> str:
+    """The form of a report by the ending of its file. Raises UsageError."""
+    ending = Path(name).suffix.lower()
+    if ending not in REPORT_ENDINGS:
+        raise UsageError(f"ends in no form of a report; expected {', '.join(REPORT_ENDINGS)}", file=name)
+    return ending
 
 
 def talk(message: str) -> None:

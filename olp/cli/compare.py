@@ -16,6 +16,7 @@ from olp.cli.common import (
     machine_given,
     put,
     refuse_early,
+    report_ending,
     setup_options,
     source,
     talk,
@@ -112,6 +113,8 @@ def command(
     refuse_early(targets, inputs, force=force)
     if part_frame and not poses:
         raise UsageError("--part-frame takes points of a part, a row each; add --poses")
+    for name in files_of(report_file):
+        report_ending(name)
     if output and poses:
         raise UsageError("-o writes deviations along a path; poses are in the report")
 
@@ -121,7 +124,6 @@ def command(
     from olp.report import to_json
 
     layout = _layout(profile, columns, measured[0], unit=unit, delimiter=delimiter, positions=positions)
-    report_files.check(report_file)
     with progress(quiet) as show:
         result = compare(
             source(nominal), measured, setup, before=before, poses=poses, profile=layout,
@@ -136,7 +138,8 @@ def command(
         if save_profile:
             written[Path(save_profile)] = result.profile.to_toml().encode()
         if report_file and report_file != STREAM:
-            written[Path(report_file)] = report_files.comparison(result, report_file)
+            day = date.date() if date else None
+            written[Path(report_file)] = report_files.comparison(result, setup, report_file, day)
         write_files(written, force=force, inputs=inputs)
     if as_json or report_file == STREAM:
         put(to_json(result.report))

@@ -18,6 +18,7 @@ from olp.cli.common import (
     proof_options,
     put,
     refuse_early,
+    report_ending,
     setup_options,
     source,
     talk,
@@ -53,7 +54,7 @@ LAST_DIGITS_UM = 10.0
     help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; for --expand-cycles.",
 )
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
-@click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
+@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
@@ -89,6 +90,8 @@ def command(
         raise UsageError(
             "JSON on stdout goes with neither -o - nor --diff; write the report to a file with --report"
         )
+    for name in files_of(report_file):
+        report_ending(name)
     refuse_early(files_of(output, report_file), call.inputs, force=force)
 
     from olp import api, report
@@ -114,7 +117,17 @@ def command(
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
     written = {Path(name): result.data for name in files_of(output)}
-    written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
+    for name in files_of(report_file):
+        from olp import report_files
+        from olp.loading import profile_of, source_of, unrolled
+
+        text, origin = source_of(nominal)
+        if flatten or expand_cycles:
+            profile = profile_of(call.setup)
+            text = unrolled(text, origin, profile, expand_cycles, peck_clearance_mm)
+        day = date.date() if date else None
+        filed = report_files.correction(result, text, call.setup, name, day, contour=contour)
+        written[Path(name)] = filed
     write_files(written, force=force, inputs=call.inputs)
     on_stderr = output == STREAM
     if on_stderr:
