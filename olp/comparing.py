@@ -12,24 +12,24 @@ from typing import Any, Literal
 import numpy as np
 
 from olp import checks
+from olp import comparing_parts as parts
 from olp.exceptions import InputError, OlpError, UsageError
-from olp.files.config import load_setup
 from olp.files.point_profile import PointProfile, looked_at
 from olp.files.points import Points, parse_points
 from olp.files.write import read_bytes
 from olp.findings import Finding
-from olp.loading import Loaded, PathLike, load
+from olp.loading import Loaded, PathLike, load, setup_of
 from olp.machine import Setup
-from olp.measured import figures, iso9283, runs
+from olp.measured import figures, runs
 from olp.measured.pairing import Order
-from olp.measured.path import Array, Path
+from olp.measured.path import Array, Index, Path
 from olp.nominal import Nominal, nominal_of
 from olp.poses import part_frame, poses_report
 from olp.program.program import Program
 from olp.program.reader import Options, read
+from olp.units import UM_PER_MM
 
 Progress = Callable[[str, float], None]
-UM = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class Comparison:
     """What a comparison found: the report ("olp-comparison-1") as a mapping and the findings.
 
     `path` is the nominal path, `runs` and `before` are the measured runs on it, in the nominal frame; all of
-    them are None and empty for poses. `part_frame` is a table for the job file, where poses were measured.
+    them are None and empty for poses. `part_frame` is a table for the job file, of poses.
     """
 
     report: dict[str, Any]
@@ -56,7 +56,7 @@ class Comparison:
             d, foot = run.deviation, run.pairing.foot_mm
             columns = (
                 run.pairing.s_mm, self.path.line[run.pairing.segment], *foot.T,
-                *(v * UM for v in (d.along, d.normal, d.binormal)), run.counted.astype(int),
+                *(v * UM_PER_MM for v in (d.along, d.normal, d.binormal)), run.counted.astype(int),
             )  # fmt: skip
             for a in range(0, len(foot), 1 << 14):
                 rows = zip(*(c[a : a + (1 << 14)].tolist() for c in columns), strict=True)
@@ -98,13 +98,14 @@ def compare(
 ) -> Comparison:
     """Hold measured runs against a nominal path, or measured points against nominal poses.
 
-    `nominal` is a program, which needs `machine`, or a file of points. Each file of `measured` and of `before`
-    is one run (cycle); with `poses` each row is a pose, paired by name or by row. `align` and `order` are as
-    in `olp.measured.runs.place`; points farther than `reach_mm` from their place are in no figure. With
-    `add_errors` measured axis positions (a control's log) are moved to where the calibrated machine's tip
-    would go. Raises InputError, UsageError and CannotCompute.
+    `nominal` is a program, which needs `machine`, or a file of points. Each file of `measured` and of
+    `before` is one run (cycle); with `poses` each row is a pose, paired by name or by row. `align` and
+    `order` are as in `olp.measured.runs.place`; points farther than `reach_mm` from their place are in no
+    figure. With `add_errors` measured axis positions (a control's log) are moved to where the calibrated
+    machine's tip would go. Raises InputError, UsageError and CannotCompute.
     """
     tell = progress or (lambda what, share: None)
+    options = {"align": align, "reach_mm": reach_mm, "tolerance_um": tolerance_um}
     tell("read", 0.0)
     if not measured:
         raise UsageError("no measured file is given; name at least one")
@@ -115,7 +116,7 @@ def compare(
         if source.points is None:
             raise UsageError("poses come from a file of points; the nominal one is a program")
         report, found = poses_report(source.points, *sets, align=align, reach_mm=reach_mm)
-        report = _head(source, sets, align, reach_mm, tolerance_um) | report
+        report = _head(source, sets, options) | report
         table = part_frame(source.points, sets[0], frame_name) if len(source.points) >= 3 else None
         return Comparison(_with(report, found), tuple(found), layout, part_frame=table)
     axes = _positions(sets) == "axes"
@@ -126,9 +127,9 @@ def compare(
         )
     path, move = _nominal(source, axes)
     _same_frame(source, sets, axes)
-    names = _names([p.file for part in sets for p in part])
+    names = _names([p.file for files in sets for p in files])
     tell("pair", 0.2)
-    points = [p.points_mm for part in sets for p in part]
+    points = [p.points_mm for files in sets for p in files]
     if add_errors:
         points = [_with_errors(source, path, move, p, order, reach_mm) for p in points]
     placed = runs.place(path, names, points, align, order, reach_mm)
@@ -139,21 +140,24 @@ def compare(
     count = len(measured)
     groups = {"after": placed.runs[:count], "before": placed.runs[count:]}
     right = {"after": placed.right[:count], "before": placed.right[count:]}
-    report = _head(source, sets, align, reach_mm, tolerance_um)
-    report["frame"] = _frame(placed)
+    report = _head(source, sets, options)
+    report["frame"] = parts.frame(placed)
     report["path"] = {
-        "length_mm": path.length_mm, "segments": len(path), "cutting_mm": _cutting_mm(path),
+        "length_mm": path.length_mm,
+        "segments": len(path),
+        "cutting_mm": float(np.diff(path.s_mm)[path.cutting].sum()),
+
         "compared_in": "axis positions" if axes else "the program's frame",
         "machine_errors_added": add_errors,
     }  # fmt: skip
-    for name, part in groups.items():
-        if part:
-            report[name] = _group(path, part, right[name])
+    for name, members in groups.items():
+        if members:
+            report[name] = parts.group(path, members, right[name])
     if source.program is not None and all(right["after"]):
         worst = report["after"].get("worst") or []
         report["worst"] = [row | {"text": source.program.text(row["line"])} for row in worst]
-    found += _verdict(report, tolerance_um)
-    found += _cycles(groups)
+    found += parts.verdict(report, tolerance_um)
+    found += parts.cycles(groups)
     if source.loaded is not None:
         found += checks.calibration_findings(source.loaded.calibration, date)
     return Comparison(_with(report, found), tuple(found), layout, path, groups["after"], groups["before"])
@@ -170,9 +174,7 @@ def _points(name: PathLike, profile: PointProfile | None) -> Points:
 def _source(
     nominal: PathLike | bytes, machine: PathLike | Setup | None, job: PathLike | None, contour: bool
 ) -> _Source:
-    setup = machine if isinstance(machine, Setup) else None
-    if setup is None and (machine is not None or job is not None):
-        setup = load_setup(machine, job)
+    setup = None if machine is None and job is None else setup_of(machine, job)
     data = nominal if isinstance(nominal, bytes) else read_bytes(nominal)
     name = "" if isinstance(nominal, bytes) else str(nominal)
     first = data[:8192].decode("utf-8", "replace").splitlines()[:40]
@@ -181,7 +183,7 @@ def _source(
         return _Source(name, data, parse_points(data, name or "<stdin>"), None, loaded)
     if setup is None:
         raise UsageError(
-            f"{name or 'the nominal path'} is no table of points, and to read a program its machine is needed; "
+            f"{name or 'the nominal path'} is no table of points, and a program needs its machine; "
             "name the machine file with -m, or a job with -j"
         )
     loaded = load(setup, None, "hold")
@@ -193,13 +195,13 @@ def _source(
 
 
 def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
-    kinds = {p.profile.positions for part in sets for p in part}
+    kinds = {p.profile.positions for files in sets for p in files}
     if len(kinds) > 1:
         raise UsageError("some measured files hold axis positions and others the tip; compare them apart")
     return kinds.pop()
 
 
-def _nominal(source: _Source, axes: bool) -> tuple[Path, Array | None]:
+def _nominal(source: _Source, axes: bool) -> tuple[Path, Index | None]:
     if source.points is not None:
         return Path.through(source.points.points_mm, source.points.line), None
     assert source.program is not None and source.loaded is not None
@@ -209,7 +211,7 @@ def _nominal(source: _Source, axes: bool) -> tuple[Path, Array | None]:
 
 def _same_frame(source: _Source, sets: Sequence[Sequence[Points]], axes: bool) -> None:
     """Frames that files state never mix. Raises InputError."""
-    stated = {p.frame: p.file for part in sets for p in part if p.frame}
+    stated = {p.frame: p.file for files in sets for p in files if p.frame}
     if source.points is not None and source.points.frame:
         stated.setdefault(source.points.frame, source.points.file)
     if source.program is not None and len(source.program.toolpath) and not axes:
@@ -230,7 +232,7 @@ def _names(files: Sequence[str]) -> list[str]:
 
 
 def _with_errors(
-    source: _Source, path: Path, move: Array | None, points: Array, order: Order | None, reach_mm: float
+    source: _Source, path: Path, move: Index | None, points: Array, order: Order | None, reach_mm: float
 ) -> Array:
     """Axis positions moved to where the tip of the calibrated machine would go, the tool's lever included."""
     assert source.program is not None and source.loaded is not None and move is not None
@@ -242,9 +244,7 @@ def _with_errors(
     return np.asarray(points + model.error(points, tool), float)
 
 
-def _eaten(
-    source: _Source, path: Path, move: Array | None, placed: runs.Placed, axes: bool
-) -> list[Finding]:
+def _eaten(source: _Source, path: Path, move: Index | None, placed: runs.Placed, axes: bool) -> list[Finding]:
     """Did the fit take the error with it? By what it moved, and by what the calibration predicts."""
     run, rigid = placed.runs[0], placed.rigid[0]
     moved = float(np.abs(rigid.inverse()(run.points_mm) - run.points_mm).max())
@@ -269,118 +269,10 @@ def _eaten(
     )
 
 
-def _cutting_mm(path: Path) -> float:
-    return float(np.diff(path.s_mm)[path.cutting].sum())
-
-
-def _frame(placed: runs.Placed) -> dict[str, Any]:
-    rigid = placed.rigid[0]
-    return {
-        "fitted": placed.fitted,
-        "shift_mm": rigid.shift_mm.tolist(),
-        "angles_deg": list(rigid.angles_deg),
-        "not_determined": list(placed.loose),
-        "order": list(placed.orders),
+def _head(source: _Source, sets: Sequence[Sequence[Points]], options: dict[str, Any]) -> dict[str, Any]:
+    nominal = {
+        "name": FilePath(source.name).name if source.name else "",
+        "sha256": hashlib.sha256(source.data).hexdigest(),
+        "kind": "program" if source.program else "points",
     }
-
-
-def _group(path: Path, group: Sequence[figures.Run], right: Sequence[bool]) -> dict[str, Any]:
-    """Figures of the runs of a group, each and together; None for a run whose pairing is wrong."""
-    rows = [
-        run.figures(path) if good else {"name": run.name, "points": len(run.points_mm), "across_um": None}
-        for run, good in zip(group, right, strict=True)
-    ]
-    out: dict[str, Any] = {"runs": rows}
-    if not all(right):
-        return out | {"iso_9283": None}
-    places = figures.stations(path)
-    command, segment = path.at(places)
-    attained = np.stack([run.at(path, places) for run in group])
-    each = iso9283.repeated(command, attained)
-    at, rt = iso9283.largest(each.accuracy), iso9283.largest(each.repeatability)
-    lines = path.line[segment]
-    out["iso_9283"] = {
-        "cycles": len(group),
-        "places": len(places),
-        "AT_um": at.value_mm * UM,
-        "AT_line": int(lines[at.place]) if at.place >= 0 else None,
-        "RT_um": rt.value_mm * UM,
-        "RT_line": int(lines[rt.place]) if rt.place >= 0 else None,
-    }
-    sizes = [row["across_um"] for row in rows if row["across_um"]]
-    if sizes:
-        out["across_um"] = {
-            "max": max(s["max"] for s in sizes),
-            "rms": float(np.sqrt(np.mean([s["rms"] ** 2 for s in sizes]))),
-            "mean": float(np.mean([s["mean"] for s in sizes])),
-            "q95": max(s["q95"] for s in sizes),
-        }
-    worst: dict[int, float] = {}
-    for run in group:
-        for row in run.worst_lines(path):
-            worst[row["line"]] = max(worst.get(row["line"], 0.0), row["max_um"])
-    top = sorted(worst.items(), key=lambda item: -item[1])[:10]
-    out["worst"] = [{"line": line, "max_um": size} for line, size in top]
-    return out
-
-
-def _verdict(report: dict[str, Any], tolerance_um: float | None) -> list[Finding]:
-    size = (report["after"].get("across_um") or {}).get("max")
-    if tolerance_um is None or size is None:
-        return []
-    report["holds"] = size <= tolerance_um
-    if report["holds"]:
-        return []
-    lines = tuple(row["line"] for row in report["after"]["worst"] if row["max_um"] > tolerance_um)
-    return [Finding(
-        "OLP609", f"{size:.2f} um off the nominal path, {tolerance_um:g} um allowed",
-        lines[0] if lines else None, lines, max(len(lines), 1),
-    )]  # fmt: skip
-
-
-def _cycles(groups: dict[str, tuple[figures.Run, ...]]) -> list[Finding]:
-    return [
-        Finding("OLP607", f"{len(part)} runs {name}; ISO 9283 asks for {iso9283.PATH_CYCLES}")
-        for name, part in groups.items()
-        if 1 < len(part) < iso9283.PATH_CYCLES
-    ]
-
-
-def _head(
-    source: _Source, sets: Sequence[Sequence[Points]], align: str, reach_mm: float, tolerance_um: float | None
-) -> dict[str, Any]:
-    def described(points: Points) -> dict[str, Any]:
-        span = None
-        if points.time_s is not None and len(points.time_s):
-            span = float(points.time_s.max() - points.time_s.min())
-        return {
-            "name": FilePath(points.file).name, "points": len(points), "seconds": span, "frame": points.frame,
-            "positions": points.profile.positions, "unit": points.profile.unit,
-            "sha256": points.sha256,
-        }  # fmt: skip
-
-    report: dict[str, Any] = {
-        "schema": "olp-comparison-1",
-        "nominal": {
-            "name": FilePath(source.name).name if source.name else "",
-            "sha256": hashlib.sha256(source.data).hexdigest(),
-            "kind": "points" if source.points is not None else "program",
-        },
-        "measured": [described(p) for p in sets[0]],
-        "measured_before": [described(p) for p in sets[1]],
-        "align": align,
-        "reach_mm": reach_mm,
-        "tolerance_um": tolerance_um,
-    }
-    if source.loaded is not None:
-        machine, calibration = source.loaded.setup.machine, source.loaded.calibration
-        report["machine"] = {
-            "name": machine.name, "chain": machine.chain, "controller": machine.controller,
-        }  # fmt: skip
-        report["calibration"] = {
-            "measured": calibration.measured, "valid_until": calibration.valid_until,
-            "model": calibration.model, "temperature_degC": calibration.temperature_degC,
-            "sha256": source.loaded.digest,
-        }  # fmt: skip
-    return report
-
+    return parts.head(nominal, source.loaded, *sets) | options

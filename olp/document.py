@@ -81,15 +81,18 @@ _SHORT = 12
 _HASH = re.compile(r"[0-9a-f]{64}")
 
 _CSS = """
-:root { --ink: #1d2327; --soft: #5b6670; --line: #d9dee2; --good: #1b7f4b; --bad: #b3261e; --blue: #1f6fb2; }
+:root { --ink: #1d2327; --soft: #5b6670; --line: #d9dee2; --good: #1b7f4b; --bad: #b3261e; }
 * { box-sizing: border-box; }
-body { font: 10pt/1.45 "Helvetica Neue", Arial, "Liberation Sans", sans-serif; color: var(--ink); margin: 0 auto;
+body { font: 10pt/1.45 "Helvetica Neue", Arial, "Liberation Sans", sans-serif; color: var(--ink); margin:
+  0 auto;
   padding: 14mm 12mm; max-width: 190mm; }
 header { border-bottom: 2pt solid var(--ink); padding-bottom: 3mm; margin-bottom: 5mm; }
 h1 { font-size: 19pt; line-height: 1.2; margin: 0; }
 header p { color: var(--soft); margin: 1mm 0 0; overflow-wrap: anywhere; }
-.verdict { border-left: 4pt solid; padding: 2.5mm 4mm; margin: 0 0 5mm; font-weight: 600; background: #f5f7f8; }
-.good { border-color: var(--good); color: var(--good); } .bad { border-color: var(--bad); color: var(--bad); }
+.verdict { border-left: 4pt solid; padding: 2.5mm 4mm; margin: 0 0 5mm; font-weight: 600; background:
+  #f5f7f8; }
+.good { border-color: var(--good); color: var(--good); } .bad { border-color: var(--bad); color:
+  var(--bad); }
 section { margin: 0 0 6mm; }
 h2 { font-size: 12.5pt; margin: 7mm 0 2mm; border-bottom: .5pt solid var(--line); padding-bottom: 1mm; }
 h3 { font-size: 10.5pt; margin: 4.5mm 0 1.5mm; }
@@ -99,7 +102,8 @@ table { border-collapse: collapse; width: 100%; margin: 1mm 0 3mm; font-size: 9p
 th { font-weight: 600; color: var(--soft); border-bottom: .75pt solid var(--ink); }
 th, td { padding: 1mm 2mm; text-align: right; vertical-align: top; font-variant-numeric: tabular-nums; }
 td { border-bottom: .5pt solid var(--line); }
-th.l, td.l { text-align: left; } th.aside, td.aside { padding-left: 12mm; } th:first-child, td:first-child { padding-left: 0; }
+th.l, td.l { text-align: left; } th.aside, td.aside { padding-left: 12mm; } th:first-child,
+  td:first-child { padding-left: 0; }
 tr, table.short { break-inside: avoid; }
 td.code, dd.code { font: 7.5pt/1.6 "DejaVu Sans Mono", Consolas, monospace; overflow-wrap: anywhere; }
 dd.code { padding-top: .4mm; }
@@ -112,7 +116,8 @@ figcaption { color: var(--soft); font-size: 8.5pt; margin-top: 1mm; }
 .notice { border-left: 3pt solid var(--line); padding: 1mm 3mm; margin: 0 0 2.5mm; break-inside: avoid; }
 .notice.error { border-color: var(--bad); } .notice.warning { border-color: #d08700; }
 .notice b { font-weight: 600; } .notice span { color: var(--soft); }
-footer { color: var(--soft); font-size: 8pt; border-top: .5pt solid var(--line); padding-top: 2mm; overflow-wrap: anywhere; }
+footer { color: var(--soft); font-size: 8pt; border-top: .5pt solid var(--line); padding-top: 2mm;
+  overflow-wrap: anywhere; }
 @page { size: A4; margin: 15mm 14mm 16mm; @bottom-right { content: counter(page) " / " counter(pages);
   font: 8pt Arial, sans-serif; color: #5b6670; } }
 @media print { body { padding: 0; max-width: none; } }
@@ -126,7 +131,8 @@ def to_html(document: Document) -> bytes:
         "<!DOCTYPE html>", '<html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{_text(document.title)}: {_text(document.subtitle)}</title><style>{_CSS}</style></head><body>",
+        f"<title>{_text(document.title)}: {_text(document.subtitle)}</title>",
+        f"<style>{_CSS}</style></head><body>",
         f"<header><h1>{_text(document.title)}</h1><p>{_text(document.subtitle)}</p></header>",
     ]  # fmt: skip
     if document.verdict is not None:
@@ -214,9 +220,12 @@ def _markdown(block: Block) -> Iterator[str]:
         yield from (f"- {_mark(a)}: {_mark(b)}" for a, b in block.rows if b)
         yield ""
     elif isinstance(block, Notice):
-        yield f"- **{block.code} {_mark(block.title)}** ({block.severity}): {_mark(block.message)} {_mark(block.remedy)}"
+        said = f"{_mark(block.message)} {_mark(block.remedy)}"
+        yield f"- **{block.code} {_mark(block.title)}** ({block.severity}): {said}"
     elif isinstance(block, Grid):
+        left = {*range(block.left), block.code, block.aside}
+        rule = ("---" if column in left else "---:" for column in range(len(block.header)))
         yield "| " + " | ".join(map(_mark, block.header)) + " |"
-        yield "|" + "|".join(" --- " if i < block.left or i in (block.code, block.aside) else " ---: " for i in range(len(block.header))) + "|"
+        yield "| " + " | ".join(rule) + " |"
         yield from ("| " + " | ".join(map(_mark, row)) + " |" for row in block.rows)
         yield ""

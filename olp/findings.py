@@ -244,8 +244,8 @@ _TABLE = (
         "OLP605",
         "frame not determined",
         Severity.WARNING,
-        "The path has the same shape after a shift or a turn, such as along a straight line or about the axis "
-        "of a circle, or fits in two places; the fit leaves that motion at zero.",
+        "The path has the same shape after a shift or a turn, such as along a straight line or about the "
+        "axis of a circle, or fits in two places; the fit leaves that motion at zero.",
         "Measure a path with corners in all directions, or give the frame.",
     ),
     Rule(
@@ -281,8 +281,8 @@ _TABLE = (
         "OLP610",
         "best-fit frame",
         Severity.INFO,
-        "The points were stated in another frame and were brought into the nominal one by the rigid transform "
-        "with the least squared distances from the path.",
+        "The points were stated in another frame and were brought into the nominal one by the rigid "
+        "transform with the least squared distances from the path.",
         "Nothing; OLP604 says where this hides errors.",
     ),
 )

@@ -14,7 +14,7 @@ from olp.measured.path import Array, Index, Path
 from olp.toolpath import Kind, Toolpath
 
 #: How far the chords that stand for arcs may leave them.
-CHORD_MM = 1e-4
+CHORD_MM = 2e-5
 _MOST_CHORDS = 20_000
 
 
@@ -29,9 +29,9 @@ class Nominal:
 def nominal_of(toolpath: Toolpath, model: ErrorModel | None, positions: Literal["tip", "axes"]) -> Nominal:
     """The path that a program asks for, arcs within CHORD_MM.
 
-    "axes": axis positions in the machine frame. "tip": of the tip in the first work frame, as `simulate` states
-    it. With a model, zeros that were touched off on the raw machine lie where it was then. Moves of unknown
-    axes are left out. Raises CannotCompute where no path is left.
+    "axes": axis positions in the machine frame. "tip": of the tip in the first work frame, as
+    `simulate` states it. With a model, zeros that were touched off on the raw machine lie where it was then.
+    Moves of unknown axes are left out. Raises CannotCompute where no path is left.
     """
     shift = np.zeros((len(toolpath.frames), 3))
     if model is not None:

@@ -31,7 +31,7 @@ def _svg(name: str, size: tuple[float, float], draw: Callable[[Figure], None]) -
     import matplotlib
     from matplotlib.figure import Figure
 
-    style = {
+    style: Any = {
         "svg.hashsalt": f"olp-{name}", "svg.fonttype": "none", "font.size": 8.0, "font.family": "sans-serif",
         "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "0.5", "axes.linewidth": 0.6,
         "xtick.color": "0.3", "ytick.color": "0.3",
@@ -118,7 +118,10 @@ def along(path: Path, runs: Runs, tolerance_um: float | None) -> bytes:
                 np.minimum.at(low, column, size)
                 np.maximum.at(high, column, size)
             seen = np.isfinite(low)
-            bands = np.maximum(np.where(seen, low, np.nan), _FLOOR_UM), np.maximum(np.where(seen, high, np.nan), _FLOOR_UM)
+            bands = (
+                np.maximum(np.where(seen, low, np.nan), _FLOOR_UM),
+                np.maximum(np.where(seen, high, np.nan), _FLOOR_UM),
+            )
             middle = (edges[1:] + edges[:-1]) / 2e3
             plot.fill_between(middle, *bands, color=COLOURS[name], alpha=0.35, linewidth=0, step="mid")
             plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{name}, largest")
@@ -173,9 +176,7 @@ def components(path: Path, runs: Runs) -> bytes:
                     rows = np.flatnonzero(run.counted)
                     rows = rows[:: max(len(rows) // _DRAWN, 1)]
                     value = getattr(run.deviation, side)[rows] * UM_PER_MM
-                    plot.plot(
-                        run.pairing.s_mm[rows] / 1e3, value, ",", color=COLOURS[name], rasterized=True
-                    )
+                    plot.plot(run.pairing.s_mm[rows] / 1e3, value, ",", color=COLOURS[name], rasterized=True)
                     plot.plot([], [], color=COLOURS[name], label=name)
             plot.set_ylabel(f"{side} in um")
             plot.grid(color="0.92", linewidth=0.5)
@@ -195,7 +196,13 @@ def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
             for name in ("before", "after"):
                 value = np.asarray(row[name]["radial_um"])
                 angle = np.linspace(0.0, 2.0 * np.pi, len(value), endpoint=False)
-                plot.plot(np.append(angle, 0.0), np.append(value, value[0]), color=COLOURS[name], linewidth=1.0, label=name)
+                plot.plot(
+                    np.append(angle, 0.0),
+                    np.append(value, value[0]),
+                    color=COLOURS[name],
+                    linewidth=1.0,
+                    label=name,
+                )
             plot.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color="0.4", linewidth=0.6)
             plot.set_ylim(-2.5 * top, 1.3 * top)
             plot.set_yticks([-top, 0.0, top], [f"-{top:.0f}", "0", f"{top:.0f} um"], fontsize=6)

@@ -15,8 +15,7 @@ from olp.measured import iso9283
 from olp.measured.path import Array
 from olp.measured.rigid import Rigid, fit_frame
 from olp.measured.runs import Align, eaten_finding
-
-UM = 1e3
+from olp.units import UM_PER_MM
 
 
 def cycles(nominal: Points, files: Sequence[Points]) -> Array:
@@ -78,7 +77,9 @@ def poses_report(
         mean = np.nanmean(groups["after"], axis=0)
         there = np.isfinite(mean).all(axis=1)
         rigid = fit_frame(mean[there], command[there])
-        groups = {name: rigid(attained.reshape(-1, 3)).reshape(attained.shape) for name, attained in groups.items()}
+        groups = {
+            name: rigid(attained.reshape(-1, 3)).reshape(attained.shape) for name, attained in groups.items()
+        }
         x, y, z = rigid.shift_mm.tolist()
         rest = _rms(_distance(command, groups["after"]))
         found.append(Finding(
@@ -114,8 +115,8 @@ def _group(
         worst = int(far.argmax())
         return {"poses": None, "iso_9283": None}, [Finding(
             "OLP601",
-            f"{int((far > reach_mm).sum())} of {len(names)} poses lie farther than {reach_mm:g} mm from their "
-            f"command, {names[worst]} by {far[worst]:.4g} mm; no figures are stated",
+            f"{int((far > reach_mm).sum())} of {len(names)} poses lie farther than {reach_mm:g} mm from "
+            f"their command, {names[worst]} by {far[worst]:.4g} mm; no figures are stated",
         )]  # fmt: skip
     found = []
     missing = ~np.isfinite(distance).any(axis=0)
@@ -124,7 +125,12 @@ def _group(
         found.append(Finding("OLP603", f"not measured: {which}", count=int(missing.sum())))
     each = iso9283.repeated(command, attained)
     rows = [
-        {"name": name, "AP_um": ap * UM, "RP_um": rp * UM, "bias_um": [v * UM for v in bias]}
+        {
+            "name": name,
+            "AP_um": ap * UM_PER_MM,
+            "RP_um": rp * UM_PER_MM,
+            "bias_um": [v * UM_PER_MM for v in bias],
+        }
         for name, ap, rp, bias in zip(
             names, each.accuracy.tolist(), each.repeatability.tolist(), each.bias.tolist(), strict=True
         )
@@ -134,8 +140,8 @@ def _group(
         "poses": rows,
         "iso_9283": {
             "cycles": len(attained),
-            "AP_um": ap.value_mm * UM, "AP_pose": names[ap.place] if ap.place >= 0 else None,
-            "RP_um": rp.value_mm * UM, "RP_pose": names[rp.place] if rp.place >= 0 else None,
+            "AP_um": ap.value_mm * UM_PER_MM, "AP_pose": names[ap.place] if ap.place >= 0 else None,
+            "RP_um": rp.value_mm * UM_PER_MM, "RP_pose": names[rp.place] if rp.place >= 0 else None,
         },
     }, found  # fmt: skip
 
@@ -146,7 +152,7 @@ def _distance(command: Array, attained: Array) -> Array:
 
 
 def _rms(distance_mm: Array) -> float:
-    return float(np.sqrt(np.mean(distance_mm**2))) * UM
+    return float(np.sqrt(np.mean(distance_mm**2))) * UM_PER_MM
 
 
 def part_frame(nominal: Points, measured: Sequence[Points], name: str) -> str:
@@ -159,12 +165,16 @@ def part_frame(nominal: Points, measured: Sequence[Points], name: str) -> str:
     mean = np.nanmean(cycles(nominal, measured), axis=0)
     there = np.isfinite(mean).all(axis=1)
     rigid = fit_frame(nominal.points_mm[there], mean[there])
-    away = np.sqrt(((rigid(nominal.points_mm[there]) - mean[there]) ** 2).sum(axis=1)) * UM
+    away = np.sqrt(((rigid(nominal.points_mm[there]) - mean[there]) ** 2).sum(axis=1)) * UM_PER_MM
     angles = {f"{axis}_deg": round(v, 9) for axis, v in zip("ABC", rigid.angles_deg, strict=True)}
     offset = {f"{axis}_mm": round(v, 6) for axis, v in zip("XYZ", rigid.shift_mm.tolist(), strict=True)}
     said = (
         f"best fit of {int(there.sum())} measured points: {away.max():.2f} um at most, "
         f"{float(np.sqrt(np.mean(away**2))):.2f} um rms left"
     )
-    lines = [*comment(said), f"[work_offsets.{toml_key(name)}]", *toml_lines(offset | angles | {"set_by": "true"})]
+    lines = [
+        *comment(said),
+        f"[work_offsets.{toml_key(name)}]",
+        *toml_lines(offset | angles | {"set_by": "true"}),
+    ]
     return "\n".join(lines) + "\n"

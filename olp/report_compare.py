@@ -150,7 +150,8 @@ def _worst(report: Report) -> Iterator[str]:
     texts = {row["line"]: printable(row["text"]) for row in report.get("worst") or ()}
     yield "Lines that are farthest off, in um"
     rows = [
-        [str(row["line"]), number(row["max_um"]), shortened(texts.get(row["line"], ""), 60)] for row in worst[:5]
+        [str(row["line"]), number(row["max_um"]), shortened(texts.get(row["line"], ""), 60)]
+        for row in worst[:5]
     ]
     for line in table(["line", "max", ""], [[a, b, ""] for a, b, _ in rows], left=0):
         yield f"{line}  {rows.pop(0)[2]}".rstrip() if line.split()[0] != "line" else line

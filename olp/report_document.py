@@ -4,6 +4,7 @@ documentation of numerical compensation."""
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -23,8 +24,8 @@ def correction(report: Report, plots: Plots, version: str, date: datetime.date |
     name = program.get("name") or "program"
     largest, allowed = deviation["path_max_um"], deviation["allowed_um"]
     sentence = (
-        f"{'Within tolerance' if deviation['holds'] else 'Above tolerance'}: after correction the path is at most "
-        f"{number(largest)} um from the nominal one; {number(allowed)} um are allowed "
+        f"{'Within tolerance' if deviation['holds'] else 'Above tolerance'}: after correction the path is at "
+        f"most {number(largest)} um from the nominal one; {number(allowed)} um are allowed "
         f"(tolerance {report['tolerance_um']:g} um, and rounding)."
     )
     sections = [
@@ -52,8 +53,11 @@ def comparison(report: Report, plots: Plots, version: str, date: datetime.date |
     elif "holds" in report:
         size = figure(report["after"], ("across_um", "max"))
         words = "Within tolerance" if report["holds"] else "Above tolerance"
-        verdict = (report["holds"], f"{words}: the measured path is at most {number(size)} um from the nominal one; "
-                                    f"{report['tolerance_um']:g} um are allowed.")  # fmt: skip
+        sentence = (
+            f"{words}: the measured path is at most {number(size)} um from the nominal one; "
+            f"{report['tolerance_um']:g} um are allowed."
+        )
+        verdict = (report["holds"], sentence)
     sections = [
         Section("Result", list(_comparison_result(report))),
         Section("Machine tool and numerical controller", [Pairs(_machine(report))]),
@@ -78,8 +82,8 @@ def _subtitle(name: str, report: Report, date: datetime.date | None) -> str:
 
 def _footer(version: str) -> str:
     return (
-        f"Written by olp {version}. Deviations are distances of the tool tip from the nominal path, unless said "
-        "otherwise; error = actual minus commanded."
+        f"Written by olp {version}. Deviations are distances of the tool tip from the nominal path, unless "
+        "said otherwise; error = actual minus commanded."
     )
 
 
@@ -140,7 +144,7 @@ def _applied(report: Report) -> Iterator[Block]:
     yield Pairs([
         ("Tolerance", f"{report['tolerance_um']:g} um for model and chords"),
         ("Largest correction", f"{number(report.get('largest_correction_um'))} um"),
-        ("Moves", f"{moves.get('total', 0)}: " + ", ".join(f"{moves[k]} {w}" for k, w in words if k in moves)),
+        ("Moves", f"{moves.get('total', 0)}: {', '.join(f'{moves[k]} {w}' for k, w in words if k in moves)}"),
         ("Changes", ", ".join(f"{moves[k]} {w}" for k, w in changes if k in moves)),
         ("Written with", ", ".join(f"{count} decimals in {unit}" for unit, count in digits.items())),
     ])  # fmt: skip
@@ -196,9 +200,9 @@ def _tests(report: Report, plots: Plots) -> Iterator[Section]:
     if not tests:
         return
     blocks: list[Block] = [Paragraph(
-        "What a ball-bar should show in the middle of the calibrated volume, before and after correction with the "
-        "same digits: circular deviation G in both directions and hysteresis H (ISO 230-4). A result far from "
-        "it says that the calibration no longer describes the machine, or that dynamics add to it."
+        "What a ball-bar should show in the middle of the calibrated volume, before and after correction, "
+        "with the same digits: circular deviation G in both directions and hysteresis H (ISO 230-4). A result "
+        "far from it says that the calibration no longer describes the machine, or that dynamics add to it."
     )]  # fmt: skip
     if "circles" in plots:
         blocks.append(Plot(plots["circles"], "Predicted circles, counter-clockwise, deviations magnified."))
@@ -216,7 +220,9 @@ def _tests(report: Report, plots: Plots) -> Iterator[Section]:
         "positioning E and reversal B of each diagonal, as ISO 230-6 asks."
     )]  # fmt: skip
     if "diagonals" in plots:
-        blocks.append(Plot(plots["diagonals"], "Predicted deviation of positioning along the body diagonals."))
+        blocks.append(
+            Plot(plots["diagonals"], "Predicted deviation of positioning along the body diagonals.")
+        )
     rows = [
         [
             f"{row['name']}, {row['length_mm']:.0f} mm",
@@ -235,7 +241,11 @@ def _notices(report: Report) -> Iterator[Block]:
     for f in found:
         rule = RULES[f["code"]]
         lines = f["lines"][:8]
-        place = f" Lines {', '.join(map(str, lines))}{' and more' if f['count'] > len(lines) else ''}." if lines else ""
+        place = (
+            f" Lines {', '.join(map(str, lines))}{' and more' if f['count'] > len(lines) else ''}."
+            if lines
+            else ""
+        )
         message = f"{f['message'][:1].upper()}{f['message'][1:]}.{place}"
         yield Notice(f["severity"], f["code"], rule.title, message, rule.remedy)
     if not found:
@@ -251,7 +261,11 @@ def _limits(report: Report) -> Iterator[Block]:
 
 def _documentation(report: Report, version: str, date: datetime.date | None) -> Iterator[Block]:
     rows = [("Software", f"olp {version}"), ("Date", _date(date))]
-    for key, title in (("program", "Nominal program"), ("nominal", "Nominal path"), ("corrected", "Corrected program")):
+    for key, title in (
+        ("program", "Nominal program"),
+        ("nominal", "Nominal path"),
+        ("corrected", "Corrected program"),
+    ):
         part = report.get(key)
         if part:
             said = (part.get("name"), f"{part['lines']} lines" if "lines" in part else "")
@@ -282,12 +296,13 @@ def _measurement(report: Report) -> Iterator[Block]:
     if frame.get("fitted"):
         x, y, z = frame["shift_mm"]
         a, b, c = frame["angles_deg"]
-        how = (
-            f"best fit: shift {x:.4f}, {y:.4f}, {z:.4f} mm; turn A {a:.6f}, B {b:.6f}, C {c:.6f} deg"
-        )
+        how = f"best fit: shift {x:.4f}, {y:.4f}, {z:.4f} mm; turn A {a:.6f}, B {b:.6f}, C {c:.6f} deg"
     added = path.get("machine_errors_added")
+    compared = ""
+    if path:
+        compared = f"{path['cutting_mm'] / 1e3:.3f} m of cutting moves, in {path['compared_in']}"
     yield Pairs([
-        ("Compared", "" if not path else f"{path['cutting_mm'] / 1e3:.3f} m of cutting moves, in {path['compared_in']}"),
+        ("Compared", compared),
         ("Frame", how),
         ("Order of points", ", ".join(dict.fromkeys(frame.get("order") or ()))),
         ("Points in no figure", f"farther than {report['reach_mm']:g} mm from their place"),
@@ -295,29 +310,38 @@ def _measurement(report: Report) -> Iterator[Block]:
     ])  # fmt: skip
 
 
+def _iso(figures: Report) -> Iterator[str]:
+    """The figures of ISO 9283 that there are, with their places."""
+    for name in ("AT", "RT", "AP", "RP"):
+        value = figures.get(f"{name}_um")
+        if isinstance(value, float) and math.isfinite(value):
+            line, pose = figures.get(f"{name}_line"), figures.get(f"{name}_pose")
+            place = f" at line {line}" if line else f" at {pose}" if pose else ""
+            yield f"{name} {number(value)} um{place}"
+
+
 def _measured(report: Report, plots: Plots) -> Iterator[Block]:
+    sides = ("normal_um", "binormal_um")
     rows = [
         [
             row["name"], name, str(row.get("counted", row["points"])),
             *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
-            *(number((row.get(f"{s}_um") or {}).get(k)) for s in ("normal", "binormal") for k in ("mean", "rms")),
+            *(number((row.get(side) or {}).get(key)) for side in sides for key in ("mean", "rms")),
         ]
         for name in ("before", "after")
         for row in (report.get(name) or {}).get("runs") or ()
     ]  # fmt: skip
     if rows:
         yield Grid(
-            ["run, in um", "", "points", "largest", "rms", "normal mean", "rms", "binormal mean", "rms"], rows, 2
+            ["run, in um", "", "points", "largest", "rms", "normal mean", "rms", "binormal mean", "rms"],
+            rows,
+            2,
         )
     for name in ("before", "after"):
         iso = (report.get(name) or {}).get("iso_9283") or {}
         if iso:
-            keys = [k for k in ("AT_um", "RT_um", "AP_um", "RP_um") if isinstance(iso.get(k), float)]
-            said = "; ".join(
-                f"{k[:2]} {number(iso[k])} um" + (f" at line {iso[f'{k[:2]}_line']}" if iso.get(f"{k[:2]}_line") else "")
-                for k in keys if iso[k] == iso[k]
-            )  # fmt: skip
-            yield Paragraph(f"ISO 9283, {name}, {iso['cycles']} cycle{'s' if iso['cycles'] > 1 else ''}: {said}.")
+            cycles = f"{iso['cycles']} cycle{'s' if iso['cycles'] > 1 else ''}"
+            yield Paragraph(f"ISO 9283, {name}, {cycles}: {'; '.join(_iso(iso))}.")
     yield from _path_plots(plots)
     worst = report.get("worst") or (report.get("after") or {}).get("worst") or ()
     if worst:

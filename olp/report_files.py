@@ -39,16 +39,30 @@ def comparison(result: Comparison, setup: Setup | None, name: str, date: datetim
         return to_json(report)
     plots: dict[str, bytes] = {}
     runs = {"before": result.before, "after": result.runs}
-    if FilePath(name).suffix.lower() == ".html" and result.path is not None and any(r.counted.any() for r in result.runs):
+    if (
+        FilePath(name).suffix.lower() == ".html"
+        and result.path is not None
+        and any(r.counted.any() for r in result.runs)
+    ):
         tolerance = report.get("tolerance_um")
-        plots = _path_plots(result.path, runs, tolerance) | {"components": plots_path.components(result.path, runs)}
-    return _written(report_document.comparison(report, plots | _test_plots(report, name), __version__, date), name)
+        plots = _path_plots(result.path, runs, tolerance) | {
+            "components": plots_path.components(result.path, runs)
+        }
+    return _written(
+        report_document.comparison(report, plots | _test_plots(report, name), __version__, date), name
+    )
 
 
 def correction(
-    result: api.Correction, nominal: bytes, setup: Setup, name: str, date: datetime.date | None, *, contour: bool
+    result: api.Correction,
+    nominal: bytes,
+    setup: Setup,
+    name: str,
+    date: datetime.date | None,
+    *,
+    contour: bool,
 ) -> bytes:
-    """The report of a correction in the form that `name` ends in; `nominal` is the text that was corrected."""
+    """The report of a correction in the form that `name` ends in; `nominal` is what was corrected."""
     from olp import report_document
 
     report = dict(result.report) | {"test_paths": _tests(setup)}
@@ -57,7 +71,9 @@ def correction(
     plots: dict[str, bytes] = {}
     if FilePath(name).suffix.lower() == ".html":
         plots = _predicted_plots(result, nominal, setup, contour)
-    return _written(report_document.correction(report, plots | _test_plots(report, name), __version__, date), name)
+    return _written(
+        report_document.correction(report, plots | _test_plots(report, name), __version__, date), name
+    )
 
 
 def _written(document: Document, name: str) -> bytes:
@@ -92,9 +108,7 @@ def _path_plots(path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float 
     }
 
 
-def _predicted_plots(
-    result: api.Correction, nominal: bytes, setup: Setup, contour: bool
-) -> dict[str, bytes]:
+def _predicted_plots(result: api.Correction, nominal: bytes, setup: Setup, contour: bool) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
     loaded = load(setup, None, "hold")
     program = read(nominal, loaded.setup, loaded.profile, Options(contour=contour), words=False)
@@ -112,5 +126,3 @@ def _predicted_plots(
     if not all(run.counted.any() for group in runs.values() for run in group):
         return {}
     return _path_plots(path, runs, float(result.report["tolerance_um"]))
-
-

@@ -42,7 +42,8 @@ def _runs(model: ErrorModel, target: Array, tool: Array, digit: float) -> dict[s
         command = invert(model, target, tool, _play(model, command))
     command = np.round(command / digit) * digit
     return {
-        name: c + model.error(c, tool, _play(model, c)) for name, c in (("before", target), ("after", command))
+        name: c + model.error(c, tool, _play(model, c))
+        for name, c in (("before", target), ("after", command))
     }
 
 

@@ -31,6 +31,7 @@ LAYERS = (
     {"review"},
     {"loading", "poses"},
     {"replanning"},
+    {"comparing_parts"},
     {"correction", "retiming", "comparing"},
     {"api"},
     {"report_files"},

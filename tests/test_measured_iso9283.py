@@ -17,8 +17,8 @@ def test_pose_accuracy_and_repeatability_by_hand() -> None:
     """Four cycles at one pose, commanded (10, 20, 30).
 
     Attained x: 10.01, 10.03, 10.02, 10.02; y: 20.00, 20.00, 20.02, 19.98; z: 30.00 each. Barycentre
-    (10.02, 20.00, 30.00), so AP = 0.02. Distances from it: 0.01, 0.01, 0.02, 0.02; mean 0.015; deviations from the
-    mean 0.005 each, S = sqrt(4 x 0.005^2 / 3) = 0.0057735; RP = 0.015 + 3 x 0.0057735 = 0.0323205.
+    (10.02, 20.00, 30.00), so AP = 0.02. Distances from it: 0.01, 0.01, 0.02, 0.02; mean 0.015; deviations
+    from the mean 0.005 each, S = sqrt(4 x 0.005^2 / 3) = 0.0057735; RP = 0.015 + 3 x 0.0057735 = 0.0323205.
     """
     attained = np.array([
         [[10.01, 20.00, 30.0]], [[10.03, 20.00, 30.0]], [[10.02, 20.02, 30.0]], [[10.02, 19.98, 30.0]],
@@ -42,9 +42,9 @@ def test_the_worst_pose_counts_and_one_cycle_has_no_repeatability() -> None:
 def test_path_accuracy_and_repeatability_by_hand() -> None:
     """Three cycles along X, off by y = 0.010, 0.020 and 0.030 mm everywhere, and z = 0.
 
-    In each normal plane: barycentre y = 0.020, so AT = 0.020. Distances from it 0.010, 0, 0.010; mean 0.00666667;
-    S = sqrt((2 x 0.00333333^2 + 0.00666667^2) / 2) = 0.0057735; RT = 0.0066667 + 3 x 0.0057735 = 0.0239872.
-    The cycles were sampled at other places each, which the figures must not see.
+    In each normal plane: barycentre y = 0.020, so AT = 0.020. Distances from it 0.010, 0, 0.010; mean
+    0.00666667; S = sqrt((2 x 0.00333333^2 + 0.00666667^2) / 2) = 0.0057735; RT = 0.0066667 + 3 S =
+    0.0239872. The cycles were sampled at other places each, which the figures must not see.
     """
     path = Path.through(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]))
     runs = []
@@ -62,7 +62,7 @@ def test_path_accuracy_and_repeatability_by_hand() -> None:
 
 
 def test_the_worst_place_of_a_path_counts() -> None:
-    """Two cycles that part linearly: y = 0 and y = x / 1000. At x: barycentre x/2000, both distances x/2000."""
+    """Two cycles that part linearly: y = 0 and y = x / 1000. Barycentre and distances are x / 2000."""
     path = Path.through(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]))
     x = np.linspace(0.0, 100.0, 1001)
     runs = []

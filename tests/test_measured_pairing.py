@@ -107,7 +107,7 @@ def test_to_and_fro_on_one_line() -> None:
 
 
 def test_parallel_passes_closer_than_the_deviation() -> None:
-    """A raster whose lines lie 0.05 mm apart, on a machine that is off by 0.12 mm: the nearest line is wrong."""
+    """Lines 0.05 mm apart, on a machine that is off by 0.12 mm: the nearest line is wrong."""
     rows = np.repeat(np.arange(60), 2) * 0.05
     ends = np.tile((0.0, 80.0, 80.0, 0.0), 30)
     path = Path.through(np.column_stack((ends, rows, np.zeros(120))))
@@ -200,7 +200,9 @@ def test_a_fit_that_takes_the_error_is_told() -> None:
 
 
 @settings(max_examples=40)
-@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3), st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3))
+@given(
+    st.lists(st.floats(-3, 3), min_size=3, max_size=3), st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3)
+)
 def test_rigid_transforms_invert_and_their_angles_make_them(turn: list[float], shift: list[float]) -> None:
     rigid = Rigid(rotation_of(np.array(turn)), np.array(shift))
     points = np.random.default_rng(2).normal(0, 100, (20, 3))

@@ -26,6 +26,8 @@ from olp.exceptions import UsageError
 
 if TYPE_CHECKING:
     from olp.files.point_profile import PointProfile
+    from olp.measured.pairing import Order
+    from olp.measured.runs import Align
 
 
 @click.command("compare")
@@ -35,7 +37,9 @@ if TYPE_CHECKING:
 @click.option("--before", multiple=True, metavar="FILE", help="A run without correction; may be repeated.")
 @click.option("--poses", is_flag=True, help="Rows are poses, not places along a path.")
 @click.option("--profile", metavar="NAME|FILE", help="How the files are laid out; see --save-profile.")
-@click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, t, name or line.")
+@click.option(
+    "--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, t, name or line."
+)
 @click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z.")
 @click.option(
     "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "space"]), help="What separates columns."
@@ -58,7 +62,9 @@ if TYPE_CHECKING:
 @click.option("--tolerance-um", type=Length(), help="Exit with 1 where the measured path is farther off.")
 @click.option("--add-errors", is_flag=True, help="Move axis positions of a log by the machine's errors.")
 @click.option("-o", "--output", metavar="OUT.csv", help="Deviation of every point.")
-@click.option("--part-frame", metavar="FILE.toml", help="Work offset from three or more poses, for the job file.")
+@click.option(
+    "--part-frame", metavar="FILE.toml", help="Work offset from three or more poses, for the job file."
+)
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
 @click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
@@ -86,8 +92,8 @@ def command(
     delimiter: str | None,
     positions: str | None,
     save_profile: str | None,
-    align: str,
-    order: str | None,
+    align: Align,
+    order: Order | None,
     reach_mm: float,
     tolerance_um: float | None,
     add_errors: bool,
@@ -129,7 +135,7 @@ def command(
             source(nominal), measured, setup, before=before, poses=poses, profile=layout,
             align=align, order=order, reach_mm=reach_mm, tolerance_um=tolerance_um, add_errors=add_errors,
             frame_name=frame_name, contour=contour, date=date.date() if date else None, progress=show,
-        )  # type: ignore[arg-type] # fmt: skip
+        )  # fmt: skip
         written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(output)}
         if part_frame and result.part_frame is None:
             raise UsageError("a part frame takes at least three nominal points")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -66,7 +66,8 @@ class PointProfile(Table):
         "control)",
     )
     frame: Text | None = Field(
-        default=None, description='the frame that the points are stated in, such as "G54"; not known if left out'
+        default=None,
+        description='the frame that the points are stated in, such as "G54"; not known if left out',
     )
     columns: ColumnsTable = Field(default_factory=ColumnsTable, description="the table [columns]")
 
@@ -101,9 +102,7 @@ def load_profile(name: PathLike) -> PointProfile:
     return validate(PointProfile, values, lines, str(name))
 
 
-def with_options(
-    profile: PointProfile, columns: Sequence[str], **values: str | float | None
-) -> PointProfile:
+def with_options(profile: PointProfile, columns: Sequence[str], **values: str | float | None) -> PointProfile:
     """A profile with what the command line says: `columns` such as "X=East", and keys that are not None."""
     table = dict(profile.columns.given)
     for item in columns:
@@ -113,8 +112,8 @@ def with_options(
             hint = f"did you mean {near}?" if near else f"expected one of {', '.join(COLUMNS)}"
             raise UsageError(f"--column {item} is not understood; {hint}, as in --column X=East")
         table[key] = int(column) if column.isdigit() else column
-    changed = {key: value for key, value in values.items() if value is not None}
-    changed["columns"] = ColumnsTable(**table)  # type: ignore[assignment,arg-type]
+    changed: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
+    changed["columns"] = ColumnsTable(**table)
     return profile.model_copy(update=changed)
 
 
@@ -131,36 +130,37 @@ def looked_at(lines: Sequence[str]) -> PointProfile | None:
     delimiter = _delimiter(rows)
     cells = [_cells(row, delimiter) for row in rows]
     decimal = "comma" if any(_COMMA_NUMBER.fullmatch(c) for row in cells for c in row) else "point"
-    common = {"delimiter": delimiter, "decimal": decimal, "comment": comment}
+    common: dict[str, Any] = {"delimiter": delimiter, "decimal": decimal, "comment": comment}
     found = _named(cells[0])
     if found is not None:
         columns, unit = found
-        return PointProfile(**common, unit=unit, columns=columns)  # type: ignore[arg-type]
+        return PointProfile(**common, unit=unit, columns=columns)
     number = [bool(_NUMBER.fullmatch(c.replace(",", "."))) for c in cells[0]]
     if number == [True] * 3:
-        return PointProfile(**common, header=False, columns=ColumnsTable(X=1, Y=2, Z=3))  # type: ignore[arg-type]
+        return PointProfile(**common, header=False, columns=ColumnsTable(X=1, Y=2, Z=3))
     text = next((i for i, is_number in enumerate(number) if is_number), 0)
     # a point may be named by a number: what counts are three numbers at the end behind a word
     if text and all(number[text:]) and len(number) - 3 in (text, text + 1):
         x = len(number) - 2
         columns = ColumnsTable(X=x, Y=x + 1, Z=x + 2, name=x - 1)
-        return PointProfile(**common, header=False, columns=columns)  # type: ignore[arg-type]
+        return PointProfile(**common, header=False, columns=columns)
     return None
 
 
 def _delimiter(rows: Sequence[str]) -> str:
-    first = rows[-1]
-    for name, mark in (("semicolon", ";"), ("tab", "\t"), ("comma", ",")):
-        if mark in first and not (mark == "," and len(_COMMA_NUMBER.findall(first)) == first.count(",") < 3):
+    row = rows[-1]
+    for name, mark in (("semicolon", ";"), ("tab", "\t")):
+        if mark in row:
             return name
-    return "space"
+    decimal_commas = sum(bool(_COMMA_NUMBER.fullmatch(cell)) for cell in row.split())
+    return "comma" if "," in row and decimal_commas < 3 else "space"
 
 
 def _cells(row: str, delimiter: str) -> list[str]:
     return [cell.strip().strip('"') for cell in row.split(DELIMITERS[delimiter])]
 
 
-def _named(header: Sequence[str]) -> tuple[ColumnsTable, str] | None:
+def _named(header: Sequence[str]) -> tuple[ColumnsTable, Any] | None:
     """Columns whose names say what they hold, and the unit in them."""
     found: dict[str, str] = {}
     units = set()
@@ -177,4 +177,4 @@ def _named(header: Sequence[str]) -> tuple[ColumnsTable, str] | None:
         match_ = next((cell for cell in header if cell.lower() in names), None)
         if match_ is not None:
             found[key] = match_
-    return ColumnsTable(**found), units.pop()  # type: ignore[arg-type]
+    return ColumnsTable(**found), units.pop()

@@ -73,17 +73,17 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         raise InputError("holds no points; expected a row a point", file=file)
     if found is None:
         raise InputError(
-            "does not tell which columns hold X, Y and Z; name them with --column X=.. --column Y=.. --column "
-            "Z=.., by name or number, or give a profile with --profile",
+            "does not tell which columns hold X, Y and Z; name them by name or number with --column X=.. "
+            "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
     stated = re.search(r"^[#/;\s]*frame\s*=\s*(\S+)", "".join(first), re.MULTILINE)
     skip, header = _header(first, found, file)
+    if next(_rows(text, found, skip), None) is None:
+        raise InputError("holds no points; expected a row a point", file=file)
     columns = {key: _place(column, header, file) for key, column in found.columns.given.items()}
     numbers = [key for key in columns if key != "name"]
     table = _table(text, file, found, skip, [columns[key] for key in numbers])
-    if not len(table):
-        raise InputError("holds no points; expected a row a point", file=file)
     column = dict(zip(numbers, table.T, strict=True))
     time = column["t"] * SECONDS[found.time_unit] if "t" in column else None
     if time is None and found.sample_period_s is not None:
@@ -110,7 +110,7 @@ def _header(first: Sequence[str], profile: PointProfile, file: str) -> tuple[int
             if not profile.header:
                 return number, []
             return number + 1, _cells(line, profile)
-    raise InputError("holds no points; expected a row a point", file=file)
+    return len(first), []
 
 
 def _holds(line: str, profile: PointProfile) -> bool:
@@ -163,9 +163,7 @@ def _table(text: str, file: str, profile: PointProfile, skip: int, columns: Sequ
     return np.asarray(table, float)
 
 
-def _wrong_row(
-    text: str, file: str, profile: PointProfile, skip: int, columns: Sequence[int]
-) -> InputError:
+def _wrong_row(text: str, file: str, profile: PointProfile, skip: int, columns: Sequence[int]) -> InputError:
     for number, cells in _rows(text, profile, skip):
         for column in columns:
             if column >= len(cells):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.measured.pairing import Order, Pairing, coarse, pair, thinned
+from olp.measured.pairing import FAR, Order, Pairing, coarse, pair, thinned
 from olp.measured.path import Array, Path
 from olp.measured.rigid import Rigid, fit_path, fit_points
 
@@ -33,9 +33,7 @@ class Alignment:
     rival: bool = False
 
 
-def paired(
-    path: Path, points_mm: Array, order: Order | None, reach_mm: float
-) -> tuple[Order, Pairing]:
+def paired(path: Path, points_mm: Array, order: Order | None, reach_mm: float) -> tuple[Order, Pairing]:
     """Pair points (m, 3) in the nominal frame in their order, which is found where it is not given.
 
     Along or against the path, whichever costs less; in none, where order leaves many points farther than
@@ -54,7 +52,7 @@ def paired(
 
 
 def _cost(path: Path, points: Array) -> float:
-    return coarse(path, points, _FIRST)[3]
+    return coarse(path, points, _FIRST, FAR)[3]
 
 
 def _typical(path: Path, points: Array, order: Order) -> float:

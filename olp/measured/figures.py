@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from olp.measured.pairing import Pairing
+from olp.measured.pairing import Order, Pairing
 from olp.measured.path import Array, Index, Mask, Path, Split, split
+from olp.units import UM_PER_MM
 
 #: places along the path at which runs are compared
 STATIONS = 2000
-_WORST = 10
 #: a gap between points of so many usual ones is no path any more
 _GAP = 8.0
-UM = 1e3
+#: so many times its reach from its end a path has left it
+_LEFT = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,15 +34,19 @@ class Run:
     counted: Mask
 
     @staticmethod
-    def of(name: str, path: Path, points_mm: Array, pairing: Pairing, reach_mm: float) -> Run:
+    def of(
+        name: str, path: Path, points_mm: Array, pairing: Pairing, reach_mm: float, order: Order = "forward"
+    ) -> Run:
         """`counted` are good points on moves that cut."""
+        if order != "free":
+            pairing = replace(pairing, beyond=_off_the_ends(path, points_mm, pairing, reach_mm, order))
         good = (pairing.distance_mm <= reach_mm) & ~pairing.beyond & ~pairing.doubtful
         deviation = split(path, pairing.segment, points_mm - pairing.foot_mm)
         return Run(name, points_mm, pairing, deviation, good, good & path.cutting[pairing.segment])
 
     def figures(self, path: Path) -> dict[str, Any]:
         """Counts and deviations in um, of cutting moves only."""
-        size = self.deviation.across[self.counted] * UM
+        size = self.deviation.across[self.counted] * UM_PER_MM
         out: dict[str, Any] = {
             "name": self.name,
             "points": len(self.points_mm),
@@ -59,7 +64,7 @@ class Run:
             "q95": float(np.quantile(size, 0.95)),
         }
         for name in ("normal", "binormal"):
-            value = getattr(self.deviation, name)[self.counted] * UM
+            value = getattr(self.deviation, name)[self.counted] * UM_PER_MM
             out[f"{name}_um"] = {
                 "min": float(value.min()), "max": float(value.max()), "mean": float(value.mean()),
                 "rms": float(np.sqrt(np.mean(value * value))),
@@ -103,28 +108,46 @@ class Run:
         out[near] = (place + between)[near]
         return out
 
-    def worst_lines(self, path: Path) -> list[dict[str, Any]]:
-        """The lines with the largest deviations, in um."""
-        if not self.counted.any():
-            return []
+    def largest_by_line(self, path: Path) -> dict[int, float]:
+        """The largest deviation in um of each line of the program."""
         line = path.line[self.pairing.segment[self.counted]]
-        size = self.deviation.across[self.counted]
         names, which = np.unique(line, return_inverse=True)
         most = np.zeros(len(names))
-        np.maximum.at(most, which, size)
-        top = np.argsort(-most, kind="stable")[:_WORST]
-        return [{"line": int(names[i]), "max_um": float(most[i]) * UM} for i in top.tolist()]
+        np.maximum.at(most, which, self.deviation.across[self.counted] * UM_PER_MM)
+        return dict(zip(names.tolist(), most.tolist(), strict=True))
+
+
+def _off_the_ends(path: Path, points: Array, pairing: Pairing, reach: float, order: Order) -> Mask:
+    """(m,) `beyond`, and what was measured on the way to the first place of the path and from its last one.
+
+    That is there where the measurement begins out of reach; it ends where it is nearest to that place.
+    """
+    out = pairing.beyond.copy()
+    ends = path.vertex_mm[[0, -1]] if order == "forward" else path.vertex_mm[[-1, 0]]
+    at = (0.0, path.length_mm) if order == "forward" else (path.length_mm, 0.0)
+    for end, s, turn in ((ends[0], at[0], slice(None)), (ends[1], at[1], slice(None, None, -1))):
+        distance, mask = pairing.distance_mm[turn], out[turn]
+        inside = np.flatnonzero(distance <= reach)
+        if not len(inside) or inside[0] == 0:
+            continue
+        # as far as the path has left its end for good
+        gone = np.flatnonzero(np.abs(pairing.s_mm[turn][inside[0] :] - s) > _LEFT * reach)
+        last = inside[0] + (gone[0] if len(gone) else len(distance) - inside[0])
+        away = points[turn][: last + 1] - end
+        size = np.einsum("ij,ij->i", away, away)
+        arrival = int(size.argmin())
+        mask[: arrival if size[arrival] <= reach * reach else inside[0]] = True
+    return out
 
 
 def _cutting_places(path: Path) -> tuple[Array, Index, Mask]:
     """Arc lengths of places even along the path, their segments, and which of them cut."""
-    places = (np.arange(STATIONS) + 0.5) * (path.length_mm / STATIONS)
+    places = (np.arange(STATIONS, dtype=float) + 0.5) * (path.length_mm / STATIONS)
     segment = path.at(places)[1]
     return places, segment, path.cutting[segment]
 
 
 def stations(path: Path) -> Array:
-    """Arc lengths (k,) of places even along the cutting moves of the path, clear of its corners' double
-    meaning by being fixed before anything is measured."""
+    """Arc lengths (k,) of places even along the path, on its cutting moves only."""
     places, _, cutting = _cutting_places(path)
     return places[cutting]

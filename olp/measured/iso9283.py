@@ -33,7 +33,7 @@ def repeated(command_mm: Array, attained_mm: Array) -> Repeated:
     8.2 and 8.3 take the same for the places of a path in its normal planes. A place that a cycle did not
     reach (NaN) takes the cycles that did.
     """
-    there = np.isfinite(attained_mm).all(axis=2)
+    there = np.asarray(np.isfinite(attained_mm).all(axis=2), bool)
     count = there.sum(axis=0)
     weight = there[:, :, None]
     value = np.where(weight, attained_mm, 0.0)

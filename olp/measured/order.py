@@ -19,13 +19,16 @@ Moves = npt.NDArray[np.uint8]
 _ROWS, _OVERLAP, _TOGETHER = 960, 64, 256
 #: share of a squared node distance that a node costs which lies before the first row or behind the last
 _UNVISITED = 0.25
+#: a place that is farther off than this many times the usual square pulls at nothing
+_FAR = 100.0
 _DOWN, _BOTH, _RIGHT, _ANEW = np.uint8(0), np.uint8(1), np.uint8(2), np.uint8(3)
 
 
-def whole(points_mm: Array, nodes_mm: Array) -> tuple[Index, float]:
+def whole(points_mm: Array, nodes_mm: Array, far_mm: float = np.inf) -> tuple[Index, float]:
     """The best node (L,) of L points among K nodes in order, and the cost of the way; L x K cells.
 
-    The first and the last nodes need not be met.
+    The first and the last nodes need not be met. Points farther than `far_mm` from a node pay no more than
+    that: what is no part of the path, such as the way to its start, then pulls at nothing.
     """
     count, width = len(points_mm), len(nodes_mm)
     step = np.diff(nodes_mm, axis=0)
@@ -34,7 +37,7 @@ def whole(points_mm: Array, nodes_mm: Array) -> tuple[Index, float]:
     moves = np.empty((count, 1, width), np.uint8)
     total = np.full((1, width), np.inf)
     for i in range(count):
-        cost = _square(nodes_mm - points_mm[i])[None]
+        cost = np.minimum(_square(nodes_mm - points_mm[i]), far_mm * far_mm)[None]
         start = idle[None] + cost if i == 0 else None
         total, moves[i] = _row(total, cost, most, start)
     end = total[0] + idle[::-1]
@@ -53,7 +56,8 @@ def banded(points_mm: Array, nodes_mm: Array, middle: Index, width: int) -> Inde
     count = len(points_mm)
     width = min(width, len(nodes_mm))
     low = np.clip(np.maximum.accumulate(middle) - width // 2, 0, len(nodes_mm) - width)
-    most = float(np.median(_square(points_mm - nodes_mm[middle])))
+    step = _square(np.diff(nodes_mm, axis=0)).mean()
+    most = max(float(np.median(_square(points_mm - nodes_mm[middle]))), float(step))
     out = np.empty(count, np.int64)
     starts = np.arange(0, count, _ROWS)
     for a in range(0, len(starts), _TOGETHER):
@@ -76,7 +80,7 @@ def _side_by_side(points: Array, nodes: Array, low: Index, width: int, most: flo
     total = np.zeros((stretches, width))
     padded = np.full((stretches, width + 1), np.inf)
     for i in range(rows):
-        cost = _square(nodes[low[i][:, None] + column] - points[i][:, None])
+        cost = np.minimum(_square(nodes[low[i][:, None] + column] - points[i][:, None]), _FAR * most)
         if i:
             padded[:, :width] = total
             shift = (low[i] - low[i - 1])[:, None]

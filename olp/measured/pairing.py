@@ -21,6 +21,8 @@ _TIME = 0.1
 #: means of so many points measure the way travelled, so that noise does not
 _MEANS = 8192
 _BLOCK = 1 << 17
+#: share of the size of a path beyond which a point is no part of it
+FAR = 0.05
 #: nodes looked at where points come in no order
 _NEIGHBOURS = 24
 #: segments that a foot may wander from where the order put it
@@ -73,7 +75,7 @@ def thinned(points_mm: Array, count: int) -> tuple[Array, Array]:
     cuts = np.searchsorted(measure, np.linspace(measure[0], measure[-1], count + 1)[1:-1])
     # a mean of places on both sides of a gap would be a place on neither
     cuts = np.unique(np.concatenate(([0], cuts, leaps(points_mm, count) + 1, [m])))
-    return _means(points_mm, cuts), 0.5 * (cuts[:-1] + cuts[1:] - 1)
+    return _means(points_mm, cuts), np.asarray(0.5 * (cuts[:-1] + cuts[1:] - 1), float)
 
 
 def leaps(points_mm: Array, count: int) -> Index:
@@ -98,18 +100,21 @@ def _means(points: Array, edges: Index) -> Array:
     return np.asarray(np.add.reduceat(points, edges[:-1], axis=0) / np.diff(edges)[:, None], float)
 
 
-def coarse(path: Path, points_mm: Array, count: int = COARSE) -> tuple[Array, Array, Array, float]:
-    """Thinned points (L, 3), the index and the arc length of each (L,), and the cost of their way."""
+def coarse(
+    path: Path, points_mm: Array, count: int = COARSE, far: float = np.inf
+) -> tuple[Array, Array, Array, float]:
+    """Thinned points (L, 3), the index and the arc length of each (L,), and the cost of their way; `far` is
+    the share of the size of the path beyond which a point is no part of it."""
     few, index = thinned(points_mm, count)
     s = np.linspace(0.0, path.length_mm, count)
-    near, cost = whole(few, path.at(s)[0])
+    near, cost = whole(few, path.at(s)[0], far * float(np.linalg.norm(np.ptp(path.vertex_mm, axis=0))))
     return few, index, s[near], cost
 
 
 def _in_order(path: Path, points: Array) -> tuple[Array, float]:
     """Arc length (m,) of the node of each point, and the distance of nodes: level by level."""
     m = len(points)
-    _, index, s, _ = coarse(path, points)
+    _, index, s, _ = coarse(path, points, far=FAR)
     finest = int(np.clip(max(len(path), m), COARSE, min(max(4 * m, COARSE), _MOST)))
     count = COARSE
     gaps = leaps(points, COARSE) if m > COARSE else np.zeros(0, np.int64)
@@ -124,7 +129,7 @@ def _in_order(path: Path, points: Array) -> tuple[Array, float]:
         index, s = at, nodes_s[near]
         if last:
             break
-    return _between(np.arange(m), index, s, gaps), path.length_mm / (count - 1)
+    return _between(np.arange(m, dtype=float), index, s, gaps), path.length_mm / (count - 1)
 
 
 def _project(path: Path, points: Array, s: Array, step: float) -> Pairing:
@@ -165,7 +170,14 @@ def _nearer(
 
 
 def _walk(
-    path: Path, points: Array, rows: Index, side: int, segment: Index, foot: Array, square: Array, share: Array
+    path: Path,
+    points: Array,
+    rows: Index,
+    side: int,
+    segment: Index,
+    foot: Array,
+    square: Array,
+    share: Array,
 ) -> None:
     """Go on along the path as long as it comes nearer: noise may hold the order off by some nodes."""
     for _ in range(_STEPS):
@@ -193,7 +205,7 @@ def _free(path: Path, points: Array) -> Pairing:
     count = int(np.clip(4 * max(m, len(path)), COARSE, _MOST))
     nodes_s = np.linspace(0.0, path.length_mm, count)
     step = path.length_mm / (count - 1)
-    distance, near = cKDTree(path.at(nodes_s)[0]).query(points, k=_NEIGHBOURS)
+    distance, near = map(np.asarray, cKDTree(path.at(nodes_s)[0]).query(points, k=_NEIGHBOURS))
     pairing = _project(path, points, nodes_s[near[:, 0]], step)
     other = np.abs(near - near[:, :1]) > _NEIGHBOURS
     other &= distance < distance[:, :1] + 2.0 * pairing.distance_mm[:, None] + step

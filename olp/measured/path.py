@@ -41,7 +41,9 @@ class Path:
         kept = np.append(True, length > 0.0) if len(points) else np.zeros(0, bool)
         points, line, cutting = points[kept], line[kept], cutting[kept]
         if len(points) < 2:
-            raise CannotCompute("the nominal path has fewer than two places; there is no path to compare with")
+            raise CannotCompute(
+                "the nominal path has fewer than two places; there is no path to compare with"
+            )
         s = np.append(0.0, np.cumsum(length[length > 0.0]))
         return Path(points, line[1:], cutting[1:], s)
 
@@ -72,7 +74,8 @@ class Path:
         """Unit vectors (m, 3) along, normal and binormal of segments.
 
         The normal is level and points to the left of travel seen from +Z, the binormal completes the
-        right-handed triple, so that on a level path it points up. Where the path is upright, the normal is +Y.
+        right-handed triple, so that on a level path it points up. Where the path is upright, the normal is
+        +Y.
         """
         along = self.vertex_mm[segment + 1] - self.vertex_mm[segment]
         along = along / np.sqrt((along * along).sum(axis=1))[:, None]

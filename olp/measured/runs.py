@@ -10,10 +10,11 @@ import numpy as np
 
 from olp.findings import Finding
 from olp.measured.aligning import Alignment, align, paired, refit
-from olp.measured.figures import UM, Run
+from olp.measured.figures import Run
 from olp.measured.pairing import Order, pair
 from olp.measured.path import Array, Path
-from olp.measured.rigid import Rigid
+from olp.measured.rigid import Rigid, fit_path
+from olp.units import UM_PER_MM
 
 Align = Literal["auto", "none", "fit", "each"]
 
@@ -30,7 +31,7 @@ _COVERED = 0.98
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
     """Runs in the nominal frame; `rigid` brought each into it, `fitted` tells whether it was fitted.
-    `eaten_um`, None without a fit: rms of what the last frame took of the deviations, and of what it left."""
+    `right` (one a run): whether its pairing is to be trusted."""
 
     runs: tuple[Run, ...]
     orders: tuple[Order, ...]
@@ -42,7 +43,12 @@ class Placed:
 
 
 def place(
-    path: Path, names: Sequence[str], points: Sequence[Array], how: Align, order: Order | None, reach_mm: float
+    path: Path,
+    names: Sequence[str],
+    points: Sequence[Array],
+    how: Align,
+    order: Order | None,
+    reach_mm: float,
 ) -> Placed:
     """Place runs of points (m, 3) on a path.
 
@@ -67,8 +73,8 @@ def place(
         rival = any(f.rival for f in fits)
         found = [paired(path, move(p), order, reach_mm) for move, p in zip(rigid, points, strict=True)]
     runs = [
-        Run.of(name, path, move(p), pairing, reach_mm)
-        for name, move, p, (_, pairing) in zip(names, rigid, points, found, strict=True)
+        Run.of(name, path, move(p), pairing, reach_mm, one)
+        for name, move, p, (one, pairing) in zip(names, rigid, points, found, strict=True)
     ]
     orders = [one for one, _ in found]
     right = [_right(path, run, one) for run, one in zip(runs, orders, strict=True)]
@@ -111,8 +117,8 @@ def findings(path: Path, placed: Placed) -> list[Finding]:
             inside = max(int((~run.pairing.beyond).sum()), 1)
             out.append(Finding(
                 "OLP601",
-                f"{run.name}: {int(off.sum())} of {inside} points find no place within reach, or the order of "
-                f"the points is not that of the path; median distance "
+                f"{run.name}: {int(off.sum())} of {inside} points find no place within reach, or the order "
+                f"of the points is not that of the path; median distance "
                 f"{float(np.median(run.pairing.distance_mm)):.4g} mm; no figures are stated",
             ))  # fmt: skip
             continue
@@ -159,7 +165,7 @@ def _frame_findings(placed: Placed) -> list[Finding]:
 def rms_um(run: Run) -> float:
     """Root mean square of the distance from the path in um, NaN where nothing counts."""
     size = run.deviation.across[run.counted]
-    return float(np.sqrt(np.mean(size * size))) * UM if len(size) else float("nan")
+    return float(np.sqrt(np.mean(size * size))) * UM_PER_MM if len(size) else float("nan")
 
 
 def eaten(path: Path, run: Run, rigid: Rigid) -> tuple[float, float]:
@@ -172,14 +178,12 @@ def eaten(path: Path, run: Run, rigid: Rigid) -> tuple[float, float]:
     along = path.axes(run.pairing.segment)[0]
     away -= np.einsum("ij,ij->i", away, along)[:, None] * along
     before = np.sqrt(np.mean(np.einsum("ij,ij->i", away[run.counted], away[run.counted])))
-    return float(before) * UM, rms_um(run)
+    return float(before) * UM_PER_MM, rms_um(run)
 
 
 def eaten_of_field(path: Path, run: Run, error_mm: Array) -> tuple[float, float]:
     """What a fit would take of a known field of errors (m, 3) at the feet of a run: rms across the path in um
     of the field, and of what the best fit leaves of it."""
-    from olp.measured.rigid import fit_path
-
     feet, along = run.pairing.foot_mm[run.counted], path.axes(run.pairing.segment[run.counted])[0]
     field = error_mm[run.counted]
     rigid, _ = fit_path(feet + field, feet, along)
@@ -187,7 +191,7 @@ def eaten_of_field(path: Path, run: Run, error_mm: Array) -> tuple[float, float]
     sizes = []
     for part in (field, rest):
         part = part - np.einsum("ij,ij->i", part, along)[:, None] * along
-        sizes.append(float(np.sqrt(np.mean(np.einsum("ij,ij->i", part, part)))) * UM)
+        sizes.append(float(np.sqrt(np.mean(np.einsum("ij,ij->i", part, part)))) * UM_PER_MM)
     return sizes[0], sizes[1]
 
 
