@@ -200,9 +200,9 @@ def _tests(report: Report, plots: Plots) -> Iterator[Section]:
     if not tests:
         return
     blocks: list[Block] = [Paragraph(
-        "What a ball-bar should show in the middle of the calibrated volume, before and after correction, "
-        "with the same digits: circular deviation G in both directions and hysteresis H (ISO 230-4). A result "
-        "far from it says that the calibration no longer describes the machine, or that dynamics add to it."
+        "What a ball-bar should show in the middle of the calibrated volume, before and after "
+        "correction: circular deviation G in both directions and hysteresis H (ISO 230-4). A result far "
+        "from it says that the calibration no longer describes the machine, or that dynamics add to it."
     )]  # fmt: skip
     if "circles" in plots:
         blocks.append(Plot(plots["circles"], "Predicted circles, counter-clockwise, deviations magnified."))
