@@ -141,7 +141,8 @@ def to_html(document: Document) -> bytes:
     for number, section in _numbered(document.sections):
         tag = f"h{section.level + 1}"
         parts.append(f"<{tag}>{number} {_text(section.title)}</{tag}>")
-        parts += [_html(block) for block in section.blocks]
+        following = (*section.blocks[1:], None)
+        parts += [_html(block, after) for block, after in zip(section.blocks, following, strict=True)]
     parts.append(f"<footer>{_text(document.footer)}</footer></body></html>")
     return ("\n".join(parts) + "\n").encode()
 
@@ -173,10 +174,10 @@ def _text(text: str) -> str:
     return html.escape(printable(text))
 
 
-def _html(block: Block) -> str:
+def _html(block: Block, after: Block | None) -> str:
     if isinstance(block, Paragraph):
-        # what announces a table stays with it
-        lead = ' class="lead"' if block.text.endswith(":") else ""
+        # what announces a table or a plot stays with it
+        lead = ' class="lead"' if isinstance(after, Grid | Plot) else ""
         return f"<p{lead}>{_text(block.text)}</p>"
     if isinstance(block, Pairs):
         rows = (

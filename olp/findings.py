@@ -278,7 +278,7 @@ _TABLE = (
         "Look at the worst lines, and at the before/after table for what the correction gained.",
     ),
     Rule(
-        "OLP610",
+        "OLP611",
         "best-fit frame",
         Severity.INFO,
         "The points were stated in another frame and were brought into the nominal one by the rigid "

@@ -83,7 +83,7 @@ def poses_report(
         x, y, z = rigid.shift_mm.tolist()
         rest = _rms(_distance(command, groups["after"]))
         found.append(Finding(
-            "OLP610",
+            "OLP611",
             f"shift {x:.4f}, {y:.4f}, {z:.4f} mm, turn {np.degrees(rigid.angle_rad):.6f} deg; rms residual "
             f"{rest:.3g} um",
         ))  # fmt: skip

@@ -155,6 +155,33 @@ def test_a_frame_anywhere_in_space_is_found(order: str) -> None:
     assert np.abs(found.rigid(away(points)) - points).max() < 10 * NOISE_MM / np.sqrt(4000 / 6)
 
 
+def test_a_field_comes_back_from_another_frame_up_to_what_a_best_fit_takes() -> None:
+    """Noise, turned and shifted, other density, a path that crosses itself, three laps: all at once."""
+    rng = np.random.default_rng(11)
+    turns = 2 * np.pi * LAPS
+    path = Path.through(eight(np.linspace(0, turns, 9000)))
+    u = np.sort(rng.uniform(0, turns, 6000))
+    real = eight(u) + field(eight(u))
+    away = Rigid(rotation_of(np.array((-0.4, 1.1, 0.8))), np.array((-700.0, 300.0, 1500.0)))
+    placed = runs.place(path, ["a"], [away(real + rng.normal(0, NOISE_MM, real.shape))], "fit", None, 1.0)
+    assert placed.right == (True,)
+    run = placed.runs[0]
+    s = np.interp(u, np.linspace(0, turns, 9000), path.s_mm)
+    assert np.abs(run.pairing.s_mm - s).max() < 0.5
+    # the noise-free points under the frame that was found: what is left is noise
+    there = placed.rigid[0].after(away)(real)
+    want = expected(path, run.pairing.segment, there - eight(u))
+    got = np.column_stack((run.deviation.normal, run.deviation.binormal))
+    assert np.abs(got - want).max() < 5.5 * NOISE_MM + 1e-3
+    assert np.sqrt(((got - want) ** 2).mean()) < 1.1 * NOISE_MM + 1e-3
+    # and no other frame near by leaves less
+    least = np.sqrt((run.deviation.across**2).mean())
+    for turn in np.eye(3) * 5e-5:
+        other = Rigid(rotation_of(turn), np.zeros(3))(run.points_mm)
+        parts = split(path, run.pairing.segment, other - run.pairing.foot_mm)
+        assert np.sqrt((parts.across**2).mean()) > least
+
+
 def test_a_wrong_pairing_is_a_finding_and_not_a_number() -> None:
     rng = np.random.default_rng(10)
     path = Path.through(eight(np.linspace(0, 2 * np.pi, 3000)))

@@ -38,7 +38,7 @@ def whole(points_mm: Array, nodes_mm: Array, far_mm: float = np.inf) -> tuple[In
     total = np.full((1, width), np.inf)
     for i in range(count):
         cost = np.minimum(_square(nodes_mm - points_mm[i]), far_mm * far_mm)[None]
-        start = idle[None] + cost if i == 0 else None
+        start = np.asarray(idle[None] + cost, float) if i == 0 else None
         total, moves[i] = _row(total, cost, most, start)
     end = total[0] + idle[::-1]
     last = int(end.argmin())

@@ -151,7 +151,7 @@ def _frame_findings(placed: Placed) -> list[Finding]:
     residual = rms_um(run)
     x, y, z = rigid.shift_mm.tolist()
     out = [Finding(
-        "OLP610",
+        "OLP611",
         f"shift {x:.4f}, {y:.4f}, {z:.4f} mm, turn {np.degrees(rigid.angle_rad):.6f} deg; rms residual "
         f"across the path {residual:.3g} um",
     )]  # fmt: skip
