@@ -135,13 +135,16 @@ def compare(
     placed = runs.place(path, names, points, align, order, reach_mm)
     tell("figures", 0.8)
     found = runs.findings(path, placed)
-    if placed.fitted and all(placed.right):
-        found += _eaten(source, path, move, placed, axes)
+    taken = _taken(source, path, move, placed, axes) if placed.fitted and all(placed.right) else None
+    if taken is not None:
+        found += runs.eaten_finding(*taken)
     count = len(measured)
     groups = {"after": placed.runs[:count], "before": placed.runs[count:]}
     right = {"after": placed.right[:count], "before": placed.right[count:]}
     report = _head(source, sets, options)
     report["frame"] = parts.frame(placed)
+    if taken is not None:
+        report["frame"] |= {"error_rms_um": taken[0], "left_by_fit_rms_um": taken[1], "error_is": taken[2]}
     report["path"] = {
         "length_mm": path.length_mm,
         "segments": len(path),
@@ -244,14 +247,17 @@ def _with_errors(
     return np.asarray(points + model.error(points, tool), float)
 
 
-def _eaten(source: _Source, path: Path, move: Index | None, placed: runs.Placed, axes: bool) -> list[Finding]:
-    """Did the fit take the error with it? By what it moved, and by what the calibration predicts."""
+def _taken(
+    source: _Source, path: Path, move: Index | None, placed: runs.Placed, axes: bool
+) -> tuple[float, float, str] | None:
+    """What the fit takes of the error: rms in um across the path before and after it, and of which error;
+    None where nothing is known of that."""
     run, rigid = placed.runs[0], placed.rigid[0]
     moved = float(np.abs(rigid.inverse()(run.points_mm) - run.points_mm).max())
     if moved < 1.0:  # stated in the nominal frame already, as far as anybody can tell
-        return runs.eaten_finding(*runs.eaten(path, run, rigid), "as measured")
+        return *runs.eaten(path, run, rigid), "as measured"
     if source.program is None or source.loaded is None or move is None:
-        return []
+        return None
     toolpath = source.program.toolpath
     tool = toolpath.tool_mm()
     which = move[run.pairing.segment]
@@ -260,13 +266,12 @@ def _eaten(source: _Source, path: Path, move: Index | None, placed: runs.Placed,
         nominal = nominal_of(toolpath, source.loaded.model, "axes")
         share = (run.pairing.s_mm - path.s_mm[run.pairing.segment]) / np.diff(path.s_mm)[run.pairing.segment]
         if len(nominal.path) != len(path):
-            return []
+            return None
         begin = nominal.path.vertex_mm[run.pairing.segment]
         at = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
     error = source.loaded.model.error(at, tool if tool.ndim == 1 else tool[which])
-    return runs.eaten_finding(
-        *runs.eaten_of_field(path, run, error), "that the calibration predicts for the uncorrected machine"
-    )
+    whose = "that the calibration predicts for the uncorrected machine"
+    return *runs.eaten_of_field(path, run, error), whose
 
 
 def _head(source: _Source, sets: Sequence[Sequence[Points]], options: dict[str, Any]) -> dict[str, Any]:

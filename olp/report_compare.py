@@ -52,6 +52,14 @@ def change(before: Any, after: Any) -> str:
     return f"{before / after:.1f} x smaller" if before >= after else f"{after / before:.1f} x larger"
 
 
+def taken_by_fit(frame: Report) -> str:
+    """How much of an error the best fit leaves, where that is known."""
+    if "error_rms_um" not in frame:
+        return ""
+    before, after = number(frame["error_rms_um"]), number(frame["left_by_fit_rms_um"])
+    return f"of {before} um rms {frame['error_is']}, such a fit leaves {after} um"
+
+
 def table_rows(report: Report) -> list[tuple[str, Any, Any]]:
     """Title, figure before, figure after in um, of what there is."""
     rows = [
@@ -84,6 +92,8 @@ def _frame(report: Report) -> Iterator[str]:
     a, b, c = frame["angles_deg"]
     yield "Best-fit frame, measured to nominal"
     yield f"  shift in mm {x:.4f}, {y:.4f}, {z:.4f}; turn A, B, C in deg {a:.6f}, {b:.6f}, {c:.6f}"
+    if taken := taken_by_fit(frame):
+        yield from textwrap.wrap(taken, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
 def _verdict(report: Report) -> Iterator[str]:

@@ -11,7 +11,7 @@ from typing import Any
 from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
 from olp.findings import RULES
 from olp.report import Report, number
-from olp.report_compare import change, figure, table_rows
+from olp.report_compare import change, figure, table_rows, taken_by_fit
 
 Plots = Mapping[str, bytes]
 _MOST_SOURCES, _MOST_POSES = 24, 60
@@ -304,6 +304,7 @@ def _measurement(report: Report) -> Iterator[Block]:
     yield Pairs([
         ("Compared", compared),
         ("Frame", how),
+        ("What the fit takes", taken_by_fit(frame)),
         ("Order of points", ", ".join(dict.fromkeys(frame.get("order") or ()))),
         ("Points in no figure", f"farther than {report['reach_mm']:g} mm from their place"),
         ("Machine's errors", "added to the axis positions of the log, from the calibration" if added else ""),
