@@ -161,6 +161,17 @@ def test_a_program_before_and_after(tmp_path: Path) -> None:
     assert head.split(",")[-4:] == ["along_um", "normal_um", "binormal_um", "counted"]
     assert len(rows) == sum(part["points"] for part in (*report["measured"], *report["measured_before"]))
     assert run(*words, "-o", tmp_path / "d.csv").exit_code == 2, "exists already"
+    # from anywhere in space: what the fit leaves is what the calibration says that a fit would leave
+    points = np.loadtxt(tmp_path / "raw.csv", delimiter=",", skiprows=2)[:, :3]
+    away = Rigid(rotation_of(np.array((0.3, -1.1, 2.0))), np.array((3000.0, -1500.0, 700.0)))
+    (tmp_path / "tracker.csv").write_text(table(away(points)))
+    found = json.loads(run("compare", PROGRAM, tmp_path / "tracker.csv", "-m", MACHINE, "--json").stdout)
+    assert codes(found) >= {"OLP611"}
+    assert "OLP601" not in codes(found)
+    frame = found["frame"]
+    assert frame["left_by_fit_rms_um"] < frame["error_rms_um"]
+    # the fit is of all moves, rapids too, and the figures are of cutting ones
+    assert found["after"]["across_um"]["rms"] == pytest.approx(frame["left_by_fit_rms_um"], rel=0.5, abs=0.3)
 
 
 @pytest.mark.parametrize(("words", "said"), [
