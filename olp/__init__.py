@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from olp.api import inspect as inspect
     from olp.api import simulate as simulate
     from olp.api import verify as verify
+    from olp.comparing import Comparison as Comparison
+    from olp.comparing import compare as compare
     from olp.exceptions import CannotCompute as CannotCompute
     from olp.exceptions import ConfigError as ConfigError
     from olp.exceptions import InputError as InputError
@@ -45,6 +47,8 @@ _HOME = {
     "check": "olp.gate",
     "Simulation": "olp.api",
     "Verification": "olp.api",
+    "compare": "olp.comparing",
+    "Comparison": "olp.comparing",
     "correct": "olp.api",
     "error_at": "olp.api",
     "flatten": "olp.api",
