@@ -19,7 +19,7 @@ from olp.correction import Progress, Run, correct_bytes, last_digit_mm, verify_p
 from olp.errormodel.base import Array
 from olp.exceptions import OlpError, UsageError
 from olp.files.meshes import read_mesh
-from olp.findings import RULES, Finding
+from olp.findings import GATE_CODES, Finding
 from olp.geometry import PLANES
 from olp.loading import Loaded, PathLike, load, setup_of, source_of
 from olp.machine import Setup
@@ -125,21 +125,17 @@ def check(
     return Check(kept, report, around)
 
 
-#: what a gate looks for: all codes but those of measured paths
-CODES = tuple(code for code in RULES if not code.startswith("OLP6"))
-
-
 def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
     """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises
     UsageError for what begins no code."""
     for prefix in (*select, *ignore):
-        if not any(code.startswith(prefix.upper()) for code in CODES):
+        if not any(code.startswith(prefix.upper()) for code in GATE_CODES):
             raise UsageError(
                 f"{prefix!r} is no code of a finding, nor how one begins; olp explain lists them all"
             )
     wanted, unwanted = (tuple(prefix.upper() for prefix in prefixes) for prefixes in (select, ignore))
     return [
-        c for c in CODES if (not wanted or c.startswith(wanted)) and not (unwanted and c.startswith(unwanted))
+        c for c in GATE_CODES if (not wanted or c.startswith(wanted)) and not (unwanted and c.startswith(unwanted))
     ]
 
 

@@ -12,7 +12,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 from olp import __version__
-from olp.findings import RULES, Rule, Severity
+from olp.findings import GATE_CODES, RULES, Rule, Severity
 from olp.report import Report, findings_text, number, pairs, printable, table, to_json
 
 _LEVEL = {Severity.INFO: "note", Severity.WARNING: "warning", Severity.ERROR: "error"}
@@ -38,7 +38,7 @@ def _heads(report: Report) -> Iterator[str]:
         ("Program", printable(f"{program['name'] or 'stdin'}, {program['lines']} lines")),
         ("Checked", report["checked"]),
         ("Machine", printable("{name}, chain {chain}, control {controller}".format(**machine))),
-        ("Codes", f"{len(report['rules'])} of {len(RULES)} checked"),
+        ("Codes", f"{len(report['rules'])} of {len(GATE_CODES)} checked"),
     ])  # fmt: skip
 
 

@@ -16,8 +16,7 @@ from gate_cases import CASES, TOUCH, Call, box, clamp, tool
 from test_cli import run
 
 import olp
-from olp.findings import RULES
-from olp.gate import CODES
+from olp.findings import GATE_CODES, RULES
 
 FORMS = ("text", "json", "sarif", "junit")
 #: an error with a line, one with many, a warning without any, an information
@@ -68,7 +67,7 @@ def test_json_is_the_report_of_the_library(tmp_path: Path) -> None:
     report = json.loads(run("check", program, "-m", machine, "-j", job, "--format", "json").stdout)
     again = olp.check(str(program), machine, job).report
     assert report["findings"] == json.loads(json.dumps(again["findings"]))
-    assert (report["schema"], report["rules"]) == ("olp-check-1", list(CODES))
+    assert (report["schema"], report["rules"]) == ("olp-check-1", list(GATE_CODES))
 
 
 def sarif(text: str) -> dict[str, Any]:

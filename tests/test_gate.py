@@ -9,8 +9,7 @@ from gate_cases import ARC, CASES, Call, box, scaled
 
 import olp
 from olp.exceptions import ProgramError, UsageError
-from olp.findings import RULES
-from olp.gate import CODES
+from olp.findings import GATE_CODES, RULES
 
 PROGRAMS = Path(__file__).resolve().parents[1] / "programs"
 
@@ -20,7 +19,7 @@ def codes(result: olp.Check) -> set[str]:
 
 
 def test_every_code_has_its_cases_and_its_explanation() -> None:
-    assert set(CASES) == set(CODES)
+    assert set(CASES) == set(GATE_CODES)
     for rule in RULES.values():
         assert all(len(text) > 6 for text in (rule.title, rule.why, rule.remedy, rule.example)), rule.code
         assert rule.why.endswith(".")
