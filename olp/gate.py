@@ -134,9 +134,8 @@ def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
                 f"{prefix!r} is no code of a finding, nor how one begins; olp explain lists them all"
             )
     wanted, unwanted = (tuple(prefix.upper() for prefix in prefixes) for prefixes in (select, ignore))
-    return [
-        c for c in GATE_CODES if (not wanted or c.startswith(wanted)) and not (unwanted and c.startswith(unwanted))
-    ]
+    found = [code for code in GATE_CODES if not wanted or code.startswith(wanted)]
+    return [code for code in found if not (unwanted and code.startswith(unwanted))]
 
 
 def _case(
