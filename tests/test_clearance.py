@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from coal_judge import Scene
 from gate_cases import TRUE_ZERO, Call, block, clamp, tool
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from judge.coal_judge import Scene
 
 import olp
 from olp.clearance.distance import Swept, nearest
 from olp.clearance.parts import parts_of
-from olp.clearance.search import CLOSE_MM, Best, search
+from olp.clearance.search import CLOSE_MM, CONTACT_MM, Best, search
 from olp.clearance.tree import LEAF, Tree
 from olp.machine import HolderPart, Tool
 
@@ -139,6 +139,7 @@ def test_the_search_finds_what_looking_at_all_finds(seed: int, count: int) -> No
 
 @few
 @given(SEEDS)
+@example(9998)
 def test_no_contact_between_way_points_is_missed(seed: int) -> None:
     """Small triangles, each somewhere in the way of a fast move, among many that are not."""
     rng = np.random.default_rng(seed)
@@ -147,7 +148,7 @@ def test_no_contact_between_way_points_is_missed(seed: int) -> None:
     hit += (surface_points(rng, swept) - on_triangles(rng, hit))[:, None]
     best = Best.of(100)
     search(Tree.of(np.concatenate((triangles(rng, 500, 1000.0), hit))), swept, np.arange(100), best, 0)
-    assert best.distance_mm.max() <= CLOSE_MM
+    assert best.distance_mm.max() <= CONTACT_MM
 
 
 @settings(max_examples=8)

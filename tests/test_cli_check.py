@@ -82,7 +82,7 @@ def test_sarif_holds_rules_places_and_levels(tmp_path: Path) -> None:
     assert log["version"] == "2.1.0"
     (found,) = log["runs"]
     rules = found["tool"]["driver"]["rules"]
-    assert [r["id"] for r in rules] == list(RULES)
+    assert [r["id"] for r in rules] == list(GATE_CODES)
     assert all(
         r["help"]["text"] and r["shortDescription"]["text"] and r["fullDescription"]["text"] for r in rules
     )
@@ -111,10 +111,10 @@ def test_junit_has_a_test_for_each_code(tmp_path: Path) -> None:
     parser = pytest.importorskip("junitparser")
     text = checked(tmp_path, SEVERAL, "--format", "junit", "--date", "2026-11-21").stdout
     (suite,) = parser.JUnitXml.fromstring(text.encode())
-    assert (suite.tests, suite.failures, suite.errors) == (len(RULES), 1, 0)
+    assert (suite.tests, suite.failures, suite.errors) == (len(GATE_CODES), 1, 0)
     assert suite.timestamp == "2026-11-21T00:00:00"
     cases = {case.name.split()[0]: case for case in suite}
-    assert list(cases) == list(RULES)
+    assert list(cases) == list(GATE_CODES)
     assert {code for code, case in cases.items() if not case.is_passed} == {"OLP405"}
     (failure,) = cases["OLP405"].result
     assert failure.type == "OLP405"

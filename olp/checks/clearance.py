@@ -17,7 +17,7 @@ import numpy as np
 
 from olp.checks.base import finding
 from olp.clearance.parts import Part, parts_of
-from olp.clearance.search import CLOSE_MM, Best, search
+from olp.clearance.search import CONTACT_MM, Best, search
 from olp.clearance.sweep import CHORD_MM, Ways, ways_of
 from olp.clearance.tree import Tree
 from olp.compensation.plan import zero_shifts
@@ -145,7 +145,7 @@ def _measure(
     mine = ways.of_moves(moves & rapid & ~beside)
     search(tree, mine.swept(part), mine.move, best, tag)
     mine = ways.of_moves(moves & rapid & beside)
-    touch = Best.of(len(path), 2 * CLOSE_MM)
+    touch = Best.of(len(path), 2 * CONTACT_MM)
     search(tree, mine.swept(part.shrunk(SLACK_MM)), mine.move, touch, tag)
     hit = np.flatnonzero((touch.tag == tag) & (best.distance_mm > 0.0))
     for mine_, theirs in (
@@ -228,7 +228,7 @@ def _by_line(
     """The least of the moves of each line."""
     distance = best.distance_mm.copy()
     distance[path.arcs.move] -= CHORD_MM
-    distance[distance <= CLOSE_MM] = 0.0
+    distance[distance <= CONTACT_MM] = 0.0
     found = np.flatnonzero(best.tag >= 0)
     order = found[np.lexsort((distance[found], path.line[found]))]
     first = order[np.flatnonzero(np.diff(path.line[order], prepend=-1))]

@@ -12,6 +12,8 @@ from olp.clearance.tree import LEAF, Tree, box_distance
 
 #: what is nearer than the nearest found so far by less than this is not looked for, in mm
 CLOSE_MM = 1e-4
+#: bodies of metres that touch are found to be no farther apart than this
+CONTACT_MM = 5e-4
 #: swept parts that go down the tree together
 _CHUNK = 1 << 12
 #: of so many swept parts one is searched first, for a guess at the others
