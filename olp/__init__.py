@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from olp.api import inspect as inspect
     from olp.api import simulate as simulate
     from olp.api import verify as verify
+    from olp.comparing import Comparison as Comparison
+    from olp.comparing import compare as compare
     from olp.exceptions import CannotCompute as CannotCompute
     from olp.exceptions import ConfigError as ConfigError
     from olp.exceptions import InputError as InputError
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from olp.exceptions import ProgramError as ProgramError
     from olp.files.config import load_setup as load_setup
     from olp.findings import Finding as Finding
+    from olp.gate import Check as Check
+    from olp.gate import check as check
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -38,9 +42,13 @@ if TYPE_CHECKING:
     from olp.review.notebook import add_layers as add_layers
 
 _HOME = {
+    "Check": "olp.gate",
     "Correction": "olp.api",
+    "check": "olp.gate",
     "Simulation": "olp.api",
     "Verification": "olp.api",
+    "compare": "olp.comparing",
+    "Comparison": "olp.comparing",
     "correct": "olp.api",
     "error_at": "olp.api",
     "flatten": "olp.api",

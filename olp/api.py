@@ -10,9 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from olp import checks
-from olp.compensation.plan import Limits, plan, zero_shifts
+from olp.compensation.plan import zero_shifts
 from olp.compensation.stamp import find_stamp
-from olp.correction import Progress, correct_bytes, last_digit_mm, report_of
+from olp.correction import Progress, correct_bytes, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import ConfigError, OlpError
 from olp.files.config import load_setup as load_setup
@@ -20,9 +20,7 @@ from olp.findings import Finding
 from olp.loading import PathLike, lever_of, load, profile_of, setup_of, source_of, unrolled
 from olp.machine import Setup
 from olp.program.reader import Options, read
-from olp.proof import prove
 from olp.toolpath import Kind
-from olp.units import MM_PER_UM
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,14 +83,14 @@ def correct(
     """
     data, name = source_of(program)
     try:
-        text, report, findings = correct_bytes(
+        run = correct_bytes(
             data, name, load(machine, job, outside_box), tolerance_um=tolerance_um,
             hold=outside_box == "hold", unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm,
             contour=contour, rapids=split_rapids, date=date, tell=progress or _silent,
         )  # fmt: skip
     except OlpError as error:
         raise (error.in_file(name) if name and error.line is not None else error) from None
-    return Correction(text, report, findings)
+    return Correction(run.text, run.report, run.findings)
 
 
 def verify(
@@ -119,27 +117,13 @@ def verify(
     for data, name in texts:
         tell("read", 0.0)
         try:
-            programs.append(read(data, loaded.setup, loaded.profile, options))
+            programs.append((read(data, loaded.setup, loaded.profile, options), name))
         except OlpError as error:
             raise error.in_file(name or "<program>") from None
-    first, second = programs
-    limits = Limits(tolerance_um * MM_PER_UM, refuse_outside=False)
-    rows = plan(first.toolpath, loaded.model, limits)
-    digit = last_digit_mm(second, loaded.setup)
-    try:
-        proof = prove(
-            first, second, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
-            passed=rows.passed,
-        )  # fmt: skip
-    except OlpError as error:
-        raise error.in_file(texts[1][1] or "<corrected>") from None
-    findings = (
-        *checks.calibration_findings(loaded.calibration, date),
-        *checks.proof_findings(proof, rows.passed),
-        *checks.program_findings(first, loaded.setup, contour=contour),
+    run = verify_programs(
+        programs[0], programs[1], loaded, tolerance_um=tolerance_um, contour=contour, date=date
     )
-    report = report_of(first, texts[0], loaded, proof, findings, tolerance_um)
-    return Verification(report, findings)
+    return Verification(run.report, run.findings)
 
 
 def simulate(

@@ -5,26 +5,27 @@ from __future__ import annotations
 import datetime
 import hashlib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from olp import checks
+from olp.checks import state
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
 from olp.compensation.writer import Writer
 from olp.errormodel.base import Array
-from olp.exceptions import AlreadyCorrected, ProgramError
+from olp.exceptions import AlreadyCorrected, OlpError, ProgramError
 from olp.findings import Finding
 from olp.loading import Loaded, unrolled
 from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.proof import Proof, prove
-from olp.toolpath import Flag, Toolpath
+from olp.toolpath import Flag, Index, Toolpath
 from olp.units import MM_PER_UM
 
 Progress = Callable[[str, float], None]
@@ -37,6 +38,20 @@ _DOES_NOT_PROVE = (
     "that the calibration still describes the machine: measure a circle or a diagonal to see that",
     "what the control does between blocks (blending, following error) and what the process does to the part",
 )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
+    report ("olp-report-1") and the findings."""
+
+    text: bytes
+    nominal: Program
+    corrected: Program
+    proof: Proof
+    passed: Index
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
 
 
 def correct_bytes(
@@ -53,8 +68,9 @@ def correct_bytes(
     rapids: bool,
     date: datetime.date | None,
     tell: Progress,
-) -> tuple[bytes, dict[str, Any], tuple[Finding, ...]]:
-    """The corrected bytes of a program, the report of the run, and the findings."""
+    outside: str = "OLP403",
+) -> Run:
+    """Correct a program and prove it; `outside` is the code of what is held at the face of the box."""
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
@@ -84,10 +100,8 @@ def correct_bytes(
     nominal = replace(program, words=None, slot=program.slot[:0])
     del program
     passed = rows.passed
-    commands = _ends(rows, len(path))
-    corrections = _largest_correction(path, commands)
-    state = checks.state_findings(path, commands, loaded.model, loaded.setup, held=hold)
-    del rows, commands
+    corrections = _largest_correction(path, _ends(rows, len(path)))
+    del rows
     corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
     proof = prove(
         nominal,
@@ -100,10 +114,10 @@ def correct_bytes(
     )
     _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
     findings = (
-        *checks.calibration_findings(loaded.calibration, date),
+        *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
         *checks.hole_findings(holes, limits.tolerance_mm),
-        *state,
+        *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
     )
@@ -115,7 +129,51 @@ def correct_bytes(
     }
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     report["largest_correction_um"] = corrections * 1e3
-    return text, report, findings
+    return Run(text, nominal, corrected, proof, passed, report, findings)
+
+
+def verify_programs(
+    nominal: tuple[Program, str],
+    corrected: tuple[Program, str],
+    loaded: Loaded,
+    *,
+    tolerance_um: float,
+    contour: bool,
+    date: datetime.date | None,
+) -> Run:
+    """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError
+    where the second is no correction of the first."""
+    (first, name), (second, other) = nominal, corrected
+    limits = Limits(tolerance_um * MM_PER_UM, refuse_outside=False)
+    rows = plan(first.toolpath, loaded.model, limits)
+    digit = last_digit_mm(second, loaded.setup)
+    try:
+        proof = prove(
+            first, second, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
+            passed=rows.passed,
+        )  # fmt: skip
+    except OlpError as error:
+        raise error.in_file(other or "<corrected>") from None
+    findings = (
+        *_calibration(loaded, date),
+        *checks.proof_findings(proof, rows.passed),
+        *checks.program_findings(first, loaded.setup, contour=contour),
+    )
+    report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)
+    return Run(second.data, first, second, proof, rows.passed, report, findings)
+
+
+def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
+    """Travel, and the calibrated box under the code `outside`, of the corrected path, with the nominal
+    lines."""
+    path = replace(proof.written, line=proof.nominal.line[proof.owner()])
+    found = state.travel_findings(path, loaded.setup.machine)
+    return found if outside is None else [*found, *state.box_findings(path, loaded.model.box_mm, outside)]
+
+
+def _calibration(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
+    days = loaded.setup.machine.sanity.calibration_days
+    return state.calibration_findings(loaded.calibration, date, days)
 
 
 def _prove_without_deleted(

@@ -7,26 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import IntEnum
 
-
-class Severity(IntEnum):
-    """Ordered, so that `--fail-on warning` is a comparison."""
-
-    INFO = 0
-    WARNING = 1
-    ERROR = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """A code with its title, its usual severity, why it matters and what to do."""
-
-    code: str
-    title: str
-    severity: Severity
-    why: str
-    remedy: str
+from olp.gate_rules import GATE
+from olp.rule import Rule as Rule
+from olp.rule import Severity as Severity
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +47,7 @@ _TABLE = (
         "than the tolerance plus what rounding to the last digit explains.",
         "Raise --tolerance-um, let the machine take more digits (least_increment_mm), or look at the listed "
         "blocks.",
+        "A hand-edited corrected program: `G1 X100.050` where X100.012 was written.",
     ),
     Rule(
         "OLP102",
@@ -71,6 +56,7 @@ _TABLE = (
         "These moves were written as they were: the error there depends on an axis that has not been "
         "commanded yet, or the control moves by itself (G53, G28, G30), or the section is switched off.",
         "Give start_mm in the job file, or command all axes in the first rapid.",
+        "`G0 X10` as the first move, while nobody has commanded Y and Z.",
     ),
     Rule(
         "OLP103",
@@ -78,6 +64,7 @@ _TABLE = (
         Severity.INFO,
         "Until an axis has moved by its lost motion in one direction, nobody knows on which flank it rests.",
         "Approach the first point from a known side; the spread is at most half the lost motion.",
+        "`[backlash] X_um = 4.0` and a program that begins with `G1 X10`.",
     ),
     Rule(
         "OLP104",
@@ -86,6 +73,7 @@ _TABLE = (
         "A block that also moves a rotary or other axis is corrected at its end only and never split; the "
         "other axis' words are carried untouched.",
         "Split the block in the source where the path between its ends matters.",
+        "`G1 X10 Y20 A90` in a long block.",
     ),
     Rule(
         "OLP105",
@@ -94,6 +82,7 @@ _TABLE = (
         "A canned cycle moves straight along the tool axis, so it can be exact at one depth only; here the "
         "rest of the stroke leaves the nominal path by more than the tolerance.",
         "Write the cycles out as plain moves with --expand-cycles.",
+        "`G81 Z-80 R2` where the column leans by 3 um over 80 mm.",
     ),
     Rule(
         "OLP106",
@@ -102,6 +91,7 @@ _TABLE = (
         "A machine with three linear axes cannot turn its tool; the angular errors of the axes remain in the "
         "orientation of the tool.",
         "Nothing in the program can mend it; the largest angle is in the report.",
+        "EAX of 200 urad and a face mill of 40 mm radius: 8 um at its rim.",
     ),
     Rule(
         "OLP107",
@@ -110,6 +100,7 @@ _TABLE = (
         "No move of the program was corrected at a known position, so the proof says nothing.",
         "Look whether this is the program that you meant; command all axes, or give start_mm in the job "
         "file.",
+        "A program of nothing but G53 moves.",
     ),
     Rule(
         "OLP201",
@@ -118,6 +109,7 @@ _TABLE = (
         "In G64 without P the control rounds corners as far as its acceleration asks for, which can be a "
         "millimetre.",
         "Use G64 P<tolerance> Q0, or G61 where exact stops are affordable.",
+        "`G64` alone in the first line of a LinuxCNC program.",
     ),
     Rule(
         "OLP202",
@@ -125,6 +117,7 @@ _TABLE = (
         Severity.WARNING,
         "The control may leave the programmed path by more than the whole correction, which then is lost.",
         "Use a path tolerance well below the correction.",
+        "`G64 P0.5` on a machine whose largest error is 0.04 mm.",
     ),
     Rule(
         "OLP203",
@@ -132,6 +125,7 @@ _TABLE = (
         Severity.WARNING,
         "G64 P without Q0 lets the control merge short blocks and spend the whole tolerance on smooth paths.",
         "Add Q0 to keep P as a bound at corners only.",
+        "`G64 P0.01`, where LinuxCNC takes Q = P.",
     ),
     Rule(
         "OLP301",
@@ -139,6 +133,7 @@ _TABLE = (
         Severity.INFO,
         "The program states neither G20 nor G21; millimetres were assumed.",
         "State G21 (or G20) at the start of the program.",
+        "`G90 G54` and no G21 before `G0 X10`.",
     ),
     Rule(
         "OLP302",
@@ -147,6 +142,7 @@ _TABLE = (
         "On this control a length without a decimal point counts least increments: X100 is 0.1 mm.",
         'If the control is set to calculator-type input, state decimal_point = "calculator" in the machine '
         'file.',
+        "`X100` on a Fanuc control.",
     ),
     Rule(
         "OLP303",
@@ -154,13 +150,15 @@ _TABLE = (
         Severity.INFO,
         "The work offset is taken as touched off on the raw machine, so the touched point keeps its place.",
         'State set_by = "true" where the part was located by other means.',
+        "`[work_offsets.G54]` with X_mm, Y_mm, Z_mm and nothing else.",
     ),
     Rule(
         "OLP304",
         "block delete",
         Severity.INFO,
         "Blocks under `/` were taken as executed; the program was proved with them left out too.",
-        "Nothing.",
+        "Nothing, where both positions of the switch are meant.",
+        "`/G1 X100`.",
     ),
     Rule(
         "OLP305",
@@ -169,6 +167,7 @@ _TABLE = (
         "Under G41/G42 the control offsets the contour by the tool radius; the correction was computed on "
         "the contour.",
         "Program the tool path where the radius is large against the change of the error.",
+        "`olp correct part.nc --contour` with `G41 D1` in the program.",
     ),
     Rule(
         "OLP306",
@@ -176,6 +175,7 @@ _TABLE = (
         Severity.WARNING,
         "A feed move starts where a rapid ended uncorrected, so its beginning leaves the nominal path.",
         "Command all axes in rapids first, or give start_mm in the job file.",
+        "`G0 X10`, then `G1 X50 F600`, with Y and Z unknown at the G0.",
     ),
     Rule(
         "OLP401",
@@ -183,6 +183,7 @@ _TABLE = (
         Severity.WARNING,
         "The date given is later than valid_until of the calibration.",
         "Measure the machine again.",
+        "`--date 2027-06-01`, and `valid_until = 2027-05-14`.",
     ),
     Rule(
         "OLP402",
@@ -190,6 +191,7 @@ _TABLE = (
         Severity.ERROR,
         "A corrected command leaves the travel of an axis, so the control will stop with a limit alarm.",
         "Move the part, or leave the section out with (olp off).",
+        "Travel of X up to 2000 mm, and the corrected program writes X2000.012.",
     ),
     Rule(
         "OLP403",
@@ -197,6 +199,7 @@ _TABLE = (
         Severity.WARNING,
         "Commands outside the calibrated box were corrected with the error at its face (--outside-box hold).",
         "Measure the machine over the whole working volume.",
+        "box_mm of X up to 2000, and a move to X2001 with --outside-box hold.",
     ),
     Rule(
         "OLP404",
@@ -204,10 +207,104 @@ _TABLE = (
         Severity.INFO,
         "These errors are left to the control, which corrects them already.",
         "Nothing, as long as the control's tables stay active.",
+        'compensated_by_controller = ["EXX"].',
+    ),
+    Rule(
+        "OLP601",
+        "wrong pairing",
+        Severity.ERROR,
+        "Many measured points find no place on the nominal path, or lie much nearer to another pass than to "
+        "the one that their order says; figures from such pairs would mean nothing, so none are stated.",
+        "Look whether this is the program that was measured, whether the points are in its order (--order) "
+        "and its frame (--align fit), and whether their unit is right; --reach-mm says how far a point may "
+        "lie from its place.",
+        "A run in inches read as mm, or the points of another part.",
+    ),
+    Rule(
+        "OLP602",
+        "measured points left out",
+        Severity.WARNING,
+        "Single points lie farther from the path than --reach-mm and are part of no figure: outliers of the "
+        "instrument, or a piece of another path.",
+        "Look at the points; raise --reach-mm where the machine is really off by as much.",
+        "Three of 2000 points lie 40 mm away, where the beam was broken.",
+    ),
+    Rule(
+        "OLP603",
+        "part of the path not measured",
+        Severity.WARNING,
+        "A stretch of the cutting path has no measured points, so nothing is said about it.",
+        "Measure it, or compare with a program that ends where the measurement does.",
+        "The tracker lost its target between lines 210 and 260.",
+    ),
+    Rule(
+        "OLP604",
+        "the fit takes the error with it",
+        Severity.WARNING,
+        "A best-fit frame cannot tell a shift or a turn of the path from an error of the machine: what "
+        "squareness and straightness turn and shift goes into the frame, and the residual looks better "
+        "than the part will be.",
+        "Measure in the machine's frame: take the instrument's frame from points that are independent of the "
+        "path, such as artefacts or the table, and compare with --align none.",
+        "40 urad between X and Y on a flat contour: a turn of 20 urad hides half of it.",
+    ),
+    Rule(
+        "OLP605",
+        "frame not determined",
+        Severity.WARNING,
+        "The path has the same shape after a shift or a turn, such as along a straight line or about the "
+        "axis of a circle, or fits in two places; the fit leaves that motion at zero.",
+        "Measure a path with corners in all directions, or give the frame.",
+        "All points lie on one line along X: turns about it and shifts along it change nothing.",
+    ),
+    Rule(
+        "OLP606",
+        "points not in the order of the path",
+        Severity.INFO,
+        "The points run against the path, or in no order along it; each then takes its nearest place.",
+        "Nothing, as long as the path neither repeats nor crosses itself; else measure in order.",
+        "A CMM sorted the points by their numbers.",
+    ),
+    Rule(
+        "OLP607",
+        "fewer cycles than ISO 9283 asks for",
+        Severity.INFO,
+        "ISO 9283 takes accuracy and repeatability from 30 cycles for poses and 10 for paths; fewer give the "
+        "same figures with more scatter.",
+        "Measure more cycles, or state their number with the figures.",
+        "AT from 3 runs.",
+    ),
+    Rule(
+        "OLP608",
+        "place of points in doubt",
+        Severity.WARNING,
+        "Without an order, points near a crossing belong to either pass; they are part of no figure.",
+        "Measure in order along the path.",
+        "A figure eight, measured with `--order free`: points beside its crossing.",
+    ),
+    Rule(
+        "OLP609",
+        "measured path above tolerance",
+        Severity.ERROR,
+        "The measured path leaves the nominal one by more than --tolerance-um.",
+        "Look at the worst lines, and at the before/after table for what the correction gained.",
+        "12 um at line 340 with `--tolerance-um 5`.",
+    ),
+    Rule(
+        "OLP611",
+        "best-fit frame",
+        Severity.INFO,
+        "The points were stated in another frame and were brought into the nominal one by the rigid "
+        "transform with the least squared distances from the path.",
+        "Nothing; OLP604 says where this hides errors.",
+        "Points of a tracker that stands beside the machine.",
     ),
 )
 
-RULES = {rule.code: rule for rule in _TABLE}
+RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE), key=lambda rule: rule.code)}
+
+#: what a gate looks for: all but those of measured paths
+GATE_CODES = tuple(code for code in RULES if not code.startswith("OLP6"))
 
 
 def worst(findings: Iterable[Finding]) -> Severity | None:

@@ -33,6 +33,18 @@ def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Arr
     return out
 
 
+def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quarter: int) -> Array:
+    """(n,) share of each arc at which it first passes a multiple of a right angle, counted in `quarter`; NaN
+    where it does not."""
+    rows = np.arange(len(start))
+    first, second = (_AXES[plane][:, i] for i in range(2))
+    begin = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
+    turn = np.mod((quarter * np.pi / 2 - begin) * np.sign(sweep), 2 * np.pi)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = turn / np.abs(sweep)
+    return np.where(share <= 1.0, share, np.nan)
+
+
 def segment_distance(point: Array, start: Array, end: Array) -> Array:
     """(n,) distances of points from segments; a segment without length is a point."""
     along = end - start

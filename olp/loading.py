@@ -48,7 +48,7 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
     return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
 
 
-def setup_of(machine: PathLike | Setup, job: PathLike | None) -> Setup:
+def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
     """The setup that a caller gave, or that of a machine file and a job file."""
     return machine if isinstance(machine, Setup) else load_setup(machine, job)
 

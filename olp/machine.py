@@ -56,12 +56,37 @@ class WorkOffset:
 
 
 @dataclass(frozen=True, slots=True)
+class HolderPart:
+    """A part of a tool holder, round about the tool's axis: `radius_mm` at its lower end, `top_radius_mm`
+    at its upper one."""
+
+    length_mm: float
+    radius_mm: float
+    top_radius_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sanity:
+    """What a check before deployment takes for sane: the largest correction, how far a tool may differ from
+    those measured with, temperatures from that of the calibration, the age of a calibration without an end
+    of its own, and the clearance of tool and holder."""
+
+    largest_correction_mm: float = 1.0
+    tool_within_mm: float = 100.0
+    temperature_within_K: float = 5.0
+    calibration_days: int = 365
+    clearance_mm: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class Tool:
     """A row of the control's tool table, and the lever for angular errors.
 
     `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to
     minus the length; a negative Z length is a touch-off value and gives no lever. `set_by` "touch"
     means that the length was set on the raw machine at axis position `touched_at_mm`.
+    `cutting_length_mm` counts from the tip up, None: all that the holder leaves free; `holder` is stacked
+    upwards and ends at the gauge point.
     """
 
     number: int
@@ -70,6 +95,8 @@ class Tool:
     gauge_to_tip_mm: Vector | None = None
     set_by: Literal["touch", "true"] = "true"
     touched_at_mm: Vector | None = None
+    cutting_length_mm: float | None = None
+    holder: tuple[HolderPart, ...] = ()
 
     @property
     def lever_mm(self) -> Vector | None:
@@ -106,6 +133,7 @@ class Machine:
     decimal_point: Literal["increment", "calculator"] = "increment"
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
+    sanity: Sanity = Sanity()
 
     @property
     def least_increment_mm(self) -> Vector:

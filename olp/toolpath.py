@@ -8,6 +8,7 @@ from enum import IntEnum, IntFlag
 import numpy as np
 import numpy.typing as npt
 
+from olp.geometry import arc_points, quarter_shares
 from olp.machine import ZERO, Vector
 
 Array = npt.NDArray[np.float64]
@@ -99,6 +100,20 @@ class Toolpath:
             out[1:] = self.end_mm[first : last - 1]
             out[0] = self.end_mm[first - 1] if first else self.start_mm
         return out
+
+    def reach_mm(self) -> tuple[Array, Array]:
+        """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, on the way there;
+        NaN where an axis is not known. Both ends of a line in a box hold all of it."""
+        if not len(self.arcs):
+            return self.end_mm, self.end_mm
+        arcs, move = self.arcs, self.arcs.move
+        low, high = self.end_mm.copy(), self.end_mm.copy()
+        start = self.starts_mm()[move]
+        for quarter in range(4):
+            share = quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter)
+            at = arc_points(start, self.end_mm[move], arcs.centre_mm, arcs.plane, arcs.sweep_rad, share)
+            low[move], high[move] = np.fmin(low[move], at), np.fmax(high[move], at)
+        return low, high
 
     def tool_mm(self, first: int = 0, last: int | None = None) -> Array:
         """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3)."""

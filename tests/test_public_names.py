@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 RUN = "from olp.cli import main\ntry: main({!r})\nexcept SystemExit as end: assert end.code == 0, end.code"
 LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
-    *("correct", "verify", "simulate", "retime", "inspect", "error_at", "flatten", "load_setup"),
-    *("Correction", "Verification", "Simulation", "Retiming", "Finding"),
+    *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
+    *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
     *("view", "Review", "add_layers"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }

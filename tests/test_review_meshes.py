@@ -11,10 +11,12 @@ from judge.machines import CHAINS, Recipe, zero_machine
 from judge.unpacker import Page
 
 import olp
+from olp.checks.clearance import rotation
 from olp.exceptions import ConfigError, InputError
+from olp.files.meshes import read_mesh
 from olp.machine import WorkOffset
 from olp.review import meshes
-from olp.review.meshes import coarser, load, nodes, of_machine, rotation
+from olp.review.meshes import coarser, nodes, of_machine
 
 TEXT = "G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100 F600\nY80 Z30\nM2\n"
 
@@ -105,7 +107,7 @@ def test_a_fine_mesh_is_drawn_coarser(monkeypatch: pytest.MonkeyPatch, tmp_path:
     monkeypatch.setattr(meshes, "MOST_FACES", 500)
     sphere = trimesh.creation.icosphere(subdivisions=5, radius=50.0)
     sphere.export(tmp_path / "ball.ply")
-    vertices, faces = load(str(tmp_path / "ball.ply"))
+    vertices, faces = coarser(*read_mesh(tmp_path / "ball.ply"))
     assert 100 < len(faces) <= 500
     assert faces.max() < len(vertices)
     radius = np.linalg.norm(vertices[np.unique(faces)], axis=1)

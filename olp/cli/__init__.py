@@ -23,7 +23,9 @@ VERBS = {
     "verify": "Prove a corrected program from the two texts alone.",
     "simulate": "Write the path that the machine would really take, as CSV.",
     "retime": "Re-time a program within the limits of the axes, and say how long it takes.",
+    "check": "Say whether a program may run: a gate with findings, for people and pipelines.",
     "view": "Show a job in the browser: paths, enlarged errors, time, program text.",
+    "compare": "Hold measured runs against a nominal path: deviations, ISO 9283 figures.",
     "schema": "Print the JSON Schema of a machine, calibration or job file.",
     "explain": "Explain the code of a finding, or list all codes.",
 }

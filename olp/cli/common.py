@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 STREAM = "-"
 FINDINGS_EXIT = 1
+REPORT_ENDINGS = (".html", ".json", ".md")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -142,6 +143,14 @@ def refuse_twice(names: Iterable[str]) -> None:
         if path in seen:
             raise UsageError("is named as output twice; name two files", file=name)
         seen.add(path)
+
+
+def report_ending(name: str) -> str:
+    """The form of a report by the ending of its file. Raises UsageError."""
+    ending = Path(name).suffix.lower()
+    if ending not in REPORT_ENDINGS:
+        raise UsageError(f"ends in no form of a report; expected {', '.join(REPORT_ENDINGS)}", file=name)
+    return ending
 
 
 def talk(message: str) -> None:

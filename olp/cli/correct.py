@@ -19,6 +19,7 @@ from olp.cli.common import (
     put,
     refuse_early,
     refuse_twice,
+    report_ending,
     setup_options,
     source,
     talk,
@@ -55,7 +56,7 @@ LAST_DIGITS_UM = 10.0
     help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; for --expand-cycles.",
 )
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
-@click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
+@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
 @click.option(
     "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
 )
@@ -97,6 +98,8 @@ def command(
         raise UsageError(
             "JSON on stdout goes with neither -o - nor --diff; write the report to a file with --report"
         )
+    for name in files_of(report_file):
+        report_ending(name)
     inputs = (*call.inputs, *(mesh.file for mesh in call.setup.job.meshes))
     outputs = files_of(output, report_file, review_file)
     refuse_early(outputs, inputs, force=force)
@@ -122,7 +125,6 @@ def command(
                 progress=show,
             )
             written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
-            written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
             if review_file is not None:
                 from olp.review.job import view
 
@@ -135,6 +137,17 @@ def command(
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
+    for name in files_of(report_file):
+        from olp import report_files
+        from olp.loading import profile_of, source_of, unrolled
+
+        text, origin = source_of(nominal)
+        if flatten or expand_cycles:
+            profile = profile_of(call.setup)
+            text = unrolled(text, origin, profile, expand_cycles, peck_clearance_mm)
+        day = date.date() if date else None
+        filed = report_files.correction(result, text, call.setup, name, day, contour=contour)
+        written[Path(name)] = filed
     write_files(written, force=force, inputs=inputs)
     on_stderr = output == STREAM
     if on_stderr:

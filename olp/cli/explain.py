@@ -30,7 +30,8 @@ def command(code: str | None, as_json: bool) -> None:
 def _rule(code: str) -> Rule:
     rule = RULES.get(code.upper())
     if rule is None:
-        near = difflib.get_close_matches(code.upper(), RULES, 1)
+        longer = [other for other in RULES if other.startswith(code.upper())]
+        near = longer or difflib.get_close_matches(code.upper(), RULES, 1)
         hint = f"did you mean {near[0]}?" if near else "olp explain lists them all"
         raise UsageError(f"{code!r} is no code of a finding; {hint}")
     return rule
@@ -42,7 +43,8 @@ def _severity(rule: Rule) -> str:
 
 def _text(rule: Rule) -> str:
     parts = [f"{rule.code} {rule.title} ({_severity(rule)})"]
-    for title, sentence in (("Why it matters", rule.why), ("What to do", rule.remedy)):
+    sections = (("Why it matters", rule.why), ("Example", rule.example), ("What to do", rule.remedy))
+    for title, sentence in sections:
         parts.append(f"{title}:\n" + textwrap.fill(sentence, 96, initial_indent="  ", subsequent_indent="  "))
     return "\n\n".join(parts) + "\n"
 
@@ -53,5 +55,6 @@ def _as_dict(rule: Rule) -> dict[str, str]:
         "title": rule.title,
         "severity": _severity(rule),
         "why": rule.why,
+        "example": rule.example,
         "remedy": rule.remedy,
     }

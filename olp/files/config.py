@@ -15,8 +15,8 @@ from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.machine import Axis, Job, Machine, Mesh, Setup, Tool, Vector, WorkOffset
-from olp.units import AXES
+from olp.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
+from olp.units import AXES, MM_PER_UM
 
 __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
 
@@ -91,6 +91,13 @@ def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
         length_active=file.job_defaults.length_active,
         path_mode=file.path.mode,
         blend_mm=file.path.blend_mm,
+        sanity=Sanity(
+            largest_correction_mm=file.check.largest_correction_um * MM_PER_UM,
+            tool_within_mm=file.check.tool_within_mm,
+            temperature_within_K=file.check.temperature_within_K,
+            calibration_days=file.check.calibration_days,
+            clearance_mm=file.check.clearance_mm,
+        ),
     )
     return machine, lines
 
@@ -156,6 +163,15 @@ def _tools(tables: Tools) -> dict[int, Tool]:
             gauge_to_tip_mm=table.gauge_to_tip_mm,
             set_by=table.set_by,
             touched_at_mm=table.touched_at_mm.complete if table.touched_at_mm else None,
+            cutting_length_mm=table.cutting_length_mm,
+            holder=tuple(
+                HolderPart(
+                    part.length_mm,
+                    part.radius_mm,
+                    part.radius_mm if part.top_radius_mm is None else part.top_radius_mm,
+                )
+                for part in table.holder
+            ),
         )
         for number, table in tables.items()
     }

@@ -115,6 +115,14 @@ class WorkOffsetTable(Table):
         return value
 
 
+class HolderTable(Table):
+    length_mm: Positive = Field(description="the length of this part along the tool's axis, in mm")
+    radius_mm: Positive = Field(description="the radius of this part at its lower end, in mm")
+    top_radius_mm: Positive | None = Field(
+        default=None, description="the radius at its upper end, in mm; radius_mm if left out"
+    )
+
+
 class ToolTable(Table):
     X_mm: float = Field(default=0.0, description="the tool offset in X as in the control's tool table, in mm")
     Y_mm: float = Field(default=0.0, description="the tool offset in Y as in the control's tool table, in mm")
@@ -133,6 +141,28 @@ class ToolTable(Table):
         validate_default=True,
         description="the axis positions in mm where the length was set, { X = .., Y = .., Z = .. }",
     )
+
+    cutting_length_mm: Positive | None = Field(
+        default=None, description="how far up from the tip the tool cuts, in mm; to the holder if left out"
+    )
+    holder: list[HolderTable] = Field(
+        default=[],
+        description="tables [[tools.NUMBER.holder]], the parts of the holder from its lower end up to the "
+        "gauge point",
+    )
+
+    @field_validator("holder")
+    @classmethod
+    def _shorter_than_tool(cls, value: list[HolderTable], info: ValidationInfo) -> list[HolderTable]:
+        lever = info.data.get("gauge_to_tip_mm")
+        reach = abs(lever[2]) if lever is not None else abs(info.data.get("Z_mm", 0.0))
+        total = sum(part.length_mm for part in value)
+        if value and total >= reach:
+            raise refusal(
+                f"is {total:g} mm long, and the tip is {reach:g} mm below the gauge point; expected a holder "
+                "that leaves the tip free"
+            )
+        return value
 
     @field_validator("touched_at_mm")
     @classmethod
@@ -157,6 +187,27 @@ class PathTable(Table):
         default=None,
         description="how far the control may leave the path at corners where the program names no "
         "tolerance, in mm; 0.01 if left out",
+    )
+
+
+class CheckTable(Table):
+    largest_correction_um: Positive = Field(
+        default=1000.0, description="the largest correction that is taken for sane, in um; 1000 if left out"
+    )
+    tool_within_mm: Positive = Field(
+        default=100.0,
+        description="how far the tip may be, from the gauge point and along any axis, from where it was with "
+        "the tools measured with, in mm; 100 if left out",
+    )
+    temperature_within_K: Positive = Field(
+        default=5.0,
+        description="how far a temperature may be from that of the calibration, in K; 5 if left out",
+    )
+    calibration_days: Annotated[int, Field(ge=1)] = Field(
+        default=365, description="how old a calibration without valid_until may be, in days; 365 if left out"
+    )
+    clearance_mm: NotNegative = Field(
+        default=1.0, description="the least clearance of tool and holder to meshes, in mm; 1 if left out"
     )
 
 
@@ -199,6 +250,9 @@ class MachineFile(Table):
     axes: AxesTable = Field(description="the tables [axes.X], [axes.Y] and [axes.Z]")
     path: PathTable = Field(
         default_factory=PathTable, description="the table [path]: how the control passes from block to block"
+    )
+    check: CheckTable = Field(
+        default_factory=CheckTable, description="the table [check]: what a check takes for sane"
     )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")

@@ -27,10 +27,13 @@ ROUNDING_SHARE = 0.87
 class Proof:
     """Deviations of the nominal program (`before`) and of the corrected one (`after`), per nominal move.
 
-    `digit_mm` is the coarsest last digit written. `allowed_mm` is tolerance plus rounding.
-    """
+    `written` is the path of the corrected program, and `groups` (n,) the last of its moves that belongs to
+    each nominal one. `digit_mm` is the coarsest last digit written. `allowed_mm` is tolerance plus
+    rounding. """
 
     nominal: Toolpath
+    written: Toolpath
+    groups: Index
     before: Deviation
     after: Deviation
     tolerance_mm: float
@@ -49,6 +52,10 @@ class Proof:
         at = np.where(counts, np.nan_to_num(self.after.waypoint), 0.0)
         along = np.where(counts & self.cutting & ~self.lean, np.nan_to_num(self.after.path), 0.0)
         return np.asarray(np.maximum(at, along), float)
+
+    def owner(self) -> Index:
+        """(m,) the nominal move that each move of the corrected program belongs to."""
+        return np.searchsorted(self.groups, np.arange(len(self.written)))
 
     @property
     def holds(self) -> bool:
@@ -91,7 +98,7 @@ def prove(
         )
     after = measure(path, target, written, groups, model, tolerance_mm * _BEND_SHARE, exempt)
     before = measure(path, target, path, np.arange(len(path)), model, 1e-3, exempt)
-    return Proof(path, before, after, tolerance_mm, digit_mm, cutting_moves(path), loose)
+    return Proof(path, written, groups, before, after, tolerance_mm, digit_mm, cutting_moves(path), loose)
 
 
 def _with_pecks(nominal: Program, corrected: Program, parts: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:

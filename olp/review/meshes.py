@@ -7,19 +7,17 @@ positions.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from olp.checks.clearance import rotation
 from olp.errormodel.base import Array
-from olp.exceptions import InputError
-from olp.files.write import read_bytes
-from olp.machine import Machine, Mesh, Setup, WorkOffset
+from olp.files.meshes import read_mesh
+from olp.machine import Machine, Mesh, Setup
 from olp.units import AXES
 
 #: more faces than this are drawn coarser
@@ -62,45 +60,13 @@ def of_job(setup: Setup, origin_mm: Array) -> list[Body]:
 
 
 def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array) -> Body:
-    vertices, faces = load(mesh.file)
+    vertices, faces = coarser(*read_mesh(mesh.file))
     vertices = vertices * mesh.unit_mm
     offset = None if mesh.frame == "machine" else setup.work_offset(mesh.frame)
     if offset is not None:
         vertices = vertices @ rotation(offset).T + np.array(offset.offset_mm)
     name = Path(mesh.file).stem
     return Body(f"mesh-{number}", name, mesh.role, vertices - origin_mm, faces)
-
-
-def rotation(offset: WorkOffset) -> Array:
-    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C about
-    Z."""
-    out = np.eye(3)
-    for axis, degrees in enumerate(offset.rotation_deg):
-        first, second = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-        turn[first, first] = turn[second, second] = cosine
-        turn[first, second], turn[second, first] = -sine, sine
-        out = turn @ out
-    return out
-
-
-def load(path: str) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Vertices and triangles of a mesh file (STL, OBJ, PLY, GLB and what else trimesh reads)."""
-    import trimesh
-
-    data = read_bytes(path)
-    kind = Path(path).suffix.lower().removeprefix(".")
-    try:
-        loaded: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind).to_mesh()
-        vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
-    except Exception as error:  # readers of many formats raise what they like
-        raise InputError(
-            f"is no mesh that can be read ({type(error).__name__}); expected STL, OBJ, PLY or GLB", file=path
-        ) from None
-    if not len(faces) or not np.isfinite(vertices).all():
-        raise InputError("holds no triangles; expected a mesh", file=path)
-    return coarser(vertices, faces)
 
 
 def coarser(vertices: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, npt.NDArray[np.int64]]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import datetime
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from olp.checks.base import finding, lines_of
 from olp.compensation.holes import HolePlan
-from olp.errormodel import Calibration, ErrorModel
-from olp.errormodel.base import Array, Mask
+from olp.errormodel import ErrorModel
 from olp.findings import Finding
 from olp.machine import Setup
 from olp.program.program import Program
@@ -20,24 +18,8 @@ from olp.toolpath import Flag, Kind, Toolpath
 
 Index = npt.NDArray[np.int64]
 
-_LISTED = 20
 _SAMPLED = 4096
 _WORST = 5
-
-
-def _finding(code: str, message: str, lines: Sequence[int] = (), count: int | None = None) -> Finding:
-    unique = sorted(set(lines))
-    return Finding(
-        code,
-        message,
-        unique[0] if unique else None,
-        tuple(unique[:_LISTED]),
-        len(unique) if count is None else count,
-    )
-
-
-def lines_of(path: Toolpath, moves: Mask | Array) -> list[int]:
-    return [int(v) for v in np.unique(path.line[moves]).tolist()]
 
 
 def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[Finding]:
@@ -47,13 +29,13 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     for name, line, _ in program.remarks:
         if name == "unit":
             out.append(
-                _finding(
+                finding(
                     "OLP301", "neither G20 nor G21 stands before the first move; millimetres assumed", [line]
                 )
             )
         elif name == "increments":
             out.append(
-                _finding(
+                finding(
                     "OLP302",
                     "lengths without a decimal point are read as least increments of the control",
                     [line],
@@ -63,7 +45,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     if whole.any():
         lines = lines_of(path, whole)
         out.append(
-            _finding(
+            finding(
                 "OLP104", f"{len(lines)} blocks move another axis too; corrected at their ends only", lines
             )
         )
@@ -71,7 +53,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     if deleted.any():
         lines = lines_of(path, deleted)
         out.append(
-            _finding(
+            finding(
                 "OLP304", f"{len(lines)} blocks stand under block delete; proved with and without", lines
             )
         )
@@ -82,13 +64,13 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     })  # fmt: skip
     for name in assumed:
         out.append(
-            _finding("OLP303", f"{name} is taken as touched off on the raw machine at its own position")
+            finding("OLP303", f"{name} is taken as touched off on the raw machine at its own position")
         )
     if contour:
-        out.append(_finding("OLP305", "contours under G41/G42 were taken as the path of the tool"))
+        out.append(finding("OLP305", "contours under G41/G42 were taken as the path of the tool"))
     if setup.machine.compensated_by_controller:
         names = ", ".join(sorted(setup.machine.compensated_by_controller))
-        out.append(_finding("OLP404", f"the control corrects {names}; left to it"))
+        out.append(finding("OLP404", f"the control corrects {names}; left to it"))
     return out
 
 
@@ -99,7 +81,7 @@ def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
         return out
     if not program.path_modes and len(program.toolpath):
         out.append(
-            _finding(
+            finding(
                 "OLP201",
                 f"no path mode is stated: {program.profile.path_mode}",
                 [int(program.toolpath.line[0])],
@@ -107,14 +89,14 @@ def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
         )
     bare = [m.line for m in program.path_modes if m.tolerance_mm is None]
     if bare:
-        out.append(_finding("OLP201", "G64 without P lets the control round corners without bound", bare))
+        out.append(finding("OLP201", "G64 without P lets the control round corners without bound", bare))
     wide = [
         m for m in program.path_modes if m.tolerance_mm is not None and m.tolerance_mm > correction_mm > 0
     ]
     if wide:
         worst = max(m.tolerance_mm or 0.0 for m in wide)
         out.append(
-            _finding(
+            finding(
                 "OLP202",
                 f"{wide[0].name} lets the path leave by {worst * 1e3:.3g} um, more than the largest "
                 f"correction of {correction_mm * 1e3:.3g} um",
@@ -124,7 +106,7 @@ def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     merging = [m.line for m in program.path_modes if m.merges and (m.tolerance_mm or 0) > 0]
     if merging:
         out.append(
-            _finding("OLP203", "G64 P without Q0 also merges short blocks within the tolerance", merging)
+            finding("OLP203", "G64 P without Q0 also merges short blocks within the tolerance", merging)
         )
     return out
 
@@ -138,7 +120,7 @@ def proof_findings(proof: Proof, passed: Index) -> list[Finding]:
     if above.any():
         worst = int(size.argmax())
         out.append(
-            _finding(
+            finding(
                 "OLP101",
                 f"{int(above.sum())} moves end above tolerance: {size[worst] * 1e3:.2f} um at line "
                 f"{int(path.line[worst])}, allowed {proof.allowed_mm * 1e3:.2f} um",
@@ -146,16 +128,16 @@ def proof_findings(proof: Proof, passed: Index) -> list[Finding]:
             )
         )
     if not proof.after.judged.any():
-        out.append(_finding("OLP107", "no move of this program could be judged"))
+        out.append(finding("OLP107", "no move of this program could be judged"))
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
     untouched[passed] = True
     if untouched.any():
         lines = lines_of(path, untouched)
-        out.append(_finding("OLP102", f"{int(untouched.sum())} moves were written as they were", lines))
+        out.append(finding("OLP102", f"{int(untouched.sum())} moves were written as they were", lines))
     unknown = proof.after.flank > proof.tolerance_mm
     if unknown.any():
         out.append(
-            _finding(
+            finding(
                 "OLP103",
                 f"at {int(unknown.sum())} way-points the flank of an axis is not known yet; the tip may be "
                 f"off by up to {proof.after.flank.max() * 1e3:.1f} um there",
@@ -164,7 +146,7 @@ def proof_findings(proof: Proof, passed: Index) -> list[Finding]:
         )
     if proof.lean.any():
         lines = lines_of(path, proof.lean)
-        out.append(_finding("OLP306", f"{len(lines)} feed moves start where a move ended uncorrected", lines))
+        out.append(finding("OLP306", f"{len(lines)} feed moves start where a move ended uncorrected", lines))
     return out
 
 
@@ -176,51 +158,10 @@ def hole_findings(holes: HolePlan, tolerance_mm: float) -> list[Finding]:
     if not leaning:
         return []
     return [
-        _finding(
+        finding(
             "OLP105",
             f"{len(leaning)} holes lean by up to {holes.lean_mm.max() * 1e3:.2f} um between R and bottom",
             leaning,
-        )
-    ]
-
-
-def state_findings(
-    path: Toolpath, command_mm: Array, model: ErrorModel, setup: Setup, *, held: bool
-) -> list[Finding]:
-    """Travel, the face of the box, and unknown lost motion."""
-    out = []
-    with np.errstate(invalid="ignore"):
-        for i, name in enumerate("XYZ"):
-            low, high = setup.machine.axes[name].travel_mm
-            nominal_out = (path.end_mm[:, i] < low) | (path.end_mm[:, i] > high)
-            beyond = (command_mm[:, i] < low) | (command_mm[:, i] > high)
-            if (beyond & ~nominal_out).any():
-                lines = lines_of(path, beyond & ~nominal_out)
-                out.append(
-                    _finding(
-                        "OLP402", f"{name} is commanded beyond its travel of {low:g} to {high:g} mm", lines
-                    )
-                )
-        if held:
-            box = model.box_mm
-            out_of = ((command_mm < box[:, 0]) | (command_mm > box[:, 1])).any(axis=1)
-            out_of &= (path.flag & np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)) == 0
-            if out_of.any():
-                lines = lines_of(path, out_of)
-                out.append(
-                    _finding("OLP403", f"{int(out_of.sum())} commands lie outside the calibrated box", lines)
-                )
-    return out
-
-
-def calibration_findings(calibration: Calibration, date: datetime.date | None) -> list[Finding]:
-    """Is the calibration still valid on the day given?"""
-    until = calibration.valid_until
-    if date is None or until is None or date <= until:
-        return []
-    return [
-        _finding(
-            "OLP401", f"the calibration was valid until {until.isoformat()}, the job is of {date.isoformat()}"
         )
     ]
 

@@ -1,0 +1,30 @@
+"""How checks write findings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from olp.errormodel.base import Array, Mask
+from olp.findings import Finding
+from olp.toolpath import Index, Toolpath
+
+_LISTED = 20
+
+
+def finding(code: str, message: str, lines: Sequence[int] = (), count: int | None = None) -> Finding:
+    """A finding at the lines given; `count` is how many there are, of which the first few are listed."""
+    unique = sorted(set(lines))
+    return Finding(
+        code,
+        message,
+        unique[0] if unique else None,
+        tuple(unique[:_LISTED]),
+        len(unique) if count is None else count,
+    )
+
+
+def lines_of(path: Toolpath, moves: Mask | Array | Index) -> list[int]:
+    """The lines of moves, each once."""
+    return [int(v) for v in np.unique(path.line[moves]).tolist()]

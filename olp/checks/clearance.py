@@ -1,0 +1,249 @@
+"""Clearance of tool and holder along a path, against the meshes of a job.
+
+Everything is seen from the workpiece. A mesh of a work offset stands where the program sees it: the tip is
+there at the axis position less the active tool length. One of the frame "machine" counts in axis positions:
+the tip is at the axis position plus its tool vector; a mesh of role machine stands still while axes before
+F carry the workpiece.
+
+What cuts may touch the workpiece in feed moves. In a rapid that begins or ends at one, it leaves or reaches
+what it cuts: there it counts less `SLACK_MM` all around, and only contact counts. """
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.checks.base import finding
+from olp.clearance.parts import Part, parts_of
+from olp.clearance.search import CONTACT_MM, Best, search
+from olp.clearance.sweep import CHORD_MM, Ways, ways_of
+from olp.clearance.tree import Tree
+from olp.compensation.plan import zero_shifts
+from olp.errormodel import ErrorModel, play_states
+from olp.errormodel.base import Array, Mask
+from olp.findings import Finding
+from olp.machine import Mesh, Setup, WorkOffset
+from olp.toolpath import Flag, Index, Kind, Toolpath
+
+#: what a mesh of the workpiece and the path that cuts it may differ by (chords of both, allowances)
+SLACK_MM = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A mesh of the job: (m, 3, 3) `triangle` in mm in its own frame."""
+
+    mesh: Mesh
+    name: str
+    triangle: Array
+
+    def offset(self, setup: Setup) -> WorkOffset | None:
+        return None if self.mesh.frame == "machine" else setup.work_offset(self.mesh.frame)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearances:
+    """Of b blocks: (b,) `line`, `clearance_mm` (0: contact), (b, 3) the nearest `point_mm` of a mesh in its
+    own frame; (b,) `part` and `solid`, what is nearest, as indices of `parts` and `solids`. `unknown` are
+    lines that could not be looked at."""
+
+    line: Index
+    clearance_mm: Array
+    point_mm: Array
+    part: Index
+    solid: Index
+    parts: tuple[str, ...]
+    solids: tuple[Solid, ...]
+    unknown: tuple[int, ...]
+
+    def rows(self) -> Iterator[dict[str, object]]:
+        """One mapping a block."""
+        for k in range(len(self.line)):
+            solid = self.solids[self.solid[k]]
+            yield {
+                "line": int(self.line[k]),
+                "clearance_mm": float(self.clearance_mm[k]),
+                "part": self.parts[self.part[k]],
+                "mesh": solid.name,
+                "role": solid.mesh.role,
+                "frame": solid.mesh.frame,
+                "point_mm": self.point_mm[k].tolist(),
+            }
+
+    def nearest(self, most: int) -> Clearances:
+        """The blocks that come nearest, in order."""
+        order = np.argsort(self.clearance_mm, kind="stable")[:most]
+        return Clearances(
+            self.line[order], self.clearance_mm[order], self.point_mm[order], self.part[order],
+            self.solid[order], self.parts, self.solids, self.unknown,
+        )  # fmt: skip
+
+    def findings(self, limit_mm: float) -> list[Finding]:
+        """Contacts, clearances below the limit, and what was not looked at."""
+        out = []
+        touching = self.clearance_mm <= 0.0
+        for code, rows, what in (
+            ("OLP701", touching, "touches"),
+            ("OLP702", ~touching & (self.clearance_mm < limit_mm), "comes near"),
+        ):
+            if not rows.any():
+                continue
+            first = int(np.flatnonzero(rows)[self.clearance_mm[rows].argmin()])
+            solid = self.solids[self.solid[first]]
+            place = ", ".join(f"{v:.3f}" for v in self.point_mm[first].tolist())
+            text = (
+                f"the {self.parts[self.part[first]]} {what} {solid.name} at ({place}) in {solid.mesh.frame}"
+            )
+            if code == "OLP702":
+                text += f": {self.clearance_mm[first]:.4g} mm, {limit_mm:g} mm are asked for"
+            text += f", line {int(self.line[first])}"
+            out.append(finding(code, text, self.line[rows].tolist()))
+        if self.unknown:
+            text = f"{len(self.unknown)} blocks move from or to unknown places, or with a tool without length"
+            out.append(finding("OLP703", text, self.unknown))
+        return out
+
+
+def clearances(path: Toolpath, model: ErrorModel, setup: Setup, solids: Sequence[Solid]) -> Clearances:
+    """The least clearance of each block of a path, with its place.
+
+    Distances are exact to `CLOSE_MM` along the straight ways between way-points and along arcs
+    (`CHORD_MM`), for the tip that the error model gives at the way-points. """
+    names: list[str] = []
+    best = Best.of(len(path))
+    seen = np.zeros(len(path), bool)
+    tips = _Tips.of(path, model, setup)
+    tools = _tools(path, setup)
+    for number, solid in enumerate(solids):
+        tree = Tree.of(_placed(solid, setup))
+        start, end = tips.of_solid(solid)
+        ways = ways_of(path, start, end)
+        known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+        for parts, moves in tools:
+            seen |= moves & known
+            for part in parts:
+                names.append(part.name)
+                tag = number + len(solids) * (len(names) - 1)
+                _measure(path, tree, ways, part, moves, solid.mesh.role == "workpiece", best, tag)
+    return _by_line(path, best, names, setup, solids, seen)
+
+
+def _measure(
+    path: Toolpath, tree: Tree, ways: Ways, part: Part, moves: Mask, workpiece: bool, best: Best, tag: int
+) -> None:
+    """One part of a tool against one mesh, on the moves with that tool."""
+    if not (workpiece and part.cuts):
+        mine = ways.of_moves(moves)
+        search(tree, mine.swept(part), mine.move, best, tag)
+        return
+    rapid = path.kind == Kind.RAPID
+    beside = np.zeros(len(path), bool)
+    beside[1:] |= ~rapid[:-1]
+    beside[:-1] |= ~rapid[1:]
+    mine = ways.of_moves(moves & rapid & ~beside)
+    search(tree, mine.swept(part), mine.move, best, tag)
+    mine = ways.of_moves(moves & rapid & beside)
+    touch = Best.of(len(path), 2 * CONTACT_MM)
+    search(tree, mine.swept(part.shrunk(SLACK_MM)), mine.move, touch, tag)
+    hit = np.flatnonzero((touch.tag == tag) & (best.distance_mm > 0.0))
+    for mine_, theirs in (
+        (best.distance_mm, touch.distance_mm), (best.point_mm, touch.point_mm), (best.away, touch.away),
+        (best.triangle, touch.triangle), (best.tag, touch.tag),
+    ):  # fmt: skip
+        mine_[hit] = theirs[hit]
+
+
+def _tools(path: Toolpath, setup: Setup) -> list[tuple[tuple[Part, ...], Mask]]:
+    """The tools of a path with the moves of each; tools that have no length are left out."""
+    by_tool: dict[int, list[int]] = {}
+    for number, frame in enumerate(path.frames):
+        if frame.tool is not None:
+            by_tool.setdefault(frame.tool, []).append(number)
+    out = []
+    for tool, frames in by_tool.items():
+        described = setup.tool(tool)
+        parts = parts_of(described) if described is not None else ()
+        if parts:
+            out.append((parts, np.isin(path.frame, frames)))
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tips:
+    """Where the tip really is, relative to the workpiece: (n, 3) at the start and the end of each move, in
+    axis positions; and what is to be added to that, per move."""
+
+    start: Array
+    end: Array
+    in_program: Array
+    in_machine: Array
+    carried: Mask
+
+    @staticmethod
+    def of(path: Toolpath, model: ErrorModel, setup: Setup) -> _Tips:
+        lost = model.lost_motion_mm(path.end_mm) if len(path) else None
+        play = None if lost is None else play_states(path.end_mm, lost)
+        end = path.end_mm + model.error(path.end_mm, path.tool_mm(), play)
+        origin = np.array(path.start_mm)[None]
+        start = np.concatenate((origin + model.error(origin, path.tools_mm()[:1][0]), end[:-1]))
+        frames = path.frames
+        shift = zero_shifts(frames, model)
+        length = np.array([f.length_mm for f in frames]).reshape(-1, 3)
+        chain = setup.machine.chain
+        carried = np.array([chain.index(axis) < chain.index("F") for axis in "XYZ"])
+        return _Tips(start, end, (-shift - length)[path.frame], path.tools_mm()[path.frame], carried)
+
+    def of_solid(self, solid: Solid) -> tuple[Array, Array]:
+        """(n, 3) the tip at start and end of each move, in the coordinates that a mesh is placed in."""
+        start, end = self.start, self.end
+        if solid.mesh.frame != "machine":
+            return start + self.in_program, end + self.in_program
+        if solid.mesh.role == "machine":
+            # what is known of an axis that carries the workpiece does not matter here
+            start, end = (np.where(self.carried, 0.0, p) for p in (start, end))
+        return start + self.in_machine, end + self.in_machine
+
+
+def _placed(solid: Solid, setup: Setup) -> Array:
+    """(m, 3, 3) triangles in axis positions."""
+    offset = solid.offset(setup)
+    if offset is None:
+        return solid.triangle
+    return np.asarray(solid.triangle @ rotation(offset).T + np.array(offset.offset_mm), float)
+
+
+def rotation(offset: WorkOffset) -> Array:
+    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C
+    about Z."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("xyz", offset.rotation_deg, degrees=True).as_matrix(), float)
+
+
+def _by_line(
+    path: Toolpath, best: Best, names: list[str], setup: Setup, solids: Sequence[Solid], seen: Mask
+) -> Clearances:
+    """The least of the moves of each line."""
+    distance = best.distance_mm.copy()
+    distance[path.arcs.move] -= CHORD_MM
+    distance[distance <= CONTACT_MM] = 0.0
+    found = np.flatnonzero(best.tag >= 0)
+    order = found[np.lexsort((distance[found], path.line[found]))]
+    first = order[np.flatnonzero(np.diff(path.line[order], prepend=-1))]
+    solid, part = best.tag[first] % max(len(solids), 1), best.tag[first] // max(len(solids), 1)
+    point = best.point_mm[first].copy()
+    for number, each in enumerate(solids):
+        offset = each.offset(setup)
+        if offset is not None:
+            rows = solid == number
+            point[rows] = (point[rows] - np.array(offset.offset_mm)) @ rotation(offset)
+    labels = tuple(dict.fromkeys(names))
+    index = np.array([labels.index(name) for name in names] or [0])
+    moving = (path.flag & np.uint8(Flag.CONTROL)) == 0
+    unknown = np.unique(path.line[moving & ~seen]).tolist() if solids else []
+    return Clearances(
+        path.line[first].astype(np.int64), distance[first], point, index[part], solid, labels, tuple(solids),
+        tuple(int(line) for line in unknown),
+    )  # fmt: skip

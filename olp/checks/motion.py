@@ -1,0 +1,264 @@
+"""Checks of what a program asks of the axes: feeds, accelerations, reversals, and rapids that come too
+low."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.checks.base import finding, lines_of
+from olp.compensation.plan import targets, zero_shifts
+from olp.deviation import cutting_moves
+from olp.errormodel import ErrorModel
+from olp.errormodel.base import Array, Mask
+from olp.exceptions import ProgramError
+from olp.findings import Finding
+from olp.geometry import PLANES, quarter_shares
+from olp.machine import Machine
+from olp.program.feeds import Scan, feeds, lengths_mm
+from olp.program.program import Program
+from olp.proof import Proof
+from olp.toolpath import Flag, Index, Kind, Toolpath
+
+#: a corner is sharper than this: every control slows down there, and nobody asks it not to
+_SMOOTH_RAD = 0.35
+#: ways between two turns of an axis that are shorter than so many times its lost motion are short
+_SHORT = 10.0
+#: so many short ways in a row make a passage
+_ROW = 5
+#: a feed has changed where it did by more than this share; that of G93 goes with the length of its block
+_CHANGED = 0.05
+#: digits of feeds and lengths may put an axis on its limit
+_ON_LIMIT = 1.0 + 1e-6
+#: places along a rapid that are looked at
+_SHARES = np.linspace(0.125, 1.0, 8)
+_INVERSE, _PER_TURN = 930, 950
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Feeds:
+    """(n,) feed of each move in mm/s as of `olp.program.feeds`, or the finding that there is none."""
+
+    mm_s: Array | None
+    modes: dict[int, list[int]]
+    refused: Finding | None
+
+    @staticmethod
+    def of(program: Program) -> Feeds:
+        """The feeds of a program that was read with its words."""
+        assert program.words is not None
+        scan = Scan.of(program, program.words, block_delete=False)
+        modes = {
+            code: scan.code_line[scan.code == code].tolist()
+            for code in (_INVERSE, _PER_TURN)
+            if (scan.code == code).any()
+        }
+        try:
+            return Feeds(feeds(scan), modes, None)
+        except ProgramError as error:
+            line = [] if error.line is None else [error.line]
+            return Feeds(None, modes, finding("OLP307", error.message, line))
+
+    def findings(self) -> list[Finding]:
+        """No feed, and feeds that are no speeds."""
+        found = [] if self.refused is None else [self.refused]
+        names = {_INVERSE: "G93 (one over the time)", _PER_TURN: "G95 (by turns of the spindle)"}
+        for code, lines in self.modes.items():
+            found.append(finding("OLP308", f"the feed counts by {names[code]}", lines))
+        return found
+
+
+def demand_findings(path: Toolpath, feed_mm_s: Array, machine: Machine) -> list[Finding]:
+    """Velocities and accelerations of an axis that the programmed feed asks for, beyond its limits.
+
+    On arcs v^2 / r towards the centre; at joints of feed moves that turn by less than 20 degrees the change
+    of velocity over half the time of both moves. """
+    axes = [machine.axes[name] for name in "XYZ"]
+    velocity, acceleration = _demands(path, feed_mm_s)
+    out = []
+    for code, asked, limit, unit, what in (
+        ("OLP205", velocity, [a.velocity_mm_s for a in axes], "mm/s", "velocity"),
+        ("OLP206", acceleration, [a.acceleration_mm_s2 for a in axes], "mm/s2", "acceleration"),
+    ):
+        beyond: Mask = asked > np.array(limit) * _ON_LIMIT
+        moves: Mask = np.asarray(beyond.any(axis=1))
+        if bool(moves.any()):
+            share = np.where(beyond, asked / np.array(limit), 0.0)
+            move, axis = np.unravel_index(int(share.argmax()), share.shape)
+            most = f"{asked[move, axis]:.4g} {unit} of {'XYZ'[axis]}, whose limit is {limit[axis]:g} {unit}"
+            text = f"{int(moves.sum())} moves ask an axis for more {what} than it has, at most {most}"
+            out.append(finding(code, text, lines_of(path, moves)))
+    return out
+
+
+def _demands(path: Toolpath, feed_mm_s: Array) -> tuple[Array, Array]:
+    """(n, 3) largest velocity and acceleration of each axis on feed moves, 0 where nothing is known."""
+    count = len(path)
+    start, length = path.starts_mm(), lengths_mm(path)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        way = (path.end_mm - start) / length[:, None]
+    usable = (path.kind != Kind.RAPID) & np.isfinite(feed_mm_s) & (length > 0)
+    first, last = np.where(usable[:, None], way, np.nan), np.where(usable[:, None], way, np.nan)
+    speed = np.where(usable, feed_mm_s, 0.0)
+    velocity = np.abs(np.nan_to_num(first)) * speed[:, None]
+    acceleration = np.zeros((count, 3))
+    arcs, rows = path.arcs, path.arcs.move
+    if len(arcs):
+        begin, end, most, radius, climb = _arc_ways(path, length)
+        first[rows], last[rows] = begin, end
+        velocity[rows] = np.where(usable[rows, None], most * speed[rows, None], 0.0)
+        # towards the centre: at most what the way to it has of an axis
+        normal = _normals(path) * (speed[rows] * climb)[:, None] ** 2 / radius[:, None]
+        acceleration[rows] = np.where(usable[rows, None], normal, 0.0)
+    joint = _joints(first, last, speed, length, usable & cutting_moves(path))
+    return velocity, np.fmax(acceleration, joint)
+
+
+def _arc_ways(path: Toolpath, length: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Of each arc: unit ways at its start and end (m, 3), the largest share of each axis (m, 3), its radius
+    and the share of the speed that goes round."""
+    arcs, at = path.arcs, path.arcs.move
+    start, end = path.starts_mm()[at], path.end_mm[at]
+    axes, rows = np.array(PLANES)[arcs.plane], np.arange(len(arcs))
+    one, two, three = axes[:, 0], axes[:, 1], axes[:, 2]
+    c0, c1 = arcs.centre_mm[rows, one], arcs.centre_mm[rows, two]
+    radius = np.hypot(start[rows, one] - c0, start[rows, two] - c1)
+    around = np.clip(np.abs(arcs.sweep_rad) * radius / length[at], 0.0, 1.0)
+    ways = []
+    for point in (start, end):
+        angle = np.arctan2(point[rows, two] - c1, point[rows, one] - c0)
+        way = np.zeros((len(arcs), 3))
+        way[rows, one] = -np.sin(angle) * np.sign(arcs.sweep_rad) * around
+        way[rows, two] = np.cos(angle) * np.sign(arcs.sweep_rad) * around
+        way[rows, three] = (end[rows, three] - start[rows, three]) / length[at]
+        ways.append(way)
+    most = np.maximum(np.abs(ways[0]), np.abs(ways[1]))
+    for quarter in range(4):
+        passed = np.isfinite(quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter))
+        across = two if quarter % 2 == 0 else one
+        most[rows[passed], across[passed]] = around[passed]
+    return ways[0], ways[1], most, radius, around
+
+
+def _normals(path: Toolpath) -> Array:
+    """(m, 3) the largest share of each axis that the way to the centre of an arc has."""
+    arcs, at = path.arcs, path.arcs.move
+    start, end = path.starts_mm()[at], path.end_mm[at]
+    axes, rows = np.array(PLANES)[arcs.plane], np.arange(len(arcs))
+    out = np.zeros((len(arcs), 3))
+    for point in (start, end):
+        away = point - arcs.centre_mm
+        away[rows, axes[:, 2]] = 0.0
+        with np.errstate(invalid="ignore", divide="ignore"):
+            out = np.fmax(out, np.abs(away) / np.sqrt((away * away).sum(axis=1))[:, None])
+    for quarter in range(4):
+        passed = np.isfinite(quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter))
+        along = axes[:, quarter % 2]
+        out[rows[passed], along[passed]] = 1.0
+    return out
+
+
+def _joints(first: Array, last: Array, speed: Array, length: Array, usable: Mask) -> Array:
+    """(n, 3) acceleration at the start of each move that goes on smoothly from the one before."""
+    out = np.zeros((len(first), 3))
+    if len(first) < 2:
+        return out
+    smooth = usable[1:] & usable[:-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        turn = np.arccos(np.clip(np.einsum("ij,ij->i", last[:-1], first[1:]), -1.0, 1.0))
+        smooth &= turn < _SMOOTH_RAD
+        time = 0.5 * (length[:-1] / speed[:-1] + length[1:] / speed[1:])
+        change = first[1:] * speed[1:, None] - last[:-1] * speed[:-1, None]
+        # a step of the feed itself is a matter of ramps, which every control makes
+        change = np.where((np.abs(speed[1:] - speed[:-1]) <= 1e-9 * speed[1:])[:, None], change, 0.0)
+        out[1:][smooth] = (np.abs(change) / time[:, None])[smooth]
+    return np.nan_to_num(out)
+
+
+def changed_findings(proof: Proof, nominal_mm_s: Array, written_mm_s: Array) -> list[Finding]:
+    """Moves whose feed is another one in the corrected program."""
+    owner = proof.owner()
+    before = nominal_mm_s[owner]
+    with np.errstate(invalid="ignore"):
+        change = np.abs(written_mm_s - before) / before
+    moves = np.isfinite(change) & (change > _CHANGED) & cutting_moves(proof.written)
+    if not moves.any():
+        return []
+    worst = int(np.where(moves, change, 0.0).argmax())
+    what = (
+        f"{int(moves.sum())} moves have another feed than in the nominal program: "
+        f"{written_mm_s[worst] * 60:.4g} mm/min for {before[worst] * 60:.4g} mm/min"
+    )
+    return [finding("OLP309", what, lines_of(proof.nominal, owner[moves]))]
+
+
+def reversal_findings(path: Toolpath, model: ErrorModel) -> list[Finding]:
+    """Passages in which an axis with lost motion turns round after every short way."""
+    lost = model.lost_motion_mm(path.end_mm) if len(path) else None
+    out: list[Finding] = []
+    for axis in range(3 if lost is not None else 0):
+        assert lost is not None
+        width = float(np.nanmax(np.nan_to_num(np.abs(lost[:, axis])), initial=0.0))
+        moves = _heavy(path.end_mm[:, axis], _SHORT * width) if width > 0 else np.zeros(0, np.int64)
+        if len(moves):
+            what = (
+                f"{'XYZ'[axis]} turns round {len(moves)} times after ways below {_SHORT * width:.3g} mm, "
+                f"{_SHORT:g} times its lost motion"
+            )
+            out.append(finding("OLP204", what, lines_of(path, moves)))
+    return out
+
+
+def _heavy(command: Array, short_mm: float) -> Index:
+    """The moves at whose ends an axis turns, in rows of at least so many short ways; unknown places end a
+    row."""
+    known = np.flatnonzero(np.isfinite(command))
+    step = np.diff(command[known])
+    moving = np.flatnonzero(step != 0)
+    turn = moving[:-1][np.sign(step[moving[1:]]) != np.sign(step[moving[:-1]])]
+    at = command[known[turn + 1]]
+    short = np.abs(np.diff(at)) < short_mm
+    # runs of short ways between consecutive turns
+    edge = np.flatnonzero(np.diff(np.concatenate(([0], short.view(np.int8), [0]))))
+    rows = [np.arange(a, b + 1) for a, b in edge.reshape(-1, 2).tolist() if b - a >= _ROW]
+    return known[turn[np.concatenate(rows)] + 1] if rows else np.zeros(0, np.int64)
+
+
+def low_findings(proof: Proof, model: ErrorModel) -> list[Finding]:
+    """First moves and rapids that take the tip lower in Z than the nominal program means to and does."""
+    path, written = proof.nominal, proof.written
+    # how many strokes a canned cycle makes is the control's
+    ours, theirs = ((p.flag & np.uint8(Flag.CYCLE)) == 0 for p in (path, written))
+    rapid = (path.kind == Kind.RAPID) & ours
+    if len(rapid):
+        rapid[int(np.isfinite(path.end_mm[:, 2]).argmax())] = True
+    shift = zero_shifts(path.frames, model)
+    goal = targets(path, shift)
+    meant = np.concatenate(([np.array(path.start_mm)], goal[:-1])) if len(path) else goal
+    # what is meant lies on the straight way between way-points; what is done is seen in between, too
+    low = np.fmin(np.fmin(meant[:, 2], goal[:, 2]), _lowest(path, model))
+    reached = np.full(len(path), np.inf)
+    np.fmin.at(reached, proof.owner()[theirs], _lowest(written, model)[theirs])
+    play = model.lost_motion_mm(path.end_mm)
+    loose = 0.0 if play is None else float(np.nanmax(np.nan_to_num(play[:, 2]), initial=0.0)) / 2
+    with np.errstate(invalid="ignore"):
+        below = low - reached - loose > proof.allowed_mm
+        moves = rapid & below & np.isfinite(reached)
+    if not moves.any():
+        return []
+    deep = float((low - reached)[moves].max())
+    what = (
+        f"{int(moves.sum())} first moves or rapids come up to {deep:.4g} mm lower than in the nominal program"
+    )
+    return [finding("OLP310", what, lines_of(path, moves))]
+
+
+def _lowest(path: Toolpath, model: ErrorModel) -> Array:
+    """(n,) the lowest Z of the tip on each move, from eight places along it; NaN where nothing is known."""
+    start, tool = path.starts_mm(), path.tool_mm()
+    out = np.full(len(path), np.nan)
+    for share in _SHARES.tolist():
+        at = path.end_mm if share == 1.0 else start + share * (path.end_mm - start)
+        out = np.fmin(out, at[:, 2] + np.nan_to_num(model.error(at, tool)[:, 2]))
+    return out

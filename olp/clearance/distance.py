@@ -1,0 +1,212 @@
+"""Distance between a cone frustum that is swept along a straight way and a triangle, for many pairs at once.
+
+Both are convex, and so is what all differences of their points make: its point nearest to the origin is
+searched with the algorithm of Gilbert, Johnson and Keerthi (IEEE Journal of Robotics and Automation 4,
+1988, 193-203), with support points of the true round shape. Each step gives an upper bound, the point
+found, and a lower one, the plane through its support point: the search ends where they meet. """
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: bounds have met where they are so close, in mm
+MET_MM = 1e-5
+#: distances below this count as contact: less than what the arithmetic resolves over a metre
+TOUCH_MM = 1e-7
+_STEPS = 64
+_BATCH = 1 << 13
+#: a simplex is flat below this share of what its edges could span
+_FLAT = 1e-13
+_PAIRS = ((0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Swept:
+    """n frusta about axes parallel to Z, swept along straight ways: tip at (n, 3) `start`, moved by (n, 3)
+    `way`; (n, 2) `level` of lower and upper end above the tip, (n, 2) `radius` there. All mm."""
+
+    start: Array
+    way: Array
+    level: Array
+    radius: Array
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, rows: Index) -> Swept:
+        return Swept(self.start[rows], self.way[rows], self.level[rows], self.radius[rows])
+
+    def bounds(self) -> tuple[Array, Array]:
+        """(n, 3) lowest and highest corner of the box about the way of each axis, without the radius."""
+        low = np.minimum(self.start, self.start + self.way)
+        high = np.maximum(self.start, self.start + self.way)
+        low[:, 2] += self.level[:, 0]
+        high[:, 2] += self.level[:, 1]
+        return low, high
+
+    def support(self, direction: Array) -> Array:
+        """(n, 3) the point farthest along a direction (n, 3), less `start`."""
+        flat = np.sqrt(direction[:, 0] ** 2 + direction[:, 1] ** 2)
+        reach = self.level * direction[:, 2:] + self.radius * flat[:, None]
+        upper = reach[:, 1] > reach[:, 0]
+        wide = np.where(upper, self.radius[:, 1], self.radius[:, 0])
+        wide = wide / np.where(flat > 0, flat, np.inf)
+        ahead = np.einsum("ij,ij->i", self.way, direction) > 0
+        out = np.where(ahead[:, None], self.way, 0.0)
+        out[:, 0] += wide * direction[:, 0]
+        out[:, 1] += wide * direction[:, 1]
+        out[:, 2] += np.where(upper, self.level[:, 1], self.level[:, 0])
+        return out
+
+    def gap(self, triangle: Array, direction: Array) -> Array:
+        """(n,) by how much a plane across a direction (n, 3) of length 1 separates each from its triangle
+        (n, 3, 3): no more than the distance."""
+        near = np.einsum("ijk,ik->ij", triangle - self.start[:, None], direction).min(axis=1)
+        return np.asarray(near - np.einsum("ij,ij->i", self.support(direction), direction), float)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearest:
+    """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from the
+    swept part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it is
+    only known to be at least that: inf, with `away` across a plane that separates them by about so much."""
+
+    distance_mm: Array
+    point_mm: Array
+    away: Array
+
+
+def nearest(swept: Swept, triangle: Array, bound_mm: Array | None = None) -> Nearest:
+    """Distances of n swept parts, each from its triangle (n, 3, 3); those of `bound_mm` (n,) or more are not
+    worked out. Exact to `MET_MM`."""
+    count = len(swept)
+    out = Nearest(np.full(count, np.inf), np.zeros((count, 3)), np.zeros((count, 3)))
+    bound = np.full(count, np.inf) if bound_mm is None else bound_mm
+    for a in range(0, count, _BATCH):
+        rows = np.arange(a, min(a + _BATCH, count))
+        _batch(swept.take(rows), triangle[rows], bound[rows], rows, out)
+    return out
+
+
+def _batch(swept: Swept, triangle: Array, bound: Array, rows: Index, out: Nearest) -> None:
+    """Search one batch; `rows` is where its pairs stand in the result. Pairs leave it as they are done."""
+    local = triangle - swept.start[:, None]
+    point = local.mean(axis=1) - 0.5 * swept.way
+    point[:, 2] -= 0.5 * swept.level.sum(axis=1)
+    found = np.zeros((len(rows), 4, 3))
+    source = np.zeros((len(rows), 4, 3))
+    weight = np.zeros((len(rows), 4))
+    size = np.full(len(rows), np.inf)
+    low = np.zeros(len(rows))
+    seen = local[:, 0]
+    for step in range(_STEPS):
+        pick = np.einsum("ijk,ik->ij", local, point).argmin(axis=1)
+        near = local[np.arange(len(local)), pick]
+        new = near - swept.support(point)
+        if step:
+            low = np.maximum(low, np.einsum("ij,ij->i", point, new) / size)
+            met = (size - low <= MET_MM) | (low >= bound)
+            if met.any():
+                _done(met, low, bound, size, point, seen, swept.start, rows, out)
+                go = ~met
+                if not go.any():
+                    return
+                swept, local, bound, rows = swept.take(np.flatnonzero(go)), local[go], bound[go], rows[go]
+                found, source, weight, size, low = found[go], source[go], weight[go], size[go], low[go]
+                point, new, near, seen = point[go], new[go], near[go], seen[go]
+        order = np.argsort(-weight, axis=1, kind="stable")[:, :3]
+        at = np.arange(len(rows))[:, None]
+        kept = weight[at, order] > 0
+        found = np.concatenate(
+            (new[:, None], np.where(kept[..., None], found[at, order], new[:, None])), axis=1
+        )
+        source = np.concatenate(
+            (near[:, None], np.where(kept[..., None], source[at, order], near[:, None])), axis=1
+        )
+        weight = _weights(found)
+        last, point = point, np.einsum("ij,ijk->ik", weight, found)
+        before, size = size, np.sqrt(np.einsum("ij,ij->i", point, point))
+        low = np.where(size <= TOUCH_MM, size, low)
+        size = np.maximum(size, TOUCH_MM)
+        stuck = np.flatnonzero(size > before)
+        if stuck.size:
+            # corners so close that the arithmetic loses them: go on from the best point as the only corner
+            point[stuck], size[stuck] = last[stuck], before[stuck]
+            found[stuck, 0], source[stuck, 0] = last[stuck], seen[stuck]
+            weight[stuck] = (1.0, 0.0, 0.0, 0.0)
+        seen = np.einsum("ij,ijk->ik", weight, source)
+    _done(np.ones(len(rows), bool), low, bound, size, point, seen, swept.start, rows, out)
+
+
+def _done(
+    met: Mask, low: Array, bound: Array, size: Array, point: Array, seen: Array, start: Array, rows: Index,
+    out: Nearest,
+) -> None:  # fmt: skip
+    """Write the pairs that are done; those beyond their bound stay at infinity."""
+    ours = met & ((low < bound) | (size <= TOUCH_MM))
+    out.away[rows[met]] = point[met] / size[met, None]
+    to = rows[ours]
+    touching = size[ours] <= TOUCH_MM
+    out.distance_mm[to] = np.where(touching, 0.0, size[ours])
+    out.point_mm[to] = seen[ours] + start[ours]
+    out.away[to[touching]] = 0.0
+
+
+def _weights(found: Array) -> Array:
+    """(n, 4) weights of the point nearest to the origin in simplices (n, 4, 3) whose first corner is the
+    newest.
+
+    That corner takes part, so its own faces are all that is looked at: 3 edges, 3 triangles, the whole.
+    Corners may coincide. """
+    first = found[:, 0]
+    edge = found[:, 1:] - first[:, None]
+    gram = np.einsum("nik,njk->nij", edge, edge)
+    goal = -np.einsum("nik,nk->ni", edge, first)
+    base = np.einsum("ij,ij->i", first, first)
+    share = np.zeros((len(found), 3))
+    best = base.copy()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for i in range(3):
+            square = gram[:, i, i]
+            t = np.clip(np.where(square > 0, goal[:, i] / square, 0.0), 0.0, 1.0)
+            norm = base - 2 * t * goal[:, i] + t * t * square
+            _take(norm < best, norm, best, share, {i: t})
+        for i, j in _PAIRS:
+            g, h, k = gram[:, i, i], gram[:, j, j], gram[:, i, j]
+            det = g * h - k * k
+            u = (goal[:, i] * h - goal[:, j] * k) / det
+            v = (goal[:, j] * g - goal[:, i] * k) / det
+            norm = base - u * goal[:, i] - v * goal[:, j]
+            inside = (det > _FLAT * g * h) & (u > 0) & (v > 0) & (u + v < 1)
+            _take(inside & (norm < best), norm, best, share, {i: u, j: v})
+        _whole(edge, first, gram, best, share)
+    return np.concatenate((1.0 - share.sum(axis=1, keepdims=True), share), axis=1)
+
+
+def _take(better: Mask, norm: Array, best: Array, share: Array, parts: dict[int, Array]) -> None:
+    best[better] = norm[better]
+    share[better] = 0.0
+    for column, values in parts.items():
+        share[better, column] = values[better]
+
+
+def _whole(edge: Array, first: Array, gram: Array, best: Array, share: Array) -> None:
+    """The origin inside the tetrahedron: contact."""
+    normal = np.cross(edge[:, 1], edge[:, 2])
+    volume = np.einsum("ij,ij->i", edge[:, 0], normal)
+    size = gram[:, 0, 0] * gram[:, 1, 1] * gram[:, 2, 2]
+    solid = volume * volume > _FLAT * size
+    if not solid.any():
+        return
+    u = -np.einsum("ij,ij->i", first, normal) / volume
+    v = -np.einsum("ij,ij->i", first, np.cross(edge[:, 2], edge[:, 0])) / volume
+    w = -np.einsum("ij,ij->i", first, np.cross(edge[:, 0], edge[:, 1])) / volume
+    inside = solid & (u >= 0) & (v >= 0) & (w >= 0) & (u + v + w <= 1)
+    _take(inside, np.zeros(len(best)), best, share, {0: u, 1: v, 2: w})

@@ -1,0 +1,45 @@
+"""Tools as stacked frusta, from the tool table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from olp.machine import Tool
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A frustum about the tool's axis: heights above the tip and radii, lower end first; whether it cuts."""
+
+    name: str
+    level_mm: tuple[float, float]
+    radius_mm: tuple[float, float]
+    cuts: bool
+
+    def shrunk(self, by_mm: float) -> Part:
+        """The same, less so much at its side and at its lower end, as far as it goes."""
+        low, high = self.level_mm
+        a, b = self.radius_mm
+        return Part(
+            self.name, (min(low + by_mm, high), high), (max(a - by_mm, 0.0), max(b - by_mm, 0.0)), self.cuts
+        )
+
+
+def parts_of(tool: Tool) -> tuple[Part, ...]:
+    """The tool from its tip to the gauge point: what cuts, the shank of the same radius, the holder. Nothing
+    where the table gives no length."""
+    lever = tool.lever_mm
+    if lever is None or lever[2] >= 0.0:
+        return ()
+    length = -lever[2]
+    free = length - sum(part.length_mm for part in tool.holder)
+    cuts = min(tool.cutting_length_mm or free, free)
+    out = [Part("tool", (0.0, cuts), (tool.radius_mm, tool.radius_mm), True)]
+    if cuts < free:
+        out.append(Part("shank", (cuts, free), (tool.radius_mm, tool.radius_mm), False))
+    level = free
+    for holder in tool.holder:
+        ends = (level, level + holder.length_mm)
+        out.append(Part("holder", ends, (holder.radius_mm, holder.top_radius_mm), False))
+        level += holder.length_mm
+    return tuple(out)

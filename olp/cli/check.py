@@ -1,0 +1,138 @@
+"""`olp check`."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+import click
+
+from olp.cli.common import (
+    STREAM,
+    Length,
+    exit_for,
+    files_of,
+    given,
+    put,
+    refuse_early,
+    setup_options,
+    source,
+    talk,
+)
+from olp.cli.progress import progress
+from olp.exceptions import OlpError, UsageError
+
+
+def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(code.strip() for value in values for code in value.split(",") if code.strip())
+
+
+@click.command("check")
+@click.argument("program", required=False)
+@setup_options
+@click.option(
+    "--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is the correction of it."
+)
+@click.option(
+    "--select", multiple=True, callback=_codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
+)
+@click.option("--ignore", multiple=True, callback=_codes, metavar="CODES", help="All codes but these.")
+@click.option(
+    "--fail-on",
+    type=click.Choice(["info", "warning", "error", "never"]),
+    default="error",
+    show_default=True,
+    help="Exit with 1 where a finding is at least this severe.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "json", "sarif", "junit"]),
+    default="text",
+    show_default=True,
+    help="SARIF 2.1.0 and JUnit XML are for pipelines.",
+)
+@click.option("-o", "--output", metavar="OUT", default=STREAM, help="Default: stdout.")
+@click.option(
+    "--date",
+    type=click.DateTime(["%Y-%m-%d"]),
+    metavar="YYYY-MM-DD",
+    help="The day of the run, to be compared with valid_until of the calibration.",
+)
+@click.option(
+    "--tolerance-um",
+    type=Length(),
+    default=1.0,
+    show_default=True,
+    help="How far the corrected path may be from the nominal one, rounding apart.",
+)
+@click.option(
+    "--outside-box",
+    type=click.Choice(["refuse", "hold"]),
+    default="refuse",
+    show_default=True,
+    help="Outside the calibrated box: an error (OLP405), or a warning (OLP403) and the error at the face.",
+)
+@click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
+@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
+@click.option("--force", is_flag=True, help="Overwrite the output file.")
+def command(
+    program: str | None,
+    machine: str | None,
+    job: str | None,
+    nominal: str | None,
+    select: tuple[str, ...],
+    ignore: tuple[str, ...],
+    fail_on: str,
+    form: str,
+    output: str,
+    date: datetime.datetime | None,
+    tolerance_um: float,
+    outside_box: str,
+    clearances: str | None,
+    contour: bool,
+    force: bool,
+) -> None:
+    """May this program run on this machine? A gate before deployment.
+
+    A nominal PROGRAM is corrected, and what that gives is checked; a corrected one is checked as it is, and
+    against NOMINAL where that is given. """
+    call = given(program, machine, job)
+    if nominal == call.program == STREAM:
+        raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")
+    inputs = (*call.inputs, *files_of(nominal), *(mesh.file for mesh in call.setup.job.meshes))
+    if clearances is not None and not call.setup.job.meshes:
+        raise UsageError("--clearances needs meshes; name them in the job file, a table [[meshes]] each")
+    if clearances == output == STREAM:
+        raise UsageError("findings and --clearances cannot both go to stdout; name a file for one of them")
+    refuse_early(files_of(output, clearances), inputs, force=force)
+
+    from olp.files.write import write_files
+    from olp.gate import check
+    from olp.report_check import FORMATS, to_csv
+
+    with progress(form != "text") as show:
+        try:
+            result = check(
+                source(call.program),
+                call.setup,
+                nominal=None if nominal is None else source(nominal),
+                tolerance_um=tolerance_um,
+                outside_box="hold" if outside_box == "hold" else "refuse",
+                contour=contour,
+                date=date.date() if date else None,
+                select=select,
+                ignore=ignore,
+                progress=show,
+            )
+        except OlpError as error:
+            raise (error.in_file("<stdin>") if error.line is not None else error) from None
+    parts = {output: FORMATS[form](result.report, fail_on).encode()}
+    if clearances is not None and result.clearances is not None:
+        parts[clearances] = to_csv(result.clearances.rows())
+    write_files({Path(name): parts[name] for name in files_of(*parts)}, force=force, inputs=inputs)
+    if STREAM in parts:
+        put(parts[STREAM])
+    for name in files_of(*parts):
+        talk(f"wrote {name}")
+    exit_for(result.findings, fail_on)

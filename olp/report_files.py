@@ -1,0 +1,128 @@
+"""Report files of a correction and of a comparison: HTML, JSON or Markdown by the ending of their name."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from olp import __version__, api
+from olp.comparing import Comparison
+from olp.document import Document, to_html, to_markdown
+from olp.exceptions import CannotCompute
+from olp.loading import lever_of, load
+from olp.machine import Setup
+from olp.measured.figures import Run
+from olp.measured.pairing import pair
+from olp.measured.path import Path
+from olp.nominal import nominal_of
+from olp.program.reader import Options, read
+from olp.report import to_json
+from olp.testpaths import predicted
+
+#: points of a predicted path in a picture, about
+_POINTS = 120_000
+_STEP_MM = 0.5
+
+
+def comparison(result: Comparison, setup: Setup | None, name: str, date: datetime.date | None) -> bytes:
+    """The report of a comparison in the form that `name` ends in."""
+    from olp import plots_path, report_document
+
+    report = dict(result.report)
+    if setup is not None:
+        report["test_paths"] = _tests(setup)
+    if FilePath(name).suffix.lower() == ".json":
+        return to_json(report)
+    plots: dict[str, bytes] = {}
+    runs = {"before": result.before, "after": result.runs}
+    if (
+        FilePath(name).suffix.lower() == ".html"
+        and result.path is not None
+        and any(r.counted.any() for r in result.runs)
+    ):
+        tolerance = report.get("tolerance_um")
+        plots = _path_plots(result.path, runs, tolerance) | {
+            "components": plots_path.components(result.path, runs)
+        }
+    return _written(
+        report_document.comparison(report, plots | _test_plots(report, name), __version__, date), name
+    )
+
+
+def correction(
+    result: api.Correction,
+    nominal: bytes,
+    setup: Setup,
+    name: str,
+    date: datetime.date | None,
+    *,
+    contour: bool,
+) -> bytes:
+    """The report of a correction in the form that `name` ends in; `nominal` is what was corrected."""
+    from olp import report_document
+
+    report = dict(result.report) | {"test_paths": _tests(setup)}
+    if FilePath(name).suffix.lower() == ".json":
+        return to_json(report)
+    plots: dict[str, bytes] = {}
+    if FilePath(name).suffix.lower() == ".html":
+        plots = _predicted_plots(result, nominal, setup, contour)
+    return _written(
+        report_document.correction(report, plots | _test_plots(report, name), __version__, date), name
+    )
+
+
+def _written(document: Document, name: str) -> bytes:
+    return to_html(document) if FilePath(name).suffix.lower() == ".html" else to_markdown(document)
+
+
+def _tests(setup: Setup) -> dict[str, Any]:
+    loaded = load(setup, None, "hold")
+    digit = max(setup.machine.least_increment_mm)
+    return predicted(loaded.model, np.array(lever_of(setup, None), float), digit)
+
+
+def _test_plots(report: Mapping[str, Any], name: str) -> dict[str, bytes]:
+    from olp import plots_path
+
+    tests = report.get("test_paths")
+    if not tests or FilePath(name).suffix.lower() != ".html":
+        return {}
+    return {
+        "circles": plots_path.circles(tests["circles"]),
+        "diagonals": plots_path.diagonals(tests["diagonals"]["rows"]),
+    }
+
+
+def _path_plots(path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float | None) -> dict[str, bytes]:
+    from olp import plots_path
+
+    return {
+        "picture": plots_path.picture(path, runs),
+        "along": plots_path.along(path, runs, tolerance),
+        "histogram": plots_path.histogram(runs, tolerance),
+    }
+
+
+def _predicted_plots(result: api.Correction, nominal: bytes, setup: Setup, contour: bool) -> dict[str, bytes]:
+    """Plots of where the tip would go, with the nominal and with the corrected program."""
+    loaded = load(setup, None, "hold")
+    program = read(nominal, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    try:
+        path = nominal_of(program.toolpath, loaded.model, "tip").path
+    except CannotCompute:
+        return {}
+    step = max(_STEP_MM, path.length_mm / _POINTS)
+    runs: dict[str, Sequence[Run]] = {}
+    for side, text in (("before", nominal), ("after", result.data)):
+        points = api.simulate(text, setup, step_mm=step, contour=contour).points_mm
+        # what the plots leave out is what has no place, such as a tool change
+        reach = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
+        runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)
+    if not all(run.counted.any() for group in runs.values() for run in group):
+        return {}
+    return _path_plots(path, runs, float(result.report["tolerance_um"]))

@@ -1,0 +1,74 @@
+"""Clearance by an independent library: coal, the successor of hpp-fcl."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from olp.clearance.distance import Swept
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A random bumpy surface with loose triangles, and cylinders or cones on straight ways among them."""
+
+    triangle: np.ndarray
+    start: np.ndarray
+    way: np.ndarray
+    level: np.ndarray
+    radius: np.ndarray
+    shape: str
+    mesh: Any
+
+    @staticmethod
+    def of(rng: np.random.Generator, shape: str, count: int = 25) -> Scene:
+        coal = pytest.importorskip("coal")
+        x = np.linspace(-60.0, 60.0, 25)
+        grid = np.stack([*np.meshgrid(x, x, indexing="ij"), rng.normal(size=(25, 25)) * 4.0], axis=-1)
+        a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+        faces = np.concatenate([np.stack(f, axis=-2).reshape(-1, 3, 3) for f in ((a, b, c), (a, c, d))])
+        loose = rng.uniform(-60.0, 60.0, (80, 1, 3)) + rng.normal(size=(80, 3, 3)) * 6.0
+        triangle = np.concatenate((faces, loose))
+        mesh = coal.BVHModelOBBRSS()
+        mesh.beginModel(len(triangle), 3 * len(triangle))
+        for one in triangle:
+            mesh.addTriangle(*one)
+        mesh.endModel()
+        level = np.sort(rng.uniform(0.0, 60.0, (count, 2)), axis=1) + np.array([0.0, 1.0])
+        start = rng.uniform((-80.0, -80.0, 0.0), (80.0, 80.0, 60.0), (count, 3))
+        way = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-2.0, 1.5, (count, 1))
+        return Scene(triangle, start, way, level, rng.uniform(0.1, 12.0, count), shape, mesh)
+
+    def swept(self) -> Swept:
+        top = self.radius if self.shape == "cylinder" else np.zeros(len(self.radius))
+        return Swept(self.start, self.way, self.level, np.stack([self.radius, top], axis=1))
+
+    def least(self, k: int, within_mm: float) -> tuple[float, float]:
+        """Bounds of the least distance on way k, no farther apart than that."""
+        import coal
+
+        long = float(self.level[k, 1] - self.level[k, 0])
+        form = (coal.Cylinder if self.shape == "cylinder" else coal.Cone)(float(self.radius[k]), long)
+        request = coal.DistanceRequest()
+        request.gjk_tolerance, request.gjk_max_iterations = 1e-10, 1000
+        middle = self.start[k] + [0.0, 0.0, float(self.level[k].mean())]
+        length = float(np.linalg.norm(self.way[k]))
+
+        def at(t: float) -> float:
+            place = coal.Transform3s(np.eye(3), middle + t * self.way[k])
+            result = coal.DistanceResult()
+            return max(float(coal.distance(form, place, self.mesh, coal.Transform3s(), request, result)), 0.0)
+
+        best = at(0.5)
+        queue = [(best - 0.5 * length, 0.0, 1.0)]
+        while queue and queue[0][0] < best - within_mm and best > 0.0:
+            _, a, b = heapq.heappop(queue)
+            for c, d in ((a, (a + b) / 2), ((a + b) / 2, b)):
+                value = at((c + d) / 2)
+                best = min(best, value)
+                heapq.heappush(queue, (value - 0.5 * (d - c) * length, c, d))
+        return max(min(queue[0][0], best), 0.0) if queue else best, best

@@ -1,0 +1,230 @@
+"""For every code of a finding, a program that triggers it and one that just does not."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acceptance import TRUE_ZERO, machine
+
+import olp
+
+DAY = datetime.date(2026, 11, 21)
+#: units, a path tolerance and known axes, so that nothing else is found
+HEAD = b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"
+TOUCH = "[work_offsets.G54]\n"
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of `check`, all of it from text."""
+
+    body: bytes = b"G1 X100\n"
+    head: bytes = HEAD
+    nominal: bytes | None = None
+    calibration: str = ""
+    curves: Mapping[str, str] = field(default_factory=dict)
+    tables: str = TRUE_ZERO
+    keys: str = ""
+    controller: str = "linuxcnc"
+    increment_mm: float = 0.001
+    job: str = ""
+    start: str = ""
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    swap: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def machine(self, folder: Path) -> Path:
+        job = f"start_mm = {{ {self.start} }}\n{self.job}"
+        path = machine(
+            folder, self.calibration, self.curves, controller=self.controller, keys=self.keys,
+            tables=self.tables, job=job, increment_mm=self.increment_mm,
+        )  # fmt: skip
+        for name, data in self.files.items():
+            (folder / name).write_bytes(data)
+        for old, new in self.swap.items():
+            for file in (path, path.with_name("calibration.toml")):
+                file.write_text(file.read_text().replace(old, new, 1))
+        return path
+
+    def program(self) -> bytes:
+        return self.head + self.body
+
+    def run(self, folder: Path) -> olp.Check:
+        path = self.machine(folder)
+        nominal = None if self.nominal is None else self.head + self.nominal
+        options = {"date": DAY, **self.options}
+        return olp.check(self.program(), path, path.with_name("job.toml"), nominal=nominal, **options)
+
+
+def box(x_most: float) -> dict[str, str]:
+    return {"box_mm = [[-1000.0, 2000.0]": f"box_mm = [[-1000.0, {x_most}]"}
+
+
+def travel(x_most: float) -> dict[str, str]:
+    return {"travel_mm = [-1000.0, 2000.0]": f"travel_mm = [-1000.0, {x_most}]"}
+
+
+def tool(z_mm: float, more: str = "") -> str:
+    return f"{TRUE_ZERO}[tools.1]\nZ_mm = {z_mm}\nradius_mm = 5.0\n{more}[job_defaults]\ntool = 1\n"
+
+
+def curve(z_mm: float) -> dict[str, Any]:
+    table = f'[[curves]]\nfile = "x.csv"\ntool_mm = [0.0, 0.0, {z_mm}]\n'
+    return {"calibration": table, "curves": {"x.csv": "X_mm,EXX_um\n-1000,0\n2000,1\n"}}
+
+
+def scaled(um: float) -> dict[str, Any]:
+    """An error of X that grows from 0 at 0 to so much at 100 mm."""
+    table = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
+    return {
+        "calibration": table,
+        "curves": {"x.csv": f"X_mm,EXX_um\n-1000,{-10 * um}\n2000,{20 * um}\n"},
+    }
+
+
+def roll(urad: float) -> dict[str, Any]:
+    table = '[[curves]]\nfile = "x.csv"\n'
+    return {"calibration": table, "curves": {"x.csv": f"X_mm,EAX_urad\n-1000,{urad}\n2000,{urad}\n"}}
+
+
+ARC = b"G1 X100 Y-10\nG3 X100 Y10 I0 J10\n"
+STAMP = b"(olp-corrected 0123456789ab olp 0)\n"
+BACK = "[backlash]\nX_um = 20.0\n"
+WIGGLE = b"G1 X100\n" + b"".join(b"G1 X%.3f\n" % (100 + 0.15 * (k % 2)) for k in range(1, 8))
+SLOWER = b"".join(b"G1 X%.3f\n" % (100 + 0.25 * (k % 2)) for k in range(1, 8))
+FANUC = b"G21 G90 G54\nG0 X0. Y0. Z0.\nF600\n"
+
+
+def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> bytes:
+    """A box as ASCII STL."""
+    corner = [[(low, high)[(k >> i) & 1][i] for i in range(3)] for k in range(8)]
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
+    out = ["solid box"]
+    for face in faces:
+        out += ["facet normal 0 0 0", "outer loop"]
+        out += ["vertex {:.17g} {:.17g} {:.17g}".format(*corner[k]) for k in face]
+        out += ["endloop", "endfacet"]
+    return ("\n".join([*out, "endsolid box"]) + "\n").encode()
+
+
+def clamp(high: float, role: str = "fixture", frame: str = "G54") -> dict[str, Any]:
+    """A block in the way from X0 to X100, between X40 and X60, whose top is at `high`."""
+    return {
+        "job": f'[[meshes]]\nfile = "clamp.stl"\nrole = "{role}"\nframe = "{frame}"\n',
+        "files": {"clamp.stl": block((40.0, -10.0, -50.0), (60.0, 10.0, high))},
+    }
+
+
+OVER = b"G0 Z10\nG0 X100\n"
+
+#: code -> (a call that triggers it, one that just does not)
+CASES: dict[str, tuple[Call, Call]] = {
+    # allowed: 1 um and 0.87 of a digit of 1 um
+    "OLP101": (
+        Call(b"G1 X100.002\n", nominal=b"G1 X100\n"),
+        Call(b"G1 X100.001\n", nominal=b"G1 X100\n"),
+    ),
+    "OLP102": (Call(b"G53 G0 Z0\n"), Call(b"G0 Z0\n")),
+    "OLP103": (
+        Call(calibration="[backlash]\nX_um = 2.01\n"),
+        Call(calibration="[backlash]\nX_um = 2.0\n"),
+    ),
+    "OLP104": (Call(b"G1 X100 A90\n"), Call(b"G1 X100\n")),
+    # the middle of the stroke is exact: its ends are off by 100 urad times half of it
+    "OLP105": (
+        Call(b"G81 X10 Y10 Z-21 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
+        Call(b"G81 X10 Y10 Z-19 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
+    ),
+    "OLP106": (Call(tables=tool(100.0), **roll(201.0)), Call(tables=tool(100.0), **roll(199.0))),
+    "OLP107": (Call(b"G53 G0 X0 Y0 Z0\n", head=b"G21 G90\n"), Call()),
+    "OLP201": (Call(b"G64\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
+    "OLP202": (
+        Call(b"G64 P0.0101 Q0\nG1 X100\n", **scaled(10.0)),
+        Call(b"G64 P0.0099 Q0\nG1 X100\n", **scaled(10.0)),
+    ),
+    "OLP203": (Call(b"G64 P0.0001\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
+    # short is below 10 times the lost motion, less what the correction takes up
+    "OLP204": (Call(WIGGLE, calibration=BACK), Call(b"G1 X100\n" + SLOWER, calibration=BACK)),
+    "OLP205": (Call(b"G1 X100 F30001\n"), Call(b"G1 X100 F30000\n")),
+    # 2000 mm/s2 at a radius of 5 mm: 100 mm/s
+    "OLP206": (Call(b"G1 X100\nG2 I5 F6010\n"), Call(b"G1 X100\nG2 I5 F5990\n")),
+    "OLP301": (
+        Call(head=b"G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"),
+        Call(head=b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"),
+    ),
+    "OLP302": (
+        Call(b"G1 X1000\n", head=FANUC, controller="fanuc"),
+        Call(b"G1 X1000.\n", head=FANUC, controller="fanuc"),
+    ),
+    "OLP303": (Call(tables=TOUCH), Call(tables=TRUE_ZERO)),
+    "OLP304": (Call(b"/G1 X100 Y0 Z0\nG1 X100 Y0 Z0\n"), Call(b"G1 X100 Y0 Z0\n")),
+    "OLP305": (
+        Call(b"G41 D1\nG1 X100\nG40\n", tables=tool(50.0), options={"contour": True}),
+        Call(b"G1 X100\nG40\n", tables=tool(50.0)),
+    ),
+    "OLP306": (
+        Call(b"(olp off)\nG1 X100\n(olp on)\nG1 Y100\n", **scaled(10.0)),
+        Call(b"G1 X100\nG1 Y100\n", **scaled(10.0)),
+    ),
+    "OLP307": (
+        Call(b"G93 G1 X100 F10\nG1 X200\n"),
+        Call(b"G93 G1 X100 F10\nG1 X200 F10\n"),
+    ),
+    "OLP308": (Call(b"G95 S100 M3\nG1 X100 F1\n"), Call(b"G94 S100 M3\nG1 X100 F1\n")),
+    "OLP309": (
+        Call(b"G1 X100 F631\n", nominal=b"G1 X100 F600\n"),
+        Call(b"G1 X100 F629\n", nominal=b"G1 X100 F600\n"),
+    ),
+    "OLP310": (
+        Call(b"G0 Z49.998\nX100\n", nominal=b"G0 Z50\nX100\n"),
+        Call(b"G0 Z49.999\nX100\n", nominal=b"G0 Z50\nX100\n"),
+    ),
+    "OLP311": (Call(b"G1 X1\n" + STAMP * 2), Call(b"G1 X1\n" + STAMP)),
+    "OLP312": (Call(b"G1 X1\n" + STAMP), Call(b"G1 X1\n")),
+    "OLP401": (
+        Call(swap={"valid_until = 2099-01-01\n": ""}, options={"date": datetime.date(2027, 1, 16)}),
+        Call(swap={"valid_until = 2099-01-01\n": ""}, options={"date": datetime.date(2027, 1, 15)}),
+    ),
+    "OLP402": (Call(ARC, swap=travel(109.999)), Call(ARC, swap=travel(110.0))),
+    "OLP403": (
+        Call(ARC, swap=box(109.999), options={"outside_box": "hold"}),
+        Call(ARC, swap=box(110.0), options={"outside_box": "hold"}),
+    ),
+    "OLP404": (Call(keys='compensated_by_controller = ["EXX"]\n'), Call()),
+    "OLP405": (Call(ARC, swap=box(109.999)), Call(ARC, swap=box(110.0))),
+    "OLP406": (
+        Call(tables=tool(150.1), **curve(-50.0)),
+        Call(tables=tool(150.0), **curve(-50.0)),
+    ),
+    "OLP407": (
+        Call(job="[temperatures_degC]\nX_scale = 25.1\n"),
+        Call(job="[temperatures_degC]\nX_scale = 25.0\n"),
+    ),
+    "OLP408": (Call(options={"date": None}), Call()),
+    "OLP409": (Call(**scaled(1011.0)), Call(**scaled(1009.0))),
+    "OLP410": (
+        Call(keys='compensated_by_controller = "all"\n'),
+        Call(keys="compensated_by_controller = []\n"),
+    ),
+    "OLP411": (
+        Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
+        Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
+    ),
+    "OLP701": (
+        Call(OVER, tables=tool(50.0), **clamp(10.0)),
+        Call(OVER, tables=tool(50.0), **clamp(9.999)),
+    ),
+    "OLP702": (
+        Call(OVER, tables=tool(50.0), **clamp(9.001)),
+        Call(OVER, tables=tool(50.0), **clamp(8.999)),
+    ),
+    "OLP703": (
+        Call(OVER, tables=tool(50.0).replace("Z_mm = 50.0", "Z_mm = 0.0"), **clamp(0.0)),
+        Call(OVER, tables=tool(50.0), swap={}, **clamp(0.0), start="X = 0.0, Y = 0.0, Z = 0.0"),
+    ),
+}
