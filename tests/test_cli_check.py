@@ -181,7 +181,7 @@ def test_programs_come_from_stdin_as_well(tmp_path: Path) -> None:
 
 def test_the_gate_passes_what_correct_wrote(tmp_path: Path) -> None:
     folder = tmp_path / "mill"
-    shutil.copytree(Path(olp.__file__).parents[1] / "programs" / "haas-mill", folder)
+    shutil.copytree(Path(__file__).parents[1] / "programs" / "haas-mill", folder)
     job = ("-j", folder / "job.toml")
     assert run("correct", *job, "-q", "-o", folder / "out.nc").exit_code == 0
     pair = run("check", folder / "out.nc", *job, "--nominal", folder / "bracket.nc")
