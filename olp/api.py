@@ -12,14 +12,15 @@ import numpy as np
 from olp import checks
 from olp.compensation.plan import zero_shifts
 from olp.compensation.stamp import find_stamp
-from olp.correction import Progress, correct_bytes, verify_programs
+from olp.correction import correct_bytes, verify_programs
 from olp.errormodel.base import Array
-from olp.exceptions import ConfigError, OlpError
+from olp.exceptions import ConfigError, OlpError, naming
 from olp.files.config import load_setup as load_setup
 from olp.findings import Finding
 from olp.loading import PathLike, lever_of, load, profile_of, setup_of, source_of, unrolled
 from olp.machine import Setup
 from olp.program.reader import Options, read
+from olp.progress import Progress, silent
 from olp.toolpath import Kind
 
 
@@ -82,14 +83,12 @@ def correct(
     InputError (ProgramError with its line, ConfigError, OutsideBox) and CannotCompute.
     """
     data, name = source_of(program)
-    try:
+    with naming(name):
         run = correct_bytes(
             data, name, load(machine, job, outside_box), tolerance_um=tolerance_um,
             hold=outside_box == "hold", unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm,
-            contour=contour, rapids=split_rapids, date=date, tell=progress or _silent,
+            contour=contour, rapids=split_rapids, date=date, tell=progress or silent,
         )  # fmt: skip
-    except OlpError as error:
-        raise (error.in_file(name) if name and error.line is not None else error) from None
     return Correction(run.text, run.report, run.findings)
 
 
@@ -110,7 +109,7 @@ def verify(
     Raises ProgramError where the second is no correction of the first.
     """
     loaded = load(machine, job, outside_box)
-    tell = progress or _silent
+    tell = progress or silent
     options = Options(contour=contour)
     texts = [source_of(p) for p in (nominal, corrected)]
     programs = []
@@ -241,10 +240,6 @@ def flatten(
         return unrolled(data, name, profile_of(setup_of(machine, job)), expand_cycles)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
-
-
-def _silent(what: str, share: float) -> None:
-    return None
 
 
 __all__ = [

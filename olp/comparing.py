@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any, Literal
@@ -27,9 +27,8 @@ from olp.nominal import Nominal, nominal_of
 from olp.poses import part_frame, poses_report
 from olp.program.program import Program
 from olp.program.reader import Options, read
+from olp.progress import Progress, silent
 from olp.units import UM_PER_MM
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +103,7 @@ def compare(
     figure. With `add_errors` measured axis positions (a control's log) are moved to where the calibrated
     machine's tip would go. Raises InputError, UsageError and CannotCompute.
     """
-    tell = progress or (lambda what, share: None)
+    tell = progress or silent
     options = {"align": align, "reach_mm": reach_mm, "tolerance_um": tolerance_um}
     tell("read", 0.0)
     if not measured:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,11 +23,10 @@ from olp.loading import Loaded, unrolled
 from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
+from olp.progress import Progress
 from olp.proof import Proof, prove
 from olp.toolpath import Flag, Index, Toolpath
 from olp.units import MM_PER_UM
-
-Progress = Callable[[str, float], None]
 
 _PROVES = (
     "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",

@@ -16,6 +16,9 @@ Each holds its data and builds its message in `__str__`, as
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+
 
 class OlpError(Exception):
     """Base of all errors of `olp`; `exit_code` is the status of the command line."""
@@ -88,3 +91,12 @@ class CannotCompute(OlpError):
 
 class NotInvertible(CannotCompute):
     """No command reaches the target within 1e-9 mm: the error grows as fast as the position."""
+
+
+@contextlib.contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Errors with a line that name no file are of this one; with "" they stay as they are."""
+    try:
+        yield
+    except OlpError as error:
+        raise (error.in_file(file) if file and error.line is not None else error) from None

@@ -141,7 +141,7 @@ _TABLE = (
         Severity.INFO,
         "On this control a length without a decimal point counts least increments: X100 is 0.1 mm.",
         'If the control is set to calculator-type input, state decimal_point = "calculator" in the machine '
-        'file.',
+        "file.",
         "`X100` on a Fanuc control.",
     ),
     Rule(

@@ -15,9 +15,9 @@ from olp.checks import motion, state
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.compensation.stamp import find_stamp
-from olp.correction import Progress, Run, correct_bytes, last_digit_mm, verify_programs
+from olp.correction import Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
-from olp.exceptions import OlpError, UsageError
+from olp.exceptions import OlpError, UsageError, naming
 from olp.files.meshes import read_mesh
 from olp.findings import GATE_CODES, Finding
 from olp.geometry import PLANES
@@ -25,6 +25,7 @@ from olp.loading import Loaded, PathLike, load, setup_of, source_of
 from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
+from olp.progress import Progress, silent
 from olp.proof import Proof
 from olp.toolpath import Flag
 from olp.units import MM_PER_UM, RAD_PER_URAD
@@ -98,7 +99,7 @@ def check(
     (ProgramError with its line), and CannotCompute.
     """
     codes = chosen(select, ignore)
-    tell = progress or _silent
+    tell = progress or silent
     setup = setup_of(machine, job)
     everything = "all" in setup.machine.compensated_by_controller
     if everything:
@@ -107,13 +108,11 @@ def check(
     data, name = source_of(program)
     outside = "OLP405" if outside_box == "refuse" else "OLP403"
     options = Options(contour=contour)
-    try:
+    with naming(name):
         case = _case(data, name, nominal, loaded, options, tolerance_um, date, outside, tell)
         tell("check", 0.8)
         found = _findings(case, tolerance_um * MM_PER_UM, outside, date, contour)
         around = _clearances(case, codes, tell)
-    except OlpError as error:
-        raise (error.in_file(name) if name and error.line is not None else error) from None
     if everything:
         found.append(finding("OLP410", 'compensated_by_controller is "all"'))
     if around is not None:
@@ -287,7 +286,3 @@ def _report(
         "rules": codes,
         "findings": [f.as_dict() for f in found],
     }
-
-
-def _silent(what: str, share: float) -> None:
-    return None

@@ -82,9 +82,7 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(
-    data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None
-) -> bytes:
+def unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
     """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it."""
     from olp.program.flatten import flatten as unroll
 

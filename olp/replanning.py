@@ -3,7 +3,7 @@ deviation bounded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.exceptions import CannotCompute, OlpError, UsageError
+from olp.exceptions import CannotCompute, OlpError, UsageError, naming
 from olp.loading import profile_of, unrolled
 from olp.machine import Setup
 from olp.program.feed_words import Shared, check_feeds, write_feeds
@@ -20,13 +20,12 @@ from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.program.state import PathMode
 from olp.program.timing import BLEND_MM
+from olp.progress import Progress
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
 from olp.trajectory.inertia import Inertial, capped, sure
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import Array, AxisLimits, Route
 from olp.trajectory.usage import LineUse, SlowPlaces, usage
-
-Progress = Callable[[str, float], None]
 
 #: plans that a bound on the inertial deviation may take before it is made sure of
 _TRIALS = 3
@@ -57,7 +56,7 @@ class Case:
     ) -> Case:  # fmt: skip
         """Raises ProgramError with its file and line; CannotCompute where nothing of it can be timed."""
         stated = setup.machine.blend_mm
-        try:
+        with naming(name):
             profile = profile_of(setup)
             text = unrolled(data, name, profile, False) if flatten else data
             program = read(text, setup, profile, Options(block_delete=block_delete, contour=contour))
@@ -70,8 +69,6 @@ class Case:
                 "the call" if blend_mm is not None else "the machine file" if stated else "the default",
                 block_delete, contour, (),
             ).driven()  # fmt: skip
-        except OlpError as error:
-            raise (error.in_file(name) if name and error.line is not None else error) from None
         if not case.legs and case.untimed()["moves"]:
             raise CannotCompute(
                 "no move of the program begins and ends at known positions of all axes, so nothing can be "

@@ -14,7 +14,8 @@ from olp.loading import PathLike, profile_of, setup_of, source_of
 from olp.machine import Setup
 from olp.plots import Format as Picture
 from olp.program.feed_words import Shared
-from olp.replanning import Case, Plan, Progress, blend_study, planned, with_feeds, within_inertial
+from olp.progress import Progress, silent
+from olp.replanning import Case, Plan, blend_study, planned, with_feeds, within_inertial
 from olp.trajectory.from_program import axis_limits
 from olp.trajectory.inertia import Inertial, compliance_of
 from olp.trajectory.plan import Trajectory
@@ -125,7 +126,7 @@ class Retiming:
         least planned feed of them. Raises ProgramError for a feed that cannot be written in the style of
         its word.
         """
-        data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or _silent)
+        data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or silent)
         return data
 
     def plots(
@@ -173,10 +174,6 @@ _WRITERS: Mapping[Format, Callable[[Trajectory, float], Iterator[bytes]]] = {
 }  # fmt: skip
 
 
-def _silent(what: str, share: float) -> None:
-    return None
-
-
 def numbered(target: Path, number: int) -> Path:
     """The file of a stretch, counted from 1, where there are several."""
     return target.with_name(f"{target.stem}-{number}{target.suffix}")
@@ -211,7 +208,7 @@ def retime(
     """
     setup = setup_of(machine, job)
     profile_of(setup)
-    tell = progress or _silent
+    tell = progress or silent
 
     def case_of(source: PathLike | bytes) -> Case:
         return Case.of(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from olp.compensation.invert import invert
-from olp.errormodel import ErrorModel, play_states
+from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array
 from olp.units import UM_PER_MM
 
@@ -39,17 +39,12 @@ def _runs(model: ErrorModel, target: Array, tool: Array, digit: float) -> dict[s
     command = target
     for _ in range(2):
         # the flank depends on the corrected commands, and they on the flank
-        command = invert(model, target, tool, _play(model, command))
+        command = invert(model, target, tool, plays(model, command))
     command = np.round(command / digit) * digit
     return {
-        name: c + model.error(c, tool, _play(model, c))
+        name: c + model.error(c, tool, plays(model, c))
         for name, c in (("before", target), ("after", command))
     }
-
-
-def _play(model: ErrorModel, command: Array) -> Array | None:
-    width = model.lost_motion_mm(command)
-    return None if width is None else play_states(command, width)
 
 
 def _circle(model: ErrorModel, tool: Array, digit: float, plane: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import olp
 PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
-    {"exceptions", "rule", "units"},
+    {"exceptions", "progress", "rule", "units"},
     {"gate_rules"},
     {"findings"},
     {"geometry", "tables"},

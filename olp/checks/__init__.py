@@ -53,9 +53,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     if deleted.any():
         lines = lines_of(path, deleted)
         out.append(
-            finding(
-                "OLP304", f"{len(lines)} blocks stand under block delete; proved with and without", lines
-            )
+            finding("OLP304", f"{len(lines)} blocks stand under block delete; proved with and without", lines)
         )
     assumed = sorted({
         f.work_offset for f in path.frames

@@ -6,7 +6,7 @@ the tip is at the axis position plus its tool vector; a mesh of role machine sta
 F carry the workpiece.
 
 What cuts may touch the workpiece in feed moves. In a rapid that begins or ends at one, it leaves or reaches
-what it cuts: there it counts less `SLACK_MM` all around, and only contact counts. """
+what it cuts: there it counts less `SLACK_MM` all around, and only contact counts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from olp.clearance.search import CONTACT_MM, Best, search
 from olp.clearance.sweep import CHORD_MM, Ways, ways_of
 from olp.clearance.tree import Tree
 from olp.compensation.plan import zero_shifts
-from olp.errormodel import ErrorModel, play_states
+from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array, Mask
 from olp.findings import Finding
 from olp.machine import Mesh, Setup, WorkOffset
@@ -110,7 +110,7 @@ def clearances(path: Toolpath, model: ErrorModel, setup: Setup, solids: Sequence
     """The least clearance of each block of a path, with its place.
 
     Distances are exact to `CLOSE_MM` along the straight ways between way-points and along arcs
-    (`CHORD_MM`), for the tip that the error model gives at the way-points. """
+    (`CHORD_MM`), for the tip that the error model gives at the way-points."""
     names: list[str] = []
     best = Best.of(len(path))
     seen = np.zeros(len(path), bool)
@@ -183,8 +183,7 @@ class _Tips:
 
     @staticmethod
     def of(path: Toolpath, model: ErrorModel, setup: Setup) -> _Tips:
-        lost = model.lost_motion_mm(path.end_mm) if len(path) else None
-        play = None if lost is None else play_states(path.end_mm, lost)
+        play = plays(model, path.end_mm) if len(path) else None
         end = path.end_mm + model.error(path.end_mm, path.tool_mm(), play)
         origin = np.array(path.start_mm)[None]
         start = np.concatenate((origin + model.error(origin, path.tools_mm()[:1][0]), end[:-1]))

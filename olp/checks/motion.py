@@ -73,7 +73,7 @@ def demand_findings(path: Toolpath, feed_mm_s: Array, machine: Machine) -> list[
     """Velocities and accelerations of an axis that the programmed feed asks for, beyond its limits.
 
     On arcs v^2 / r towards the centre; at joints of feed moves that turn by less than 20 degrees the change
-    of velocity over half the time of both moves. """
+    of velocity over half the time of both moves."""
     axes = [machine.axes[name] for name in "XYZ"]
     velocity, acceleration = _demands(path, feed_mm_s)
     out = []

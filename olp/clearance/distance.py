@@ -3,7 +3,7 @@
 Both are convex, and so is what all differences of their points make: its point nearest to the origin is
 searched with the algorithm of Gilbert, Johnson and Keerthi (IEEE Journal of Robotics and Automation 4,
 1988, 193-203), with support points of the true round shape. Each step gives an upper bound, the point
-found, and a lower one, the plane through its support point: the search ends where they meet. """
+found, and a lower one, the plane through its support point: the search ends where they meet."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def _weights(found: Array) -> Array:
     newest.
 
     That corner takes part, so its own faces are all that is looked at: 3 edges, 3 triangles, the whole.
-    Corners may coincide. """
+    Corners may coincide."""
     first = found[:, 0]
     edge = found[:, 1:] - first[:, None]
     gram = np.einsum("nik,njk->nij", edge, edge)

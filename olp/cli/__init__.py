@@ -5,14 +5,13 @@ Every error of `olp` becomes one `olp: error: ...` on stderr and an exit code he
 
 from __future__ import annotations
 
-import difflib
-import importlib
 import os
 
 import click
 
 from olp import __version__
 from olp.cli.common import silence_stdout, talk
+from olp.cli.late import LateGroup
 from olp.exceptions import OlpError
 
 #: Verb to what it does. Kept here so that `olp --help` imports no verb.
@@ -26,6 +25,7 @@ VERBS = {
     "check": "Say whether a program may run: a gate with findings, for people and pipelines.",
     "view": "Show a job in the browser: paths, enlarged errors, time, program text.",
     "compare": "Hold measured runs against a nominal path: deviations, ISO 9283 figures.",
+    "calibrate": "Make a calibration from measurements; read and write the tables of controls.",
     "schema": "Print the JSON Schema of a machine, calibration or job file.",
     "explain": "Explain the code of a finding, or list all codes.",
 }
@@ -38,31 +38,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
-class _Verbs(click.Group):
-    """A group of verbs that are imported late."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(VERBS)
-
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in VERBS:
-            return None
-        command: click.Command = importlib.import_module(f"olp.cli.{name}").command
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        name = args[0]
-        if name not in VERBS and not name.startswith("-"):
-            near = difflib.get_close_matches(name, VERBS, 1)
-            hint = f"did you mean {near[0]}?" if near else "see olp --help"
-            ctx.fail(f"there is no verb {name!r}; {hint}")
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Verbs"):
-            formatter.write_dl(list(VERBS.items()))
+class _Verbs(LateGroup):
+    """The verbs; an error of ours ends in one line and an exit code."""
 
     def invoke(self, ctx: click.Context) -> object:
         try:
@@ -89,6 +66,8 @@ Exit codes: 0 good; 1 findings at or above --fail-on; 2 wrong call; 3 input unre
 4 no answer; 130 interrupted."""
 
 main = _Verbs(
+    VERBS,
+    "olp.cli.{}",
     name="olp",
     help=_HELP,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

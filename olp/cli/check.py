@@ -96,7 +96,7 @@ def command(
     """May this program run on this machine? A gate before deployment.
 
     A nominal PROGRAM is corrected, and what that gives is checked; a corrected one is checked as it is, and
-    against NOMINAL where that is given. """
+    against NOMINAL where that is given."""
     call = given(program, machine, job)
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")

@@ -101,9 +101,7 @@ def _cut_batch(
     active = np.arange(len(move))
     stride = last.copy()
     while active.size:
-        reach = _longest(
-            across, first[active], begin[active], last[active], stride[active], tolerance, _FEW
-        )
+        reach = _longest(across, first[active], begin[active], last[active], stride[active], tolerance, _FEW)
         # the search looks at few samples of a long chord; what it found is tested at all of them
         wrong = np.flatnonzero(~_fits(across, first[active], begin[active], reach, tolerance, _ALL))
         if wrong.size:

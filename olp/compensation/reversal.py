@@ -88,7 +88,7 @@ def _may_turn(path: Toolpath, rows: Plan) -> Mask:
     """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place."""
     may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
-    may[0] = False
+    may[:1] = False
     may[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
     return np.asarray(may, bool)
 

@@ -12,7 +12,7 @@ from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.chain import RigidBody
 from olp.errormodel.huddersfield import huddersfield
-from olp.errormodel.reversal import play_interval, play_states
+from olp.errormodel.reversal import play_interval, play_states, plays
 from olp.errormodel.thermal import ThermalExpansion
 from olp.errormodel.total import total
 from olp.exceptions import ConfigError
@@ -27,6 +27,7 @@ __all__ = [
     "build",
     "play_interval",
     "play_states",
+    "plays",
     "total",
 ]
 

@@ -89,9 +89,7 @@ def axis_bounds(bodies: Sequence[Body], box_mm: Array, tool: Array, *, second_or
     return [bound for bound in found if bound is not None]
 
 
-def _axis_bound(
-    body: Body, reach: Array, extra: float, widened: float, lipschitz: float
-) -> AxisBound | None:
+def _axis_bound(body: Body, reach: Array, extra: float, widened: float, lipschitz: float) -> AxisBound | None:
     parts = body.components.variation
     if all(v is None or not v.varies for v in parts):
         return None

@@ -14,9 +14,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel.base import Array
+from olp.errormodel.base import Array, ErrorModel
 from olp.errormodel.boxed import as_points
 from olp.exceptions import UsageError
+
+
+def plays(model: ErrorModel, axis_mm: Array) -> Array | None:
+    """(n, 3) play at successive commands (n, 3) from an unknown start; None where no axis has lost motion."""
+    width = model.lost_motion_mm(axis_mm)
+    return None if width is None else play_states(axis_mm, width)
 
 
 def play_states(axis_mm: Array, lost_motion_mm: Array, start: Array | None = None) -> Array:

@@ -27,9 +27,7 @@ def clear_length_mm(model: ErrorModel, tools_mm: Array, bend_mm: float) -> float
 def longer(delta_mm: Array, length_mm: float) -> npt.NDArray[np.int64]:
     """Moves by `delta_mm` (n, 3) that are longer than that along an axis; unknown ones are not."""
     size = np.abs(delta_mm)
-    return np.flatnonzero(
-        (size[:, 0] > length_mm) | (size[:, 1] > length_mm) | (size[:, 2] > length_mm)
-    )
+    return np.flatnonzero((size[:, 0] > length_mm) | (size[:, 1] > length_mm) | (size[:, 2] > length_mm))
 
 
 def steps_needed(

@@ -242,9 +242,7 @@ class State:
         if repeats == 0:
             return ()
         xy, step = self._place(given, first, second)
-        r, z = levels(
-            self._needed("r"), self._needed(depth), absolute=self.absolute, initial_z=self.initial
-        )
+        r, z = levels(self._needed("r"), self._needed(depth), absolute=self.absolute, initial_z=self.initial)
         self.at(tool)
         strokes = cycle_moves(
             code,

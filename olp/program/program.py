@@ -107,4 +107,3 @@ class Program:
         if self.data[end : end + 1] in (b"\n", b"\r"):
             return self.data[end : end + 1]
         return b"\r\n" if b"\r\n" in self.data[:4096] else b"\n"
-

@@ -29,7 +29,7 @@ class Proof:
 
     `written` is the path of the corrected program, and `groups` (n,) the last of its moves that belongs to
     each nominal one. `digit_mm` is the coarsest last digit written. `allowed_mm` is tolerance plus
-    rounding. """
+    rounding."""
 
     nominal: Toolpath
     written: Toolpath

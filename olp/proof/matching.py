@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.deviation import Index
-from olp.errormodel import ErrorModel, play_states
+from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
 from olp.program.program import Program
@@ -32,8 +32,7 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         )
     if extra == 0:
         return np.arange(count)
-    lost = model.lost_motion_mm(path.end_mm)
-    play = None if lost is None else play_states(path.end_mm, lost)
+    play = plays(model, path.end_mm)
     actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
     loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)

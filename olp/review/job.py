@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,15 +12,16 @@ import numpy as np
 
 from olp import api
 from olp.compensation.plan import targets, zero_shifts
-from olp.correction import Progress, last_digit_mm
+from olp.correction import last_digit_mm
 from olp.errormodel.base import Array
-from olp.exceptions import ConfigError, OlpError
+from olp.exceptions import ConfigError, naming
 from olp.files.measured import read_measured
 from olp.files.write import read_bytes, write_bytes
 from olp.loading import Loaded, PathLike, load, source_of, unrolled
 from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
+from olp.progress import Progress, silent
 from olp.proof.matching import match as match_moves
 from olp.retiming import retime
 from olp.review.listing import aligned
@@ -91,12 +91,12 @@ def view(
     programmed feed. `step_mm` is the distance between samples. Raises InputError (ProgramError with its line,
     ConfigError) and CannotCompute.
     """
-    tell = progress or _silent
+    tell = progress or silent
     data, name = source_of(program)
     loaded = load(machine, job, "hold" if corrected is not None else outside_box)
     setup, options = loaded.setup, Options(contour=contour)
     if flatten or expand_cycles:
-        with _in_file(name):
+        with naming(name):
             data = unrolled(data, name, loaded.profile, expand_cycles, peck_clearance_mm)
     if corrected is not None:
         other, corrected_name = source_of(corrected)
@@ -105,15 +105,15 @@ def view(
         ).report
     else:
         if correction is None:
-            with _in_file(name):
+            with naming(name):
                 correction = api.correct(
                     data, setup, tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
                     progress=progress,
                 )  # fmt: skip
         other, report = correction.data, correction.report
-    with _in_file(name):
+    with naming(name):
         nominal = read(data, setup, loaded.profile, options)
-    with _in_file(corrected_name):
+    with naming(corrected_name or (f"{name} (corrected)" if name else "")):
         second = read(other, setup, loaded.profile, options)
         groups = _groups(nominal, second, loaded, tolerance_um)
         tell("sample", 0.0)
@@ -147,15 +147,6 @@ def view(
         tool_radius_mm=_radius(setup, nominal),
     )
     return Review(scene)
-
-
-@contextlib.contextmanager
-def _in_file(name: str) -> Iterator[None]:
-    """Errors with a line are of this file."""
-    try:
-        yield
-    except OlpError as error:
-        raise (error.in_file(name) if name and error.line is not None else error) from None
 
 
 def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples, Array]:
@@ -219,7 +210,3 @@ def _radius(setup: Setup, nominal: Program) -> float:
     numbers = [f.tool for f in nominal.toolpath.frames if f.tool is not None]
     tools = [setup.tool(number) for number in numbers]
     return max((tool.radius_mm for tool in tools if tool is not None), default=0.0)
-
-
-def _silent(what: str, share: float) -> None:
-    return None

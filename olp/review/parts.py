@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel import ErrorModel, play_states
+from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array
 from olp.geometry import PLANES, arc_points
 from olp.program.feeds import lengths_mm
@@ -198,11 +198,6 @@ def held_mm(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:
         (move > 0) & np.isin(path.kind[move], _STRAIGHT), path.frame[np.maximum(move - 1, 0)], own
     )
     return np.asarray(shift[before] + share[:, None] * (shift[own] - shift[before]))
-
-
-def plays(model: ErrorModel, points: Array) -> Array | None:
-    width = model.lost_motion_mm(points)
-    return None if width is None else play_states(points, width)
 
 
 def error_mm(model: ErrorModel, points: Array, tool: Array, move: Index, play: Array | None) -> Array:

@@ -13,13 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import zero_shifts
-from olp.errormodel import ErrorModel
+from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.exceptions import CannotCompute
 from olp.program.feeds import lengths_mm
 from olp.program.program import Program
-from olp.review.parts import BLOCK, Ends, Index, Parts, error_mm, held_mm, plays, set_beside, set_in_holes
+from olp.review.parts import BLOCK, Ends, Index, Parts, error_mm, held_mm, set_beside, set_in_holes
 from olp.toolpath import Kind, Toolpath
 
 #: samples that a path is given unless its length asks for fewer, and the shortest and longest step between
@@ -96,7 +96,8 @@ def sample(
     set_in_holes(nominal, corrected, move, axis, command)
     result = error_mm(model, command, tool, move, play_there) - held + (command - axis)
     # of several samples at one place the last stands for all: what came before took up lost motion
-    keep = np.append((np.diff(move) != 0) | (np.diff(share) > 1e-12), True)
+    keep = np.ones(len(move), bool)
+    keep[:-1] = (np.diff(move) != 0) | (np.diff(share) > 1e-12)
     keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(result).all(axis=1)
     if not keep.any():
         raise CannotCompute(

@@ -8,13 +8,14 @@ out, and the exact stop at every way-point always remains.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from olp.exceptions import CannotCompute
+from olp.progress import Progress
 from olp.trajectory.audit import Audit, Ratios, with_jumps
 from olp.trajectory.contest import contest, fastest, stops_of
 from olp.trajectory.motion import Array, Index, Motion
@@ -22,8 +23,6 @@ from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import needs_stop
 from olp.trajectory.solvers import Run
 from olp.trajectory.stretches import Stretch, least_to_optimise, runs_of, together
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

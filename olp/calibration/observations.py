@@ -1,0 +1,141 @@
+"""Readings of instruments as values, in the one sense of this package: actual minus commanded, of the tool
+relative to the workpiece, right-handed, mm and rad, by axis position.
+
+Readers turn units, senses and instruments' habits into these types; nothing after them knows another sense.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.exceptions import ConfigError
+from olp.machine import COMPONENTS, SQUARENESS, ZERO, Vector
+from olp.units import AXES
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Reference = Literal["functional-point", "table"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """One component error read at targets along one axis, rows in the order of time.
+
+    `component` is an ISO 230-1 name such as EXX (positioning), EYX (straightness) or EBX (angle); the moving
+    axis is its last letter. `target_mm` (n,) axis positions, `value` (n,) in mm or rad, `run` (n,) from 1,
+    `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` is where the other axes
+    stood (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference` "table"
+    the reflector stayed fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
+    straightness. Straightness lines that name the same `square` were read against its two legs.
+    `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
+    all readings of a line (mm/mm, a laser's wavelength). Raises ConfigError.
+    """
+
+    component: str
+    target_mm: Array
+    value: Array
+    run: Index
+    direction: Index
+    line_mm: Vector
+    tool_mm: Vector = ZERO
+    reference: Reference = "functional-point"
+    square: str | None = None
+    sigma: float = 0.0
+    sigma_scale: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for name, kind in (
+            ("target_mm", float),
+            ("value", float),
+            ("run", np.int64),
+            ("direction", np.int64),
+        ):
+            column = np.array(getattr(self, name), dtype=kind)
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+        label = f"line {self.component}"
+        n = len(self.target_mm)
+        if self.component not in COMPONENTS:
+            raise ConfigError(
+                f"{label}: expected an ISO 230-1 name such as EXX, EYX or EBX", file=self.source
+            )
+        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction)):
+            raise ConfigError(
+                f"{label}: {n} readings; expected at least 2, each with all columns", file=self.source
+            )
+        if not (np.isfinite(self.target_mm).all() and np.isfinite(self.value).all()):
+            raise ConfigError(f"{label}: a reading is not finite; leave the row out", file=self.source)
+        if not np.isin(self.direction, (-1, 1)).all():
+            raise ConfigError(f"{label}: a direction is neither +1 nor -1", file=self.source)
+
+    @property
+    def axis(self) -> int:
+        """0, 1, 2 for a line along X, Y, Z."""
+        return AXES.index(self.component[2])
+
+    @property
+    def quantity(self) -> Literal["positioning", "straightness", "angle"]:
+        if self.component[1] in "ABC":
+            return "angle"
+        return "positioning" if self.component[1] == self.component[2] else "straightness"
+
+
+@dataclass(frozen=True, slots=True)
+class Square:
+    """An optical or mechanical square that two straightness lines share.
+
+    `error_rad` is by how much the angle between its legs differs from 90 degrees (more is +), as its
+    certificate says; `sigma_rad` its standard uncertainty.
+    """
+
+    name: str
+    error_rad: float = 0.0
+    sigma_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SquarenessReading:
+    """The squareness of two axes as some instrument gave it, already in the contract's sense.
+
+    `component` is C0Y, B0Z or A0Z; `value_rad` the lean of the mean line of the later axis against that of
+    the earlier one, as at the axis positions `line_mm` with tool vector `tool_mm`, over the lengths
+    `span_mm` (low, high) of the earlier and of the later axis. `sigma_rad` is its standard uncertainty.
+    """
+
+    component: str
+    value_rad: float
+    line_mm: Vector
+    span_mm: tuple[tuple[float, float], tuple[float, float]]
+    tool_mm: Vector = ZERO
+    sigma_rad: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.component not in SQUARENESS:
+            raise ConfigError(
+                f"squareness {self.component}: expected one of {', '.join(SQUARENESS)}", file=self.source
+            )
+        if not np.isfinite(self.value_rad):
+            raise ConfigError(f"squareness {self.component} is not finite", file=self.source)
+
+
+@dataclass(frozen=True, slots=True)
+class Measurements:
+    """All readings of one calibration, as taken: what `fit` takes.
+
+    `periods_mm` are the periods of screws and scales by axis, where cyclic errors are looked for;
+    `active_during_measurement` are the errors that the control corrected then.
+    """
+
+    machine: str
+    lines: tuple[Line, ...]
+    squares: tuple[Square, ...] = ()
+    squareness: tuple[SquarenessReading, ...] = ()
+    periods_mm: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]] = ((), (), ())
+    temperature_degC: float = 20.0
+    active_during_measurement: frozenset[str] = frozenset()

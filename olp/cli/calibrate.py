@@ -1,0 +1,16 @@
+"""`olp calibrate`: from measurements to the calibration that corrects programs, and tables of controls."""
+
+from __future__ import annotations
+
+from olp.cli.late import LateGroup
+
+#: Verb to what it does; each is a module `olp.cli.calibrate_VERB`.
+VERBS: dict[str, str] = {}
+
+_HELP = (
+    """Makes the calibration of a machine from measurements, and reads and writes the tables of controls."""
+)
+
+command = LateGroup(
+    VERBS, "olp.cli.calibrate_{}", name="calibrate", help=_HELP, subcommand_metavar="VERB ..."
+)
