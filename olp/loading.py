@@ -9,7 +9,7 @@ from typing import Literal
 
 from olp.errormodel import Calibration, ErrorModel, build
 from olp.exceptions import ConfigError
-from olp.files.calibration import load_calibration
+from olp.files.calibration import files_beside, load_calibration
 from olp.files.config import load_setup
 from olp.files.write import read_bytes
 from olp.machine import Setup
@@ -64,13 +64,10 @@ def profile_of(setup: Setup) -> Profile:
 
 
 def _digest(calibration: str, machine: object) -> str:
-    """Hash of the calibration file, its curve files and the machine values that decide the model."""
-    import tomllib
-
-    raw = read_bytes(calibration)
-    digest = hashlib.sha256(raw)
-    for curve in tomllib.loads(raw.decode()).get("curves", []):
-        digest.update(read_bytes(Path(calibration).parent / curve["file"]))
+    """Hash of the calibration file, the files that it names and the machine values that decide the model."""
+    digest = hashlib.sha256(read_bytes(calibration))
+    for file in files_beside(calibration):
+        digest.update(read_bytes(file))
     digest.update(repr(getattr(machine, "chain", "")).encode())
     return digest.hexdigest()
 

@@ -16,7 +16,7 @@ LAYERS = (
     {"exceptions", "progress", "rule", "units"},
     {"gate_rules"},
     {"findings"},
-    {"geometry", "tables"},
+    {"geometry", "grids", "tables"},
     {"machine"},
     {"toolpath"},
     {"program"},

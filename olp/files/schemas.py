@@ -7,9 +7,9 @@ One class per TOML table; a key that no class names is refused. Every descriptio
 from __future__ import annotations
 
 import datetime
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from olp.files.fields import (
     CONTROLLERS,
@@ -28,32 +28,9 @@ from olp.files.fields import (
     Triple,
     refusal,
 )
+from olp.files.schema_base import Position, Table
+from olp.files.schema_gridded import BeamTable, ComplianceTable, MapTable
 from olp.machine import COMPONENTS
-
-
-class Table(BaseModel):
-    """A TOML table. `not_built` holds keys of the contract that this version cannot honour, and why."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
-    not_built: ClassVar[dict[str, str]] = {}
-
-
-class Position(Table):
-    """Axis positions in mm; an axis that is not named is not known."""
-
-    X: float | None = Field(default=None, description="a position of axis X in mm")
-    Y: float | None = Field(default=None, description="a position of axis Y in mm")
-    Z: float | None = Field(default=None, description="a position of axis Z in mm")
-
-    @property
-    def values(self) -> tuple[float | None, float | None, float | None]:
-        return (self.X, self.Y, self.Z)
-
-    @property
-    def complete(self) -> tuple[float, float, float] | None:
-        """The three positions, None where one is missing."""
-        x, y, z = self.values
-        return None if x is None or y is None or z is None else (x, y, z)
 
 
 class AxisTable(Table):
@@ -336,8 +313,6 @@ class CalibrationFile(Table):
     """olp-calibration-1: the measured errors of one machine, actual minus commanded."""
 
     not_built: ClassVar[dict[str, str]] = {
-        "maps": "volumetric error maps",
-        "compliance": "load-dependent errors",
         "covariance": "uncertainty of the calibration",
     }
     schema_: Literal["olp-calibration-1"] = Field(
@@ -359,10 +334,20 @@ class CalibrationFile(Table):
         default=frozenset(),
         description="the errors that the control corrected while measuring, a list of ISO 230-1 names",
     )
+    payload_kg: NotNegative = Field(
+        default=0.0, description="the payload on the machine while measuring, in kg; 0 if left out"
+    )
     curves: list[CurveTable] = Field(default=[], description="tables [[curves]]")
     squareness: SquarenessTable = Field(default_factory=SquarenessTable, description="the table [squareness]")
     backlash: BacklashTable = Field(default_factory=BacklashTable, description="the table [backlash]")
     cyclic: list[CyclicTable] = Field(default=[], description="tables [[cyclic]]")
+    maps: list[MapTable] = Field(default=[], description="tables [[maps]], measured deviations of the tip")
+    compliance: list[ComplianceTable] = Field(
+        default=[], description="tables [[compliance]], errors per kg of payload"
+    )
+    compliance_beam: list[BeamTable] = Field(
+        default=[], description="tables [[compliance_beam]], beams that bend under the payload"
+    )
     thermal: ThermalTable | None = Field(default=None, description="the table [thermal]")
 
     @field_validator("valid_until")
@@ -420,8 +405,3 @@ class JobFile(Table):
 
 #: File kind to its model, in the order in which a user meets them.
 FILES: dict[str, type[Table]] = {"machine": MachineFile, "calibration": CalibrationFile, "job": JobFile}
-
-
-def is_table(annotation: Any) -> bool:
-    """Whether an annotation is one of the table models."""
-    return isinstance(annotation, type) and issubclass(annotation, Table)
