@@ -12,6 +12,7 @@ import numpy as np
 
 from olp import checks
 from olp.checks import state
+from olp.checks.model import model_findings
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
@@ -77,7 +78,7 @@ def correct_bytes(
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
     if unroll or expand:
-        data = unrolled(data, name, loaded.profile, expand, clearance)
+        data = unrolled(data, name, loaded.setup, expand, clearance)
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
     tell("correct", 0.2)
@@ -91,6 +92,8 @@ def correct_bytes(
         stamp=stamp_line(loaded.digest, loaded.profile.comment),
     )  # fmt: skip
     text = writer.text()
+    if not writer.changed:
+        text = data
     parts, tally, holes = writer.parts, writer.tally, writer.holes
     del writer
     tell("prove", 0.7)
@@ -118,6 +121,7 @@ def correct_bytes(
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
+        *_model(path, loaded, limits.tolerance_mm),
     )
     report = report_of(nominal, (data, name), loaded, proof, findings, tolerance_um)
     report["moves"] = checks.tally_moves(path, len(passed), parts) | {
@@ -156,6 +160,7 @@ def verify_programs(
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
         *checks.program_findings(first, loaded.setup, contour=contour),
+        *_model(first.toolpath, loaded, limits.tolerance_mm),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)
     return Run(second.data, first, second, proof, rows.passed, report, findings)
@@ -172,6 +177,11 @@ def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Fi
 def _calibration(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
     days = loaded.setup.machine.sanity.calibration_days
     return state.calibration_findings(loaded.calibration, date, days)
+
+
+def _model(path: Toolpath, loaded: Loaded, tolerance_mm: float) -> list[Finding]:
+    sanity = loaded.setup.machine.sanity
+    return model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
 
 
 def _prove_without_deleted(

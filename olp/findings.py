@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from olp.gate_rules import GATE
+from olp.model_rules import MODEL
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
 
@@ -301,7 +302,7 @@ _TABLE = (
     ),
 )
 
-RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE), key=lambda rule: rule.code)}
+RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE, *MODEL), key=lambda rule: rule.code)}
 
 #: what a gate looks for: all but those of measured paths
 GATE_CODES = tuple(code for code in RULES if not code.startswith("OLP6"))

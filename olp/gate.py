@@ -14,6 +14,7 @@ from olp import checks
 from olp.checks import motion, state
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
+from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp
 from olp.correction import Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
@@ -189,6 +190,7 @@ def _findings(
         found += state.box_findings(path, loaded.model.box_mm, outside)
         found += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
         found += checks.program_findings(program, loaded.setup, contour=contour)
+        found += model_findings(program.toolpath, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None:
             proof = case.proof()
             found += checks.proof_findings(proof, run.passed)

@@ -79,10 +79,14 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it."""
+def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: float | None = None) -> bytes:
+    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
+    Payloads that the job gives by line become comments first, as lines are others afterwards."""
+    from olp.program.directives import with_payloads
     from olp.program.flatten import flatten as unroll
 
+    profile = profile_of(setup)
+    data = with_payloads(data, setup.job.payloads, profile.comment)
     folder = Path(name).parent if name else None
 
     def beside(wanted: str) -> bytes | None:

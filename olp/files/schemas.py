@@ -7,6 +7,7 @@ One class per TOML table; a key that no class names is refused. Every descriptio
 from __future__ import annotations
 
 import datetime
+from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
@@ -84,7 +85,11 @@ class WorkOffsetTable(Table):
         default=None, description="the number of the tool that touched, one of [tools]"
     )
 
-    @field_validator("touched_at_mm", "touch_tool")
+    touched_payload_kg: NotNegative | None = Field(
+        default=None, description="the payload at the touch, in kg; payload_kg of the job if left out"
+    )
+
+    @field_validator("touched_at_mm", "touch_tool", "touched_payload_kg")
     @classmethod
     def _only_if_touched(cls, value: object, info: ValidationInfo) -> object:
         if info.data.get("set_by") == "true" and value is not None:
@@ -380,6 +385,13 @@ class MeshTable(Table):
     )
 
 
+class PayloadTable(Table):
+    line: Annotated[int, Field(ge=1)] = Field(
+        description="the line of the program from which on it holds, counted from 1"
+    )
+    payload_kg: NotNegative = Field(description="the payload from there on, in kg")
+
+
 class JobFile(Table):
     """olp-job-1: what changes from job to job."""
 
@@ -392,7 +404,15 @@ class JobFile(Table):
         default_factory=Position,
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
     )
-    payload_kg: NotNegative = Field(default=0.0, description="the mass of workpiece and fixture, in kg")
+    payload_kg: NotNegative = Field(
+        default=0.0, description="what the machine carries at the start of the program, in kg"
+    )
+    payloads: list[PayloadTable] = Field(
+        default=[],
+        description="tables [[payloads]], the payload from a line of the program on; instead, the program "
+        "may "
+        "hold comments such as (OLP PAYLOAD 30 kg)",
+    )
     temperatures_degC: TemperaturesTable = Field(
         default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
     )
@@ -401,6 +421,16 @@ class JobFile(Table):
     )
     tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
+
+    @field_validator("payloads")
+    @classmethod
+    def _ascending_lines(cls, value: list[PayloadTable]) -> list[PayloadTable]:
+        for before, after in pairwise(value):
+            if after.line <= before.line:
+                raise refusal(
+                    f"name line {after.line} after line {before.line}; expected ascending lines, each once"
+                )
+        return value
 
 
 #: File kind to its model, in the order in which a user meets them.
