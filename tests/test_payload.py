@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 from pathlib import Path
 
@@ -13,9 +14,12 @@ from hypothesis import strategies as st
 from judge.beam import under_the_load
 
 import olp
-from olp.errormodel import Calibration, ComponentTable, Curve, build
+from olp.errormodel import Calibration, ComponentTable, Curve, DeviationMap, build
 from olp.errormodel.beams import Beam, tube_mm4
 from olp.exceptions import ConfigError, ProgramError
+from olp.files.calibration import load_calibration
+from olp.files.calibration_writer import calibration_files
+from olp.files.write import write_files
 from olp.loading import load
 from olp.machine import CHAINS
 from olp.program.directives import with_payloads
@@ -346,3 +350,36 @@ def test_a_beam_in_the_files_of_a_machine(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         found.error(np.array([[500.0, 0, 0]]), np.array([0, 0, 0, 30.0])), [[0, 0, -expected]], rtol=1e-6
     )
+
+
+def test_maps_loads_and_beams_are_written_and_read_back_the_same(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    x, y, z = (np.sort(rng.uniform(low, high, 3)) for low, high in BOX)
+    levels = tuple(np.array([low, *k[1:2], high]) for k, (low, high) in zip((x, y, z), BOX, strict=True))
+    whole = Calibration(
+        "m",
+        BOX,
+        measured=datetime.date(2026, 5, 14),
+        maps=(
+            DeviationMap(levels, rng.normal(size=(3, 3, 3, 3)), tool_mm=(0.1, 2.0, -3.0)),
+            DeviationMap(
+                (*levels[:2], [-1.0]), rng.normal(size=(3, 3, 1, 3)), interpolation="cubic", holds_along=("Z",)
+            ),
+        ),
+        compliance=tables(3, "linear"),
+        beams=(Beam("X", "simple", (0.0, 800.0), 210.0, 1.5e7, "+Y", (0.0, 1.0, 2.0)),),
+        payload_kg=12.5,
+    )
+    write_files(calibration_files(whole, tmp_path / "c.toml"))
+    again = load_calibration(tmp_path / "c.toml")
+    assert (again.payload_kg, again.beams) == (whole.payload_kg, whole.beams)
+    for one, two in zip(whole.maps, again.maps, strict=True):
+        np.testing.assert_array_equal(one.values, two.values)
+        assert (one.tool_mm, one.kind, one.interpolation) == (two.tool_mm, two.kind, two.interpolation)
+    for one, two in zip(whole.compliance, again.compliance, strict=True):
+        assert one.columns.keys() == two.columns.keys()
+        for name in one.columns:
+            np.testing.assert_array_equal(one.columns[name], two.columns[name])
+        assert (one.arguments, one.tool_mm, one.reference) == (two.arguments, two.tool_mm, two.reference)
+        others = ["XYZ".index(a) for a in "XYZ" if a != one.axis]
+        assert [one.line_mm[k] for k in others] == [two.line_mm[k] for k in others]

@@ -13,7 +13,7 @@ from olp.files.problems import Problem, config_error, nearest
 from olp.files.tables import Array, Row, decoded, records_of, rows_of
 from olp.files.write import PathLike, read_bytes
 from olp.machine import COMPONENTS
-from olp.units import AXES, MM_PER_UM, RAD_PER_URAD
+from olp.units import AXES
 
 Index = npt.NDArray[np.int64]
 
@@ -27,7 +27,7 @@ _NAMED = 6
 @dataclass(frozen=True, slots=True, eq=False)
 class GridTable:
     """`arguments` such as ("Y", "Z") with their ascending levels `knots_mm`, and the columns by name, each of
-    the shape of the grid, in the unit of the file."""
+    the shape of the grid, in mm or rad."""
 
     arguments: tuple[str, ...]
     knots_mm: tuple[Array, ...]
@@ -41,9 +41,7 @@ def read_map(path: PathLike) -> GridTable:
     Raises InputError where the file cannot be read, ConfigError with every problem and its line.
     """
     table = _parse(read_bytes(path), str(path), _map_problems)
-    return GridTable(
-        table.arguments, table.knots_mm, {n[:2]: v * MM_PER_UM for n, v in table.columns.items()}
-    )
+    return GridTable(table.arguments, table.knots_mm, {n[:2]: v for n, v in table.columns.items()})
 
 
 def read_component_grid(path: PathLike) -> GridTable:
@@ -53,11 +51,7 @@ def read_component_grid(path: PathLike) -> GridTable:
     Raises as `read_map`.
     """
     table = _parse(read_bytes(path), str(path), _component_problems)
-    columns = {
-        name[:3]: values * (MM_PER_UM if name.endswith("_um_kg") else RAD_PER_URAD)
-        for name, values in table.columns.items()
-    }
-    return GridTable(table.arguments, table.knots_mm, columns)
+    return GridTable(table.arguments, table.knots_mm, {n[:3]: v for n, v in table.columns.items()})
 
 
 def _parse(data: bytes, file: str, problems_of: Callable[[int, Sequence[str]], list[Problem]]) -> GridTable:
