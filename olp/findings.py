@@ -304,8 +304,8 @@ _TABLE = (
 
 RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE, *MODEL), key=lambda rule: rule.code)}
 
-#: what a gate looks for: all but those of measured paths
-GATE_CODES = tuple(code for code in RULES if not code.startswith("OLP6"))
+#: what a gate looks for: all but those of measured paths and of measurements of a machine
+GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))
 
 
 def worst(findings: Iterable[Finding]) -> Severity | None:

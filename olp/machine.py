@@ -157,7 +157,8 @@ class Mesh:
 @dataclass(frozen=True, slots=True)
 class Job:
     """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `payloads` leads
-    from a line of the program, counted from 1, to the payload from there on."""
+    from a line of the program, counted from 1, to the payload from there on. Temperatures of the structure's
+    sensors come from `sensors_degC`, settled, or from `sensor_log` at a time in it."""
 
     program: str | None = None
     machine: str | None = None
@@ -165,6 +166,9 @@ class Job:
     payload_kg: float = 0.0
     payloads: Mapping[int, float] = field(default_factory=dict)
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)
+    sensors_degC: Mapping[str, float] | None = None
+    sensor_log: str | None = None
+    sensor_log_at_s: float | None = None
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
     meshes: tuple[Mesh, ...] = ()

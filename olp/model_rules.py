@@ -35,4 +35,48 @@ MODEL = (
         "where the machine is stiff enough.",
         "payload_kg = 30 in the job file, and a calibration of curves alone.",
     ),
+    Rule(
+        "OLP423",
+        "sensor temperatures not stated",
+        Severity.WARNING,
+        "The calibration holds how the structure distorts with the temperatures of its sensors, and the job "
+        "states none: the distortion is left in the path.",
+        "Give [temperatures_degC.sensors], or sensor_log, in the job file.",
+        'structure = "thermal.toml" under [thermal], and a job without temperatures.',
+    ),
+    Rule(
+        "OLP424",
+        "structure warmer or colder than identified",
+        Severity.WARNING,
+        "A structure temperature lies outside the range of the logs from which the distortion was "
+        "identified; it was taken at the end of the range (--outside-box hold).",
+        "Log the drift at such temperatures too, or wait until the machine is back in the range.",
+        "range_degC = [19, 30] of a sensor that says 33 degC.",
+    ),
+    Rule(
+        "OLP850",
+        "shape of a drift not identified",
+        Severity.WARNING,
+        "The readings of this component stand at too few positions, or over too little of the axis, to tell "
+        "its growth from its bow there.",
+        "Read the drift at three positions or more, at both ends and in the middle.",
+        "`EXX@500_um` alone: only an offset can be told.",
+    ),
+    Rule(
+        "OLP851",
+        "bend without its angle",
+        Severity.WARNING,
+        "A straightness drifts, so a guide bends, and what rides on a bent guide turns. No angle of that "
+        "axis was read, so the part of the drift that acts over the length of the tool is not in the model.",
+        "Read the angle too, with a level or a laser.",
+        "`EZX@1000_um` and no `EBX@..._urad`: 40 urad at 300 mm are 12 um.",
+    ),
+    Rule(
+        "OLP852",
+        "drift that the sensors do not explain",
+        Severity.WARNING,
+        "Held out of the fit, much of the drift of this component is left.",
+        "Put a sensor where the heat comes in, log for longer, or log days that differ.",
+        "EZZ with 45 % of its drift left: the spindle has no sensor.",
+    ),
 )

@@ -116,6 +116,17 @@ def test_the_chord_bound_is_never_exceeded(seed: int, interpolation: str, sizes)
     assert np.all(model.chord_bound(0.6 * delta, TOOL) <= bound * (1.0 + 1e-12))
 
 
+def test_a_bow_departs_by_its_whole_height() -> None:
+    """Both ends equal, so the change over the move is nothing, and the departure all of the span."""
+    values = np.zeros((3, 2, 2, 3))
+    values[1, :, :, 2] = 0.04
+    model = model_of(DeviationMap(([0.0, 400.0, 800.0], *BOX[1:]), values, interpolation="cubic"))
+    start, delta = np.array([[0.0, 0.0, -100.0]]), np.array([[800.0, 0.0, 0.0]])
+    found = departures(model, start, delta, TOOL)
+    np.testing.assert_allclose(found, 0.04, rtol=1e-3)
+    np.testing.assert_allclose(model.chord_bound(delta, TOOL), 0.04)
+
+
 def test_the_bound_of_a_smooth_map_is_not_far_above_what_happens() -> None:
     levels = [np.linspace(low, high, 9) for low, high in BOX]
     x, y, z = np.meshgrid(*levels, indexing="ij")

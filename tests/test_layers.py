@@ -33,7 +33,7 @@ LAYERS = (
     {"loading", "poses"},
     {"replanning"},
     {"comparing_parts"},
-    {"correction", "retiming", "comparing"},
+    {"correction", "retiming", "comparing", "thermal_fitting"},
     {"gate"},
     {"api"},
     {"report_files"},

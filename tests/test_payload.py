@@ -363,7 +363,10 @@ def test_maps_loads_and_beams_are_written_and_read_back_the_same(tmp_path: Path)
         maps=(
             DeviationMap(levels, rng.normal(size=(3, 3, 3, 3)), tool_mm=(0.1, 2.0, -3.0)),
             DeviationMap(
-                (*levels[:2], [-1.0]), rng.normal(size=(3, 3, 1, 3)), interpolation="cubic", holds_along=("Z",)
+                (*levels[:2], [-1.0]),
+                rng.normal(size=(3, 3, 1, 3)),
+                interpolation="cubic",
+                holds_along=("Z",),
             ),
         ),
         compliance=tables(3, "linear"),

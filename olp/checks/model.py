@@ -1,4 +1,4 @@
-"""Checks of what the error model knows of this job: the tool of a map, payloads."""
+"""Checks of what the error model knows of this job: the tool of a map, payloads, temperatures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,21 @@ def model_findings(
         *_map_tools(path, calibration, sanity),
         *_payloads(path, calibration),
         *_jumps(path, model, tolerance_mm),
+        *_structure(calibration),
     ]
+
+
+def _structure(calibration: Calibration) -> list[Finding]:
+    structure = calibration.structure
+    if structure is None:
+        return []
+    names = ", ".join(sensor.name for sensor in structure.sensors)
+    if structure.temperatures_degC is None:
+        return [finding("OLP423", f"the job states no temperatures of {names}; their distortion is left")]
+    far = [f"{name} {value:.2f} degC" for name, value in structure.outside().items()]
+    if not far:
+        return []
+    return [finding("OLP424", f"{', '.join(far)}: taken at the end of the identified range")]
 
 
 def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list[Finding]:

@@ -78,4 +78,13 @@ def build(
         )  # fmt: skip
     if calibration.thermal is not None:
         models.append(ThermalExpansion.of(calibration.thermal, box, hold))
+    if calibration.structure is not None:
+        tables = calibration.structure.tables(hold=hold)
+        if tables:
+            models.append(
+                GridErrors.of(
+                    "thermal", tables, chain, calibration.datum_mm, box, hold=hold,
+                    tool_terms=calibration.model != "huddersfield",
+                )
+            )  # fmt: skip
     return total(models)

@@ -17,6 +17,7 @@ import numpy as np
 from olp.errormodel.base import Array
 from olp.errormodel.beams import Beam
 from olp.errormodel.gridded import COVER_MM, ComponentTable, DeviationMap, cover_problems, frozen, refuse
+from olp.errormodel.structure import Structure
 from olp.exceptions import ConfigError
 from olp.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.units import AXES
@@ -155,6 +156,7 @@ class Calibration:
     backlash_mm: Vector = ZERO
     cyclic: tuple[Cyclic, ...] = ()
     thermal: Thermal | None = None
+    structure: Structure | None = None
     maps: tuple[DeviationMap, ...] = ()
     compliance: tuple[ComponentTable, ...] = ()
     beams: tuple[Beam, ...] = ()
@@ -238,6 +240,20 @@ class Calibration:
             )
         for table in self.compliance:
             problems += cover_problems(table.name, table.arguments, table.knots_mm, self.box_mm)
+        if self.structure is not None:
+            problems += self.structure.cover_problems(self.box_mm)
+            scales = [
+                f"E{a}{a}"
+                for a, scale in zip(AXES, self.thermal.scale_per_K if self.thermal else ZERO, strict=True)
+                if scale != 0.0
+            ]
+            problems += [
+                f"the thermal structure holds {name}, and {name[2]}_scale_um_m_K expands the scale again; "
+                f"expected one "
+                f"of the two: the drift of {name} was read with the scale as it is"
+                for name in self.structure.components()
+                if name in scales
+            ]
         for beam in self.beams:
             problems += beam.problems(self.box_mm)
         if not (np.isfinite(self.payload_kg) and self.payload_kg >= 0.0):

@@ -2,8 +2,8 @@
 
 Along a move by d the second derivative is sum_jk d_j d_k f_jk inside the cells, and the slope jumps by d_j
 times that of f_j where a face of a cell is crossed. The departure is the integral of a tent kernel against
-both (see `chord`): at most 1/8 of the first and 1/4 of the jumps. A function that changes by no more than L
-over the move departs by no more than L/2, and never by more than its whole span. All of them grow with each
+both (see `chord`): at most 1/8 of the first and 1/4 of the jumps. A function whose slope makes no more
+than L over the move departs by no more than L/2, and never by more than its whole span. All of them grow with each
 |d_j|, so that a bound holds for shorter moves too.
 """
 
@@ -58,7 +58,8 @@ class GridBound:
         for d, kinks in zip(length, self.kinks, strict=True):
             if kinks is not None:
                 bound += d[:, None] * kinks.take(bins(d), axis=0, mode="clip")
-        return np.minimum(bound, np.minimum(0.5 * self.change(delta_mm), self.span))
+        steep = 0.5 * (np.abs(delta_mm[:, self.axes]) @ self.slope)
+        return np.minimum(bound, np.minimum(steep, self.span))
 
     def change(self, delta_mm: Array) -> Array:
         """(n, m) bound of the change from start to end."""

@@ -12,12 +12,14 @@ import numpy as np
 from olp.errormodel.beams import Beam, tube_mm4
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.gridded import ComponentTable, DeviationMap
+from olp.errormodel.structure import Structure
 from olp.exceptions import ConfigError, InputError
 from olp.files.grids import read_component_grid, read_map
 from olp.files.problems import config_error, validate
 from olp.files.schema_base import Position
 from olp.files.schema_gridded import BeamTable, ComplianceTable, MapTable
 from olp.files.schemas import CalibrationFile, CurveTable, CyclicTable, ThermalTable
+from olp.files.structure import load_structure
 from olp.files.tables import read_curves
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
@@ -37,11 +39,9 @@ def files_beside(path: PathLike) -> list[FilePath]:
     it."""
     try:
         values = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
-        return [
-            FilePath(path).parent / table["file"]
-            for name in ("curves", "maps", "compliance")
-            for table in values.get(name, ())
-        ]
+        names = [t["file"] for name in ("curves", "maps", "compliance") for t in values.get(name, ())]
+        structure = values.get("thermal", {}).get("structure")
+        return [FilePath(path).parent / name for name in (*names, *([structure] if structure else ()))]
     except (ValueError, TypeError, KeyError, AttributeError):
         return []
 
@@ -76,6 +76,17 @@ def load_calibration(
     curves = each("curves", file.curves, _curve)
     maps = each("maps", file.maps, _map)
     compliance = each("compliance", file.compliance, _compliance)
+    structure: Structure | None = None
+    if file.thermal is not None and file.thermal.structure is not None:
+        key = ("thermal", "structure")
+        try:
+            structure = load_structure(FilePath(path).parent / file.thermal.structure, file.machine)
+        except ConfigError as error:
+            errors.append(error)
+        except InputError as error:
+            found.append(
+                (line_of(key, lines), f'{dotted(key)} = "{file.thermal.structure}": {error.message}')
+            )
     if found:
         errors.insert(0, config_error(found, str(path)))
     if errors:
@@ -94,6 +105,7 @@ def load_calibration(
             squareness={name: shifted(getattr(file.squareness, f"{name}_urad"), -6) for name in SQUARENESS},
             backlash_mm=_vector([shifted(getattr(file.backlash, f"{axis}_um"), -3) for axis in AXES]),
             cyclic=tuple(_cyclic(table) for table in file.cyclic),
+            structure=structure,
             thermal=_thermal(file.thermal, file.temperature_degC, temperatures_degC or {}),
             temperature_degC=file.temperature_degC,
             measured=file.measured,

@@ -14,6 +14,7 @@ from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.exceptions import ConfigError
 from olp.files.fields import SIGN
 from olp.files.gridded_writer import beam_lines, compliance_csv, compliance_lines, map_csv, map_lines
+from olp.files.structure import structure_text
 from olp.files.toml_text import comment, toml_lines
 from olp.machine import SQUARENESS, ZERO, Vector
 from olp.units import AXES, shifted
@@ -59,6 +60,11 @@ def calibration_files(
         names.append(_unused(f"{target.stem}-load", names))
         files[target.with_name(names[-1])] = compliance_csv(table, in_unit_text).encode()
         tables += compliance_lines(table, names[-1])
+    warm, structure = calibration.thermal is not None or calibration.structure is not None, None
+    if calibration.structure is not None:
+        structure = f"{target.stem}-thermal.toml"
+        text = structure_text(calibration.structure, calibration.machine, in_unit)
+        files[target.with_name(structure)] = text
     lines = [
         *(line for note in notes for line in comment(note)),
         *_head(calibration),
@@ -72,7 +78,7 @@ def calibration_files(
         *(line for cyclic in calibration.cyclic for line in _cyclic(cyclic)),
         *tables,
         *(line for beam in calibration.beams for line in beam_lines(beam)),
-        *(_thermal(calibration.thermal) if calibration.thermal is not None else ()),
+        *(_thermal(calibration.thermal or Thermal(), structure) if warm else ()),
     ]
     return {target: ("\n".join(lines) + "\n").encode(), **files}
 
@@ -164,12 +170,13 @@ def _cyclic(cyclic: Cyclic) -> Iterator[str]:
     )
 
 
-def _thermal(thermal: Thermal) -> Iterator[str]:
+def _thermal(thermal: Thermal, structure: str | None) -> Iterator[str]:
     scales = zip(AXES, thermal.scale_per_K, strict=True)
     yield from ("", "[thermal]")
     yield from toml_lines({f"{axis}_scale_um_m_K": in_unit(scale, -6) for axis, scale in scales})
     yield from toml_lines(
         {
+            "structure": structure,
             "workpiece_um_m_K": in_unit(thermal.workpiece_per_K, -6),
             "fixed_at_mm": None if thermal.fixed_at_mm == ZERO else _floats(thermal.fixed_at_mm),
             "clamped_at_mm": None if thermal.clamped_at_mm == ZERO else _floats(thermal.clamped_at_mm),

@@ -133,7 +133,12 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
-        temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),
+        temperatures_degC=file.temperatures_degC.model_dump(
+            exclude_none=True, exclude={"sensors", "sensor_log", "sensor_log_at_s"}
+        ),
+        sensors_degC=file.temperatures_degC.sensors,
+        sensor_log=beside(path, file.temperatures_degC.sensor_log),
+        sensor_log_at_s=file.temperatures_degC.sensor_log_at_s,
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
         meshes=tuple(meshes),

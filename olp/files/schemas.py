@@ -305,6 +305,12 @@ class ThermalTable(Table):
     Y_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Y, in um/(m K)")
     Z_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Z, in um/(m K)")
     workpiece_um_m_K: float = Field(default=0.0, description="the expansion of the workpiece, in um/(m K)")
+    structure: Text | None = Field(
+        default=None,
+        description="the path of an olp-thermal-1 file, which `olp calibrate thermal` writes: how the "
+        "structure "
+        "distorts with the temperatures of sensors",
+    )
     fixed_at_mm: Triple = Field(
         default=(0.0, 0.0, 0.0), description="the axis positions where the scales are fixed, [X, Y, Z] in mm"
     )
@@ -369,6 +375,29 @@ class TemperaturesTable(Table):
     Y_scale: float | None = Field(default=None, description="the temperature of the scale of Y, in degC")
     Z_scale: float | None = Field(default=None, description="the temperature of the scale of Z, in degC")
     workpiece: float | None = Field(default=None, description="the temperature of the workpiece, in degC")
+    sensors: dict[str, float] | None = Field(
+        default=None,
+        description="the table [temperatures_degC.sensors]: the temperature of each sensor of the thermal "
+        "structure, in degC, where all has settled",
+    )
+    sensor_log: Text | None = Field(
+        default=None,
+        description="the path of a log of the sensors instead (t_s, NAME_degC ...), relative to this file",
+    )
+    sensor_log_at_s: float | None = Field(
+        default=None,
+        validate_default=True,
+        description="the time in that log, in s; its last one if left out",
+    )
+
+    @field_validator("sensor_log_at_s")
+    @classmethod
+    def _one_way(cls, value: float | None, info: ValidationInfo) -> float | None:
+        if info.data.get("sensors") is not None and info.data.get("sensor_log") is not None:
+            raise refusal("or sensors: both sensors and sensor_log are given; expected one of the two")
+        if value is not None and info.data.get("sensor_log") is None:
+            raise refusal("is given without sensor_log; expected the path of the log, or leave this key out")
+        return value
 
 
 class MeshTable(Table):
