@@ -144,8 +144,10 @@ class Thermal:
 class Calibration:
     """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y, B0Z,
     A0Z in rad, `backlash_mm` the constant lost motion per axis. Several curves of one axis hold different
-    components. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`, which was on the
-    machine while measuring. Raises ConfigError with every problem found."""
+    components. `repeatability_mm` is the
+    standard deviation of each axis at one place, None where nobody stated it. `compliance` tables and
+    `beams` act per kg of payload beyond `payload_kg`, which was on the machine while measuring. Raises
+    ConfigError with every problem found."""
 
     machine: str
     box_mm: Array
@@ -154,6 +156,7 @@ class Calibration:
     curves: tuple[Curve, ...] = ()
     squareness: Mapping[str, float] = field(default_factory=dict)
     backlash_mm: Vector = ZERO
+    repeatability_mm: Vector | None = None
     cyclic: tuple[Cyclic, ...] = ()
     thermal: Thermal | None = None
     structure: Structure | None = None
@@ -256,6 +259,12 @@ class Calibration:
             ]
         for beam in self.beams:
             problems += beam.problems(self.box_mm)
+        if self.repeatability_mm is not None and not (
+            np.all(np.isfinite(self.repeatability_mm)) and min(self.repeatability_mm) >= 0.0
+        ):
+            problems.append(
+                f"repeatability_mm = {self.repeatability_mm}; expected three lengths of 0 or above"
+            )
         if not (np.isfinite(self.payload_kg) and self.payload_kg >= 0.0):
             problems.append(f"payload_kg = {self.payload_kg}; expected the mass while measuring, 0 or above")
         return problems

@@ -3,8 +3,8 @@
 Along a move by d the second derivative is sum_jk d_j d_k f_jk inside the cells, and the slope jumps by d_j
 times that of f_j where a face of a cell is crossed. The departure is the integral of a tent kernel against
 both (see `chord`): at most 1/8 of the first and 1/4 of the jumps. A function whose slope makes no more
-than L over the move departs by no more than L/2, and never by more than its whole span. All of them grow with each
-|d_j|, so that a bound holds for shorter moves too.
+than L over the move departs by no more than L/2, and never by more than its whole span. All of them grow
+with each |d_j|, so that a bound holds for shorter moves too.
 """
 
 from __future__ import annotations

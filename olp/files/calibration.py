@@ -104,6 +104,9 @@ def load_calibration(
             payload_kg=file.payload_kg,
             squareness={name: shifted(getattr(file.squareness, f"{name}_urad"), -6) for name in SQUARENESS},
             backlash_mm=_vector([shifted(getattr(file.backlash, f"{axis}_um"), -3) for axis in AXES]),
+            repeatability_mm=None
+            if file.repeatability is None
+            else _vector([shifted(getattr(file.repeatability, f"{axis}_um"), -3) for axis in AXES]),
             cyclic=tuple(_cyclic(table) for table in file.cyclic),
             structure=structure,
             thermal=_thermal(file.thermal, file.temperature_degC, temperatures_degC or {}),

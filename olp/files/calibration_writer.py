@@ -75,6 +75,7 @@ def calibration_files(
         ),
         *_squareness(calibration.squareness),
         *_backlash(calibration.backlash_mm),
+        *_repeatability(calibration.repeatability_mm),
         *(line for cyclic in calibration.cyclic for line in _cyclic(cyclic)),
         *tables,
         *(line for beam in calibration.beams for line in beam_lines(beam)),
@@ -154,6 +155,14 @@ def _backlash(backlash_mm: Vector) -> Iterator[str]:
     if any(backlash_mm):
         yield from ("", "[backlash]")
         yield from toml_lines({f"{a}_um": in_unit(b, -3) for a, b in zip(AXES, backlash_mm, strict=True)})
+
+
+def _repeatability(repeatability_mm: Vector | None) -> Iterator[str]:
+    if repeatability_mm is not None:
+        yield from ("", "[repeatability]")
+        yield from toml_lines(
+            {f"{a}_um": in_unit(s, -3) for a, s in zip(AXES, repeatability_mm, strict=True)}
+        )
 
 
 def _cyclic(cyclic: Cyclic) -> Iterator[str]:

@@ -273,6 +273,12 @@ class BacklashTable(Table):
     Z_um: float = Field(default=0.0, description="the lost motion of axis Z, in um")
 
 
+class RepeatabilityTable(Table):
+    X_um: NotNegative = Field(default=0.0, description="the standard deviation of axis X, in um")
+    Y_um: NotNegative = Field(default=0.0, description="the standard deviation of axis Y, in um")
+    Z_um: NotNegative = Field(default=0.0, description="the standard deviation of axis Z, in um")
+
+
 class CyclicTable(Table):
     component: Literal[COMPONENTS] = Field(  # type: ignore[valid-type]
         description='the ISO 230-1 name of a component error, such as "EXX"'
@@ -351,6 +357,10 @@ class CalibrationFile(Table):
     curves: list[CurveTable] = Field(default=[], description="tables [[curves]]")
     squareness: SquarenessTable = Field(default_factory=SquarenessTable, description="the table [squareness]")
     backlash: BacklashTable = Field(default_factory=BacklashTable, description="the table [backlash]")
+    repeatability: RepeatabilityTable | None = Field(
+        default=None,
+        description="the table [repeatability]: the random part of each axis, which no correction removes",
+    )
     cyclic: list[CyclicTable] = Field(default=[], description="tables [[cyclic]]")
     maps: list[MapTable] = Field(default=[], description="tables [[maps]], measured deviations of the tip")
     compliance: list[ComplianceTable] = Field(
