@@ -186,6 +186,7 @@ def inspect(
         "axis_range_mm": ranges,
         "tools": sorted({f.tool for f in path.frames if f.tool is not None}),
         "work_offsets": sorted({f.work_offset for f in path.frames}),
+        "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
         "path_modes": [
             {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in found.path_modes
         ],

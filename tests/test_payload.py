@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import datetime
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from acceptance import TRUE_ZERO, machine, unstamped
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge.beam import under_the_load
 
 import olp
+from olp.cli import main
 from olp.errormodel import Calibration, ComponentTable, Curve, DeviationMap, build
 from olp.errormodel.beams import Beam, tube_mm4
 from olp.exceptions import ConfigError, ProgramError
@@ -386,3 +389,39 @@ def test_maps_loads_and_beams_are_written_and_read_back_the_same(tmp_path: Path)
         assert (one.arguments, one.tool_mm, one.reference) == (two.arguments, two.tool_mm, two.reference)
         others = ["XYZ".index(a) for a in "XYZ" if a != one.axis]
         assert [one.line_mm[k] for k in others] == [two.line_mm[k] for k in others]
+
+
+def test_inspect_shows_maps_loads_and_payloads(tmp_path: Path) -> None:
+    rows = [f"{x},{y},{z},1,2,2" for x in (-1000, 2000) for y in (-1000, 2000) for z in (-1000, 2000)]
+    (tmp_path / "map.csv").write_text("X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um\n" + "\n".join(rows))
+    path = loaded(tmp_path, calibration='payload_kg = 5\n[[maps]]\nfile = "map.csv"\nkind = "residual"\n')
+    done = CliRunner().invoke(main, ["inspect", str(path), "--json"])
+    summary = json.loads(done.output)
+    assert summary["maps"][0]["nodes"] == "2 x 2 x 2"
+    assert summary["maps"][0]["max_um"] == pytest.approx(3.0)
+    assert summary["load"][0] == {
+        "name": "compliance load.csv: EZX", "by_position_of": "X", "max_um_kg": pytest.approx(20.0),
+    }  # fmt: skip
+    assert summary["load_measured_with"] == {"payload_kg": 5.0}
+    assert "max urad kg" in CliRunner().invoke(main, ["inspect", str(path)]).output
+    program = (HEAD + "G1 X10 F600\n(olp payload 30)\nG0 X20\nM2\n").encode()
+    assert olp.inspect(program, path)["payloads_kg"] == [0.0, 30.0]
+
+
+def test_the_stamp_changes_with_every_file_that_decides_the_model(tmp_path: Path) -> None:
+    path = loaded(tmp_path)
+    before = load(path, None, "refuse").digest
+    (tmp_path / "load.csv").write_text(LOAD.replace("-20,2", "-21,2"))
+    assert load(path, None, "refuse").digest != before
+
+
+def test_the_review_page_and_a_comparison_take_the_payload(tmp_path: Path) -> None:
+    path = loaded(tmp_path, "[[payloads]]\nline = 4\npayload_kg = 30")
+    job, source = path.with_name("job.toml"), (HEAD + "G1 X100 F600\nG0 X200\nG1 X300\nM2\n").encode()
+    page = olp.view(source, path, job)
+    assert page is not None
+    shown = olp.simulate(source, path, job, step_mm=5.0)
+    (tmp_path / "measured.csv").write_bytes(shown.to_csv())
+    found = olp.compare(source, [tmp_path / "measured.csv"], path, job)
+    # 3 um/kg at X300
+    assert found.report["after"]["across_um"]["max"] == pytest.approx(90.0, abs=0.1)
