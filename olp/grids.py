@@ -118,32 +118,42 @@ class Grid:
     values: Array
     kind: Kind
     lines: tuple[Line, ...] = field(repr=False)
+    #: by node, the values of the window of the last argument that begins there, side by side
+    windows: Array = field(repr=False)
 
     @classmethod
     def through(cls, knots: Sequence[Array], values: Array, kind: Kind) -> Grid:
         lines = tuple(Line.through(np.asarray(k, float), kind) for k in knots)
-        return cls(
-            tuple(line.knots for line in lines), np.ascontiguousarray(values, dtype=np.float64), kind, lines
-        )
+        whole = np.ascontiguousarray(values, dtype=np.float64)
+        rows = whole.reshape(-1, whole.shape[-1])
+        window = lines[-1].weights.shape[2]
+        # rows that a window would leave the end of the table from are never asked for
+        side_by_side = [rows[k : len(rows) - window + 1 + k] for k in range(window)]
+        windows = np.concatenate(side_by_side, axis=1)
+        return cls(tuple(line.knots for line in lines), whole, kind, lines, windows)
 
     def __call__(self, q: Array) -> Array:
         """(n, m) values at finite arguments q (n, d)."""
-        out = np.empty((len(q), self.values.shape[-1]))
-        flat = self.values.reshape(-1, self.values.shape[-1])
+        columns = self.values.shape[-1]
+        out = np.empty((len(q), columns))
         sizes = self.values.shape[:-1]
         strides = [math.prod(sizes[k + 1 :]) for k in range(len(sizes))]
         for start in range(0, len(q), _BLOCK):
             part = q[start : start + _BLOCK]
             found = [line.at(part[:, k]) for k, line in enumerate(self.lines)]
             node = sum((first * stride for (first, _), stride in zip(found, strides, strict=True)), start=0)
-            total = np.zeros((len(part), flat.shape[1]))
-            for corner in product(*(range(weight.shape[1]) for _, weight in found)):
-                offset = sum(c * stride for c, stride in zip(corner, strides, strict=True))
-                share = found[0][1][:, corner[0]]
-                for (_, weight), c in zip(found[1:], corner[1:], strict=True):
-                    share = share * weight[:, c]
-                total += share[:, None] * flat.take(node + offset, axis=0)
-            out[start : start + _BLOCK] = total
+            total: Array | None = None
+            for corner in product(*(range(weight.shape[1]) for _, weight in found[:-1])):
+                offset = sum(c * stride for c, stride in zip(corner, strides, strict=False))
+                value = self.windows.take(node + offset, axis=0)
+                for (_, weight), c in zip(found, corner, strict=False):
+                    value *= weight[:, c, None]
+                total = value if total is None else np.add(total, value, out=total)
+            assert total is not None
+            last = found[-1][1]
+            np.einsum(
+                "nkm,nk->nm", total.reshape(len(part), -1, columns), last, out=out[start : start + _BLOCK]
+            )
         return out
 
     def varies(self) -> npt.NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from acceptance import TRUE_ZERO, machine, unstamped
+from acceptance import TRUE_ZERO, machine, points, unstamped
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -124,6 +124,7 @@ def test_any_comment_of_the_dialect_in_any_case(tmp_path: Path, controller: str,
         ("(OLP PAYLOAD 3,5)", "mass in kg"),
         ("; olp paylod 30", "is not understood"),
         ("(olp payload 3)(olp payload 4)", "two payloads"),
+        ("/M8 (olp payload 3)", "under block delete"),
     ],
 )
 def test_a_malformed_comment_is_refused_with_its_line(tmp_path: Path, comment: str, words: str) -> None:
@@ -425,3 +426,23 @@ def test_the_review_page_and_a_comparison_take_the_payload(tmp_path: Path) -> No
     found = olp.compare(source, [tmp_path / "measured.csv"], path, job)
     # 3 um/kg at X300
     assert found.report["after"]["across_um"]["max"] == pytest.approx(90.0, abs=0.1)
+
+
+def test_payloads_between_the_holes_of_a_cycle_and_in_distances(tmp_path: Path) -> None:
+    """A cycle takes the depth of each of its holes under the payload of its block; G91 counts differences."""
+    path = loaded(tmp_path)
+    holes = HEAD + "G81 X100 Z-5 R2 F100\n(olp payload 30)\nX200\nX300 (olp payload 10)\nG80\nM2\n"
+    text = olp.correct(holes.encode(), path).data.decode()
+    depth = [float(z) for z in re.findall(r"Z(-[\d.]+)", text)]
+    assert depth == [-5.0, -4.94, -4.97]
+    steps = HEAD + "(olp payload 30)\nG91\nG0 X100\nG0 X100\nG90\nM2\n"
+    moved = points(olp.correct(steps.encode(), path).data)
+    np.testing.assert_allclose(moved[1:, 2], [0.03, 0.06], atol=1e-9)
+
+
+def test_planned_feeds_are_written_into_a_program_with_payloads_by_line(tmp_path: Path) -> None:
+    path = loaded(tmp_path, "[[payloads]]\nline = 4\npayload_kg = 30")
+    job, source = path.with_name("job.toml"), (HEAD + "G1 X1 F60000\nG1 X2\nG0 X300\nM2\n").encode()
+    text = olp.retime(source, path, job).with_feeds()
+    assert b"F60000" not in text
+    assert z_words(olp.correct(text, path, job).data) == z_words(olp.correct(source, path, job).data)

@@ -159,7 +159,7 @@ def test_the_stated_uncertainty_is_that_of_repeated_fits() -> None:
     offset = Distortion("EXX", "beam", (0.0, 2000.0), 1e-3)
     steady = Structure((Sensor("beam", 20.0, (0.0, 40.0)),), (offset,))
     found, sigma = [], []
-    for seed in range(30):
+    for seed in range(16):
         log = exact_log(steady, seed, noise=1e-3)
         own = {key: value for key, value in log.readings.items() if key[0] == "EXX"}
         fit = identify([DriftLog(log.time_s, log.sensors_degC, own)], BOX, 20.0)
@@ -167,6 +167,21 @@ def test_the_stated_uncertainty_is_that_of_repeated_fits() -> None:
         sigma.append(fit.sigma[0][0])
     z = np.array(found) / np.array(sigma)
     assert 0.6 < np.sqrt(np.mean(z * z)) < 1.6
+
+
+def test_a_log_of_every_second_is_thinned_and_tells_the_same() -> None:
+    log = exact_log(STRUCTURE, 1)
+    log = DriftLog(log.time_s, log.sensors_degC, {k: v for k, v in log.readings.items() if k[0] == "EXX"})
+    dense = np.arange(log.time_s[0], log.time_s[-1], 2.0)
+    fine = DriftLog(
+        dense,
+        {name: np.interp(dense, log.time_s, v) for name, v in log.sensors_degC.items()},
+        {key: np.interp(dense, log.time_s, v) for key, v in log.readings.items()},
+    )
+    one, two = (identify([given], BOX, {"beam": 20.0, "column": 21.0}) for given in (log, fine))
+    assert two.components[0].readings < one.components[0].readings * 30
+    for a, b in zip(one.structure.distortions, two.structure.distortions, strict=True):
+        assert (b.offset, b.growth, b.bow) == pytest.approx((a.offset, a.growth, a.bow), rel=0.03, abs=2e-4)
 
 
 def test_what_the_logs_do_not_tell_is_refused_or_said() -> None:

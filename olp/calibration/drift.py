@@ -14,7 +14,7 @@ what the model is worth.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,8 @@ _LAGS = np.geomspace(2e-3, 0.5, 14)
 #: A part may be ahead of its sensor by so much of the log: a sensor that is glued on badly.
 _LONGEST_LEAD = 0.05
 _ROUNDS = 4
+#: Longer logs are thinned: half a minute on a day.
+_MOST_ROWS = 3000
 _REFINED = 12
 #: What is held out of the only log.
 _HELD_OUT = 0.25
@@ -106,6 +108,7 @@ def identify(
     Raises ConfigError for logs that do not fit together and CannotCompute where they do not tell enough.
     """
     names = _names(logs, sensors)
+    logs = [_thinned(log) for log in logs]
     reference = {
         n: float(reference_degC[n] if isinstance(reference_degC, Mapping) else reference_degC) for n in names
     }
@@ -139,6 +142,29 @@ def _names(logs: Sequence[DriftLog], chosen: Sequence[str]) -> list[str]:
     return list(chosen) or names
 
 
+def _thinned(log: DriftLog) -> DriftLog:
+    """A log of no more than _MOST_ROWS rows: means of what was read in equal spans of time."""
+    if len(log.time_s) <= _MOST_ROWS:
+        return log
+    edges = np.linspace(log.time_s[0], log.time_s[-1], _MOST_ROWS + 1)
+    place = np.clip(np.searchsorted(edges, log.time_s, side="right") - 1, 0, _MOST_ROWS - 1)
+
+    def mean(values: Array) -> Array:
+        known = np.isfinite(values)
+        count = np.bincount(place[known], minlength=_MOST_ROWS)
+        total = np.bincount(place[known], values[known], _MOST_ROWS)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    time = mean(log.time_s)
+    kept = np.isfinite(time)
+    return replace(
+        log,
+        time_s=time[kept],
+        sensors_degC={name: mean(values)[kept] for name, values in log.sensors_degC.items()},
+        readings={key: mean(values)[kept] for key, values in log.readings.items()},
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Channel:
     """Readings (m,) of one component at one position in one log, at rows (m,) of it."""
@@ -157,6 +183,7 @@ class _Problem:
     reference: Mapping[str, float]
     box_mm: Array
     channels: tuple[_Channel, ...]
+    _known: dict[tuple[int, str, float], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
@@ -212,12 +239,16 @@ class _Problem:
     def rises(self, lags: Mapping[str, float]) -> list[Array]:
         """(n, sensors) structure temperature above the reference, by log."""
         return [
-            np.stack(
-                [lagged(log.time_s, log.sensors_degC[n], lags[n]) - self.reference[n] for n in self.names],
-                axis=1,
-            )
-            for log in self.logs
+            np.stack([self._rise(number, name, lags[name]) for name in self.names], axis=1)
+            for number in range(len(self.logs))
         ]
+
+    def _rise(self, number: int, name: str, lag_s: float) -> Array:
+        key = (number, name, lag_s)
+        if key not in self._known:
+            log = self.logs[number]
+            self._known[key] = lagged(log.time_s, log.sensors_degC[name], lag_s) - self.reference[name]
+        return self._known[key]
 
     def span(self, component: str) -> tuple[float, float]:
         low, high = self.box_mm[AXES.index(component[2])]

@@ -98,7 +98,8 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
     from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
-    inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
+    named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
+    inputs = files_of(*named)
     if setup.machine.calibration is not None:
         inputs += [str(file) for file in files_beside(setup.machine.calibration)]
     return setup, tuple(inputs)

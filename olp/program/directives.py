@@ -65,6 +65,13 @@ class Directives:
                 continue
             if place in payloads:
                 raise ProgramError("two payloads stand in this line; expected one", line=number)
+            if chunk.deleted[place]:
+                raise ProgramError(
+                    "a payload stands under block delete, so it is not known later whether it holds; "
+                    "expected it in a "
+                    "block without `/`",
+                    line=number,
+                )
             payloads[place] = payload
         return payloads
 
