@@ -92,6 +92,20 @@ def test_a_node_returns_what_was_measured_and_maps_add(interpolation: str) -> No
     assert total([model_of(one)]).rotation(points).max() == 0.0
 
 
+@pytest.mark.parametrize(("interpolation", "cells"), [("linear", 1), ("cubic", 2)])
+def test_an_impulse_at_a_node_is_felt_in_the_cells_around_it(interpolation: str, cells: int) -> None:
+    levels = tuple(np.linspace(low, high, 9) for low, high in BOX)
+    values = np.zeros((9, 9, 9, 3))
+    values[4, 4, 4, 1] = 1.0
+    model = model_of(DeviationMap(levels, values, interpolation=interpolation))
+    points = places(1, 3000)
+    felt = model.error(points, TOOL)[:, 1]
+    away = np.abs((points - [k[4] for k in levels]) / [k[1] - k[0] for k in levels]).max(axis=1)
+    assert np.all(felt[away >= cells] == 0.0)
+    assert np.all(felt[away < 0.5] > 0.1)
+    assert not model.error(points, TOOL)[:, [0, 2]].any()
+
+
 def departures(model, start: np.ndarray, delta: np.ndarray, tool: np.ndarray) -> np.ndarray:
     share = np.linspace(0.0, 1.0, 97)
     points = start[:, None, :] + share[None, :, None] * delta[:, None, :]

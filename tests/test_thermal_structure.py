@@ -228,7 +228,8 @@ def test_a_structure_is_written_and_read_back_the_same(tmp_path: Path) -> None:
 
 
 LOG = (
-    "# tool_mm = [0, 0, -120]\n# line_mm = { Y = 5.0 }\nt_s,beam_degC,EXX@500_um,EBX@-10.5_urad\n"
+    "# tool_mm = [0, 0, -120]\n# line_mm = "
+    "{ X = 0, Y = 5.0, Z = 1 }\nt_s,beam_degC,EXX@500_um,EBX@-10.5_urad\n"
     "0,20.1,1.5,2\n60,20.2,,3\n"
 )
 
@@ -239,7 +240,7 @@ def test_a_log_is_read() -> None:
     assert log.sensors_degC["beam"].tolist() == [20.1, 20.2]
     np.testing.assert_array_equal(log.readings["EXX", 500.0], [1.5e-3, np.nan])
     np.testing.assert_array_equal(log.readings["EBX", -10.5], [2e-6, 3e-6])
-    assert (log.tool_mm, log.line_mm) == ((0.0, 0.0, -120.0), (0.0, 5.0, 0.0))
+    assert (log.tool_mm, log.line_mm) == ((0.0, 0.0, -120.0), (0.0, 5.0, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -253,6 +254,7 @@ def test_a_log_is_read() -> None:
         ("20.2", "", 'line 5: beam_degC = "" is no number'),
         ("20.1,1.5", "20.1,1,5", "line 4: 5 values under 4 columns"),
         ("[0, 0, -120]", "[0, 0]", "line 1: tool_mm = [0, 0]"),
+        ("X = 0, Y", "Y", "line 2: line_mm = { Y = 5.0, Z = 1 }; expected three lengths"),
         ("60,20.2,,3\n", "", "expected at least 2"),
     ],
 )

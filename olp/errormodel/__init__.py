@@ -68,12 +68,12 @@ def build(
     else:
         models.append(RigidBody(box, hold, build_bodies(calibration, chain, skip_components)))
     models += [MapErrors.of(described, box, hold) for described in calibration.maps]
-    loaded = [*calibration.compliance, *(beam.table(box, chain) for beam in calibration.beams)]
-    if loaded:
+    beams = [beam.table(box, chain) for beam in calibration.beams]
+    if calibration.compliance or beams:
         models.append(
             GridErrors.of(
-                "load", loaded, chain, calibration.datum_mm, box, hold=hold,
-                mass_kg=calibration.payload_kg, tool_terms=calibration.model != "huddersfield",
+                "load", calibration.compliance, chain, calibration.datum_mm, box, hold=hold,
+                apart=beams, mass_kg=calibration.payload_kg, tool_terms=calibration.model != "huddersfield",
             )
         )  # fmt: skip
     if calibration.thermal is not None:

@@ -241,7 +241,15 @@ class Calibration:
                 f"none of "
                 'them beside it, or kind = "residual" where the map is what they leave'
             )
+        seen: dict[str, str] = {}
         for table in self.compliance:
+            for name in sorted(set(table.names) & set(seen)):
+                problems.append(
+                    f"{name} stands in {seen[name]} and in {table.name}; expected each component once, or "
+                    f"the load "
+                    "counts twice"
+                )
+            seen |= dict.fromkeys(table.names, table.name)
             problems += cover_problems(table.name, table.arguments, table.knots_mm, self.box_mm)
         if self.structure is not None:
             problems += self.structure.cover_problems(self.box_mm)
@@ -258,6 +266,13 @@ class Calibration:
                 if name in scales
             ]
         for beam in self.beams:
+            bent = f"E{beam.direction[1]}{beam.axis}"
+            if bent in seen:
+                problems.append(
+                    f"{bent} stands in {seen[bent]}, and a beam of axis {beam.axis} bends it too; "
+                    f"expected one of the "
+                    "two: what was measured holds the beam"
+                )
             problems += beam.problems(self.box_mm)
         if self.repeatability_mm is not None and not (
             np.all(np.isfinite(self.repeatability_mm)) and min(self.repeatability_mm) >= 0.0

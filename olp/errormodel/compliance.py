@@ -40,8 +40,17 @@ class GridBody:
 
     @classmethod
     def of(
-        cls, table: ComponentTable, chain: str, datum_mm: Vector, mass_kg: float | None, *, tool_terms: bool
+        cls,
+        table: ComponentTable,
+        chain: str,
+        datum_mm: Vector,
+        mass_kg: float | None,
+        beside: Sequence[ComponentTable],
+        *,
+        tool_terms: bool,
     ) -> GridBody:
+        """`beside` are all tables of this axis that were measured together, this one included: a translation
+        holds what the angles did on its own line, whichever table they stand in."""
         order = chain.replace("F", "")
         after = order[order.index(table.axis) + 1 :]
         carries = chain.index(table.axis) < chain.index("F")
@@ -50,7 +59,7 @@ class GridBody:
             table.knots_mm, np.stack([table.columns[n] for n in names], axis=-1), table.interpolation
         )
         column = tuple(names.index(n) if (n := f"E{d}{table.axis}") in names else None for d in DIRECTIONS)
-        levers = levers_of((table,), datum_mm, table.axis, after, carries, tool_terms)
+        levers = levers_of(tuple(beside), datum_mm, table.axis, after, carries, tool_terms)
         return cls(
             axis=AXES.index(table.axis),
             axes=tuple(AXES.index(a) for a in table.arguments),
@@ -159,9 +168,18 @@ class GridErrors(Boxed):
         hold: bool,
         mass_kg: float | None = None,
         tool_terms: bool = True,
+        apart: Sequence[ComponentTable] = (),
     ) -> GridErrors:
-        """`mass_kg` is the payload of the calibration, None where the tables do not depend on a payload."""
-        bodies = [GridBody.of(t, chain, datum_mm, mass_kg, tool_terms=tool_terms) for t in tables]
+        """`mass_kg` is the payload of the calibration, None where the tables do not depend on a payload.
+        Those in `apart` are bodies of their own, such as beams, with levers of their own."""
+        bodies = [
+            GridBody.of(
+                table, chain, datum_mm, mass_kg, [t for t in tables if t.axis == table.axis],
+                tool_terms=tool_terms,
+            )
+            for table in tables
+        ]  # fmt: skip
+        bodies += [GridBody.of(t, chain, datum_mm, mass_kg, [t], tool_terms=tool_terms) for t in apart]
         return cls(box_mm, hold, name, tuple(bodies))
 
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:

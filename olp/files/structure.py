@@ -58,12 +58,16 @@ def _distortion(table: DistortionTable) -> Distortion:
         offset=of("offset_{}_K"),
         growth=of("growth_{}_m_K", -3),
         bow=of("bow_{}_K"),
-        line_mm=None if table.line_mm is None else _vector(table.line_mm),
+        line_mm=None if table.line_mm is None else _vector(table.line_mm, table.component),
         tool_mm=table.tool_mm,
     )
 
 
-def _vector(stated: Position) -> Vector:
+def _vector(stated: Position, component: str) -> Vector:
+    """Where the other axes stood; that of the component's own axis does not matter."""
+    missing = [a for a, at in zip(AXES, stated.values, strict=True) if at is None and a != component[2]]
+    if missing:
+        raise ConfigError(f"line_mm of {component} names no {missing[0]}; expected where each axis stood")
     x, y, z = (0.0 if at is None else at for at in stated.values)
     return (x, y, z)
 
@@ -106,7 +110,7 @@ def structure_text(
 
 def read_drift_log(path: PathLike) -> DriftLog:
     """A log: `t_s`, sensors `NAME_degC`, and readings of drift `EXX@500_um` (component @ axis position in
-    mm); a reading may be empty. Comment lines `# tool_mm = [0, 0, -120]` and `# line_mm = { Y = 0.0 }` say
+    mm); a reading may be empty. Comment lines `# tool_mm = [0, 0, -120]` and `# line_mm = [0, 500, -300]` say
     with what and where it was read.
 
     Raises InputError where it cannot be read, ConfigError with every problem and its line.
@@ -214,8 +218,8 @@ def _placed(text: str) -> tuple[dict[str, Vector], list[Problem]]:
             continue
         try:
             value = tomllib.loads(f"v = {match[2]}")["v"]
-            if isinstance(value, dict) and set(value) <= set(AXES) and match[1] == "line_mm":
-                value = [value.get(axis, 0.0) for axis in AXES]
+            if isinstance(value, dict) and match[1] == "line_mm":
+                value = [value.get(axis) for axis in AXES]
             x, y, z = (float(v) for v in value)
             found[match[1]] = (x, y, z)
         except (ValueError, TypeError):
