@@ -2,10 +2,10 @@
 
     python tests/benchmarks/bench_calibrate.py [SEEDS]
 
-Random machines of 3 x 2 x 1 m and six chains (four with moving tables), a full set of lines each (laser 0.5 um
-+ 0.5 um/m, angles 1 urad, squares 5 urad, five runs there and back, drift), all through a place off the datum
-and with a reflector off the gauge point. Judged at fresh places with two tools, one never measured with.
-Choices (what a step must gain) were made on rough machines with seeds from 100, never on the smooth ones.
+Random machines of 3 x 2 x 1 m and six chains (four with moving tables), a full set of lines each (laser
+0.5 um + 0.5 um/m, angles 1 urad, squares 5 urad, five runs there and back, drift), all through a place off
+the datum and with a reflector off the gauge point. Judged at fresh places with two tools, one never measured
+with. Choices (what a step must gain) were made on rough machines with seeds from 100, never on smooth ones.
 """
 
 from __future__ import annotations

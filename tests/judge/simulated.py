@@ -223,12 +223,8 @@ def all_lines(
         axis = AXES.index(name[2])
         reference = "table" if name[2] in tables else "functional-point"
         more.setdefault("tool", tool)
-        out.append(
-            take(
-                m, rng, name, targets=targets[axis], at=at, runs=runs, drift=drift, reference=reference,
-                **more,
-            )  # fmt: skip
-        )
+        same: dict[str, Any] = {"at": at, "runs": runs, "drift": drift, "reference": reference}
+        out.append(take(m, rng, name, targets=targets[axis], **same, **more))
 
     for a in AXES:
         add(f"E{a}{a}")
