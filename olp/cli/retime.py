@@ -12,6 +12,8 @@ from olp.cli.common import (
     STREAM,
     Length,
     contour_option,
+    exit_for,
+    fail_on_option,
     files_of,
     flatten_option,
     given,
@@ -80,6 +82,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @flatten_option
 @click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
 @json_option
+@fail_on_option
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
 def command(
@@ -106,6 +109,7 @@ def command(
     flatten: bool,
     report_file: str | None,
     as_json: bool,
+    fail_on: str,
     quiet: bool,
     force: bool,
 ) -> None:
@@ -170,6 +174,7 @@ def command(
         put(report.to_json(result.report))
     elif not quiet:
         put(report_time.to_text(result.report), err=bool(on_stdout))
+    exit_for(result.findings, fail_on)
 
 
 def _json(name: str) -> dict[str, Any]:
