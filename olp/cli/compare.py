@@ -137,11 +137,9 @@ def command(
         result = compare(
             source(nominal), measured, setup, before=before, poses=poses, profile=layout,
             align=align, order=order, reach_mm=reach_mm, tolerance_um=tolerance_um, add_errors=add_errors,
-            frame_name=frame_name, contour=contour, date=date, progress=show,
+            part_frame=frame_name if part_frame else None, contour=contour, date=date, progress=show,
         )  # fmt: skip
         written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(output)}
-        if part_frame and result.part_frame is None:
-            raise UsageError("a part frame takes at least three nominal points")
         if part_frame and result.part_frame:
             written[Path(part_frame)] = result.part_frame.encode()
         if save_profile:
@@ -164,11 +162,12 @@ def _layout(
 ) -> PointProfile | None:
     """The profile that the call asks for, None where files tell their own."""
     from olp.files.point_profile import BUILT_IN, load_profile, with_options
-    from olp.files.points import suggested
+    from olp.files.points import layout_of
+    from olp.files.write import read_bytes
 
     if profile is None and not columns and not any(values.values()):
         return None
-    start = load_profile(profile) if profile else suggested(first) or BUILT_IN["olp"]
+    start = load_profile(profile) if profile else layout_of(read_bytes(first)) or BUILT_IN["olp"]
     if profile is None and columns and all(item.partition("=")[2].isdigit() for item in columns):
         start = start.model_copy(update={"header": False})
     return with_options(start, columns, **values)
