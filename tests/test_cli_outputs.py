@@ -125,3 +125,16 @@ def test_an_error_of_no_file_stays_of_no_file(
     monkeypatch.setattr(target, fails)
     result = run(verb, "part.ngc", "-j", "job.toml")
     assert (result.exit_code, "<stdin>" in result.stderr) == (3, False), result.stderr
+
+
+def test_what_cannot_be_corrected_is_of_the_nominal_program(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    # where the axes are is not known, and their errors depend on it
+    text = '[[curves]]\nfile = "y.csv"\n'
+    machine(folder, text, {"y.csv": "Y_mm,EXY_um\n-1000,0\n2000,30\n"}, tables=TRUE_ZERO)
+    for name in ("n.ngc", "c.ngc"):
+        (folder / name).write_text("G21 G90 G54\nG1 X40 F600\n")
+    result = run("check", "c.ngc", "--nominal", "n.ngc", "-m", "machine.toml")
+    assert (result.exit_code, "n.ngc:2: " in result.stderr) == (3, True), result.stderr

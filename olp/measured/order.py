@@ -33,7 +33,7 @@ def whole(points_mm: Array, nodes_mm: Array, far_mm: float = np.inf) -> tuple[In
     count, width = len(points_mm), len(nodes_mm)
     step = np.diff(nodes_mm, axis=0)
     most = float((step * step).sum(axis=1).mean())
-    idle = _UNVISITED * most * np.arange(width)
+    idle = _UNVISITED * most * np.arange(width, dtype=float)
     moves = np.empty((count, 1, width), np.uint8)
     total = np.zeros((1, width))
     for i in range(count):
@@ -101,7 +101,7 @@ def _row(before: Array, cost: Array, most: float, start: Array | None) -> tuple[
     lost = np.ones(len(entered), bool)
     if start is None:
         np.minimum(entered[:, 1:], before[:, :-1], out=entered[:, 1:])
-        lost = ~np.isfinite(entered).any(axis=1)
+        lost[:] = ~np.isfinite(entered).any(axis=1)
         entered[lost] = 0.0
     # total_j = min(entered_j + cost_j, total_{j-1} + passed_j): with sums of passed it is a running minimum
     summed = np.cumsum(np.minimum(cost, most), axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from olp import api
 from olp.compensation.plan import targets, zero_shifts
-from olp.correction import last_digit_mm
+from olp.correction import last_digit_mm, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import ConfigError, naming
 from olp.files.measured import read_measured
@@ -100,9 +100,6 @@ def view(
             data = unrolled(data, name, loaded.profile, expand_cycles, peck_clearance_mm)
     if corrected is not None:
         other, corrected_name = source_of(corrected)
-        report = api.verify(
-            program, corrected, setup, tolerance_um=tolerance_um, contour=contour, progress=progress
-        ).report
     else:
         if correction is None:
             with naming(name):
@@ -110,11 +107,19 @@ def view(
                     data, setup, tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
                     progress=progress,
                 )  # fmt: skip
-        other, report = correction.data, correction.report
+        other = correction.data
+    tell("read", 0.0)
     with naming(name):
         nominal = read(data, setup, loaded.profile, options)
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
         second = read(other, setup, loaded.profile, options)
+        if correction is not None:
+            report = correction.report
+        else:
+            report = verify_programs(
+                (nominal, name), (second, corrected_name), loaded, tolerance_um=tolerance_um,
+                contour=contour, date=None,
+            ).report  # fmt: skip
         groups = _groups(nominal, second, loaded, tolerance_um)
         tell("sample", 0.0)
         samples = sample(nominal, second, groups, loaded.model, step_mm)
