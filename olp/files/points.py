@@ -24,6 +24,9 @@ Array = npt.NDArray[np.float64]
 _LOOK, _HEAD = 40, 1 << 16
 
 
+_FRAME = re.compile(r"[#/;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
     """(n, 3) positions in mm, with times (n,) in s, names and program lines (n,) where the file has them.
@@ -51,6 +54,14 @@ def read_points(path: PathLike, profile: PointProfile | None = None) -> Points:
     line.
     """
     return parse_points(read_bytes(path), str(path), profile)
+
+
+def row_line(points: Points, row: int) -> int:
+    """The line of the file, counted from 1, in which a point stands."""
+    text = _lines(read_bytes(points.file).decode("utf-8-sig"))
+    profile = points.profile
+    skip, _ = _header(list(itertools.islice(io.StringIO(text), _LOOK)), profile)
+    return next(itertools.islice(_rows(text, profile, skip), row, None))[0]
 
 
 def layout_of(data: bytes) -> PointProfile | None:
@@ -82,7 +93,7 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
-    stated = re.search(r"^[#/;\s]*frame\s*=\s*(\S+)", "".join(first), re.MULTILINE)
+    stated = _frame(first, file)
     skip, header = _header(first, found)
     if next(_rows(text, found, skip), None) is None:
         raise InputError("holds no points; expected a row a point", file=file)
@@ -102,7 +113,7 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         time,
         names,
         column["line"].astype(np.int64) if "line" in column else None,
-        stated[1] if stated else found.frame,
+        stated or found.frame,
         found,
         hashlib.sha256(data).hexdigest(),
     )
@@ -111,6 +122,20 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
 def _lines(text: str) -> str:
     """A text with one kind of line ends."""
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _frame(first: Sequence[str], file: str) -> str | None:
+    """The frame that the head of a file states."""
+    stated = None
+    for number, line in enumerate(first, 1):
+        match = _FRAME.match(line)
+        if match and stated not in (None, match[1]):
+            raise InputError(
+                f"the frame is {match[1]} here and {stated} before; expected one frame a file",
+                file=file, line=number,
+            )  # fmt: skip
+        stated = match[1] if match else stated
+    return stated
 
 
 def _header(first: Sequence[str], profile: PointProfile) -> tuple[int, list[str]]:
