@@ -50,7 +50,7 @@ class Matcher:
         self._shift = zero_shifts(path.frames, model)
         self._home = self._zero(int(path.frame[0]))
         self._origin = origin_mm
-        self._way = _ways(self._nominal, samples)
+        self._samples, self._way = samples, _ways(self._nominal, samples)
 
     def match(self, points: Points) -> Matched:
         """Raises InputError with the line of the first point that is off, where points are not of this path,
@@ -68,11 +68,19 @@ class Matcher:
             rows = rows[np.argsort(run.pairing.s_mm[rows], kind="stable")]
         foot = run.pairing.foot_mm[rows]
         # the page shows the program's own positions, without where touched zeros really lie
-        frame = self._path.frame[self._nominal.move[run.pairing.segment[rows]]]
-        base = foot + self._home - self._shift[frame] - self._origin
-        index = np.maximum.accumulate(_nearest(self._way, run.pairing.s_mm[rows]))
+        move = self._nominal.move[run.pairing.segment[rows]]
+        base = foot + self._home - self._shift[self._path.frame[move]] - self._origin
+        index = np.maximum.accumulate(self._nearest(run.pairing.s_mm[rows], move))
         found = tuple(runs.findings(nominal, placed))
         return Matched(run.name, base, run.points_mm[rows] - foot, index, found)
+
+    def _nearest(self, s_mm: Array, move: Index) -> Index:
+        """(n,) the sample next to each arc length; not the last one of the move before."""
+        way = self._way
+        after = np.clip(np.searchsorted(way, s_mm), 0, len(way) - 1)
+        before = np.maximum(after - 1, 0)
+        nearer = (s_mm - way[before] < way[after] - s_mm) & (self._samples.move[before] >= move)
+        return np.where(nearer, before, after).astype(np.int64)
 
     def _zero(self, frame: int) -> Array:
         """Where the zero of a frame of the program is on the machine, tool lengths apart."""
@@ -116,10 +124,3 @@ def _ways(nominal: Nominal, samples: Samples) -> Array:
     begin = s[np.searchsorted(of, samples.move, "left")]
     end = s[np.searchsorted(of, samples.move, "right")]
     return np.maximum.accumulate(begin + samples.share * (end - begin))
-
-
-def _nearest(way: Array, s: Array) -> Index:
-    """(m,) the sample next to each arc length."""
-    after = np.clip(np.searchsorted(way, s), 0, len(way) - 1)
-    before = np.maximum(after - 1, 0)
-    return np.where(s - way[before] < way[after] - s, before, after).astype(np.int64)
