@@ -210,7 +210,8 @@ def retime(
     path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
     times the tolerances in use. `max_inertial_um` bounds the deviation that accelerations make on the
     machine's compliance. `block_delete` leaves `/` blocks out, `flatten` unrolls loops, subprograms and
-    expressions first: lines then count in the unrolled text. Raises InputError (ProgramError with its line,
+    expressions first: lines then count in the unrolled text. Axes commanded beyond their travel are findings
+    (OLP402), and planned all the same. Raises InputError (ProgramError with its line,
     ConfigError), UsageError and CannotCompute.
     """
     setup = setup_of(machine, job)
