@@ -1,4 +1,4 @@
-"""`olp calibrate fit` from files: plans, files that describe themselves, refusals, and the shipped example."""
+"""`olp calibrate fit` from files: plans, files that describe themselves, refusals, the shipped example."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def test_the_python_way_gives_the_same(example: Path) -> None:
     assert fitted.files(example / "calibration.toml") == {
         path: path.read_bytes() for path in sorted(example.glob("calibration*"), reverse=True)
     }
-    assert [finding.code for finding in fitted.findings][0] == "OLP802"
+    assert fitted.findings[0].code == "OLP802"
 
 
 def test_json_and_fail_on(example: Path) -> None:

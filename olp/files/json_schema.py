@@ -1,4 +1,4 @@
-"""JSON Schemas of machine, calibration, job and measurement files, for editors that complete and check TOML."""
+"""JSON Schemas of the TOML files that people write, for editors that complete and check them."""
 
 from __future__ import annotations
 
