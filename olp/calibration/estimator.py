@@ -41,6 +41,8 @@ FEWEST, MOST = 6, 48
 HALF_CELLS = 5
 #: Cells where no lines but points tell of an axis.
 POINT_CELLS = 12
+#: What stands for the component of a point.
+POINT = "point"
 #: The adjustment is made anew after cyclic terms or points were left out, so often at most.
 PASSES = 4
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
@@ -264,16 +266,11 @@ def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave,
 def _slips(block: Block, cloud: Points, solved: Solved) -> list[Outlier]:
     """Points whose residual is no noise, the worst ones first."""
     _, residual, sigma = residuals_of(block, solved.theta)
+    rest = residual.reshape(-1, 3)
     off = np.abs(residual / sigma).reshape(-1, 3).max(axis=1)
     worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
     return [
-        Outlier(
-            cloud.source,
-            int(cloud.row[k]),
-            "points",
-            float(np.linalg.norm(residual[3 * k : 3 * k + 3])),
-            float(off[k]),
-        )
+        Outlier(cloud.source, int(cloud.row[k]), POINT, float(np.linalg.norm(rest[k])), float(off[k]))
         for k in worst.tolist()
         if off[k] > OUTLIER and off[k] > 0.3 * off.max()
     ]

@@ -96,9 +96,9 @@ class Line:
 class Points:
     """Places of the reflector as one set-up of a tracker (or any instrument of coordinates) saw them.
 
-    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge point
-    to the reflector, `measured_mm` (n, 3) its places in the instrument's frame, which nobody knows, but which
-    is the same for all of these points. `sigma` is the standard uncertainty of a coordinate in mm,
+    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
+    point to the reflector, `measured_mm` (n, 3) its places in the instrument's frame, which nobody knows, but
+    which is the same for all of these points. `sigma` is the standard uncertainty of a coordinate in mm,
     `sigma_scale` that of the instrument's scale (mm/mm). Raises ConfigError.
     """
 
