@@ -232,8 +232,8 @@ def fit(
     # readings less what the fit used up of their freedom
     used = float(np.trace(solved.covariance @ normal.H)) + normal.free
     return Fit(
-        measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(points), tuple(outliers),
-        box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
+        measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(points),
+        tuple(outliers), box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
     )  # fmt: skip
 
 
