@@ -27,6 +27,8 @@ STRONG, MOST_PAIRS = 0.9, 8
 SCATTER = 1.5
 #: Chi-square beyond so many standard deviations of its distribution says that the model does not fit.
 MISFIT = 5.0
+#: Offsets of the reflector that differ by less than this are one.
+ONE_OFFSET_MM = 1.0
 _POINTS = 41
 _LISTED = 10
 
@@ -222,13 +224,27 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
         yield Finding(
             "OLP801",
             f"{name} stands as zero: as large as other {like} of this machine ({sigma * scale:.2g} {unit}) "
-            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}",
+            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}"
+            + _why(fit, name),
         )
     for name in squareness_unseen(fit):
         yield Finding(
             "OLP806",
             f"{name} stands as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
         )
+
+
+def _why(fit: Fit, name: str) -> str:
+    """What points with too few offsets of the reflector have to do with an angle that they do not see."""
+    if not fit.points or name[1] in AXES:
+        return ""
+    tools = np.concatenate([result.points.tool_mm for result in fit.points])
+    size = np.linalg.svd(tools - tools.mean(axis=0), compute_uv=False)
+    if size[0] < ONE_OFFSET_MM * math.sqrt(len(tools)):
+        return "; the points have one offset of the reflector"
+    if size[1] < ONE_OFFSET_MM * math.sqrt(len(tools)):
+        return "; the offsets of the reflector lie on one line, and the turn about that line moves no point"
+    return ""
 
 
 def _outlier_findings(fit: Fit) -> Iterator[Finding]:
