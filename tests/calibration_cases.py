@@ -9,7 +9,7 @@ import numpy as np
 from judge import simulated
 
 from olp.calibration.estimator import Fit
-from olp.calibration.observations import Line, Measurements, Points, Square
+from olp.calibration.observations import Lengths, Line, Measurements, Points, Square
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
 #: tools of the judgement: the one measured with, and one that no line has seen
@@ -54,6 +54,18 @@ def cloud(
     tools = simulated.OFFSETS if tools is None else tools
     at, tool, place = simulated.points(machine, seed, n, sigma_um * 1e-3, tools)
     return Points(at, tool, place, sigma_um * 1e-3, source="points.csv")
+
+
+def rays(
+    machine: simulated.Machine, seed: int, count: int, n: int, tools: Sequence[object] | None = None
+) -> tuple[Lengths, ...]:
+    """n lengths of 0.2 um + 0.3 um/m from each of so many stations."""
+    tools = simulated.OFFSETS if tools is None else tools
+    places = simulated.stations(machine, seed, count)
+    return tuple(
+        Lengths(*simulated.lengths(machine, seed, place, k, n, tools), source=f"station-{k}.csv")
+        for k, place in enumerate(places)
+    )
 
 
 @dataclass(frozen=True)

@@ -154,6 +154,17 @@ def test_points_of_a_tracker(tmp_path: Path) -> None:
     assert found.row.tolist() == list(range(3, 11))
 
 
+def test_lengths_from_a_station(tmp_path: Path) -> None:
+    rows = [f"{x},{y},{z},{1000 + x},{x / 10},0,-90\n" for x in (0, 500) for y in (0, 300) for z in (-100, 0)]
+    head = "X_mm,Y_mm,Z_mm,length_mm,tool_X_mm,tool_Y_mm,tool_Z_mm\n"
+    (tmp_path / "s.csv").write_text(head + "".join(rows))
+    planned(tmp_path, '[[stations]]\nfile = "s.csv"\nsigma_um = 0.2\nsigma_um_m = 0.3\n')
+    (found,) = load_measurements([tmp_path]).lengths
+    assert found.length_mm[-1] == 1500.0
+    assert found.sigma_mm[-1] == pytest.approx(0.2e-3 + 0.3e-6 * 1500.0)
+    assert found.tool_mm[-1].tolist() == [50.0, 0.0, -90.0]
+
+
 @pytest.mark.parametrize(
     ("change", "more", "words"),
     [

@@ -15,8 +15,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from olp.calibration.observations import Line, Measurements, Points, Square, SquarenessReading
+from olp.calibration.observations import Lengths, Line, Measurements, Points, Square, SquarenessReading
 from olp.exceptions import ConfigError, InputError
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
@@ -27,8 +28,9 @@ from olp.files.measurement_schemas import (
     SquarenessReadingTable,
     SquareTable,
     Stated,
+    StationTable,
 )
-from olp.files.point_readings import read_point_readings
+from olp.files.point_readings import LENGTH, PointReadings, read_point_readings
 from olp.files.problems import Problem, config_error, validate
 from olp.files.readings import Readings, check_component, decoded, parse_readings, stated_keys
 from olp.files.schemas import Position
@@ -52,6 +54,7 @@ class _Gathered:
     chain: str | None
     lines: list[Line] = field(default_factory=list)
     points: list[Points] = field(default_factory=list)
+    lengths: list[Lengths] = field(default_factory=list)
     squares: dict[str, Square] = field(default_factory=dict)
     squareness: list[SquarenessReading] = field(default_factory=list)
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
@@ -108,6 +111,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         measured=found.whole["measured"][0],
         chain=found.chain,
         points=tuple(found.points),
+        lengths=tuple(found.lengths),
     )
 
 
@@ -125,7 +129,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             continue
         try:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
-            for table in (*stated.get("lines", ()), *stated.get("points", ())):
+            for table in (t for kind in ("lines", "points", "stations") for t in stated.get(kind, ())):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader says what is wrong with it.
@@ -163,14 +167,19 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    tables: list[tuple[Path, LineTable | PointsTable]] = [(("lines", k), t) for k, t in enumerate(plan.lines)]
-    tables += [(("points", k), table) for k, table in enumerate(plan.points)]
+    tables: list[tuple[Path, LineTable | PointsTable | StationTable]] = [
+        *((("lines", k), table) for k, table in enumerate(plan.lines)),
+        *((("points", k), table) for k, table in enumerate(plan.points)),
+        *((("stations", k), table) for k, table in enumerate(plan.stations)),
+    ]
     for key, item in tables:
         try:
             if isinstance(item, LineTable):
                 _line(path, item, plan.defaults, plan.vertical, found)
-            else:
+            elif isinstance(item, PointsTable):
                 found.points.append(_points(path, item, plan.defaults))
+            else:
+                found.lengths.append(_lengths(path, item, plan.defaults))
         except ConfigError as error:
             if error.file not in (None, str(path)):
                 found.errors.append(error)
@@ -204,22 +213,44 @@ def _read(path: FilePath, profile: FilePath | None) -> Readings:
 
 
 def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
-    path = plan.parent / table.file
-    readings = read_point_readings(path)
-    tool = table.tool_mm or defaults.tool_mm
-    if readings.tool_mm is None and tool is None:
-        raise ConfigError("tool_mm is missing; expected it here, or the columns tool_X_mm ... in the file")
-    if readings.tool_mm is not None and table.tool_mm is not None:
-        raise ConfigError("tool_mm is stated here and in columns of the file; expected it once")
+    readings = read_point_readings(plan.parent / table.file)
     return Points(
         axis_mm=readings.axis_mm,
-        tool_mm=np.array(tool) if readings.tool_mm is None else readings.tool_mm,
+        tool_mm=_tools(readings, table, defaults),
         measured_mm=readings.measured_mm,
         sigma=table.sigma_um * MM_PER_UM,
         sigma_scale=table.sigma_scale_um_m * PER_UNIT,
-        source=str(path),
+        source=readings.file,
         row=readings.row,
     )
+
+
+def _lengths(plan: FilePath, table: StationTable, defaults: LineKeys) -> Lengths:
+    readings = read_point_readings(plan.parent / table.file, LENGTH)
+    length = readings.measured_mm[:, 0]
+    return Lengths(
+        axis_mm=readings.axis_mm,
+        tool_mm=_tools(readings, table, defaults),
+        length_mm=length,
+        sigma_mm=table.sigma_um * MM_PER_UM + table.sigma_um_m * PER_UNIT * np.abs(length),
+        sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+        source=readings.file,
+        row=readings.row,
+    )
+
+
+def _tools(
+    readings: PointReadings, table: PointsTable | StationTable, defaults: LineKeys
+) -> npt.NDArray[np.float64]:
+    """The vector of each point, from the file or from the plan."""
+    tool = table.tool_mm or defaults.tool_mm
+    if readings.tool_mm is not None:
+        if table.tool_mm is not None:
+            raise ConfigError("tool_mm is stated here and in columns of the file; expected it once")
+        return readings.tool_mm
+    if tool is None:
+        raise ConfigError("tool_mm is missing; expected it here, or the columns tool_X_mm ... in the file")
+    return np.array(tool)
 
 
 # -- files that describe themselves ----------------------------------------------------------------------

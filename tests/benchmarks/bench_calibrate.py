@@ -20,7 +20,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from calibration_cases import FRESH, TOOLS, case, cloud, left
+from calibration_cases import FRESH, TOOLS, case, cloud, left, rays
+from judge.simulated import OFFSETS
 
 from olp.calibration.estimator import fit
 
@@ -34,19 +35,22 @@ def spread(values: np.ndarray) -> str:
 
 @dataclass(frozen=True)
 class Method:
-    """What is measured: the lines, and so many points of this uncertainty; judged with these tools."""
+    """What is measured: the lines, so many points of this uncertainty, lengths from so many stations; judged
+    with these tools."""
 
     name: str
     lines: bool
     points: int
     sigma_um: float
     tools: tuple[tuple[float, float, float], ...]
+    stations: int = 0
 
 
 METHODS = (
     Method("lines", True, 0, 0.0, TOOLS),
     Method("120 points of 5 um", False, 120, 5.0, FRESH),
     Method("lines and 40 points of 8 um", True, 40, 8.0, FRESH),
+    Method("6 stations, 250 lengths each", False, 0, 0.0, (OFFSETS[0], FRESH[1]), stations=6),
 )
 
 
@@ -58,7 +62,10 @@ def run(method: Method, family: str, seeds: int) -> None:
         points = (cloud(machine, seed, method.points, method.sigma_um),) if method.points else ()
         lines = measurements.lines if method.lines else ()
         squares = measurements.squares if method.lines else ()
-        taken = dataclasses.replace(measurements, lines=lines, squares=squares, points=points)
+        lengths = rays(machine, seed, method.stations, 250) if method.stations else ()
+        taken = dataclasses.replace(
+            measurements, lines=lines, squares=squares, points=points, lengths=lengths
+        )
         begin = time.process_time()
         found = fit(taken, machine.chain)
         spent += time.process_time() - begin

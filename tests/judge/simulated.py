@@ -281,3 +281,31 @@ def points(
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     return at, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
+
+
+def stations(m: Machine, seed: int, count: int) -> np.ndarray:
+    """(count, 3) places of a tracking interferometer about the machine."""
+    rng = np.random.default_rng([seed, count, 5])
+    low, span = m.box[:, 0], np.ptp(m.box, axis=1)
+    corners = np.array([(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1), (0.5, 0, 0.2), (0.5, 1, 1)])
+    outward = (corners[:count] - 0.5) * np.array([600.0, 600.0, 300.0])
+    return low + corners[:count] * span + outward + rng.uniform(-100, 100, (count, 3))
+
+
+def lengths(
+    m: Machine, seed: int, station: np.ndarray, number: int, n: int, tools: Any = OFFSETS,
+    sigma: tuple[float, float] = (0.2e-3, 0.3e-6),
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Axis positions, tool vectors, lengths less a dead length, and their uncertainty (mm + mm/mm) from a
+    station."""
+    rng = np.random.default_rng([seed, number, n, 13])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    place = at + tool
+    for vector in np.array(tools):
+        own = (tool == vector).all(axis=1)
+        place[own] += m.error(at[own], vector)
+    true = np.linalg.norm(place - station, axis=1)
+    noise = sigma[0] + sigma[1] * true
+    return at, tool, true - 321.0 - 40.0 * number + rng.normal(0.0, noise), noise
