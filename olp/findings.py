@@ -12,6 +12,7 @@ from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
+from olp.table_rules import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,7 +303,9 @@ _TABLE = (
     ),
 )
 
-RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE, *METROLOGY), key=lambda rule: rule.code)}
+RULES = {
+    rule.code: rule for rule in sorted((*_TABLE, *GATE, *METROLOGY, *TABLES), key=lambda rule: rule.code)
+}
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine
 GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))
