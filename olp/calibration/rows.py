@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, Decimal
 from itertools import pairwise
@@ -205,8 +206,13 @@ def _rounded(values: Array, name: str) -> Array:
 
 def _positions(curve: Curve, parts: tuple[Array, ...], most: int | None, even: bool, good: float) -> Array:
     own = curve.position_mm
-    if (even and not _is_even(own)) or (most is not None and len(own) > most):
-        return _even(own[0], own[-1], most or _MOST_EVEN)
+    if even and not _is_even(own):
+        found = _common(own, most or _MOST_EVEN)
+        if found is None:
+            return _even(own[0], own[-1], most or _MOST_EVEN)
+        own = found
+    if most is not None and len(own) > most:
+        return _even(own[0], own[-1], most)
     if curve.interpolation == "linear":
         return own
     if even:
@@ -251,9 +257,28 @@ def _is_even(position: Array) -> bool:
 
 
 def _even(low: float, high: float, count: int) -> Array:
-    """At most `count` positions with equal steps of whole micrometres from `low` to `high` or just beyond."""
+    """At most `count` positions with equal steps of whole micrometres from `low` to `high`, or just beyond
+    where no such step divides the span."""
     first = Decimal(repr(float(low)))
     span = Decimal(repr(float(high))) - first
-    step = (span / (count - 1)).quantize(_MICROMETRE, ROUND_CEILING)
-    steps = int((span / step).to_integral_value(ROUND_CEILING))
+    for steps in range(count - 1, count // 2, -1):
+        if span % (_MICROMETRE * steps) == 0:
+            step = span / steps
+            break
+    else:
+        step = (span / (count - 1)).quantize(_MICROMETRE, ROUND_CEILING)
+        steps = int((span / step).to_integral_value(ROUND_CEILING))
     return np.array([float(first + step * i) for i in range(steps + 1)])
+
+
+def _common(position: Array, most: int) -> Array | None:
+    """Equal steps that meet every position, None where that takes more than `most` of them."""
+    exact = [Decimal(repr(value)) for value in position.tolist()]
+    micrometres = [(value - exact[0]) / _MICROMETRE for value in exact]
+    if any(value != value.to_integral_value() for value in micrometres):
+        return None
+    step = math.gcd(*(int(value) for value in micrometres))
+    count = int(micrometres[-1]) // step + 1
+    if count > most:
+        return None
+    return np.array([float(exact[0] + _MICROMETRE * step * i) for i in range(count)])
