@@ -73,7 +73,8 @@ def component_rows(
     miss = max(_miss(curve, part, position) for part in parts)
     forward, backward = values[0], values[-1]
     if lost:
-        forward, backward = forward - 0.5 * lost, backward + 0.5 * lost
+        forward = _rounded(forward - 0.5 * lost, name)
+        backward = _rounded(backward + 0.5 * lost, name)
     return Rows(name, position, forward, backward, len(parts) == 2 or bool(lost), miss)
 
 

@@ -97,6 +97,10 @@ def _curve(axis: str, data: bytes, file: Path, kind: int, mm: float) -> Curve:
 
 
 def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
+    if target.suffix.lower() != ".ini":
+        raise UsageError(
+            "is no name for this table; expected an INI file, which names the others", file=str(target)
+        )
     kind = TRIMS if given.kind is None else given.kind
     most = min(MOST_ROWS, given.most or MOST_ROWS)
     lines = [
