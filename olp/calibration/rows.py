@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, Decimal
 from itertools import pairwise
@@ -80,15 +81,20 @@ def component_rows(
 
 def common_rows(calibration: Calibration, curve: Curve) -> list[Rows]:
     """Rows of the components of one curve, all at the same positions, without lost motion."""
-    still = replace(calibration, backlash_mm=ZERO)
-    own = [component_rows(still, name) for name in curve.names]
-    position = np.unique(np.concatenate([rows.position_mm for rows in own if rows is not None]))
+    position = _fine(calibration, [curve])
     out = []
     for name in (n for n in COMPONENTS if n in curve.names):
         values = [_at(curve, part, position, name) for part in _parts(curve, name)]
         miss = max(_miss(curve, part, position) for part in _parts(curve, name))
         out.append(Rows(name, position, values[0], values[-1], len(values) == 2, miss))
     return out
+
+
+def _fine(calibration: Calibration, curves: Sequence[Curve]) -> Array:
+    """Positions between which straight lines are good enough for every component of some curves."""
+    still = replace(calibration, backlash_mm=ZERO)
+    own = [component_rows(still, name) for curve in curves for name in curve.names]
+    return np.unique(np.concatenate([rows.position_mm for rows in own if rows is not None]))
 
 
 def as_straightness(calibration: Calibration) -> Calibration:
@@ -108,13 +114,19 @@ def as_straightness(calibration: Calibration) -> Calibration:
             values = _rounded(slope * (ends - calibration.datum_mm[j]), name)
             curves.append(Curve(name[2], ends, {name: values}, interpolation="linear"))
             continue
+        # Monotone cubics do not add up: the slope is added where straight lines stand for the curve.
         curve = curves[place]
-        lean = slope * (curve.position_mm - calibration.datum_mm[j])
+        position = _fine(calibration, [curve])
+        lean = slope * (position - calibration.datum_mm[j])
         sides = [
-            {n: _rounded(v + lean, n) if n == name else v for n, v in side.items()}
+            {n: _at(curve, v, position, n) + (lean if n == name else 0.0) for n, v in side.items()}
             for side in (curve.columns, curve.forward, curve.backward)
         ]
-        curves[place] = replace(curve, columns=sides[0], forward=sides[1], backward=sides[2])
+        sides = [{n: _rounded(v, n) if n == name else v for n, v in side.items()} for side in sides]
+        curves[place] = replace(
+            curve, position_mm=position, columns=sides[0], forward=sides[1], backward=sides[2],
+            interpolation="linear",
+        )  # fmt: skip
     return replace(calibration, curves=tuple(curves), squareness=dict.fromkeys(square, 0.0))
 
 
@@ -155,7 +167,7 @@ def _joined(
 ) -> Curve:
     """One curve of an axis with all its components, moved to the line through 0 with no tool."""
     j, own = AXES.index(axis), calibration.curves_of(axis)
-    position = np.unique(np.concatenate([c.position_mm for c in own] or [calibration.box_mm[j]]))
+    position = _fine(calibration, own) if own else np.array(calibration.box_mm[j])
     holder = {name: curve for curve in own for name in curve.names}
     both = any(curve.forward for curve in own)
     sides: list[dict[str, Array]] = []
@@ -182,7 +194,7 @@ def _joined(
     columns = [{n: values.get(n, np.zeros(len(position))) for n in names} for values in sides]
     return Curve(
         axis, position, {} if both else columns[0], columns[0] if both else {}, columns[-1] if both else {},
-        ZERO, ZERO, kind, "pchip" if any(c.interpolation == "pchip" for c in own) else "linear",
+        ZERO, ZERO, kind, "linear",
     )  # fmt: skip
 
 

@@ -207,8 +207,8 @@ def _compensated(reading: Reading, joints: Mapping[str, list[str]]) -> frozenset
                 names.add(f"E{letter}{letter}")
                 reading.notes.append(
                     f"[{section}] COMP_FILE = {table} corrects E{letter}{letter}, so it is listed in "
-                    "compensated_by_controller; if it was active while measuring, list it in "
-                    "active_during_measurement of the calibration instead."
+                    "compensated_by_controller (olp calibrate import --format linuxcnc reads it); if it was "
+                    "active while measuring, list it in active_during_measurement of the calibration instead."
                 )
             elif backlash := reading.length(section, "BACKLASH"):
                 reading.notes.append(
