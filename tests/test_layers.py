@@ -14,7 +14,7 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"gate_rules", "metrology_rules", "table_rules"},
+    {"calibration_rules", "gate_rules", "metrology_rules", "table_rules"},
     {"findings"},
     {"geometry", "tables"},
     {"machine"},
@@ -33,7 +33,7 @@ LAYERS = (
     {"loading", "poses"},
     {"replanning"},
     {"comparing_parts"},
-    {"correction", "retiming", "comparing"},
+    {"calibrating", "correction", "retiming", "comparing"},
     {"exchanging"},
     {"gate"},
     {"api"},

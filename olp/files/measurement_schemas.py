@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from olp.files.fields import Interval, IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
+from olp.files.fields import Chain, Interval, IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
 from olp.files.readings import SENSES
 from olp.files.schemas import Position, Table
 from olp.machine import COMPONENTS
@@ -22,7 +22,6 @@ def _sense(value: object) -> object:
 
 
 Sense = Annotated[str, Field(json_schema_extra={"enum": list(SENSES)}), BeforeValidator(_sense)]
-Unit = Literal["mm", "um", "nm", "rad", "mrad", "urad", "arcsec", "um/m", "mm/m"]
 Instrument = Literal["laser", "level", "autocollimator", "straightedge", "other"]
 
 
@@ -42,9 +41,6 @@ class LineKeys(Table):
     )
     square: Text | None = Field(
         default=None, description="the name of the square whose leg the straightness was read against"
-    )
-    unit: Unit | None = Field(
-        default=None, description='the unit of the values where the file does not say it, such as "um"'
     )
     sense: Sense | None = Field(
         default=None,
@@ -152,6 +148,10 @@ class MeasurementsFile(Table):
         alias="schema", description='the format, "olp-measurements-1"'
     )
     machine: Text = Field(description="the name in the machine file")
+    chain: Chain | None = Field(
+        default=None,
+        description='the order of axes from workpiece to tool, such as "FXYZ"; the machine file says it too',
+    )
     measured: datetime.date = Field(description="the date of measuring, such as 2026-05-14, without quotes")
     temperature_degC: float = Field(description="the temperature of the scales while measuring, in degC")
     vertical: Literal["X", "Y", "Z"] = Field(

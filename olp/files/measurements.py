@@ -16,6 +16,7 @@ from typing import Any
 
 from olp.calibration.observations import Line, Measurements, Square, SquarenessReading
 from olp.exceptions import ConfigError, InputError
+from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
     LineKeys,
     LineTable,
@@ -100,6 +101,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         temperature_degC=found.whole["temperature_degC"][0],
         active_during_measurement=found.whole.get("active_during_measurement", (frozenset(), ""))[0],
         measured=found.whole["measured"][0],
+        chain=found.chain,
     )
 
 
@@ -137,6 +139,12 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         return
     for name in ("machine", "measured", "temperature_degC", "active_during_measurement"):
         found.state(name, getattr(plan, name), str(path), line_of((name,), places))
+    if plan.chain is not None:
+        found.state("chain", plan.chain, str(path), line_of(("chain",), places))
+        if found.chain is not None and found.chain != plan.chain:
+            sentence = f'chain = "{plan.chain}", but the machine file says "{found.chain}"'
+            found.errors.append(config_error([(line_of(("chain",), places), sentence)], str(path)))
+        found.chain = found.chain or plan.chain
     for axis in AXES:
         found.periods[axis].update(getattr(plan.periods_mm, axis))
     problems: list[Problem] = []
@@ -170,26 +178,20 @@ def _plan(path: FilePath, found: _Gathered) -> None:
 def _line(plan: FilePath, table: LineTable, defaults: LineKeys, vertical: str, found: _Gathered) -> None:
     path = plan.parent / table.file
     profile = table.profile or defaults.profile
-    readings = _read(path, table, defaults, plan.parent / profile if profile else None)
+    readings = _read(path, plan.parent / profile if profile else None)
     stated, places = _stated(readings.keys, str(path))
     component = table.component or stated.component or readings.component
     if component is None:
         raise ConfigError("component is missing; expected a name such as EXX in the plan or the file")
     check_component(readings, component)
     said = _merged(table, stated, defaults, places, str(path))
+    if readings.sense_known and table.sense is not None:
+        raise ConfigError("sense is stated by the profile and by the line; expected it once", file=str(plan))
     found.lines.append(_as_line(readings, component, said, vertical, found.chain, str(path)))
 
 
-def _read(path: FilePath, table: LineKeys, defaults: LineKeys, profile: FilePath | None) -> Readings:
-    if path.suffix.lower() == ".rtx" and profile is None:
-        from olp.files.renishaw import read_rtx
-
-        return read_rtx(path, unit=table.unit or defaults.unit)
-    if profile is not None:
-        from olp.files.line_profile import load_line_profile, read_profiled
-
-        return read_profiled(path, load_line_profile(profile))
-    return parse_readings(read_bytes(path), str(path))
+def _read(path: FilePath, profile: FilePath | None) -> Readings:
+    return read_line(path, None if profile is None else load_line_profile(profile))
 
 
 # -- files that describe themselves ----------------------------------------------------------------------
@@ -286,7 +288,8 @@ def _as_line(
     if problems:
         raise ConfigError("; ".join(problems), file=file, problems=tuple(problems))
     angular = component[1] in "ABC"
-    value = readings.value if said.sense is None else readings.with_sense(said.sense).value
+    known = readings.sense_known or said.sense is None
+    value = readings.value if known else readings.with_sense(str(said.sense)).value
     place = [0.0 if at is None else at for at in said.line_mm.values]
     sigma = (said.sigma_urad or 0.0) * RAD_PER_URAD if angular else (said.sigma_um or 0.0) * MM_PER_UM
     return Line(
