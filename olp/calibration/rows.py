@@ -12,7 +12,8 @@ import numpy as np
 
 from olp.errormodel.base import Array
 from olp.errormodel.bodies import Lever, build_bodies
-from olp.errormodel.calibration import Calibration, Curve, Reference
+from olp.errormodel.calibration import Calibration, Curve, Cyclic, Reference
+from olp.errormodel.cyclic import cyclic_value
 from olp.machine import COMPONENTS, ZERO
 from olp.tables import Interpolant
 from olp.units import AXES
@@ -24,6 +25,8 @@ MISS_RAD = 5e-8
 _MOST_PARTS = 32
 #: Rows of a table with equal steps, where nothing limits it and the positions of the curve do not fit.
 _MOST_EVEN = 1001
+#: Rows for each period of a cyclic term, so that straight lines miss 2 % of its amplitude, and rows in all.
+_ROWS_A_PERIOD, _MOST_DENSE = 16, 10_001
 #: Places of a millimetre, and of a radian, that are kept of computed values.
 _MM_DECIMALS, _RAD_DECIMALS = 8, 12
 _MICROMETRE = Decimal("0.001")
@@ -35,7 +38,7 @@ _CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 
 class Rows:
     """One component along its axis: (n,) positions in mm, and errors in both directions in mm or rad; `both`
     is False where they are the same. `miss` is the largest departure of straight lines between the rows from
-    the curve, in mm or rad."""
+    the curve, in mm or rad; `cyclic` says that the cyclic terms of the component, if any, are in the rows."""
 
     name: str
     position_mm: Array
@@ -43,6 +46,7 @@ class Rows:
     backward: Array
     both: bool
     miss: float = 0.0
+    cyclic: bool = True
 
     @property
     def mean(self) -> Array:
@@ -54,29 +58,53 @@ def component_rows(
     calibration: Calibration, name: str, *, most: int | None = None, even: bool = False
 ) -> Rows | None:
     """Rows of a component as its curve states it, on its own line, with the lost motion of its axis; None
-    where the calibration does not hold it. Cyclic terms are left out.
+    where the calibration does not hold it.
 
-    Positions are the curve's own where straight lines between them are good enough, more where they are not;
-    `most` limits their number, and `even` asks for equal steps. Values at the curve's own positions are
-    exact.
+    Positions are the curve's own where straight lines between them are good enough, more where they are not,
+    and many where cyclic terms have to be followed; `most` limits their number, and `even` asks for equal
+    steps. Values at the curve's own positions are exact. Cyclic terms are left out where their period would
+    get too few rows.
     """
-    curve = next((c for c in calibration.curves if name in c.names), None)
     j = AXES.index(name[2])
     lost = calibration.backlash_mm[j] if name[1] == name[2] else 0.0
+    curve = next((c for c in calibration.curves if name in c.names), None)
+    terms = [c for c in calibration.cyclic if c.component == name and c.amplitude]
     if curve is None:
-        if not lost:
+        if not lost and not terms:
             return None
-        ends = np.array(calibration.box_mm[j])
-        return Rows(name, ends, np.full(2, -0.5 * lost), np.full(2, 0.5 * lost), True)
+        zeros = {name: np.zeros(2)}
+        curve = Curve(name[2], np.array(calibration.box_mm[j]), zeros, interpolation="linear")
     parts = _parts(curve, name)
-    position = _positions(curve, parts, most, even, MISS_RAD if name[1] in "ABC" else MISS_MM)
-    values = [_at(curve, part, position, name) for part in parts]
+    good = MISS_RAD if name[1] in "ABC" else MISS_MM
+    position = _positions(curve, parts, most, even, good)
+    dense = _dense(position, terms, most, even)
+    position = position if dense is None else dense
     miss = max(_miss(curve, part, position) for part in parts)
+    values = [_at(curve, part, position, name) for part in parts]
+    if terms and dense is not None:
+        repeating = sum((cyclic_value(term, position) for term in terms), np.zeros(len(position)))
+        values = [_rounded(part + repeating, name) for part in values]
     forward, backward = values[0], values[-1]
     if lost:
         forward = _rounded(forward - 0.5 * lost, name)
         backward = _rounded(backward + 0.5 * lost, name)
-    return Rows(name, position, forward, backward, len(parts) == 2 or bool(lost), miss)
+    both = len(parts) == 2 or bool(lost)
+    return Rows(name, position, forward, backward, both, miss, not terms or dense is not None)
+
+
+def _dense(position: Array, terms: Sequence[Cyclic], most: int | None, even: bool) -> Array | None:
+    """Positions that follow cyclic terms as well; None where there are none, or they take too many rows."""
+    if not terms:
+        return None
+    low, high = float(position[0]), float(position[-1])
+    step = min(term.period_mm for term in terms) / _ROWS_A_PERIOD
+    count = math.ceil((high - low) / step) + 1
+    limit = _MOST_DENSE if most is None else most
+    if count + (0 if even else len(position)) > limit:
+        return None
+    if even:
+        return _even(low, high, count)
+    return np.unique(np.concatenate([position, _even(low, high, count)[1:-1]]))
 
 
 def common_rows(calibration: Calibration, curve: Curve) -> list[Rows]:
@@ -84,9 +112,15 @@ def common_rows(calibration: Calibration, curve: Curve) -> list[Rows]:
     position = _fine(calibration, [curve])
     out = []
     for name in (n for n in COMPONENTS if n in curve.names):
+        terms = [c for c in calibration.cyclic if c.component == name and c.amplitude]
+        rows = [component_rows(replace(calibration, backlash_mm=ZERO), name)]
+        held = all(found is not None and found.cyclic for found in rows)
         values = [_at(curve, part, position, name) for part in _parts(curve, name)]
+        if terms and held:
+            repeating = sum((cyclic_value(term, position) for term in terms), np.zeros(len(position)))
+            values = [_rounded(part + repeating, name) for part in values]
         miss = max(_miss(curve, part, position) for part in _parts(curve, name))
-        out.append(Rows(name, position, values[0], values[-1], len(values) == 2, miss))
+        out.append(Rows(name, position, values[0], values[-1], len(values) == 2, miss, held))
     return out
 
 
@@ -95,6 +129,17 @@ def _fine(calibration: Calibration, curves: Sequence[Curve]) -> Array:
     still = replace(calibration, backlash_mm=ZERO)
     own = [component_rows(still, name) for curve in curves for name in curve.names]
     return np.unique(np.concatenate([rows.position_mm for rows in own if rows is not None]))
+
+
+def along_axes(calibration: Calibration) -> Calibration:
+    """The same without angular cyclic terms, which need levers of their own, and with a curve of zeros for
+    each component that is cyclic only."""
+    cyclic = tuple(term for term in calibration.cyclic if term.component[1] in AXES)
+    held = {name for curve in calibration.curves for name in curve.names}
+    bare = sorted({term.component for term in cyclic} - held)
+    boxes = {name: np.array(calibration.box_mm[AXES.index(name[2])]) for name in bare}
+    curves = [Curve(n[2], box, {n: np.zeros(2)}, interpolation="linear") for n, box in boxes.items()]
+    return replace(calibration, cyclic=cyclic, curves=(*calibration.curves, *curves))
 
 
 def as_straightness(calibration: Calibration) -> Calibration:
@@ -116,7 +161,7 @@ def as_straightness(calibration: Calibration) -> Calibration:
             continue
         # Monotone cubics do not add up: the slope is added where straight lines stand for the curve.
         curve = curves[place]
-        position = _fine(calibration, [curve])
+        position = _fine(replace(calibration, cyclic=()), [curve])
         lean = slope * (position - calibration.datum_mm[j])
         sides = [
             {n: _at(curve, v, position, n) + (lean if n == name else 0.0) for n, v in side.items()}
@@ -167,7 +212,7 @@ def _joined(
 ) -> Curve:
     """One curve of an axis with all its components, moved to the line through 0 with no tool."""
     j, own = AXES.index(axis), calibration.curves_of(axis)
-    position = _fine(calibration, own) if own else np.array(calibration.box_mm[j])
+    position = _fine(replace(calibration, cyclic=()), own) if own else np.array(calibration.box_mm[j])
     holder = {name: curve for curve in own for name in curve.names}
     both = any(curve.forward for curve in own)
     sides: list[dict[str, Array]] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -25,6 +25,18 @@ from olp.units import AXES
 #: "error": a value is actual minus commanded, which the control takes off; "correction": it adds the value.
 Sense = Literal["error", "correction"]
 Load = Callable[[Path], bytes]
+
+#: Rows nearer than this are a mistake: no slope between them means anything.
+LEAST_STEP_MM = 1e-6
+
+#: What of a calibration tables hold, or need not: the rest of it depends on more than the axes.
+_IN_TABLES = frozenset(
+    {
+        "machine", "box_mm", "model", "datum_mm", "curves", "squareness", "backlash_mm", "cyclic",
+        "temperature_degC", "measured", "valid_until", "active_during_measurement", "repeatability_mm",
+        "payload_kg",
+    }
+)  # fmt: skip
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
@@ -132,9 +144,9 @@ def refuse(problems: Iterable[Problem], file: Path) -> None:
 
 
 def order_problems(rows: Sequence[tuple[int, float]], what: str) -> Iterator[Problem]:
-    """Rows (line, position) that do not ascend, or are fewer than two."""
+    """Rows (line, position) that do not ascend by a nanometre or more, or are fewer than two."""
     for (_, before), (line, position) in pairwise(rows):
-        if position <= before:
+        if not position - before >= LEAST_STEP_MM:
             yield line, f"{what} {position:g} comes after {before:g}; expected ascending positions, each once"
     if len(rows) < 2:
         yield (rows[0][0] if rows else None), f"{len(rows)} rows; expected at least 2"
@@ -195,20 +207,31 @@ def calibration_of(
     )  # fmt: skip
 
 
-def not_held(calibration: Calibration, held: Iterable[str], cyclic: bool = False) -> Iterator[Finding]:
-    """A finding where a calibration holds errors that are not among `held`, or that no table holds."""
+def not_held(
+    calibration: Calibration, held: Iterable[str], written: Iterable[Rows] = ()
+) -> Iterator[Finding]:
+    """A finding where a calibration holds errors that are not among `held`, cyclic ones that the rows do not
+    follow, or what no table holds."""
     square = {name for name, value in calibration.squareness.items() if value}
     names = {name for curve in calibration.curves for name in curve.names if _any(curve, name)} | square
     lost = sorted(names - set(held))
     parts = [f"{', '.join(lost)} cannot be held"] if lost else []
-    if not cyclic and calibration.cyclic:
-        parts.append(
-            f"cyclic errors of {', '.join(sorted({c.component for c in calibration.cyclic}))} neither"
-        )
-    if calibration.thermal is not None:
-        parts.append("expansion with temperature is no part of a table")
+    followed = {rows.name for rows in written if rows.cyclic and rows.name[1] in AXES}
+    cyclic = sorted({c.component for c in calibration.cyclic if c.amplitude} - followed)
+    if cyclic:
+        parts.append(f"cyclic errors of {', '.join(cyclic)} are not followed")
+    others = [
+        f.name for f in fields(calibration) if f.name not in _IN_TABLES and _states(calibration, f.name)
+    ]
+    if others:
+        parts.append(f"no table holds what the calibration states of {', '.join(others)}")
     if parts:
         yield Finding("OLP871", "; ".join(parts) + ": they stay in the machine", count=len(lost) or 1)
+
+
+def _states(calibration: Calibration, name: str) -> bool:
+    value = getattr(calibration, name)
+    return value is not None and value != ()
 
 
 def _any(curve: Curve, name: str) -> bool:

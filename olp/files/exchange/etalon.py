@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from olp.calibration.rows import MISS_MM, MISS_RAD, component_rows, zeroed
+from olp.calibration.rows import MISS_MM, MISS_RAD, along_axes, component_rows, zeroed
 from olp.errormodel.calibration import Calibration, Curve
 from olp.exceptions import ConfigError
 from olp.files.exchange import base
@@ -115,7 +115,9 @@ def _sections(text: str, problems: list[Problem]) -> Iterator[tuple[int, str, Se
 def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     sense = base.sense_of(given, SENSE, "etalon")
     check_chain(given)
-    table = without_direction(zeroed(calibration, given.chain, given.reference or "functional-point"))
+    table = without_direction(
+        zeroed(along_axes(calibration), given.chain, given.reference or "functional-point")
+    )
     factor = base.sign(sense)
     lines = [
         f"// Errors of {calibration.machine}, variant Vendor; mm and rad; chain {given.chain}",
@@ -137,12 +139,12 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
         if table.squareness.get(name, 0.0):
             lines += [f"[{name}]", f"VALUE = {base.shown(table.squareness[name] * factor)}"]
     findings = [
-        *base.not_held(calibration, (*COMPONENTS, *SQUARENESS)),
+        *base.not_held(calibration, (*COMPONENTS, *SQUARENESS), written),
         *base.no_lost_motion(calibration),
         *base.coarse(written, MISS_MM, MISS_RAD),
     ]
     data = ("\n".join(lines) + "\n").encode("ascii", "replace")
-    return Exported({target: data}, corrected_names(calibration), tuple(findings))
+    return Exported({target: data}, corrected_names(table), tuple(findings))
 
 
 FORMAT = Format(

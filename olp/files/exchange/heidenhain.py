@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from olp.calibration.controls import AxisTables
-from olp.calibration.rows import MISS_MM, MISS_RAD, Rows, as_straightness, component_rows
+from olp.calibration.rows import MISS_MM, MISS_RAD, Rows, along_axes, as_straightness, component_rows
 from olp.errormodel.calibration import Calibration, Curve
 from olp.exceptions import ConfigError
 from olp.files.exchange import base
@@ -136,7 +136,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     factor = base.sign(sense)
     names = {axis: given.names.get(axis, axis) for axis in AXES}
     most = min(MOST_ROWS, given.most or MOST_ROWS)
-    straight = as_straightness(calibration)
+    straight = as_straightness(along_axes(calibration))
     written: list[Rows] = []
     files: dict[Path, bytes] = {}
     assigned: dict[str, str] = {}
@@ -159,7 +159,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     verify = target.with_name(f"{target.stem}-verify.h")
     program = heidenhain_program(checks(written), names, verify.stem)
     findings: list[Finding] = [
-        *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS)),
+        *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS), written),
         *base.coarse(written, MISS_MM, MISS_RAD),
         *base.lost_motion(calibration, AXES),
         Finding("OLP874", f"values have the sense stated, {sense}; run {verify.name} before any part"),
@@ -168,7 +168,9 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
         named = ", ".join(sorted(crossed))
         message = f"{named} differ by direction, and BACKLASH is for the own axis: the mean is written"
         findings.append(Finding("OLP871", message, count=len(crossed)))
-    held = {n for curve in calibration.curves for n in curve.names if n in TRANSLATIONS}
+    held = {
+        rows.name for rows in written if any(rows.name in c.names for c in along_axes(calibration).curves)
+    }
     square = {n for n, value in calibration.squareness.items() if value}
     notes = (f"sense of the values: {sense}; the tables have no place for a comment",)
     return Exported({target: cma, **files, verify: program}, frozenset(held | square), tuple(findings), notes)
@@ -186,7 +188,7 @@ def _onto(rows: Rows, position: np.ndarray) -> Rows:
     forward, backward = (
         np.round(np.interp(position, rows.position_mm, v), 8) for v in (rows.forward, rows.backward)
     )
-    return Rows(rows.name, position, forward, backward, rows.both, rows.miss)
+    return Rows(rows.name, position, forward, backward, rows.both, rows.miss, rows.cyclic)
 
 
 def _com(name: str, axis: str, found: Sequence[Rows], names: dict[str, str], factor: float) -> bytes:

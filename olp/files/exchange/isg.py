@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from olp.calibration.controls import Control, Volumetric
-from olp.calibration.rows import MISS_MM, MISS_RAD, common_rows, zeroed
+from olp.calibration.rows import MISS_MM, MISS_RAD, along_axes, common_rows, zeroed
 from olp.errormodel import build
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Curve, Reference
@@ -203,7 +203,9 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     sense = base.sense_of(given, SENSE, "isg")
     check_chain(given)
     factor = base.sign(sense)
-    table = without_direction(zeroed(calibration, given.chain, given.reference or "functional-point"))
+    table = without_direction(
+        zeroed(along_axes(calibration), given.chain, given.reference or "functional-point")
+    )
     lines = [
         f"// Errors of {calibration.machine}; mm and rad; chain {given.chain}, workpiece to tool",
         f"// sense: {sense}; levers count from axis position 0 without a tool",
@@ -220,12 +222,12 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
             columns = [rows[0].position_mm, *(base.signed(r.mean, factor) for r in rows)]
             lines += [" ".join(map(base.shown, row)) for row in np.array(columns).T.tolist()]
     findings = [
-        *base.not_held(calibration, (*COMPONENTS, *SQUARENESS)),
+        *base.not_held(calibration, (*COMPONENTS, *SQUARENESS), written),
         *base.no_lost_motion(calibration),
         *base.coarse(written, MISS_MM, MISS_RAD),
     ]
     data = ("\n".join(lines) + "\n").encode("ascii", "replace")
-    return Exported({target: data}, corrected_names(calibration), tuple(findings))
+    return Exported({target: data}, corrected_names(table), tuple(findings))
 
 
 FORMAT = Format(

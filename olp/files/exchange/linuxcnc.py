@@ -113,7 +113,8 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     written: list[Rows] = []
     for j, axis in enumerate(AXES):
         name = f"E{axis}{axis}"
-        if not any(name in curve.names for curve in calibration.curves):
+        cyclic = any(term.component == name for term in calibration.cyclic)
+        if not cyclic and not any(name in curve.names for curve in calibration.curves):
             if calibration.backlash_mm[j]:
                 lines += ["", f"[JOINT_{j}]", f"BACKLASH = {base.shown(calibration.backlash_mm[j])}"]
             continue
@@ -126,7 +127,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
         lines += ["", f"[JOINT_{j}]", f"COMP_FILE = {file.name}", f"COMP_FILE_TYPE = {kind}"]
     corrects = frozenset(rows.name for rows in written)
     findings: list[Finding] = [
-        *base.not_held(calibration, corrects),
+        *base.not_held(calibration, corrects, written),
         *base.coarse(written, MISS_MM, MISS_RAD),
         *base.lost_motion(calibration, AXES),
     ]

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from olp.calibration.controls import AxisTables
-from olp.calibration.rows import MISS_MM, MISS_RAD, Rows, as_straightness, component_rows
+from olp.calibration.rows import MISS_MM, MISS_RAD, Rows, along_axes, as_straightness, component_rows
 from olp.errormodel.calibration import Calibration, Curve
 from olp.exceptions import ConfigError
 from olp.files.exchange import base
@@ -175,7 +175,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     sense = base.sense_of(given, None, "Sinumerik")
     factor = base.sign(sense)
     names, most = _names(given), given.most or MOST_ROWS
-    straight = as_straightness(calibration)
+    straight = as_straightness(along_axes(calibration))
     written: list[Rows] = []
     body: list[str] = []
     count = 0
@@ -202,12 +202,14 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     verify = target.with_name(f"{target.stem}-verify.mpf")
     files[verify] = siemens_program(checks(written), calibration.machine)
     findings: list[Finding] = [
-        *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS)),
+        *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS), written),
         *base.coarse(written, MISS_MM, MISS_RAD),
         *base.lost_motion(calibration, AXES),
         Finding("OLP874", f"values have the sense stated, {sense}; run {verify.name} before any part"),
     ]
-    held = {n for curve in calibration.curves for n in curve.names if n in TRANSLATIONS}
+    held = {
+        rows.name for rows in written if any(rows.name in c.names for c in along_axes(calibration).curves)
+    }
     square = {n for n, value in calibration.squareness.items() if value}
     return Exported(files, frozenset(held | square), tuple(findings))
 
