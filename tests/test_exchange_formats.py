@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import datetime
 from pathlib import Path
 
 import numpy as np
@@ -358,7 +357,7 @@ def test_what_a_format_cannot_hold_is_said() -> None:
     curve = Curve("X", TRAVEL[0], {"EXX": [0, 1e-3], "ECX": [0, 1e-5], "EYX": [0, 0]})
     calibration = Calibration(
         "g", TRAVEL, curves=(curve,), squareness={"C0Y": 1e-5}, backlash_mm=(0.004, 0.0, 0.0),
-        cyclic=(Cyclic("EXX", 10.0, 1e-3),), thermal=Thermal((1e-5, 0.0, 0.0)), measured=datetime.date(2026, 1, 1),
+        cyclic=(Cyclic("EXX", 10.0, 1e-3),), thermal=Thermal((1e-5, 0.0, 0.0)),
     )  # fmt: skip
     said = {}
     for key in FORMATS:
