@@ -93,6 +93,7 @@ def export_table(
     machine: PathLike | Setup | None,
     kind: str,
     target: PathLike,
+    job: PathLike | None = None,
     *,
     calibration: PathLike | None = None,
     program: PathLike | bytes | None = None,
@@ -108,7 +109,7 @@ def export_table(
     The report says what the table would leave over the calibrated box and, with `program`, along it; the
     figures are of the table as it is written, read back. Raises UsageError, InputError.
     """
-    source = _source(machine, calibration, chain)
+    source = _source(machine, job, calibration, chain)
     given = _given(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
     form = format_named(kind)
     written = write_table(source.rest, kind, Path(target), given)
@@ -123,6 +124,7 @@ def export_table(
 
 def compare_tables(
     machine: PathLike | Setup | None,
+    job: PathLike | None = None,
     *,
     calibration: PathLike | None = None,
     program: PathLike | bytes | None = None,
@@ -132,7 +134,7 @@ def compare_tables(
 ) -> dict[str, Any]:
     """What each format of tables would leave, next to a corrected program ("olp-tables-1"). Nothing is
     written; where a sense or a reference has to be stated, the figures are those of the right one."""
-    source = _source(machine, calibration, chain)
+    source = _source(machine, job, calibration, chain)
     controls: dict[str, Control] = {}
     said: dict[str, list[dict[str, object]]] = {}
     for key, form in FORMATS.items():
@@ -167,8 +169,10 @@ class _Source:
     findings: tuple[Finding, ...]
 
 
-def _source(machine: PathLike | Setup | None, calibration: PathLike | None, chain: str | None) -> _Source:
-    if (machine is None) == (calibration is None):
+def _source(
+    machine: PathLike | Setup | None, job: PathLike | None, calibration: PathLike | None, chain: str | None
+) -> _Source:
+    if (machine is None and job is None) == (calibration is None):
         raise UsageError(
             "name either a machine file with -m, whose calibration is taken, or a calibration with -c"
         )
@@ -180,8 +184,7 @@ def _source(machine: PathLike | Setup | None, calibration: PathLike | None, chai
         )
     if chain is not None:
         raise UsageError("--chain goes with -c; the machine file states its own chain")
-    assert machine is not None
-    loaded = load(machine, None, "hold")
+    loaded = load(setup_of(machine, job), None, "hold")
     described = loaded.setup.machine
     skip = described.compensated_by_controller - loaded.calibration.active_during_measurement
     findings = []

@@ -150,6 +150,21 @@ def test_figures_of_an_example_and_their_order() -> None:
     assert framed == sorted(framed)
 
 
+@pytest.mark.parametrize("reference", ["functional-point", "table"])
+@pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "ZXFY", "YXFZ", "XYZF"])
+@pytest.mark.parametrize("key", ["isg", "etalon"])
+def test_a_volumetric_table_leaves_next_to_nothing(
+    key: str, chain: str, reference: str, tmp_path: Path
+) -> None:
+    """On every kind of chain, measured off the datum and on tables: written, read back, taken off."""
+    recipe = Recipe(chain=chain, off_datum=True, on_table=chain.split("F")[0][:1], peak_um=(50.0, 60.0))
+    machine = machines.random_machine(tmp_path / "m", 11, recipe)
+    found = olp.export_table(machine, key, tmp_path / "t.csv", reference=reference)
+    left = found.report["box"]["left"]
+    assert left["as it is"]["rms_um"] > 10.0
+    assert left[key]["max_um"] < 0.25
+
+
 @pytest.mark.parametrize("key", FORMATS)
 def test_through_files_and_back(key: str, tmp_path: Path) -> None:
     """Export, import, export: the second table is the first one, byte for byte."""

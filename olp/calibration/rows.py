@@ -30,8 +30,6 @@ _ROWS_A_PERIOD, _MOST_DENSE = 16, 10_001
 #: Places of a millimetre, and of a radian, that are kept of computed values.
 _MM_DECIMALS, _RAD_DECIMALS = 8, 12
 _MICROMETRE = Decimal("0.001")
-#: First order: eps_a adds sign * eps_a * lever_k to row i, as (i, a, k, sign).
-_CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,18 +218,16 @@ def _joined(
         values = {
             name: _at(curve, _parts(curve, name)[side], position, name) for name, curve in holder.items()
         }
-        six = [values.get(f"E{d}{axis}") for d in "ABC"]
+        none = np.zeros(len(position))
+        angles = np.column_stack([values.get(f"E{d}{axis}", none) for d in "ABC"])
         for i, name in enumerate(f"E{d}{axis}" for d in AXES):
             where = [np.zeros(1)] * 3
             where[j] = position
             arms = levers[i].at(where, [0.0, 0.0, 0.0])
             if kind == "table":
                 arms[j] = arms[j] - position
-            added = np.full(len(position), shift.get(name, 0.0))
-            for row, a, k, sign in _CROSS:
-                angle = six[a]
-                if row == i and angle is not None:
-                    added = added + sign * angle * arms[k]
+            lever = np.column_stack([none + arm for arm in arms])
+            added = np.cross(angles, lever)[:, i] + shift.get(name, 0.0)
             if name in values or np.any(added):
                 values[name] = _rounded(values.get(name, 0.0) + added, name)
         sides.append(values)

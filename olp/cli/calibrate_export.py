@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.calibrate_import import table_options
-from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
+from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, setup_options, talk
 from olp.exceptions import UsageError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command("export")
-@click.option("-m", "--machine", metavar="machine.toml", help="The machine file; its calibration is written.")
+@setup_options
 @click.option("-c", "--calibration", metavar="FILE", help="A calibration alone, without a machine.")
 @click.option("--format", "kind", metavar="FORMAT", help="One of: olp calibrate formats.")
 @click.option("-o", "--output", metavar="FILE", help="The table; further files stand beside it.")
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 @table_options
 def command(
     machine: str | None,
+    job: str | None,
     calibration: str | None,
     kind: str | None,
     output: str | None,
@@ -55,19 +56,21 @@ def command(
 
     if compare == (kind is not None):
         raise UsageError("give either --format with -o, or --compare")
-    described = machine_given(machine, None)[1] if machine else ()
+    described = machine_given(machine, job)[1] if machine or job else ()
     inputs = (*files_of(calibration, program), *described)
     common: dict[str, Any] = {
         "calibration": calibration, "program": program, "reference": reference, "most_rows": most_rows,
         "chain": chain,
     }  # fmt: skip
     if kind is None:
-        _put(compare_tables(machine, **common), as_json)
+        _put(compare_tables(machine, job, **common), as_json)
         return
     if output is None or output == STREAM:
         raise UsageError("a table is written to files; name the first one with -o")
     refuse_early([output], inputs, force=force)
-    found = export_table(machine, kind, output, sense=sense, comp_type=comp_type, axis_names=names, **common)
+    found = export_table(
+        machine, kind, output, job, sense=sense, comp_type=comp_type, axis_names=names, **common
+    )
     write_files(found.files, force=force, inputs=inputs)
     _put(found.report, as_json)
     for finding in found.findings:

@@ -61,7 +61,7 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
         elif name in COMPONENTS or name in SQUARENESS:
             what = "Gridpoints" if name in COMPONENTS else "VALUE"
             problems.append((line, f"[{name}] holds no {what}; expected {what}"))
-        elif rows or value:
+        elif rows or value != 0.0:
             left.append(f"[{name}] (line {line})")
     base.refuse(problems, path)
     if not curves and not square:
@@ -108,7 +108,7 @@ def _sections(text: str, problems: list[Problem]) -> Iterator[tuple[int, str, Se
             value = base.number(stated[1])
             if value is None:
                 problems.append((line, f'VALUE = "{stated[1]}" is no number'))
-        else:
+        elif not name or name in (*COMPONENTS, *SQUARENESS):
             problems.append((line, f'"{bare[:40]}" is not understood; expected Gridpoints or VALUE'))
 
 
