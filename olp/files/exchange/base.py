@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -202,9 +202,23 @@ def calibration_of(
         )
     square = {name: (squareness or {}).get(name, 0.0) for name in SQUARENESS}
     return Calibration(
-        machine=given.machine, box_mm=box, curves=tuple(curves), squareness=square, backlash_mm=backlash_mm,
-        measured=given.measured,
+        machine=given.machine, box_mm=box, curves=tuple(_grouped(curves)), squareness=square,
+        backlash_mm=backlash_mm, measured=given.measured,
     )  # fmt: skip
+
+
+def _grouped(curves: Sequence[Curve]) -> Iterator[Curve]:
+    """Components of an axis at the same positions in one curve, those of both directions apart."""
+    groups: dict[tuple[object, ...], list[Curve]] = {}
+    for curve in curves:
+        key = (curve.axis, bool(curve.forward), curve.reference, curve.position_mm.tobytes())
+        groups.setdefault(key, []).append(curve)
+    for group in groups.values():
+        sides = [
+            {name: values for curve in group for name, values in getattr(curve, part).items()}
+            for part in ("columns", "forward", "backward")
+        ]
+        yield replace(group[0], columns=sides[0], forward=sides[1], backward=sides[2])
 
 
 def not_held(

@@ -78,7 +78,7 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     if left:
         message = f"{', '.join(left)} are no errors of X, Y, Z and were left out"
         findings.append(Finding("OLP872", message, count=len(left)))
-    return Imported(base.calibration_of(given, _grouped(curves), path, square), tuple(findings))
+    return Imported(base.calibration_of(given, curves, path, square), tuple(findings))
 
 
 def _blocks(text: str, problems: list[Problem]) -> Iterator[Block]:
@@ -140,25 +140,6 @@ def _component(
             )  # fmt: skip
             return None
     return position, np.array([first[q] for q in position.tolist()])
-
-
-def _grouped(curves: list[Curve]) -> list[Curve]:
-    """Components of an axis at the same positions in one curve."""
-    groups: list[list[Curve]] = []
-    for curve in curves:
-        same = (
-            g for g in groups
-            if g[0].axis == curve.axis and np.array_equal(g[0].position_mm, curve.position_mm)
-        )  # fmt: skip
-        found = next(same, None)
-        if found is None:
-            groups.append([curve])
-        else:
-            found.append(curve)
-    return [
-        replace(group[0], columns={name: values for c in group for name, values in c.columns.items()})
-        for group in groups
-    ]
 
 
 def reference_of(given: Given) -> Callable[[str], Reference]:
