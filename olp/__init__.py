@@ -33,6 +33,11 @@ if TYPE_CHECKING:
     from olp.exceptions import InputError as InputError
     from olp.exceptions import OlpError as OlpError
     from olp.exceptions import ProgramError as ProgramError
+    from olp.exchanging import TableExport as TableExport
+    from olp.exchanging import TableImport as TableImport
+    from olp.exchanging import compare_tables as compare_tables
+    from olp.exchanging import export_table as export_table
+    from olp.exchanging import import_table as import_table
     from olp.files.config import load_setup as load_setup
     from olp.findings import Finding as Finding
     from olp.gate import Check as Check
@@ -54,6 +59,11 @@ _HOME = {
     "FittedCalibration": "olp.calibrating",
     "fit_calibration": "olp.calibrating",
     "correct": "olp.api",
+    "compare_tables": "olp.exchanging",
+    "export_table": "olp.exchanging",
+    "import_table": "olp.exchanging",
+    "TableExport": "olp.exchanging",
+    "TableImport": "olp.exchanging",
     "error_at": "olp.api",
     "flatten": "olp.api",
     "inspect": "olp.api",

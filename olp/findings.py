@@ -13,6 +13,7 @@ from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
+from olp.table_rules import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,7 +305,8 @@ _TABLE = (
 )
 
 RULES = {
-    rule.code: rule for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY), key=lambda rule: rule.code)
+    rule.code: rule
+    for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES), key=lambda rule: rule.code)
 }
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine

@@ -14,7 +14,7 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"calibration_rules", "gate_rules", "metrology_rules"},
+    {"calibration_rules", "gate_rules", "metrology_rules", "table_rules"},
     {"findings"},
     {"geometry", "tables"},
     {"machine"},
@@ -23,7 +23,7 @@ LAYERS = (
     {"errormodel"},
     {"deviation", "clearance", "measured"},
     {"compensation", "trajectory", "calibration"},
-    {"proof"},
+    {"proof", "residuals"},
     {"checks", "nominal", "testpaths"},
     {"scene"},
     {"report", "plots"},
@@ -34,6 +34,7 @@ LAYERS = (
     {"replanning"},
     {"comparing_parts"},
     {"calibrating", "correction", "retiming", "comparing"},
+    {"exchanging"},
     {"gate"},
     {"api"},
     {"report_files"},

@@ -8,6 +8,9 @@ from olp.cli.late import LateGroup
 VERBS: dict[str, str] = {
     "fit": "Make a calibration from lines of lasers, levels and squares.",
     "read": "Show what is understood of the file of an instrument.",
+    "import": "Read the compensation table of a control as a calibration.",
+    "export": "Write a calibration as the table of a control, and say what it would leave.",
+    "formats": "List the tables of controls: sense, what each holds, how far verified.",
 }
 
 _HELP = (
