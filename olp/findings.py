@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from olp.gate_rules import GATE
+from olp.metrology_rules import METROLOGY
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
 
@@ -301,10 +302,10 @@ _TABLE = (
     ),
 )
 
-RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE), key=lambda rule: rule.code)}
+RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE, *METROLOGY), key=lambda rule: rule.code)}
 
-#: what a gate looks for: all but those of measured paths
-GATE_CODES = tuple(code for code in RULES if not code.startswith("OLP6"))
+#: what a gate looks for: all but those of measured paths and of measurements of a machine
+GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))
 
 
 def worst(findings: Iterable[Finding]) -> Severity | None:
