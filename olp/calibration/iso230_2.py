@@ -242,9 +242,7 @@ def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
     if len(x) > 2 and line.quantity != "straightness":
         step = np.diff(x)
         if np.ptp(step) < _EQUAL * step.mean():
-            yield Finding(
-                "OLP852", f"{_named(line)}: all {len(x)} targets stand {step.mean():g} mm apart"
-            )
+            yield Finding("OLP852", f"{_named(line)}: all {len(x)} targets stand {step.mean():g} mm apart")
 
 
 def _named(line: Line) -> str:

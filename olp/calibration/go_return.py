@@ -1,0 +1,223 @@
+"""Reversal from readings approached from both sides: the paper's test B (go and return), and the reversal part
+of any bidirectional line.
+
+B_i = x_up - x_down as in ISO 230-2. An axis with lost motion b stays behind its command by b/2 on both sides,
+so its B is -b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from olp.calibration.iso230_2 import SAME_MM, scale_of
+from olp.calibration.observations import Array, Index, Line
+from olp.exceptions import ConfigError, UsageError
+from olp.findings import Finding
+from olp.machine import Machine
+from olp.units import AXES, UM_PER_MM
+
+#: A reversal whose dependence on position is less likely than this by chance depends on position.
+UNLIKELY = 0.01
+#: an estimate this many standard uncertainties from zero is not zero
+_SURE = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reversal:
+    """B at each target (m,) with its standard uncertainty, and of the line, in mm or rad.
+
+    `constant` says that one number holds for the whole line, within what the readings can tell (`chance`:
+    how likely such differences are where it does). `noise` is the standard deviation of one reading, `drift`
+    the range of the drift that was taken out.
+    """
+
+    line: Line
+    target_mm: Array
+    at: Array
+    sigma_at: Array
+    mean: float
+    sigma: float
+    constant: bool
+    chance: float
+    noise: float
+    drift: float
+
+    @property
+    def lost_motion(self) -> float:
+        """The lost motion of the axis, for a positioning line; mm."""
+        return 0.0 - self.mean
+
+    def as_dict(self) -> dict[str, Any]:
+        unit, scale = scale_of(self.line)
+        out: dict[str, Any] = {
+            "component": self.line.component,
+            "file": self.line.source,
+            f"reversal_{unit}": self.mean * scale,
+            f"sigma_{unit}": self.sigma * scale,
+            f"noise_{unit}": self.noise * scale,
+            f"drift_{unit}": self.drift * scale,
+            "constant": self.constant,
+            "chance": self.chance,
+            "targets": {
+                "target_mm": self.target_mm.tolist(),
+                f"reversal_{unit}": (self.at * scale).tolist(),
+                f"sigma_{unit}": (self.sigma_at * scale).tolist(),
+            },
+        }
+        if self.line.quantity == "positioning":
+            out["lost_motion_um"] = self.lost_motion * UM_PER_MM
+        return out
+
+
+def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
+    """The reversal of a line whose targets were approached from both sides, least squares.
+
+    With `drift` the readings count as equally spaced in time, and a continuous drift, straight within each
+    run, is taken out; without it the order of the rows does not matter. Raises ConfigError.
+    """
+    target, place = targets_of(line)
+    for i, x in enumerate(target):
+        for d, side in ((1, "+"), (-1, "-")):
+            if not ((place == i) & (line.direction == d)).any():
+                raise ConfigError(
+                    f"line {line.component}: {x:g} mm was never approached in {side}; expected every target "
+                    "approached from both sides; leave it out, or measure it again",
+                    file=line.source,
+                )
+    n, m = len(line.value), len(target)
+    own = np.zeros((n, m))
+    own[np.arange(n), place] = 1.0
+    moved = own * (0.5 * line.direction)[:, None]
+    extra = _drift_columns(line.run) if drift else np.zeros((n, 0))
+    free = np.hstack((own, moved, extra))
+    one = np.hstack((own, moved.sum(axis=1, keepdims=True), extra))
+    found, covariance, rest, dof = _solve(free, line.value)
+    noise = float(np.sqrt(rest / dof)) if dof > 0 else line.sigma
+    if noise == 0.0 and line.sigma == 0.0 and dof <= 0:
+        raise ConfigError(
+            f"line {line.component}: one reading of each target from each side and no sigma; expected "
+            "repeated runs, or the standard uncertainty of a reading",
+            file=line.source,
+        )
+    noise = max(noise, line.sigma)
+    chance = 1.0
+    single, spread, rest_one, dof_one = _solve(one, line.value)
+    if m > 1 and dof > 0:
+        chance = _chance(rest_one - rest, dof_one - dof, rest, dof, float(np.abs(line.value).max()))
+    at = found[m : 2 * m]
+    sigma_at = noise * np.sqrt(np.diag(covariance)[m : 2 * m])
+    constant = chance >= UNLIKELY
+    mean = float(single[m]) if constant else float(at.mean())
+    wander = extra @ found[2 * m :]
+    return Reversal(
+        line, target, at, sigma_at, mean, float(noise * np.sqrt(spread[m, m])), constant, chance, noise,
+        float(np.ptp(wander)) if len(wander) else 0.0,
+    )  # fmt: skip
+
+
+def targets_of(line: Line) -> tuple[Array, Index]:
+    """(m,) targets, ascending, and (n,) the target of each reading."""
+    _, place = np.unique(np.round(line.target_mm / SAME_MM).astype(np.int64), return_inverse=True)
+    count = np.bincount(place)
+    return np.bincount(place, line.target_mm) / count, np.asarray(place, np.int64)
+
+
+def _drift_columns(run: Index) -> Array:
+    """(n, k) hat functions over the rows with a knot where each run begins, the first left out: a drift is
+    seen against its start."""
+    starts = np.flatnonzero(np.diff(run, prepend=run[0] - 1) != 0)
+    if len(starts) < 2:
+        return np.zeros((len(run), 0))
+    knots = np.append(starts, len(run) - 1).astype(float)
+    rows = np.arange(len(run), dtype=float)
+    hats = np.eye(len(knots))
+    return np.column_stack([np.interp(rows, knots, hat) for hat in hats[1:]])
+
+
+def _solve(design: Array, value: Array) -> tuple[Array, Array, float, int]:
+    """(k,) estimates of least norm, (k, k) cofactors, sum of squares left and its degrees of freedom."""
+    inverse = np.linalg.pinv(design, rcond=1e-10)
+    found = inverse @ value
+    rest = value - design @ found
+    rank = int(round(float(np.trace(design @ inverse))))
+    return found, np.asarray(inverse @ inverse.T), float(rest @ rest), len(value) - rank
+
+
+def _chance(more: float, more_dof: int, rest: float, dof: int, size: float) -> float:
+    """How likely so much less is left by chance when `more_dof` parameters are added (F test)."""
+    floor = dof * (1e-12 * size) ** 2
+    if more_dof <= 0 or more <= floor:
+        return 1.0
+    from scipy.special import fdtrc
+
+    return float(fdtrc(more_dof, dof, (more / more_dof) / (max(rest, floor) / dof)))
+
+
+def findings_of(reversal: Reversal) -> Iterator[Finding]:
+    """A reversal that depends on position, and one that is no play."""
+    unit, scale = scale_of(reversal.line)
+    name = reversal.line.component
+    if not reversal.constant:
+        low, high = reversal.at.min() * scale, reversal.at.max() * scale
+        yield Finding("OLP854", f"{name}: B from {low:.2f} to {high:.2f} {unit} along the axis")
+    if reversal.line.quantity == "positioning" and reversal.mean > _SURE * reversal.sigma:
+        value, sigma = reversal.mean * scale, reversal.sigma * scale
+        yield Finding("OLP855", f"{name}: B = +{value:.2f} {unit}, standard uncertainty {sigma:.2f}")
+
+
+def backlash_toml(reversals: Sequence[Reversal]) -> str:
+    """A table [backlash] for calibration.toml; an axis whose reversal depends on position is a comment."""
+    lines = ["[backlash]"]
+    for reversal in reversals:
+        axis = AXES[reversal.line.axis]
+        b, sigma = reversal.lost_motion * UM_PER_MM, reversal.sigma * UM_PER_MM
+        if reversal.constant:
+            lines.append(f"{axis}_um = {b:.3f}  # standard uncertainty {sigma:.3f} um")
+        else:
+            low, high = np.sort(-reversal.at[[reversal.at.argmax(), reversal.at.argmin()]]) * UM_PER_MM
+            lines.append(
+                f"# {axis}: {low:.3f} to {high:.3f} um along the axis; needs a direction column, "
+                "olp calibrate fit"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def program(
+    machine: Machine, axis: str, targets_mm: Sequence[float], *, over_mm: float, feed_mm_min: float,
+    runs: int = 5, dwell_s: float = 2.0,
+) -> str:  # fmt: skip
+    """RS-274 text that goes to each target from below and from above, in axis positions (G53): `over_mm`
+    away, back, stop. Readings are due in each dwell. Raises UsageError where it leaves the travel."""
+    if axis not in machine.axes:
+        raise UsageError(f"axis {axis!r}; expected X, Y or Z")
+    if over_mm <= 0.0 or feed_mm_min <= 0.0 or runs < 1 or dwell_s < 0.0 or not len(targets_mm):
+        raise UsageError("expected targets, a way past them, a feed and a number of runs, all above zero")
+    low, high = machine.axes[axis].travel_mm
+    x = sorted(targets_mm)
+    if x[0] - over_mm < low or x[-1] + over_mm > high:
+        raise UsageError(
+            f"targets from {x[0]:g} to {x[-1]:g} mm and {over_mm:g} mm past them leave the travel of {axis}, "
+            f"{low:g} to {high:g} mm; choose targets further inside"
+        )
+    step = machine.axes[axis].least_increment_mm
+    lines = [
+        f"(go and return on {axis}: {len(x)} targets, {runs} runs, {over_mm:g} mm past each)",
+        "(the other axes stay where they stand; read the instrument in each dwell)",
+        "G21 G90 G94 G61",
+    ]
+
+    def to(position: float) -> str:
+        return f"G53 G1 {axis}{round(position / step) * step:.6f} F{feed_mm_min:g}"
+
+    for run in range(1, runs + 1):
+        for direction, order in ((1, x), (-1, x[::-1])):
+            for target in order:
+                lines += [
+                    f"(run {run} target {target:g} direction {direction})",
+                    to(target - direction * over_mm), to(target), f"G4 P{dwell_s:g}",
+                ]  # fmt: skip
+    return "\n".join([*lines, "M2"]) + "\n"
