@@ -15,10 +15,8 @@ from olp.files.tables import read_curves
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 from olp.machine import SQUARENESS, Machine, Vector
-from olp.units import AXES, MM_PER_UM, RAD_PER_URAD
+from olp.units import AXES, shifted
 
-#: um/(m K) to 1/K.
-PER_K = 1e-6
 #: The workpiece's size holds at this temperature (ISO 1) where the job states none.
 REFERENCE_DEGC = 20.0
 
@@ -56,8 +54,8 @@ def load_calibration(
             model=file.model,
             datum_mm=file.datum_mm,
             curves=tuple(curves),
-            squareness={name: getattr(file.squareness, f"{name}_urad") * RAD_PER_URAD for name in SQUARENESS},
-            backlash_mm=_vector([getattr(file.backlash, f"{axis}_um") * MM_PER_UM for axis in AXES]),
+            squareness={name: shifted(getattr(file.squareness, f"{name}_urad"), -6) for name in SQUARENESS},
+            backlash_mm=_vector([shifted(getattr(file.backlash, f"{axis}_um"), -3) for axis in AXES]),
             cyclic=tuple(_cyclic(table) for table in file.cyclic),
             thermal=_thermal(file.thermal, file.temperature_degC, temperatures_degC or {}),
             temperature_degC=file.temperature_degC,
@@ -117,9 +115,9 @@ def _curve(path: FilePath, table: CurveTable, datum_mm: Vector) -> Curve:
 
 def _cyclic(table: CyclicTable) -> Cyclic:
     if table.amplitude_um is not None:
-        amplitude = table.amplitude_um * MM_PER_UM
+        amplitude = shifted(table.amplitude_um, -3)
     else:
-        amplitude = (table.amplitude_urad or 0.0) * RAD_PER_URAD
+        amplitude = shifted(table.amplitude_urad or 0.0, -6)
     return Cyclic(table.component, table.period_mm, amplitude, table.phase_rad)
 
 
@@ -129,9 +127,9 @@ def _thermal(
     if table is None:
         return None
     return Thermal(
-        scale_per_K=_vector([getattr(table, f"{axis}_scale_um_m_K") * PER_K for axis in AXES]),
+        scale_per_K=_vector([shifted(getattr(table, f"{axis}_scale_um_m_K"), -6) for axis in AXES]),
         fixed_at_mm=table.fixed_at_mm,
-        workpiece_per_K=table.workpiece_um_m_K * PER_K,
+        workpiece_per_K=shifted(table.workpiece_um_m_K, -6),
         clamped_at_mm=table.clamped_at_mm,
         calibrated_at_degC=calibrated_at_degC,
         scale_degC=_vector([temperatures_degC.get(f"{axis}_scale", calibrated_at_degC) for axis in AXES]),

@@ -17,11 +17,14 @@ from olp.exceptions import ConfigError
 from olp.files.problems import Problem, config_error, nearest
 from olp.files.write import PathLike, read_bytes
 from olp.machine import COMPONENTS
-from olp.units import AXES, MM_PER_UM, RAD_PER_URAD
+from olp.units import AXES, shifted
 
 Array = npt.NDArray[np.float64]
 #: A data row: its line in the file and the number in each column.
 Row = tuple[int, list[float]]
+
+#: A unit of error columns as a power of ten of the base unit.
+_POWER = {"um": -3, "urad": -6}
 
 _COLUMN = re.compile(r"(sigma_)?(E[XYZABC][XYZ])_([A-Za-z]+)", re.IGNORECASE)
 
@@ -165,7 +168,7 @@ def _number(name: str, cell: str) -> tuple[float, str | None]:
     if not cell:
         return 0.0, f"is empty; expected a number in {unit}"
     try:
-        number = float(cell) if "_" not in cell else math.nan
+        number = shifted(cell, _POWER.get(unit, 0)) if "_" not in cell else math.nan
     except ValueError:
         if re.fullmatch(r"[-+]?\d*,\d+", cell):
             return 0.0, f"= {cell} has a decimal comma; expected a decimal point"
@@ -213,11 +216,10 @@ def _table(header: Sequence[str], rows: Sequence[Row], file: str) -> CurveTable:
     if len(parts) == 2 and not np.array_equal(parts[0][:, 0], parts[1][:, 0]):
         raise _positions_differ(header[0], parts[0][:, 0], parts[1][:, 0], file)
     names = _columns_of(header[0][0])
-    scale = {"um": MM_PER_UM, "urad": RAD_PER_URAD}
 
     def select(block: Array, prefix: str) -> dict[str, Array]:
         return {
-            component: _frozen(block[:, header.index(prefix + name)] * scale[_unit(component)])
+            component: _frozen(block[:, header.index(prefix + name)].copy())
             for component, name in names.items()
             if prefix + name in header
         }

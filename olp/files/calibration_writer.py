@@ -1,0 +1,194 @@
+"""A calibration as the text of its files: an olp-calibration-1 file and one CSV file a curve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+
+from olp.errormodel.base import Array
+from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.exceptions import ConfigError
+from olp.files.fields import SIGN
+from olp.files.toml_text import comment, toml_lines
+from olp.machine import SQUARENESS, ZERO, Vector
+from olp.units import AXES, shifted
+
+#: Neighbours of a number that are tried until one reads back exactly.
+_NEIGHBOURS = 3
+
+
+def calibration_files(
+    calibration: Calibration,
+    target: Path,
+    *,
+    sigma: Mapping[str, Array] | None = None,
+    notes: Sequence[str] = (),
+) -> dict[Path, bytes]:
+    """The bytes of `target`, an olp-calibration-1 file, and of its curves `<stem>-x.csv` ... beside it.
+
+    `sigma` holds standard uncertainties by component, (n,) in mm or rad at the positions of its curve; notes
+    become comments. Curves read back as the very same doubles; so does every other number of 15 digits or
+    fewer in the unit of its key, longer ones within the last bit. The temperatures of a job are no part of a
+    calibration and are not written. Raises ConfigError where it has no date of measuring, or where a sigma
+    fits no curve.
+    """
+    if calibration.measured is None:
+        raise ConfigError("the calibration has no date of measuring; give it, such as 2026-05-14")
+    sigmas = dict(sigma or {})
+    files: dict[Path, bytes] = {}
+    names: list[str] = []
+    for curve in calibration.curves:
+        name = _unused(f"{target.stem}-{curve.axis.lower()}", names)
+        names.append(name)
+        own = {component: sigmas.pop(component) for component in curve.names if component in sigmas}
+        files[target.with_name(name)] = _csv(curve, own).encode()
+    if sigmas:
+        raise ConfigError(f"sigma of {', '.join(sorted(sigmas))} fits no curve; expected names of its curves")
+    lines = [
+        *(line for note in notes for line in comment(note)),
+        *_head(calibration),
+        *(
+            line
+            for curve, name in zip(calibration.curves, names, strict=True)
+            for line in _curve(curve, name)
+        ),
+        *_squareness(calibration.squareness),
+        *_backlash(calibration.backlash_mm),
+        *(line for cyclic in calibration.cyclic for line in _cyclic(cyclic)),
+        *(_thermal(calibration.thermal) if calibration.thermal is not None else ()),
+    ]
+    return {target: ("\n".join(lines) + "\n").encode(), **files}
+
+
+def in_unit(value: float, power: int) -> float:
+    """The number of units of ten to `power` base units that reads back as `value`: 1e-4 mm is 0.1 um."""
+    number = shifted(value, -power)
+    low = high = number
+    for _ in range(_NEIGHBOURS):
+        for candidate in (low, high):
+            if shifted(candidate, power) == value:
+                return candidate
+        low, high = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
+    return number
+
+
+def in_unit_text(value: float, power: int) -> str:
+    """The shortest decimal of a double in units of ten to `power`; read as text it is the same double."""
+    text = format(Decimal(repr(float(value))).scaleb(-power), "f")
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return "0" if text in ("-0", "") else text
+
+
+def _unused(stem: str, names: Sequence[str]) -> str:
+    count = sum(name.startswith((f"{stem}.", f"{stem}-")) for name in names)
+    return f"{stem}.csv" if not count else f"{stem}-{count + 1}.csv"
+
+
+def _head(calibration: Calibration) -> Iterator[str]:
+    active = sorted(calibration.active_during_measurement)
+    yield from comment(
+        "Errors of the machine: actual minus commanded, of the tool relative to the workpiece."
+    )
+    yield from toml_lines(
+        {
+            "schema": "olp-calibration-1",
+            "machine": calibration.machine,
+            "measured": calibration.measured,
+            "valid_until": calibration.valid_until,
+            "temperature_degC": calibration.temperature_degC,
+            "sign": SIGN,
+            "model": calibration.model,
+            "datum_mm": calibration.datum_mm,
+            "box_mm": calibration.box_mm.tolist(),
+            "active_during_measurement": "all" if active == ["all"] else active,
+        }
+    )
+
+
+def _curve(curve: Curve, name: str) -> Iterator[str]:
+    line = None
+    if curve.line_mm is not None:
+        line = {a: float(v) for a, v in zip(AXES, curve.line_mm, strict=True) if a != curve.axis}
+    yield from ("", "[[curves]]")
+    yield from toml_lines(
+        {
+            "file": name,
+            "line_mm": line,
+            "tool_mm": _floats(curve.tool_mm),
+            "reference": None if curve.reference == "functional-point" else curve.reference,
+            "interpolation": curve.interpolation,
+        }
+    )
+
+
+def _squareness(squareness: Mapping[str, float]) -> Iterator[str]:
+    yield from ("", "[squareness]")
+    yield from toml_lines({f"{name}_urad": in_unit(squareness.get(name, 0.0), -6) for name in SQUARENESS})
+
+
+def _backlash(backlash_mm: Vector) -> Iterator[str]:
+    if any(backlash_mm):
+        yield from ("", "[backlash]")
+        yield from toml_lines({f"{a}_um": in_unit(b, -3) for a, b in zip(AXES, backlash_mm, strict=True)})
+
+
+def _cyclic(cyclic: Cyclic) -> Iterator[str]:
+    angular = cyclic.component[1] in "ABC"
+    yield from ("", "[[cyclic]]")
+    yield from toml_lines(
+        {
+            "component": cyclic.component,
+            "period_mm": cyclic.period_mm,
+            "amplitude_um": None if angular else in_unit(cyclic.amplitude, -3),
+            "amplitude_urad": in_unit(cyclic.amplitude, -6) if angular else None,
+            "phase_rad": cyclic.phase_rad,
+        }
+    )
+
+
+def _thermal(thermal: Thermal) -> Iterator[str]:
+    scales = zip(AXES, thermal.scale_per_K, strict=True)
+    yield from ("", "[thermal]")
+    yield from toml_lines({f"{axis}_scale_um_m_K": in_unit(scale, -6) for axis, scale in scales})
+    yield from toml_lines(
+        {
+            "workpiece_um_m_K": in_unit(thermal.workpiece_per_K, -6),
+            "fixed_at_mm": None if thermal.fixed_at_mm == ZERO else _floats(thermal.fixed_at_mm),
+            "clamped_at_mm": None if thermal.clamped_at_mm == ZERO else _floats(thermal.clamped_at_mm),
+        }
+    )
+
+
+def _csv(curve: Curve, sigma: Mapping[str, Array]) -> str:
+    for component, values in sigma.items():
+        if np.shape(values) != curve.position_mm.shape or not np.all(np.asarray(values) >= 0.0):
+            raise ConfigError(
+                f"sigma of {component} has shape {np.shape(values)}; expected a number of 0 or above at each "
+                f"of {len(curve.position_mm)} positions"
+            )
+    units = {name: ("um", -3) if name[1] in AXES else ("urad", -6) for name in curve.names}
+    both = bool(curve.forward)
+    header = [f"{curve.axis}_mm", *(["direction"] if both else [])]
+    header += [f"{name}_{unit}" for name, (unit, _) in units.items()]
+    header += [f"sigma_{name}_{units[name][0]}" for name in sigma]
+    positions = [in_unit_text(position, 0) for position in curve.position_mm.tolist()]
+    rows = [",".join(header)]
+    for direction, columns in (("+1", curve.forward), ("-1", curve.backward), ("", curve.columns)):
+        if columns:
+            cells = [positions, *([[direction] * len(positions)] if both else [])]
+            cells += [_column(columns[name], power) for name, (_, power) in units.items()]
+            cells += [_column(values, units[name][1]) for name, values in sigma.items()]
+            rows += [",".join(row) for row in zip(*cells, strict=True)]
+    return "\n".join(rows) + "\n"
+
+
+def _column(values: Array, power: int) -> list[str]:
+    return [in_unit_text(value, power) for value in np.asarray(values, float).tolist()]
+
+
+def _floats(vector: Vector) -> list[float]:
+    return [float(value) for value in vector]
