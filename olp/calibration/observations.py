@@ -6,7 +6,8 @@ Readers turn units, senses and instruments' habits into these types; nothing aft
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import datetime
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -32,7 +33,8 @@ class Line:
     the reflector stayed fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
     straightness. Straightness lines that name the same `square` were read against its two legs.
     `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
-    all readings of a line (mm/mm, a laser's wavelength). Raises ConfigError.
+    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 is not known: the spread of the runs
+    tells. `source` is the file and `row` (n,) the line of each reading in it. Raises ConfigError.
     """
 
     component: str
@@ -47,13 +49,18 @@ class Line:
     sigma: float = 0.0
     sigma_scale: float = 0.0
     source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    instrument: str = ""
 
     def __post_init__(self) -> None:
+        if not len(self.row):
+            object.__setattr__(self, "row", np.arange(1, len(self.target_mm) + 1))
         for name, kind in (
             ("target_mm", float),
             ("value", float),
             ("run", np.int64),
             ("direction", np.int64),
+            ("row", np.int64),
         ):
             column = np.array(getattr(self, name), dtype=kind)
             column.flags.writeable = False
@@ -64,7 +71,7 @@ class Line:
             raise ConfigError(
                 f"{label}: expected an ISO 230-1 name such as EXX, EYX or EBX", file=self.source
             )
-        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction)):
+        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction, self.row)):
             raise ConfigError(
                 f"{label}: {n} readings; expected at least 2, each with all columns", file=self.source
             )
@@ -89,8 +96,8 @@ class Line:
 class Square:
     """An optical or mechanical square that two straightness lines share.
 
-    `error_rad` is by how much the angle between its legs differs from 90 degrees (more is +), as its
-    certificate says; `sigma_rad` its standard uncertainty.
+    `error_rad` is by how much the angle between its legs, both along + of their axes, differs from 90 degrees
+    (more is +), as its certificate says; `sigma_rad` its standard uncertainty.
     """
 
     name: str
@@ -139,3 +146,4 @@ class Measurements:
     periods_mm: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]] = ((), (), ())
     temperature_degC: float = 20.0
     active_during_measurement: frozenset[str] = frozenset()
+    measured: datetime.date | None = None

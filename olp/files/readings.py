@@ -73,7 +73,7 @@ class Readings:
     `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name or
     None where the file does not tell; `angular` says that values are in rad, None where the file does not
     tell. `keys` is what the file states about itself, each with its line; `notes` are sentences on what the
-    reader assumed.
+    reader assumed. `sense_known` says that the values are in the contract's sense already.
     """
 
     file: str
@@ -86,12 +86,13 @@ class Readings:
     angular: bool | None = None
     keys: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    sense_known: bool = False
 
     def with_sense(self, sense: str) -> Readings:
         """The same in the contract's sense, for values stated in `sense`, a key of SENSES."""
         return Readings(
             self.file, self.target_mm, self.value * SENSES[sense], self.run, self.direction, self.line,
-            self.component, self.angular, self.keys, self.notes,
+            self.component, self.angular, self.keys, self.notes, sense_known=True,
         )  # fmt: skip
 
 
@@ -160,16 +161,15 @@ def stated_keys(text: str) -> Iterator[tuple[str, tuple[str, int]]]:
 
 
 def check_component(readings: Readings, component: str) -> None:
-    """Raise ConfigError where a component is read in the unit of the other kind, or the file names another."""
+    """Raise ConfigError where the file names another component, or holds lengths for an angle."""
     if readings.component is not None and readings.component != component:
         line = readings.keys["component"][1] if "component" in readings.keys else None
         sentence = f"the file says {readings.component}, the plan {component}; expected one of the two"
         raise config_error([(line, sentence)], readings.file)
     if readings.angular is not None and readings.angular != (component[1] in "ABC"):
-        units = "an angle, in um" if readings.angular is False else "a length, in urad"
+        found, wanted = ("angles", "lengths") if readings.angular else ("lengths", "angles")
         raise ConfigError(
-            f"{component} is {units}; expected {'urad' if component[1] in 'ABC' else 'um'}: is it another "
-            "component?",
+            f"{component} is read in {wanted}, and the file holds {found}; is it another component?",
             file=readings.file,
         )
 
