@@ -1,4 +1,5 @@
-"""ISO 230-2: figures worked by hand from the definitions, and the unidirectional figures of a published set."""
+"""ISO 230-2: figures worked by hand from the definitions, and the unidirectional figures of a published
+set."""
 
 from __future__ import annotations
 
@@ -33,10 +34,13 @@ def test_by_hand() -> None:
 
     up 0: 0, 2 -> mean 1, s = sqrt(2); up 100: 4, 4 -> 4, 0; up 200: 6, 10 -> 8, 2 sqrt(2)
     down 0: -1, -1 -> -1, 0; down 100: 0, 2 -> 1, sqrt(2); down 200: 5, 5 -> 5, 0
-    B_i = 2, 3, 3: B = 3, mean 8/3. E_up = 7, E_down = 6, E = 8 - (-1) = 9. Means of both 0, 2.5, 6.5: M = 6.5.
-    A_up: top 8 + 4 sqrt2, bottom 1 - 2 sqrt2: 7 + 6 sqrt2. A_down: 5 - min(-1, 1 - 2 sqrt2) = 5 - (1 - 2 sqrt2).
+    B_i = 2, 3, 3: B = 3, mean 8/3. E_up = 7, E_down = 6, E = 8 - (-1) = 9.
+    Means of both 0, 2.5, 6.5: M = 6.5.
+    A_up: top 8 + 4 sqrt2, bottom 1 - 2 sqrt2: 7 + 6 sqrt2.
+    A_down: 5 - min(-1, 1 - 2 sqrt2) = 5 - (1 - 2 sqrt2).
     A: 8 + 4 sqrt2 - (1 - 2 sqrt2). R_up = 8 sqrt2, R_down = 4 sqrt2.
-    R_i: max(2 sqrt2 + 2, 4 sqrt2) = 5.657, max(2 sqrt2 + 3, 4 sqrt2) = 5.828, max(4 sqrt2 + 3, 8 sqrt2) = 11.31.
+    R_i: max(2 sqrt2 + 2, 4 sqrt2) = 5.657, max(2 sqrt2 + 3, 4 sqrt2) = 5.828,
+    max(4 sqrt2 + 3, 8 sqrt2) = 11.31.
     """
     found = evaluate(line([[0, 4, 6], [2, 4, 10]], [[-1, 0, 5], [-1, 2, 5]], [0, 100, 200]))
     root = math.sqrt(2)
@@ -59,8 +63,9 @@ def test_angles_are_the_same_in_urad() -> None:
     assert angle["targets"]["s_up_urad"] == pytest.approx(length["targets"]["s_up_um"])
 
 
-#: Readings of an axis in units of 1e-8 mm less the target: paulscherrerinstitute/ecmccfg, examples/test/fat_sat,
-#: report.md (the columns that the report calls forward and backward; its data file names them the other way).
+#: Readings of an axis less the target, in units of 1e-8 mm: paulscherrerinstitute/ecmccfg,
+#: examples/test/fat_sat/report.md (the columns that the report calls forward and backward; its data file
+#: names them the other way).
 TARGET = [-10.0, -4.88, 0.24, 5.36, 10.48]
 FORWARD = [
     [-8102, -10202, -8702, -9202, -10002],

@@ -72,7 +72,8 @@ def test_few_targets_say_so() -> None:
 
 @settings(max_examples=40)
 @given(
-    st.integers(0, 2**31), st.floats(0.5, 9.0), st.floats(-3.1, 3.1), st.floats(-6, 6), st.sampled_from([8.0, 10.0]),
+    st.integers(0, 2**31), st.floats(0.5, 9.0), st.floats(-3.1, 3.1), st.floats(-6, 6),
+    st.sampled_from([8.0, 10.0]),
 )  # fmt: skip
 def test_recovery(seed: int, amplitude: float, phase: float, lost: float, period: float) -> None:
     """A smooth curve, a cyclic error and lost motion come back apart."""
@@ -109,7 +110,8 @@ def test_superposition_and_order(seed: int) -> None:
     other = random.normal(0, 5e-3, len(one.value))
     zero = add(one, -one.value)
     total = parts(separate(add(one, other), [10.0]))
-    assert total == pytest.approx(parts(separate(one, [10.0])) + parts(separate(add(zero, other), [10.0])), abs=1e-9)
+    each = parts(separate(one, [10.0])), parts(separate(add(zero, other), [10.0]))
+    assert total == pytest.approx(each[0] + each[1], abs=1e-9)
     order = random.permutation(len(one.value))
     mixed = Line(
         "EXX", one.target_mm[order], one.value[order] + other[order], one.run[order], one.direction[order],

@@ -1,5 +1,5 @@
-"""Reversal from readings approached from both sides: the paper's test B (go and return), and the reversal part
-of any bidirectional line.
+"""Reversal from readings approached from both sides: the paper's test B (go and return), and the reversal
+part of any bidirectional line.
 
 B_i = x_up - x_down as in ISO 230-2. An axis with lost motion b stays behind its command by b/2 on both sides,
 so its B is -b.
@@ -143,7 +143,7 @@ def _solve(design: Array, value: Array) -> tuple[Array, Array, float, int]:
     inverse = np.linalg.pinv(design, rcond=1e-10)
     found = inverse @ value
     rest = value - design @ found
-    rank = int(round(float(np.trace(design @ inverse))))
+    rank = round(float(np.trace(design @ inverse)))
     return found, np.asarray(inverse @ inverse.T), float(rest @ rest), len(value) - rank
 
 

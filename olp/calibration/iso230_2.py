@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -219,7 +220,7 @@ def _hull_slopes(x: Array, y: Array) -> Iterator[float]:
                     break
                 hull.pop()
             hull.append((float(px), float(py)))
-        yield from (sign * (b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(hull, hull[1:], strict=False))
+        yield from (sign * (b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(hull))
 
 
 def findings_of(evaluation: Evaluation) -> Iterator[Finding]:

@@ -1,5 +1,5 @@
-"""The parts of a line: what is not cyclic, cyclic errors by period, and reversal; and whether targets can see a
-period at all.
+"""The parts of a line: what is not cyclic, cyclic errors by period, and reversal; and whether targets can
+see a period at all.
 
 All estimates are linear in the readings: harmonic pairs beside columns that stand for any curve which is
 smooth at the density of the targets. So parts add as the readings do, and a period that the targets cannot
@@ -127,8 +127,8 @@ def separate(
     line: Line, periods_mm: Sequence[float] = (), sweeps: Sequence[Line] = (), *, harmonics: int = 2,
     drift: bool = True,
 ) -> Separation:  # fmt: skip
-    """The parts of a line with cyclic errors of the given periods (each with its harmonics: the period over 1,
-    2 ... `harmonics`), seen by the line and by fine sweeps of the same component together.
+    """The parts of a line with cyclic errors of the given periods (each with its harmonics: the period over
+    1, 2 ... `harmonics`), seen by the line and by fine sweeps of the same component together.
 
     A period that they do not see is refused, never fitted. `drift` as in `reversal_of`. Raises ConfigError.
     """
@@ -180,7 +180,7 @@ def _fit(
     inverse = np.linalg.pinv(design, rcond=1e-10)
     estimate = inverse @ (y * weight)
     rest = y * weight - design @ estimate
-    dof = len(y) - int(round(float(np.trace(design @ inverse))))
+    dof = len(y) - round(float(np.trace(design @ inverse)))
     variance = float(rest @ rest) / dof if dof > 0 else 0.0
     covariance = inverse @ inverse.T * max(variance, 1.0 if stated else 0.0)
     out = []
