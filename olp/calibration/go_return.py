@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.iso230_2 import SAME_MM, scale_of
+from olp.calibration.iso230_2 import scale_of, targets_of
 from olp.calibration.observations import Array, Index, Line
 from olp.exceptions import ConfigError, UsageError
 from olp.findings import Finding
@@ -79,7 +79,7 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     With `drift` the readings count as equally spaced in time, and a continuous drift, straight within each
     run, is taken out; without it the order of the rows does not matter. Raises ConfigError.
     """
-    target, place = targets_of(line)
+    target, place = targets_of(line.target_mm)
     for i, x in enumerate(target):
         for d, side in ((1, "+"), (-1, "-")):
             if not ((place == i) & (line.direction == d)).any():
@@ -117,13 +117,6 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
         line, target, at, sigma_at, mean, float(noise * np.sqrt(spread[m, m])), constant, chance, noise,
         float(np.ptp(wander)) if len(wander) else 0.0,
     )  # fmt: skip
-
-
-def targets_of(line: Line) -> tuple[Array, Index]:
-    """(m,) targets, ascending, and (n,) the target of each reading."""
-    _, place = np.unique(np.round(line.target_mm / SAME_MM).astype(np.int64), return_inverse=True)
-    count = np.bincount(place)
-    return np.bincount(place, line.target_mm) / count, np.asarray(place, np.int64)
 
 
 def _drift_columns(run: Index) -> Array:

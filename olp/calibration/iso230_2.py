@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from olp.calibration.observations import Array, Line
+from olp.calibration.observations import Array, Index, Line
 from olp.exceptions import ConfigError
 from olp.findings import Finding
 from olp.units import RAD_PER_URAD, UM_PER_MM
@@ -61,24 +61,14 @@ class Side:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evaluation:
-    """A line evaluated; (m,) columns over the targets, in mm or rad. `up` is the approach in +, `down` that
-    in -; of readings from one side the other one is None, and so is all that needs both.
+class Statistics:
+    """Readings at targets (m,), evaluated; columns in mm or rad. `up` is the approach in +, `down` that in -;
+    of readings from one side the other one is None, and so is all that needs both."""
 
-    Of a straightness the reference line `slope` (rad) was taken out of everything first, once for both
-    directions.
-    """
-
-    line: Line
     target_mm: Array
     runs: int
     up: Side | None
     down: Side | None
-    slope: float = 0.0
-
-    @property
-    def component(self) -> str:
-        return self.line.component
 
     @property
     def sides(self) -> tuple[Side, ...]:
@@ -122,6 +112,19 @@ class Evaluation:
                 out[f"R_{name}"] = side.repeatability
         return out
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluation(Statistics):
+    """A line evaluated. Of a straightness the reference line `slope` (rad) was taken out of everything
+    first, once for both directions."""
+
+    line: Line
+    slope: float = 0.0
+
+    @property
+    def component(self) -> str:
+        return self.line.component
+
     def as_dict(self) -> dict[str, Any]:
         """Figures and columns for JSON; keys end in um or urad."""
         unit, scale = scale_of(self.line)
@@ -161,40 +164,57 @@ def evaluate(line: Line, zone: Zone = "least-squares") -> Evaluation:
     straightness: least squares, or the one with the least range (ISO 230-1, minimum zone), through the
     means of both directions. Raises ConfigError.
     """
-    target, place = np.unique(np.round(line.target_mm / SAME_MM).astype(np.int64), return_inverse=True)
-    target_mm = np.array([line.target_mm[place == i].mean() for i in range(len(target))])
-    if len(target_mm) < 2:
-        raise ConfigError(
-            f"line {line.component}: one target; expected at least 2, better {TARGETS}", file=line.source
-        )
-    directions = [d for d in (1, -1) if (line.direction == d).any()]
-    count = {d: np.bincount(place[line.direction == d], minlength=len(target_mm)) for d in directions}
-    runs = int(max(c.max() for c in count.values()))
-    for d, counts in count.items():
-        if (counts != runs).any() or runs < 2:
-            i = int(np.argmin(counts))
-            side = "in +" if d > 0 else "in -"
-            wanted = max(runs, 2)
-            raise ConfigError(
-                f"line {line.component}: {counts[i]} readings at {target_mm[i]:g} mm approached {side}; "
-                f"expected {wanted}, as many at every target and from each side, at least 2; leave out the "
-                "incomplete run, or the targets that it lacks",
-                file=line.source,
-            )
+    label = f"line {line.component}"
+    checked_runs(line.target_mm, line.direction, label, line.source)
     slope = 0.0
     value = line.value
     if line.quantity == "straightness":
         # runs of both sides weigh the same, so the line through all readings is that of the means
-        means = np.bincount(place, value) / np.bincount(place)
-        slope, offset = reference_line(target_mm, means, zone)
-        value = value - (offset + slope * target_mm[place])
+        target, place = targets_of(line.target_mm)
+        slope, offset = reference_line(target, np.bincount(place, value) / np.bincount(place), zone)
+        value = value - (offset + slope * line.target_mm)
+    found = statistics(line.target_mm, value, line.direction, label, line.source)
+    return Evaluation(found.target_mm, found.runs, found.up, found.down, line, slope)
+
+
+def statistics(target_mm: Array, value: Array, direction: Index, label: str, source: str = "") -> Statistics:
+    """Means and spreads of readings (n,) at targets (n,). Raises ConfigError as `evaluate` does."""
+    runs = checked_runs(target_mm, direction, label, source)
+    target, place = targets_of(target_mm)
     sides: dict[int, Side] = {}
-    for d in directions:
-        rows = line.direction == d
-        mean = np.bincount(place[rows], value[rows]) / runs
-        square = np.bincount(place[rows], (value[rows] - mean[place[rows]]) ** 2)
-        sides[d] = Side(d, mean, np.sqrt(square / (runs - 1)))
-    return Evaluation(line, target_mm, runs, sides.get(1), sides.get(-1), slope)
+    for d in (1, -1):
+        rows = direction == d
+        if rows.any():
+            mean = np.bincount(place[rows], value[rows]) / runs
+            square = np.bincount(place[rows], (value[rows] - mean[place[rows]]) ** 2)
+            sides[d] = Side(d, mean, np.sqrt(square / (runs - 1)))
+    return Statistics(target, runs, sides.get(1), sides.get(-1))
+
+
+def targets_of(target_mm: Array) -> tuple[Array, Index]:
+    """(m,) targets, ascending, and (n,) the target of each reading."""
+    _, place = np.unique(np.round(target_mm / SAME_MM).astype(np.int64), return_inverse=True)
+    return np.bincount(place, target_mm) / np.bincount(place), np.asarray(place, np.int64)
+
+
+def checked_runs(target_mm: Array, direction: Index, label: str, source: str) -> int:
+    """How many readings each target has from each side. Raises ConfigError where they differ."""
+    target, place = targets_of(target_mm)
+    if len(target) < 2:
+        raise ConfigError(f"{label}: one target; expected at least 2, better {TARGETS}", file=source)
+    directions = [d for d in (1, -1) if (direction == d).any()]
+    count = {d: np.bincount(place[direction == d], minlength=len(target)) for d in directions}
+    runs = int(max(c.max() for c in count.values()))
+    for d, counts in count.items():
+        if (counts != runs).any() or runs < 2:
+            i = int(np.argmin(counts))
+            raise ConfigError(
+                f"{label}: {counts[i]} readings at {target[i]:g} mm approached in {'+' if d > 0 else '-'}; "
+                f"expected {max(runs, 2)}, as many at every target and from each side, at least 2; leave out "
+                "the incomplete run, or the targets that it lacks",
+                file=source,
+            )
+    return runs
 
 
 def reference_line(x: Array, y: Array, zone: Zone) -> tuple[float, float]:

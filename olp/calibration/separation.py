@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.calibration.go_return import Reversal, reversal_of, targets_of
-from olp.calibration.iso230_2 import scale_of
+from olp.calibration.go_return import Reversal, reversal_of
+from olp.calibration.iso230_2 import scale_of, targets_of
 from olp.calibration.observations import Array, Line
 from olp.errormodel.calibration import Cyclic
 from olp.exceptions import ConfigError
@@ -200,7 +200,7 @@ def _fit(
 
 def _means(line: Line) -> tuple[Array, Array]:
     """(m,) targets and (m,) means of both directions there."""
-    target, place = targets_of(line)
+    target, place = targets_of(line.target_mm)
     sides = []
     for d in (1, -1):
         rows = line.direction == d
