@@ -215,10 +215,10 @@ def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] 
     ConfigError.
     """
     known = dict(known or {})
-    for name, (_, sigma) in known.items():
-        if name not in UNKNOWNS or not sigma > 0.0:
+    for name, (_, spread) in known.items():
+        if name not in UNKNOWNS or not spread > 0.0:
             raise ConfigError(
-                f"known {name} with uncertainty {sigma:g}; expected one of {', '.join(UNKNOWNS)} with an "
+                f"known {name} with uncertainty {spread:g}; expected one of {', '.join(UNKNOWNS)} with an "
                 "uncertainty above zero"
             )
     if not diagonals:
@@ -230,8 +230,8 @@ def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] 
             file=diagonals[-1].source,
         )
     pairs = [d.elongation() for d in diagonals]
-    elongation, sigma = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
-    sigma = np.maximum(sigma, 1e-12)
+    elongation = np.array([p[0] for p in pairs])
+    sigma = np.maximum(np.array([p[1] for p in pairs]), 1e-12)
     design = np.array([row_of(d.unit) for d in diagonals])
     stated = np.array([[float(u == name) for u in UNKNOWNS] for name in known]).reshape(-1, len(UNKNOWNS))
     design = np.vstack((design, stated))
