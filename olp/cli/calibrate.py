@@ -5,7 +5,9 @@ from __future__ import annotations
 from olp.cli.late import LateGroup
 
 #: Verb to what it does; each is a module `olp.cli.calibrate_VERB`.
-VERBS: dict[str, str] = {}
+VERBS: dict[str, str] = {
+    "read": "Show what is understood of the file of an instrument.",
+}
 
 _HELP = (
     """Makes the calibration of a machine from measurements, and reads and writes the tables of controls."""
