@@ -22,7 +22,6 @@ def _sense(value: object) -> object:
 
 
 Sense = Annotated[str, Field(json_schema_extra={"enum": list(SENSES)}), BeforeValidator(_sense)]
-Unit = Literal["mm", "um", "nm", "rad", "mrad", "urad", "arcsec", "um/m", "mm/m"]
 Instrument = Literal["laser", "level", "autocollimator", "straightedge", "other"]
 
 
@@ -42,9 +41,6 @@ class LineKeys(Table):
     )
     square: Text | None = Field(
         default=None, description="the name of the square whose leg the straightness was read against"
-    )
-    unit: Unit | None = Field(
-        default=None, description='the unit of the values where the file does not say it, such as "um"'
     )
     sense: Sense | None = Field(
         default=None,

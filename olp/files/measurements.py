@@ -16,6 +16,7 @@ from typing import Any
 
 from olp.calibration.observations import Line, Measurements, Square, SquarenessReading
 from olp.exceptions import ConfigError, InputError
+from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
     LineKeys,
     LineTable,
@@ -170,7 +171,7 @@ def _plan(path: FilePath, found: _Gathered) -> None:
 def _line(plan: FilePath, table: LineTable, defaults: LineKeys, vertical: str, found: _Gathered) -> None:
     path = plan.parent / table.file
     profile = table.profile or defaults.profile
-    readings = _read(path, table, defaults, plan.parent / profile if profile else None)
+    readings = _read(path, plan.parent / profile if profile else None)
     stated, places = _stated(readings.keys, str(path))
     component = table.component or stated.component or readings.component
     if component is None:
@@ -180,16 +181,8 @@ def _line(plan: FilePath, table: LineTable, defaults: LineKeys, vertical: str, f
     found.lines.append(_as_line(readings, component, said, vertical, found.chain, str(path)))
 
 
-def _read(path: FilePath, table: LineKeys, defaults: LineKeys, profile: FilePath | None) -> Readings:
-    if path.suffix.lower() == ".rtx" and profile is None:
-        from olp.files.renishaw import read_rtx
-
-        return read_rtx(path, unit=table.unit or defaults.unit)
-    if profile is not None:
-        from olp.files.line_profile import load_line_profile, read_profiled
-
-        return read_profiled(path, load_line_profile(profile))
-    return parse_readings(read_bytes(path), str(path))
+def _read(path: FilePath, profile: FilePath | None) -> Readings:
+    return read_line(path, None if profile is None else load_line_profile(profile))
 
 
 # -- files that describe themselves ----------------------------------------------------------------------
@@ -282,11 +275,12 @@ def _together(positions: Sequence[Any]) -> Any:
 def _as_line(
     readings: Readings, component: str, said: LineKeys, vertical: str, chain: str | None, file: str
 ) -> Line:
-    problems = list(_line_problems(component, said, vertical, chain, readings.sense_known))
+    problems = list(_line_problems(component, said, vertical, chain))
     if problems:
         raise ConfigError("; ".join(problems), file=file, problems=tuple(problems))
     angular = component[1] in "ABC"
-    value = readings.value if said.sense is None else readings.with_sense(said.sense).value
+    assert said.sense is not None
+    value = readings.with_sense(said.sense).value
     place = [0.0 if at is None else at for at in said.line_mm.values]
     sigma = (said.sigma_urad or 0.0) * RAD_PER_URAD if angular else (said.sigma_um or 0.0) * MM_PER_UM
     return Line(
@@ -307,11 +301,9 @@ def _as_line(
     )
 
 
-def _line_problems(
-    component: str, said: LineKeys, vertical: str, chain: str | None, sense_known: bool
-) -> Iterator[str]:
+def _line_problems(component: str, said: LineKeys, vertical: str, chain: str | None) -> Iterator[str]:
     axis, angular = component[2], component[1] in "ABC"
-    if said.sense is None and not sense_known:
+    if said.sense is None:
         yield (
             "sense is missing; expected what the values mean, such as sense = "
             '"actual-minus-commanded" (of the tool relative to the workpiece)'

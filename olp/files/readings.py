@@ -66,14 +66,14 @@ _VALUES = {"value_um": "um", "value_urad": "urad"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
-    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad and, once `with_sense` was
-    called or the reader knows it, actual minus commanded of the tool relative to the workpiece; runs from 1,
-    directions +1 or -1 (from which side the target was approached).
+    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad in the sense of the file until
+    `with_sense` makes it that of the contract; runs from 1, directions +1 or -1 (from which side the target
+    was approached).
 
     `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name or
     None where the file does not tell; `angular` says that values are in rad, None where the file does not
     tell. `keys` is what the file states about itself, each with its line; `notes` are sentences on what the
-    reader assumed. `sense_known` says that the values are in the contract's sense already.
+    reader assumed.
     """
 
     file: str
@@ -86,13 +86,12 @@ class Readings:
     angular: bool | None = None
     keys: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    sense_known: bool = False
 
     def with_sense(self, sense: str) -> Readings:
         """The same in the contract's sense, for values stated in `sense`, a key of SENSES."""
         return Readings(
             self.file, self.target_mm, self.value * SENSES[sense], self.run, self.direction, self.line,
-            self.component, self.angular, self.keys, self.notes, sense_known=True,
+            self.component, self.angular, self.keys, self.notes,
         )  # fmt: skip
 
 

@@ -1,0 +1,381 @@
+"""One linear Gaussian adjustment of all readings of a machine.
+
+theta holds the 18 curves, their half differences of directions, cyclic terms and squareness; every reading
+is a linear functional of it and of nuisances (zeros, slopes, squares, drift, scale). The result carries the
+covariance of all of it, so that what was not measured is known as unknown.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.basis import CurveSpace, Spline, Wave, slope_grid, slope_weights
+from olp.calibration.lines import (
+    Noise,
+    group_of,
+    line_block,
+    noise_of,
+    square_names,
+    squareness_block,
+    targets_of,
+)
+from olp.calibration.normal import Block, Normal, locals_of, solve
+from olp.calibration.observations import Line, Measurements
+from olp.calibration.parameters import Parameters, Place
+from olp.calibration.prior import POSE, Prior
+from olp.calibration.separation import aliased
+from olp.calibration.smoothing import Shape, shape_of
+from olp.errormodel.base import Array
+from olp.exceptions import CannotCompute
+from olp.machine import COMPONENTS, ZERO, Vector
+from olp.progress import Progress, silent
+from olp.units import AXES
+
+#: Cells of the spline of a curve: as many as a line has targets between these.
+FEWEST, MOST = 6, 48
+HALF_CELLS = 5
+#: A reading whose residual is so many standard deviations is left out, at most this share of a line.
+OUTLIER, SHARE = 6.0, 0.05
+#: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
+SWEEP = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """A reading left out: its file, the line there, and how many standard deviations it is off."""
+
+    source: str
+    row: int
+    component: str
+    value: float
+    deviations: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineResult:
+    """A line after the fit: residuals (n,) in mm or rad, noise, sum of squares of standardised residuals."""
+
+    line: Line
+    noise: Noise
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """theta with its covariance and layout; see `error`, `sigma`, `design`.
+
+    `slopes` are the mean slopes of the straightness curves on lines through the datum, as functionals of
+    theta: the gauge takes them as squareness. `box_mm` (3, 2) is what the lines covered. `cyclic_unseen` says
+    by component why a period was not fitted.
+    """
+
+    measurements: Measurements
+    parameters: Parameters
+    theta: Array
+    covariance: Array
+    prior: Prior
+    lines: tuple[LineResult, ...]
+    outliers: tuple[Outlier, ...]
+    box_mm: Array
+    slopes: Mapping[str, Array]
+    chi_square: float
+    freedom: float
+    cyclic_unseen: Mapping[tuple[str, float], str]
+
+    def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3, size) dependence of the error on theta, in the gauge of the datum: on lines through it X has
+        no mean slope, nor has Y towards Z."""
+        position = np.atleast_2d(np.asarray(axis_mm, float))
+        out = self.parameters.design(position, np.asarray(tool_mm, float), play)
+        turn = self.turn
+        arm = position - np.array(self.parameters.datum_mm)
+        for row in range(3):
+            k, m = (row + 1) % 3, (row + 2) % 3
+            out[:, row] += arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
+        return out
+
+    @property
+    def turn(self) -> Array:
+        """(3, size) rotation of the frame that the gauge asks for, as functionals of theta."""
+        return np.stack([-self.slopes["EZY"], self.slopes["EZX"], -self.slopes["EYX"]])
+
+    def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3) estimated error in mm, to first order."""
+        return np.asarray(self.design(axis_mm, tool_mm, play) @ self.theta)
+
+    def sigma(self, axis_mm: Array, tool_mm: Array) -> Array:
+        """(n, 3) standard uncertainty of `error` in mm."""
+        rows = self.design(axis_mm, tool_mm)
+        return np.sqrt(
+            np.maximum(np.einsum("nik,kl,nil->ni", rows, self.covariance, rows, optimize=True), 0.0)
+        )
+
+    def curve(self, name: str, q: Array) -> Array:
+        """(n, size) mean of a component at q (n,) on its own line, in the gauge of the datum, without cyclic
+        terms, as functionals of theta."""
+        out = np.zeros((len(q), self.parameters.size))
+        out[:, self.parameters.slices[name]] = self.parameters.spaces[name].values(q)
+        if name in self.slopes:
+            axis = AXES.index(name[2])
+            out -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+        return out
+
+    def squareness(self, name: str) -> Array:
+        """(size,) a squareness in the gauge of the datum, as functional of theta."""
+        out = np.zeros(self.parameters.size)
+        out[self.parameters.slices[name]] = 1.0
+        first, second, sign = {
+            "C0Y": ("EXY", "EYX", -1.0),
+            "B0Z": ("EXZ", "EZX", 1.0),
+            "A0Z": ("EYZ", "EZY", -1.0),
+        }[name]
+        return np.asarray(out + sign * (self.slopes[first] + self.slopes[second]))
+
+
+def fit(
+    measurements: Measurements,
+    chain: str,
+    *,
+    travel_mm: Sequence[tuple[float, float]] | None = None,
+    datum_mm: Vector | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Estimate the errors of a machine from all its readings.
+
+    `travel_mm` bounds the box; the datum is the place in the box nearest to zero if left out. Raises
+    ConfigError where a line cannot be used, CannotCompute where an axis has no line.
+    """
+    tell = progress or silent
+    tell("noise", 0.0)
+    lines, noises, outliers = _screened(measurements.lines)
+    ranges, box = _ranges(lines, travel_mm)
+    datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
+    splines = [_spline(lines, axis, ranges[axis]) for axis in range(3)]
+    waves, unseen = _waves(measurements, lines)
+    shapes: dict[str, Shape] = {}
+    for k, name in enumerate(COMPONENTS):
+        tell("shapes of curves", k / len(COMPONENTS))
+        own = _own_lines(name, lines, noises)
+        if own:
+            axis = AXES.index(name[2])
+            half = Spline(*ranges[axis], HALF_CELLS)
+            shapes[name] = shape_of(own, splines[axis], half, waves.get(name, ()))
+    parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, ranges, shapes, waves)
+    prior = Prior(parameters, shapes, _squares(measurements, parameters))
+    tell("adjustment", 0.0)
+
+    def blocks() -> list[Block]:
+        found = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
+        return found + [squareness_block(reading, parameters) for reading in measurements.squareness]
+
+    normal = _gathered(blocks(), prior)
+    prior.learn(normal)
+    matrix, logdet = prior.precision()
+    solved = solve(normal, matrix, logdet)
+    results, chi_square = [], 0.0
+    for k, block in enumerate(blocks()):
+        _, residual = locals_of(block, solved.theta, np.ones(len(block), bool))
+        part = float(np.sum((residual / block.sigma) ** 2))
+        chi_square += part
+        if k < len(lines):
+            results.append(LineResult(lines[k], noises[k], residual, part))
+    # readings less what the fit used up of their freedom
+    used = float(np.trace(solved.covariance @ normal.H)) + normal.local
+    return Fit(
+        measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(outliers),
+        box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
+    )  # fmt: skip
+
+
+def _gathered(blocks: Iterable[Block], prior: Prior) -> Normal:
+    normal = Normal.of(prior.parameters.size)
+    for block in blocks:
+        normal.add(block)
+    prior.push(normal)
+    return normal
+
+
+def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:
+    """Lines without the readings that their own repetitions speak against."""
+    kept, noises, outliers = [], [], []
+    for line in lines:
+        noise = noise_of(line)
+        use = np.ones(len(line.value), bool)
+        for _ in range(max(1, int(SHARE * len(use)))):
+            some = _part(line, use)
+            noise = noise_of(some)
+            rest = _about_group(some)
+            worst = int(np.argmax(np.abs(rest)))
+            if abs(rest[worst]) <= OUTLIER * noise.sigma:
+                break
+            k = int(np.flatnonzero(use)[worst])
+            use[k] = False
+            outliers.append(
+                Outlier(
+                    line.source, int(line.row[k]), line.component, float(line.value[k]),
+                    float(abs(rest[worst]) / noise.sigma),
+                )
+            )  # fmt: skip
+        kept.append(_part(line, use))
+        noises.append(noise)
+    return kept, noises, outliers
+
+
+def _part(line: Line, use: np.ndarray) -> Line:
+    if use.all():
+        return line
+    columns = ("target_mm", "value", "run", "direction", "row")
+    return dataclasses.replace(line, **{name: getattr(line, name)[use] for name in columns})
+
+
+def _about_group(line: Line) -> Array:
+    """(n,) deviation from the others of the same target and direction, freed of the level of its run; zero
+    where fewer than three were read."""
+    group = group_of(line)
+    rest = line.value.copy()
+    for _ in range(3):
+        for labels in (group, line.run - line.run.min()):
+            rest -= _medians(rest, labels)[labels]
+    counts = np.bincount(group)[group]
+    return np.where(counts >= 3, rest, 0.0)
+
+
+def _medians(values: Array, labels: np.ndarray) -> Array:
+    out = np.zeros(int(labels.max()) + 1)
+    for label in np.unique(labels):
+        out[label] = np.median(values[labels == label])
+    return out
+
+
+def _ranges(
+    lines: Sequence[Line], travel_mm: Sequence[tuple[float, float]] | None
+) -> tuple[list[tuple[float, float]], Array]:
+    """What the lines of each axis reach together, and the box that every one of its components covers."""
+    ranges, box = [], np.zeros((3, 2))
+    for axis in range(3):
+        own = [line for line in lines if line.axis == axis]
+        if not own:
+            raise CannotCompute(
+                f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
+                "every axis"
+            )
+        low = min(float(line.target_mm.min()) for line in own)
+        high = max(float(line.target_mm.max()) for line in own)
+        ranges.append((low, high))
+        sides = []
+        for name in {line.component for line in own}:
+            same = [line for line in own if line.component == name]
+            side = (
+                min(float(line.target_mm.min()) for line in same),
+                max(float(line.target_mm.max()) for line in same),
+            )
+            if side[1] - side[0] > SWEEP * (high - low):
+                sides.append(side)
+        limits = travel_mm[axis] if travel_mm is not None else (-np.inf, np.inf)
+        box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
+        if box[axis, 0] >= box[axis, 1]:
+            raise CannotCompute(
+                f"the lines along {AXES[axis]} have no length in common within the travel; expected lines over "
+                "the same length"
+            )
+    return ranges, box
+
+
+def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float]) -> Spline:
+    own = [len(targets_of(line)) for line in lines if line.axis == axis]
+    long = [
+        len(targets_of(line))
+        for line in lines
+        if line.axis == axis and np.ptp(line.target_mm) > SWEEP * (span[1] - span[0])
+    ]
+    return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
+
+
+def _waves(
+    measurements: Measurements, lines: Sequence[Line]
+) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
+    """Cyclic terms that the targets can see, and why others cannot be seen."""
+    waves: dict[str, tuple[Wave, ...]] = {}
+    unseen: dict[tuple[str, float], str] = {}
+    for name in COMPONENTS:
+        own = [targets_of(line) for line in lines if line.component == name]
+        for period in measurements.periods_mm[AXES.index(name[2])] if own else ():
+            reasons = [aliased(targets, period) for targets in own]
+            if None in reasons:
+                waves[name] = (*waves.get(name, ()), Wave(period))
+            else:
+                unseen[name, period] = str(reasons[0])
+    return waves, unseen
+
+
+def _own_lines(name: str, lines: Sequence[Line], noises: Sequence[Noise]) -> list[tuple[Line, Noise]]:
+    """The lines of a component that were taken at its own place."""
+    own = [(line, noise) for line, noise in zip(lines, noises, strict=True) if line.component == name]
+    if not own:
+        return []
+    place = _place(own[0][0])
+    return [(line, noise) for line, noise in own if name[1] in "ABC" or _place(line) == place]
+
+
+def _place(line: Line) -> Place:
+    at = list(line.line_mm)
+    at[line.axis] = 0.0
+    return Place((at[0], at[1], at[2]), line.tool_mm)
+
+
+def _parameters(
+    chain: str,
+    datum: Vector,
+    lines: Sequence[Line],
+    splines: Sequence[Spline],
+    ranges: Sequence[tuple[float, float]],
+    shapes: Mapping[str, Shape],
+    waves: Mapping[str, tuple[Wave, ...]],
+) -> Parameters:
+    spaces, halves, places = {}, {}, {}
+    for name in COMPONENTS:
+        axis = AXES.index(name[2])
+        shape = shapes.get(name)
+        kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
+        spaces[name] = CurveSpace.of(splines[axis], shape.features if shape else (), datum[axis], kind)
+        if shape is not None and shape.half != "none":
+            half = Spline(*ranges[axis], HALF_CELLS)
+            gauge = np.eye(half.count) if shape.half == "curve" else np.ones((half.count, 1))
+            halves[name] = CurveSpace(half, (), gauge)
+        if name[1] in AXES:
+            own = [line for line in lines if line.component == name]
+            near = own or [line for line in lines if line.axis == axis and line.quantity != "angle"]
+            place = _place(near[0]) if near else Place(datum, ZERO)
+            at = list(place.line_mm)
+            at[axis] = datum[axis]
+            places[name] = Place((at[0], at[1], at[2]), place.tool_mm)
+    shared = sorted({n for line in lines if line.square is not None for n in square_names(line)})
+    return Parameters(chain, datum, spaces, places, halves, dict(waves), tuple(shared))
+
+
+def _squares(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:
+    known = {f"error of square {s.name}": (s.error_rad, max(s.sigma_rad, 1e-9)) for s in measurements.squares}
+    return {name: known.get(name, (0.0, POSE)) for name in parameters.shared}
+
+
+def _slopes(parameters: Parameters) -> dict[str, Array]:
+    """Mean slopes of the straightness curves on lines through the datum with no tool."""
+    slopes: dict[str, Array] = {}
+    for name in COMPONENTS:
+        if name[1] not in AXES or name[1] == name[2]:
+            continue
+        axis, row = AXES.index(name[2]), AXES.index(name[1])
+        spline = parameters.spaces[name].spline
+        position = np.tile(np.array(parameters.datum_mm), (len(slope_grid(spline)), 1))
+        position[:, axis] = slope_grid(spline)
+        out = np.zeros(parameters.size)
+        for part, values in parameters.displacement(row, axis, position, np.zeros(3)):
+            if part != parameters.slices.get(f"wave {name}"):
+                out[part] += slope_weights(spline) @ values
+        slopes[name] = out
+    return slopes
