@@ -142,5 +142,5 @@ def test_file_of_postures(tmp_path: Path) -> None:
     assert found.vector_mm.tolist() == [[0, 0, -100], [-80, 0, -60], [0, 0, -100]]
     # the point is at Z 0.005 by the mean of tool 1, at 0 by tool 2: tool 2 ends 0.005 higher than it says
     assert postures.fit(found).error_mm["2"] == pytest.approx([0, 0, 0.005], abs=1e-9)
-    with pytest.raises(ConfigError, match="line 3: tool 2 has no vector"):
+    with pytest.raises(ConfigError, match="line 4: tool 2 has no vector"):
         read_postures(tmp_path / "a.csv", {1: tools[1]})
