@@ -69,4 +69,12 @@ METROLOGY = (
         "Look at the residuals, and give the lines to olp calibrate fit, which knows levers and drift.",
         "Body diagonals that leave 20 um where 1 um was stated.",
     ),
+    Rule(
+        "OLP858",
+        "readings not evaluated",
+        Severity.WARNING,
+        "These readings do not allow the evaluation that they are for; a fit may still use them.",
+        "Complete the run, or leave the incomplete one out; the message says what is missing.",
+        "A line whose last run ended half way.",
+    ),
 )

@@ -23,8 +23,8 @@ from olp.units import RAD_PER_URAD, UM_PER_MM
 
 Zone = Literal["least-squares", "minimum-zone"]
 
-#: Positions this close are one target.
-SAME_MM = 1e-6
+#: Positions this close to the next one are one target.
+SAME_MM = 0.05
 #: What ISO 230-2 asks for: readings of a target from one side, and targets (a metre, and in all up to 2 m).
 RUNS, PER_METRE, TARGETS, STEP_MM, LONG_MM = 5, 5, 5, 250.0, 2000.0
 #: Steps between targets that differ by less than this share of their mean are equal.
@@ -193,8 +193,10 @@ def statistics(target_mm: Array, value: Array, direction: Index, label: str, sou
 
 def targets_of(target_mm: Array) -> tuple[Array, Index]:
     """(m,) targets, ascending, and (n,) the target of each reading."""
-    _, place = np.unique(np.round(target_mm / SAME_MM).astype(np.int64), return_inverse=True)
-    return np.bincount(place, target_mm) / np.bincount(place), np.asarray(place, np.int64)
+    order = np.argsort(target_mm, kind="stable")
+    place = np.zeros(len(target_mm), np.int64)
+    place[order[1:]] = np.cumsum(np.diff(target_mm[order]) > SAME_MM)
+    return np.bincount(place, target_mm) / np.bincount(place), place
 
 
 def checked_runs(target_mm: Array, direction: Index, label: str, source: str) -> int:

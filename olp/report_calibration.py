@@ -1,0 +1,438 @@
+"""The report of measured lines and of a calibration made from them: for people as text, and as a document
+with the plots of a metrologist."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from olp import plots_calibration
+from olp.calibration.conventions import angle_words
+from olp.calibration.estimator import Fit
+from olp.calibration.evaluating import Evaluated
+from olp.calibration.iso230_2 import Evaluation, scale_of
+from olp.calibration.observations import Array, Line
+from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
+from olp.errormodel.calibration import Calibration
+from olp.findings import RULES, Finding
+from olp.plots import Format
+from olp.plots_calibration import Fitted, name_of_straightness, name_of_turn
+from olp.report import findings_text, number, pairs, printable, table
+from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
+
+_FIGURES = ("A", "E", "R", "M", "B", "B_mean")
+_ONE_SIDE = ("A_up", "E_up", "R_up", "A_down", "E_down", "R_down")
+#: Over what the table of cyclic errors stands.
+_CYCLIC = "Cyclic errors above their uncertainty"
+_ORDER = {"positioning": 0, "straightness": 1, "angle": 2}
+_DENSE = 200
+#: What the figures say, for who reads them once a year.
+_LEGEND = (
+    "A accuracy, E systematic deviation, R repeatability, M mean systematic deviation, B reversal (largest, "
+    "and mean with its sign: approached in + less approached in -) of both directions; R + and R - of one. "
+    "Straightness counts from its reference line."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitSummary:
+    """What a fit found, for its report. `components` are rows of a table (component, and figures whose keys
+    end in units); `squareness` value and standard uncertainty in rad; `lines` and `residuals` as plots take
+    them; `outliers` and `unobserved` sentences; sum of squares and degrees of freedom of all readings."""
+
+    calibration: Calibration
+    components: Sequence[Mapping[str, Any]]
+    squareness: Mapping[str, tuple[float, float]]
+    lines: Sequence[Fitted]
+    residuals: Sequence[tuple[Line, Array]]
+    chi_square: float
+    freedom: float
+    outliers: Sequence[str] = ()
+    unobserved: Sequence[str] = ()
+    findings: Sequence[Finding] = field(default_factory=tuple)
+
+
+def fitted_lines(fit: Fit) -> tuple[Fitted, ...]:
+    """Each line of a fit beside its curve. Readings are the curve plus what the fit left of them, so their
+    zero, slope, drift and reversal are out."""
+    out = []
+    for result in fit.lines:
+        line = result.line
+        x = np.linspace(line.target_mm.min(), line.target_mm.max(), _DENSE)
+        rows = fit.curve(line.component, x)
+        sigma = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", rows, fit.covariance, rows, optimize=True), 0.0))
+        reading = fit.curve(line.component, line.target_mm) @ fit.theta + result.residual
+        out.append(Fitted(line, x, np.asarray(rows @ fit.theta), sigma, np.asarray(reading)))
+    return tuple(out)
+
+
+# -- text ------------------------------------------------------------------------------------------------
+
+
+def to_text(found: Evaluated) -> str:
+    """Plain text of an evaluation."""
+    m = found.measurements
+    sections = (
+        list(pairs([
+            ("Machine", printable(m.machine)),
+            ("Lines", f"{len(found.evaluations)} evaluated" + _plural(len(found.sweeps), "sweep")),
+        ])),
+        list(_table_text(found, bidirectional=True)),
+        list(_table_text(found, bidirectional=False)),
+        list(_cyclic_text(found)),
+        list(_reversal_text(found)),
+        list(_squareness_text(found)),
+        list(findings_text([f.as_dict() for f in found.findings])),
+    )  # fmt: skip
+    return "\n\n".join("\n".join(lines) for lines in sections if lines) + "\n"
+
+
+def _plural(count: int, noun: str) -> str:
+    return f", {count} {noun}{'s' if count != 1 else ''}" if count else ""
+
+
+def _sorted(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
+    return sorted(evaluations, key=lambda e: (e.line.axis, _ORDER[e.line.quantity], e.component))
+
+
+def _rows(found: Evaluated, keys: Sequence[str], *, both: bool) -> list[list[str]]:
+    rows = []
+    for e in _sorted(found.evaluations):
+        if (len(e.sides) == 2) != both:
+            continue
+        unit, scale = scale_of(e.line)
+        figures = e.figures()
+        cells = [number(figures[k] * scale) if k in figures else "" for k in keys]
+        label = f"{e.component} {_name(e.component)}"
+        if len(found.of(e.component)) > 1 and e.line.source:
+            label += f", {printable(FilePath(e.line.source).name)}"
+        rows.append([label, *cells, unit, str(e.runs), str(len(e.target_mm))])
+    return rows
+
+
+def _name(component: str) -> str:
+    if component[1] in "ABC":
+        return name_of_turn(component)
+    if component[1] == component[2]:
+        return "positioning"
+    return f"straightness {name_of_straightness(component)}"
+
+
+def _table_text(found: Evaluated, *, bidirectional: bool) -> Iterator[str]:
+    keys = (*_FIGURES, "R_up", "R_down") if bidirectional else _ONE_SIDE
+    rows = _rows(found, keys, both=bidirectional)
+    if rows:
+        yield "ISO 230-2" if bidirectional else "ISO 230-2, approached from one side"
+        header = ["", *(_head(key) for key in keys), "", "runs", "targets"]
+        yield from table(header, rows)
+
+
+def _head(key: str) -> str:
+    base, _, rest = key.partition("_")
+    return base + {"": "", "up": "+", "down": "-", "mean": " mean"}[rest]
+
+
+def _cyclic_text(found: Evaluated) -> Iterator[str]:
+    rows = _cyclic_rows(found)
+    if any(s.harmonics for s in found.separations):
+        yield _CYCLIC
+        yield from table(["", "period mm", "amplitude", "+-", "", "phase rad"], rows or [["none"] + [""] * 5])
+
+
+def _cyclic_rows(found: Evaluated) -> list[list[str]]:
+    """Those that are more than their expanded uncertainty."""
+    rows = []
+    for s in found.separations:
+        unit, scale = scale_of(s.line)
+        for h in s.harmonics:
+            if h.amplitude < 2.0 * h.sigma_amplitude:
+                continue
+            rows.append([
+                s.line.component, f"{h.period_mm:g}", number(h.amplitude * scale),
+                number(2.0 * h.sigma_amplitude * scale), unit, number(h.phase_rad),
+            ])  # fmt: skip
+    return rows
+
+
+def _reversal_text(found: Evaluated) -> Iterator[str]:
+    rows = _reversal_rows(found)
+    if rows:
+        yield "Reversal (B of all targets, drift taken out)"
+        yield from table(["", "B", "+-", "", "along the axis"], rows)
+
+
+def _reversal_rows(found: Evaluated) -> list[list[str]]:
+    rows = []
+    for r in sorted(found.reversals, key=lambda r: (r.line.axis, _ORDER[r.line.quantity], r.line.component)):
+        unit, scale = scale_of(r.line)
+        rows.append([
+            r.line.component, number(r.mean * scale), number(2.0 * r.sigma * scale), unit,
+            "constant" if r.constant else f"{r.at.min() * scale:.2f} to {r.at.max() * scale:.2f}",
+        ])  # fmt: skip
+    return rows
+
+
+def _squareness_text(found: Evaluated) -> Iterator[str]:
+    rows = _squareness_rows(found)
+    if rows:
+        yield "Squareness of straightness pairs, as at their place"
+        yield from table(["", "urad", "+-", "angle", "lines", "square"], rows)
+
+
+def _squareness_rows(found: Evaluated) -> list[list[str]]:
+    return [
+        [
+            p.reading.component, number(p.reading.value_rad / RAD_PER_URAD),
+            number(2.0 * p.reading.sigma_rad / RAD_PER_URAD),
+            angle_words(p.reading.component, p.reading.value_rad),
+            f"{p.first.component}, {p.second.component}", printable(p.square.name),
+        ]
+        for p in found.pairs
+    ]  # fmt: skip
+
+
+# -- plots -----------------------------------------------------------------------------------------------
+
+
+def plots_of(found: Evaluated, kind: Format = "svg") -> dict[str, bytes]:
+    """Every plot of an evaluation by its name, in the order of a report."""
+    out: dict[str, bytes] = {}
+    for axis in AXES:
+        own = [e for e in _sorted(found.evaluations) if e.component[2] == axis]
+        for e in own:
+            if e.line.quantity == "positioning":
+                out[_free(f"positioning-{e.component}", out)] = plots_calibration.positioning(e, kind)
+        for quantity, draw in (
+            ("straightness", plots_calibration.straightness),
+            ("angle", plots_calibration.angles),
+        ):
+            group = [e for e in own if e.line.quantity == quantity]
+            if group:
+                name = "straightness" if quantity == "straightness" else "angles"
+                out[f"{name}-{axis}"] = draw(group, kind=kind)
+    for pair in found.pairs:
+        name = _free(f"squareness-{pair.reading.component}", out)
+        out[name] = plots_calibration.squareness(pair, kind)
+    for separation in found.separations:
+        if separation.harmonics and separation.line.quantity == "positioning":
+            out[_free(f"cyclic-{separation.line.component}", out)] = plots_calibration.cyclic(
+                separation, kind
+            )
+    lost = [r for r in found.reversals if r.line.quantity == "positioning"]
+    if lost:
+        out["reversal"] = plots_calibration.reversals(lost, kind)
+    return out
+
+
+def _free(name: str, taken: Mapping[str, bytes]) -> str:
+    """The name, numbered where a plot has it already."""
+    k = 2
+    free = name
+    while free in taken:
+        free, k = f"{name}-{k}", k + 1
+    return free
+
+
+# -- documents -------------------------------------------------------------------------------------------
+
+
+def evaluation(
+    found: Evaluated, plots: Mapping[str, bytes], version: str, date: datetime.date | None
+) -> Document:
+    """The document of measured lines."""
+    return Document(
+        "Geometric accuracy of a machine",
+        _subtitle(found, date),
+        None,
+        [
+            Section("Measurement", [Pairs(_measurement(found))]),
+            *_evaluated(found, plots),
+            Section("Findings", list(_notices(found.findings))),
+        ],
+        _footer(version),
+    )
+
+
+def calibration(
+    found: Evaluated,
+    summary: FitSummary,
+    plots: Mapping[str, bytes],
+    version: str,
+    date: datetime.date | None,
+) -> Document:
+    """The document of a calibration: what was fitted, and the measured lines behind it. `plots` is
+    `fit_plots` and, where wanted, `plots_of`."""
+    notices = [
+        *summary.findings,
+        *(f for f in found.findings if f.code not in {g.code for g in summary.findings}),
+    ]
+    worth = summary.chi_square / max(summary.freedom, 1.0)
+    fit_blocks: list[Block] = [
+        Pairs([
+            ("Readings over their noise", f"chi square {number(summary.chi_square, 0)} at "
+             f"{number(summary.freedom, 0)} degrees of freedom, {number(worth)} a degree"),
+            ("Calibrated box", _box(summary.calibration)),
+            ("Datum", ", ".join(f"{a} {v:g}" for a, v in zip(AXES, summary.calibration.datum_mm, strict=True))
+             + " mm"),
+            ("Lost motion", ", ".join(f"{a} {number(v * UM_PER_MM)}" for a, v in
+             zip(AXES, summary.calibration.backlash_mm, strict=True)) + " um"),
+        ]),
+        *_component_table(summary.components),
+        Grid(
+            ["squareness", "urad", "+-", "angle"],
+            [
+                [name, number(v / RAD_PER_URAD), number(2 * s / RAD_PER_URAD), angle_words(name, v)]
+                for name, (v, s) in summary.squareness.items()
+            ],
+        ),
+    ]  # fmt: skip
+    if "fitted" in plots:
+        fit_blocks.append(
+            Plot(plots["fitted"], "Readings, freed of zero, slope, drift and reversal (blue approached in +, "
+                 "red in -), and the fitted curves with twice their standard uncertainty.")
+        )  # fmt: skip
+    if "residuals" in plots:
+        fit_blocks.append(Plot(plots["residuals"], "What the fit leaves of every reading."))
+    limits: list[Block] = [Paragraph(sentence) for sentence in summary.unobserved]
+    limits += [Paragraph(sentence) for sentence in summary.outliers]
+    limits += list(_notices(notices))
+    return Document(
+        "Calibration of a machine",
+        _subtitle(found, date),
+        None,
+        [
+            Section("Measurement", [Pairs(_measurement(found))]),
+            Section("Errors found", [b for b in fit_blocks if not isinstance(b, Grid) or b.rows]),
+            Section("Findings and limits", limits),
+            *_evaluated(found, plots),
+        ],
+        _footer(version),
+    )
+
+
+def fit_plots(summary: FitSummary) -> dict[str, bytes]:
+    """The plots of a fit as SVG."""
+    return {
+        "fitted": plots_calibration.fitted(summary.lines),
+        "residuals": plots_calibration.residuals(summary.residuals),
+    }
+
+
+def _subtitle(found: Evaluated, date: datetime.date | None) -> str:
+    day = date or found.measurements.measured
+    return ", ".join(v for v in (found.measurements.machine, day.isoformat() if day else "") if v)
+
+
+def _footer(version: str) -> str:
+    return (
+        f"Written by olp {version}. error = actual minus commanded, tool relative to workpiece, "
+        "right-handed, names of ISO 230-1. Uncertainties after +- are twice the standard uncertainty."
+    )
+
+
+def _measurement(found: Evaluated) -> list[tuple[str, str]]:
+    m = found.measurements
+    places = sorted({tuple(line.line_mm) for line in m.lines if line.quantity != "angle"})
+    levers = sorted({tuple(line.tool_mm) for line in m.lines if line.quantity != "angle"})
+    periods = ", ".join(
+        f"{axis} {', '.join(f'{p:g}' for p in own)} mm"
+        for axis, own in zip(AXES, m.periods_mm, strict=True)
+        if own
+    )
+    return [
+        ("Machine", m.machine),
+        ("Measured", m.measured.isoformat() if m.measured else ""),
+        ("Temperature of the scales", f"{m.temperature_degC:g} degC"),
+        ("Lines", f"{len(m.lines)}, {sum(len(line.value) for line in m.lines)} readings"),
+        ("Lines stood at", "; ".join(_vector(p) for p in places[:4]) + ("; ..." if len(places) > 4 else "")),
+        ("Tool vectors", "; ".join(_vector(p) for p in levers[:4]) + ("; ..." if len(levers) > 4 else "")),
+        ("Periods looked for", periods),
+        ("Corrected by the control then", ", ".join(sorted(m.active_during_measurement))),
+        ("Instruments", ", ".join(sorted({line.instrument for line in m.lines if line.instrument}))),
+    ]
+
+
+def _vector(values: Sequence[float]) -> str:
+    return " ".join(f"{axis}{v:g}" for axis, v in zip(AXES, values, strict=True))
+
+
+def _box(calibration: Calibration) -> str:
+    return ", ".join(
+        f"{a} {low:g} to {high:g}" for a, (low, high) in zip(AXES, calibration.box_mm, strict=True)
+    ) + " mm"  # fmt: skip
+
+
+def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section]:
+    blocks: list[Block] = [Paragraph(_LEGEND)]
+    for keys, both in (((*_FIGURES, "R_up", "R_down"), True), (_ONE_SIDE, False)):
+        rows = _rows(found, keys, both=both)
+        if rows:
+            blocks.append(Grid(["", *(_head(k) for k in keys), "", "runs", "targets"], rows))
+    yield Section("Accuracy and repeatability (ISO 230-2)", blocks)
+    for axis in AXES:
+        drawn: list[Block] = [
+            Plot(plots[name], _caption(name))
+            for name in plots
+            if name.startswith(("positioning", "straightness", "angles")) and _axis_of(name) == axis
+        ]
+        if drawn:
+            yield Section(f"Axis {axis}", drawn, 2)
+    blocks = []
+    if found.pairs:
+        blocks.append(Grid(["", "urad", "+-", "angle", "lines", "square"], _squareness_rows(found)))
+        blocks += [Plot(plots[n], _caption(n)) for n in plots if n.startswith("squareness")]
+        yield Section("Squareness", blocks)
+    parts: list[Block] = []
+    rows = _cyclic_rows(found)
+    if any(s.harmonics for s in found.separations):
+        parts.append(Paragraph(f"{_CYCLIC}."))
+    if rows:
+        parts.append(Grid(["cyclic error", "period mm", "amplitude", "+-", "", "phase rad"], rows))
+        parts += [Plot(plots[n], _caption(n)) for n in plots if n.startswith("cyclic")]
+    if rows := _reversal_rows(found):
+        parts.append(Grid(["reversal", "B", "+-", "", "along the axis"], rows))
+        parts += [Plot(plots[n], _caption(n)) for n in plots if n == "reversal"]
+    if parts:
+        yield Section("Cyclic errors and reversal", parts)
+
+
+def _axis_of(name: str) -> str:
+    return name.split("-")[1][-1]
+
+
+def _caption(name: str) -> str:
+    kind = name.split("-")[0]
+    return {
+        "positioning": "Positioning: means and twice the standard deviation of both directions, readings as "
+        "triangles, less the mean of the first target; A, E and M as spans.",
+        "straightness": "Straightness of both directions about one reference line.",
+        "angles": "Angular errors of both directions, less the mean of the first target.",
+        "squareness": "Both lines of the pair as read against the legs of the square, and their slopes.",
+        "cyclic": "Non-cyclic and cyclic part of the mean of both directions.",
+        "reversal": "Reversal at each target with twice its standard uncertainty, drift taken out.",
+    }[kind]
+
+
+def _component_table(components: Sequence[Mapping[str, Any]]) -> list[Block]:
+    if not components:
+        return []
+    keys = list(dict.fromkeys(key for row in components for key in row))
+    rows = [
+        [str(v) if isinstance(v := row.get(key, ""), str) else number(v) for key in keys]
+        for row in components
+    ]
+    left = sum(all(isinstance(row.get(key, ""), str) for row in components) for key in keys)
+    return [Grid([key.replace("_", " ") for key in keys], rows, left=max(left, 1))]
+
+
+def _notices(findings: Sequence[Finding]) -> Iterator[Block]:
+    for finding in findings:
+        rule = RULES[finding.code]
+        yield Notice(rule.severity.name.lower(), rule.code, rule.title, finding.message, rule.remedy)
+    if not findings:
+        yield Paragraph("None.")
