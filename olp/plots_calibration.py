@@ -58,8 +58,8 @@ def name_of_turn(component: str, vertical: str = "Z") -> str:
 
 
 def name_of_straightness(component: str, vertical: str = "Z") -> str:
-    """Horizontal or vertical straightness, for a component such as EZX."""
-    return "vertical" if component[1] == vertical else f"horizontal, in {component[1]}"
+    """Direction and plane of a straightness, for a component such as EZX."""
+    return f"in {component[1]}, {'vertical' if component[1] == vertical else 'horizontal'}"
 
 
 def positioning(evaluation: Evaluation, kind: Format = "svg") -> bytes:
@@ -88,7 +88,7 @@ def straightness(evaluations: Sequence[Evaluation], vertical: str = "Z", kind: F
     return _stack(
         "straightness",
         evaluations,
-        lambda name: f"straightness, {name_of_straightness(name, vertical)}",
+        lambda name: f"straightness {name_of_straightness(name, vertical)}",
         kind,
     )
 
@@ -272,12 +272,12 @@ def cyclic(separation: Separation, kind: Format = "svg") -> bytes:
         dense = np.linspace(0.0, longest, _DENSE)
         part = sum((h.at(dense) for h in waves), np.zeros(_DENSE))
         over.plot(dense, part * scale, color=MEAN, linewidth=1.0)
-        rows = "\n".join(
+        said = ", ".join(
             f"{h.period_mm:g} mm: {h.amplitude * scale:.2f} $\\pm$ {2 * h.sigma_amplitude * scale:.2f} {unit}"
             for h in waves
         )
-        over.set(xlabel=f"position modulo {longest:g} mm", title="cyclic part")
-        over.text(0.98, 0.97, rows, transform=over.transAxes, ha="right", va="top", fontsize=7)
+        over.set(xlabel=f"position modulo {longest:g} mm")
+        over.set_title(said, fontsize=7)
         for plot in (along, over):
             plot.grid(color="0.92", linewidth=0.5)
         along.legend(frameon=False, fontsize=7)

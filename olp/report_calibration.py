@@ -28,13 +28,14 @@ from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 _FIGURES = ("A", "E", "R", "M", "B", "B_mean")
 _ONE_SIDE = ("A_up", "E_up", "R_up", "A_down", "E_down", "R_down")
 #: Over what the table of cyclic errors stands.
-_CYCLIC = "Cyclic errors above their uncertainty"
+_CYCLIC = "Cyclic errors of at least three times their standard uncertainty"
+_SURE = 3.0
 _ORDER = {"positioning": 0, "straightness": 1, "angle": 2}
 _DENSE = 200
 #: What the figures say, for who reads them once a year.
 _LEGEND = (
     "A accuracy, E systematic deviation, R repeatability, M mean systematic deviation, B reversal (largest, "
-    "and mean with its sign: approached in + less approached in -) of both directions; R + and R - of one. "
+    "and mean with its sign: approached in + less approached in -). Five runs and more are asked for. "
     "Straightness counts from its reference line."
 )
 
@@ -101,17 +102,18 @@ def _sorted(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
 
 
 def _rows(found: Evaluated, keys: Sequence[str], *, both: bool) -> list[list[str]]:
+    """Component, what it is, figures, unit."""
     rows = []
     for e in _sorted(found.evaluations):
         if (len(e.sides) == 2) != both:
             continue
         unit, scale = scale_of(e.line)
         figures = e.figures()
-        cells = [number(figures[k] * scale) if k in figures else "" for k in keys]
-        label = f"{e.component} {_name(e.component)}"
+        label = _name(e.component)
         if len(found.of(e.component)) > 1 and e.line.source:
             label += f", {printable(FilePath(e.line.source).name)}"
-        rows.append([label, *cells, unit, str(e.runs), str(len(e.target_mm))])
+        cells = [number(figures[k] * scale) if k in figures else "" for k in keys]
+        rows.append([e.component, label, *cells, unit])
     return rows
 
 
@@ -124,12 +126,11 @@ def _name(component: str) -> str:
 
 
 def _table_text(found: Evaluated, *, bidirectional: bool) -> Iterator[str]:
-    keys = (*_FIGURES, "R_up", "R_down") if bidirectional else _ONE_SIDE
+    keys = _FIGURES if bidirectional else _ONE_SIDE
     rows = _rows(found, keys, both=bidirectional)
     if rows:
         yield "ISO 230-2" if bidirectional else "ISO 230-2, approached from one side"
-        header = ["", *(_head(key) for key in keys), "", "runs", "targets"]
-        yield from table(header, rows)
+        yield from table(["", "", *map(_head, keys), ""], rows, left=2)
 
 
 def _head(key: str) -> str:
@@ -141,20 +142,21 @@ def _cyclic_text(found: Evaluated) -> Iterator[str]:
     rows = _cyclic_rows(found)
     if any(s.harmonics for s in found.separations):
         yield _CYCLIC
-        yield from table(["", "period mm", "amplitude", "+-", "", "phase rad"], rows or [["none"] + [""] * 5])
+        header = ["", "", "period mm", "amplitude", "+-", "phase rad"]
+        yield from table(header, rows or [["none"] + [""] * 5], left=2)
 
 
 def _cyclic_rows(found: Evaluated) -> list[list[str]]:
-    """Those that are more than their expanded uncertainty."""
+    """Those that noise alone would hardly show (1 %)."""
     rows = []
     for s in found.separations:
         unit, scale = scale_of(s.line)
         for h in s.harmonics:
-            if h.amplitude < 2.0 * h.sigma_amplitude:
+            if h.amplitude < _SURE * h.sigma_amplitude:
                 continue
             rows.append([
-                s.line.component, f"{h.period_mm:g}", number(h.amplitude * scale),
-                number(2.0 * h.sigma_amplitude * scale), unit, number(h.phase_rad),
+                s.line.component, unit, f"{h.period_mm:g}", number(h.amplitude * scale),
+                number(2.0 * h.sigma_amplitude * scale), number(h.phase_rad),
             ])  # fmt: skip
     return rows
 
@@ -163,7 +165,7 @@ def _reversal_text(found: Evaluated) -> Iterator[str]:
     rows = _reversal_rows(found)
     if rows:
         yield "Reversal (B of all targets, drift taken out)"
-        yield from table(["", "B", "+-", "", "along the axis"], rows)
+        yield from table(["", "", "B", "+-", "along the axis"], rows, left=2)
 
 
 def _reversal_rows(found: Evaluated) -> list[list[str]]:
@@ -171,7 +173,7 @@ def _reversal_rows(found: Evaluated) -> list[list[str]]:
     for r in sorted(found.reversals, key=lambda r: (r.line.axis, _ORDER[r.line.quantity], r.line.component)):
         unit, scale = scale_of(r.line)
         rows.append([
-            r.line.component, number(r.mean * scale), number(2.0 * r.sigma * scale), unit,
+            r.line.component, unit, number(r.mean * scale), number(2.0 * r.sigma * scale),
             "constant" if r.constant else f"{r.at.min() * scale:.2f} to {r.at.max() * scale:.2f}",
         ])  # fmt: skip
     return rows
@@ -337,8 +339,9 @@ def _footer(version: str) -> str:
 
 def _measurement(found: Evaluated) -> list[tuple[str, str]]:
     m = found.measurements
-    places = sorted({tuple(line.line_mm) for line in m.lines if line.quantity != "angle"})
-    levers = sorted({tuple(line.tool_mm) for line in m.lines if line.quantity != "angle"})
+    lengths = [line for line in m.lines if line.quantity != "angle"]
+    places = sorted({_place(line) for line in lengths})
+    levers = sorted({_vector(line.tool_mm) for line in lengths})
     periods = ", ".join(
         f"{axis} {', '.join(f'{p:g}' for p in own)} mm"
         for axis, own in zip(AXES, m.periods_mm, strict=True)
@@ -349,12 +352,20 @@ def _measurement(found: Evaluated) -> list[tuple[str, str]]:
         ("Measured", m.measured.isoformat() if m.measured else ""),
         ("Temperature of the scales", f"{m.temperature_degC:g} degC"),
         ("Lines", f"{len(m.lines)}, {sum(len(line.value) for line in m.lines)} readings"),
-        ("Lines stood at", "; ".join(_vector(p) for p in places[:4]) + ("; ..." if len(places) > 4 else "")),
-        ("Tool vectors", "; ".join(_vector(p) for p in levers[:4]) + ("; ..." if len(levers) > 4 else "")),
+        ("Lines stood at", "; ".join(places[:6]) + ("; ..." if len(places) > 6 else "")),
+        ("Tool vectors", "; ".join(levers[:6]) + ("; ..." if len(levers) > 6 else "")),
         ("Periods looked for", periods),
         ("Corrected by the control then", ", ".join(sorted(m.active_during_measurement))),
         ("Instruments", ", ".join(sorted({line.instrument for line in m.lines if line.instrument}))),
     ]
+
+
+def _place(line: Line) -> str:
+    """The moving axis, and where the others stood."""
+    others = " ".join(
+        f"{a}{v:g}" for k, (a, v) in enumerate(zip(AXES, line.line_mm, strict=True)) if k != line.axis
+    )
+    return f"{AXES[line.axis]} at {others}"
 
 
 def _vector(values: Sequence[float]) -> str:
@@ -369,10 +380,10 @@ def _box(calibration: Calibration) -> str:
 
 def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section]:
     blocks: list[Block] = [Paragraph(_LEGEND)]
-    for keys, both in (((*_FIGURES, "R_up", "R_down"), True), (_ONE_SIDE, False)):
+    for keys, both in ((_FIGURES, True), (_ONE_SIDE, False)):
         rows = _rows(found, keys, both=both)
         if rows:
-            blocks.append(Grid(["", *(_head(k) for k in keys), "", "runs", "targets"], rows))
+            blocks.append(Grid(["", "", *map(_head, keys), ""], rows, left=2))
     yield Section("Accuracy and repeatability (ISO 230-2)", blocks)
     for axis in AXES:
         drawn: list[Block] = [
@@ -392,10 +403,10 @@ def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section
     if any(s.harmonics for s in found.separations):
         parts.append(Paragraph(f"{_CYCLIC}."))
     if rows:
-        parts.append(Grid(["cyclic error", "period mm", "amplitude", "+-", "", "phase rad"], rows))
+        parts.append(Grid(["cyclic error", "", "period mm", "amplitude", "+-", "phase rad"], rows, left=2))
         parts += [Plot(plots[n], _caption(n)) for n in plots if n.startswith("cyclic")]
     if rows := _reversal_rows(found):
-        parts.append(Grid(["reversal", "B", "+-", "", "along the axis"], rows))
+        parts.append(Grid(["reversal", "", "B", "+-", "along the axis"], rows, left=2))
         parts += [Plot(plots[n], _caption(n)) for n in plots if n == "reversal"]
     if parts:
         yield Section("Cyclic errors and reversal", parts)
