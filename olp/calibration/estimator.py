@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.calibration.basis import CurveSpace, Spline, Wave, slope_grid, slope_weights
+from olp.calibration.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
 from olp.calibration.lines import (
     Noise,
     group_of,
@@ -157,15 +157,8 @@ def fit(
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
     splines = [_spline(lines, axis, ranges[axis]) for axis in range(3)]
     waves, unseen = _waves(measurements, lines)
-    shapes: dict[str, Shape] = {}
-    for k, name in enumerate(COMPONENTS):
-        tell("shapes of curves", k / len(COMPONENTS))
-        own = _own_lines(name, lines, noises)
-        if own:
-            axis = AXES.index(name[2])
-            half = Spline(*ranges[axis], HALF_CELLS)
-            shapes[name] = shape_of(own, splines[axis], half, waves.get(name, ()))
-    parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, ranges, shapes, waves)
+    shapes = _shapes(lines, noises, splines, waves, tell)
+    parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
     prior = Prior(parameters, shapes, _squares(measurements, parameters))
     tell("adjustment", 0.0)
 
@@ -296,6 +289,36 @@ def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float]) -> Spli
     return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
 
 
+def _half(spline: Spline) -> Spline:
+    return Spline(spline.low_mm, spline.high_mm, HALF_CELLS)
+
+
+def _shapes(
+    lines: Sequence[Line],
+    noises: Sequence[Noise],
+    splines: Sequence[Spline],
+    waves: Mapping[str, tuple[Wave, ...]],
+    tell: Progress,
+) -> dict[str, Shape]:
+    """The shape of every component with lines: each by itself, then again where others have their steps."""
+    shapes: dict[str, Shape] = {}
+    for again in (False, True):
+        for k, name in enumerate(COMPONENTS):
+            tell("shapes of curves", (k + again * len(COMPONENTS)) / (2 * len(COMPONENTS)))
+            own = _own_lines(name, lines, noises)
+            others = [s for other, s in shapes.items() if other[2] == name[2] and other != name]
+            joints = sorted(
+                {f for shape in others for f in shape.features if isinstance(f, Step)},
+                key=lambda step: step.low_mm,
+            )
+            if own and (joints or not again):
+                spline = splines[AXES.index(name[2])]
+                shapes[name] = shape_of(
+                    own, spline, _half(spline), waves.get(name, ()), joints if again else ()
+                )
+    return shapes
+
+
 def _waves(
     measurements: Measurements, lines: Sequence[Line]
 ) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
@@ -333,7 +356,6 @@ def _parameters(
     datum: Vector,
     lines: Sequence[Line],
     splines: Sequence[Spline],
-    ranges: Sequence[tuple[float, float]],
     shapes: Mapping[str, Shape],
     waves: Mapping[str, tuple[Wave, ...]],
 ) -> Parameters:
@@ -344,7 +366,7 @@ def _parameters(
         kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
         spaces[name] = CurveSpace.of(splines[axis], shape.features if shape else (), datum[axis], kind)
         if shape is not None and shape.half != "none":
-            half = Spline(*ranges[axis], HALF_CELLS)
+            half = _half(splines[axis])
             gauge = np.eye(half.count) if shape.half == "curve" else np.ones((half.count, 1))
             halves[name] = CurveSpace(half, (), gauge)
         if name[1] in AXES:

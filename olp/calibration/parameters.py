@@ -89,20 +89,23 @@ class Parameters:
     ) -> Iterator[Part]:  # fmt: skip
         """The parts of what `axis` adds to displacement `row` at axis positions (n, 3) with tool vectors (3,)
         or (n, 3); `on_table`: as seen from a reflector that stays on the table. `direction` is (n,)."""
-        name, q = f"E{AXES[row]}{AXES[axis]}", position[:, axis]
-        yield from self.curve(name, q, direction)
-        place, after = self.places[name], self.after(axis)
+        q = position[:, axis]
+        yield from self.curve(f"E{AXES[row]}{AXES[axis]}", q, direction)
         for i, a, k, sign in CROSS:
             if i != row:
                 continue
-            lever = np.broadcast_to(tool[..., k] - place.tool_mm[k], q.shape)
-            if k in after:
-                lever = lever + (position[:, k] - place.line_mm[k])
+            lever = self.lever(row, axis, k, position, tool)
             if on_table and k == axis:
                 lever = lever - (q - self.datum_mm[axis])
             if np.any(lever != 0.0):
                 for part, values in self.curve(f"E{'ABC'[a]}{AXES[axis]}", q, direction):
                     yield part, sign * lever[:, None] * values
+
+    def lever(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
+        """(n,) coordinate `k` of the lever by which angles of `axis` act on displacement `row`."""
+        place = self.places[f"E{AXES[row]}{AXES[axis]}"]
+        lever = np.broadcast_to(tool[..., k] - place.tool_mm[k], (len(position),))
+        return lever + (position[:, k] - place.line_mm[k]) if k in self.after(axis) else lever
 
     def shear(self, row: int, position: Array) -> Iterator[Part]:
         """The parts of what squareness adds to displacement `row` at axis positions (n, 3)."""

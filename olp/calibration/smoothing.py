@@ -25,8 +25,9 @@ ROUGHNESS = np.geomspace(1e-7, 1e-1, 37), np.geomspace(1e-10, 1e-4, 37)
 AMPLITUDE = 0.3, 3e-4
 FEATURE = 0.02, 20e-6
 HALF = 0.02, 20e-6
-#: What one more feature must gain beyond its own cost, in nats, and the most features of a curve.
-GAIN, MOST = 5.0, 8
+#: What one more feature must gain beyond its own cost, in nats; the same of a step where another error of the
+#: axis has one; and the most features of a curve.
+GAIN, SHARED_GAIN, MOST = 2.0, 0.0, 8
 
 Half = Literal["none", "constant", "curve"]
 
@@ -43,9 +44,14 @@ class Shape:
 
 
 def shape_of(
-    lines: Sequence[tuple[Line, Noise]], spline: Spline, half_spline: Spline, waves: Sequence[Wave] = ()
+    lines: Sequence[tuple[Line, Noise]],
+    spline: Spline,
+    half_spline: Spline,
+    waves: Sequence[Wave] = (),
+    joints: Sequence[Step] = (),
 ) -> Shape:
-    """The shape of the curve that all these lines read, beside what repeats with `waves`."""
+    """The shape of the curve that all these lines read, beside what repeats with `waves`. At `joints` other
+    errors of the axis have a step."""
     angle = lines[0][0].quantity == "angle"
     inside = [line for line, _ in lines if np.ptp(line.target_mm) > 0.2 * (spline.high_mm - spline.low_mm)]
     targets = np.unique(np.concatenate([targets_of(line) for line in inside] or [np.zeros(0)]))
@@ -68,10 +74,13 @@ def shape_of(
     best, roughness = choice.smooth(chosen)
     while len(chosen) < MOST and c:
         rest = [i for i in range(c) if i not in chosen]
-        gains = choice.with_one_more(chosen, rest, roughness)
-        new = [*chosen, rest[int(np.argmax(gains))]]
+        at_joint = np.array([_is_joint(candidates[i], joints) for i in rest])
+        needed = np.where(at_joint, SHARED_GAIN, GAIN + np.log(len(rest)))
+        gains = choice.with_one_more(chosen, rest, roughness) - needed
+        pick = int(np.argmax(gains))
+        new = [*chosen, rest[pick]]
         value, rough = choice.smooth(new)
-        if value - best < GAIN + np.log(len(rest)):
+        if value - best < needed[pick]:
             break
         chosen, best, roughness = new, value, rough
     half: Half = "none"
@@ -79,6 +88,12 @@ def shape_of(
     if halves:
         half, half_roughness = choice.direction(chosen, roughness, best, half_spline, m + c)
     return Shape(roughness, tuple(candidates[i] for i in sorted(chosen)), half, half_roughness)
+
+
+def _is_joint(feature: Feature, joints: Sequence[Step]) -> bool:
+    return isinstance(feature, Step) and any(
+        feature.low_mm < joint.high_mm and joint.low_mm < feature.high_mm for joint in joints
+    )
 
 
 def _block(rows: Array, line: Line, noise: Noise, waves: Sequence[Wave], amplitude: float) -> Block:

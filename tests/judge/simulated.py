@@ -81,10 +81,11 @@ def machine(
     chain: str = "FXYZ",
     box: Any = BOX,
     datum: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    size: float = 0.55,
+    size: float | None = None,
 ) -> Machine:
     """A random machine of a family, "smooth" or "rough"; off by about 100 um rms."""
     rng = np.random.default_rng([seed, len(family)])
+    size = SIZE[family] if size is None else size
     sides = np.array(box, float)
     curves: dict[str, Curve] = {}
     for axis, letter in enumerate(AXES):
@@ -109,6 +110,8 @@ def machine(
 
 
 PITCH = (20.0, 10.0, 5.0)
+#: what makes a machine of a family off by about 100 um rms
+SIZE = {"smooth": 0.6, "rough": 1.0}
 
 
 def _with_pitch(base: Curve, amplitude: float, period: float, phase: float) -> Curve:
