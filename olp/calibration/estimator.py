@@ -25,7 +25,7 @@ from olp.calibration.lines import (
 )
 from olp.calibration.normal import Block, Normal, locals_of, solve
 from olp.calibration.observations import Line, Measurements
-from olp.calibration.parameters import Parameters, Place
+from olp.calibration.parameters import CROSS, Parameters, Place
 from olp.calibration.prior import POSE, Prior
 from olp.calibration.separation import aliased
 from olp.calibration.smoothing import Shape, shape_of
@@ -110,10 +110,33 @@ class Fit:
 
     def sigma(self, axis_mm: Array, tool_mm: Array) -> Array:
         """(n, 3) standard uncertainty of `error` in mm."""
-        rows = self.design(axis_mm, tool_mm)
-        return np.sqrt(
-            np.maximum(np.einsum("nik,kl,nil->ni", rows, self.covariance, rows, optimize=True), 0.0)
-        )
+        position, tool = np.atleast_2d(np.asarray(axis_mm, float)), np.asarray(tool_mm, float)
+        rows = self.design(position, tool)
+        variance = np.einsum("nik,kl,nil->ni", rows, self.covariance, rows, optimize=True)
+        for name in self.parameters.spaces:
+            axis = AXES.index(name[2])
+            between = self.between_targets(name, position[:, axis])
+            if not between.any():
+                continue
+            if name[1] in AXES:
+                variance[:, AXES.index(name[1])] += between
+                continue
+            for i, a, k, _ in CROSS:
+                if "ABC"[a] == name[1]:
+                    variance[:, i] += between * self.parameters.lever(i, axis, k, position, tool) ** 2
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def between_targets(self, name: str, q: Array) -> Array:
+        """(n,) variance of a component at q (n,) because nobody knows where between two targets a step is: with
+        probability u it lies before q, so J^2 u (1 - u)."""
+        space = self.parameters.spaces[name]
+        raw = space.gauge @ self.theta[self.parameters.slices[name]]
+        total = np.zeros(len(q))
+        for feature, jump in zip(space.features, raw[space.spline.count :], strict=True):
+            if isinstance(feature, Step):
+                u = feature.values(q)
+                total += jump**2 * u * (1.0 - u)
+        return total
 
     def curve(self, name: str, q: Array) -> Array:
         """(n, size) mean of a component at q (n,) on its own line, in the gauge of the datum, without cyclic
