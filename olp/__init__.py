@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from olp.api import inspect as inspect
     from olp.api import simulate as simulate
     from olp.api import verify as verify
+    from olp.calibrating import FittedCalibration as FittedCalibration
+    from olp.calibrating import fit_calibration as fit_calibration
     from olp.comparing import Comparison as Comparison
     from olp.comparing import compare as compare
     from olp.exceptions import CannotCompute as CannotCompute
@@ -54,6 +56,8 @@ _HOME = {
     "Verification": "olp.api",
     "compare": "olp.comparing",
     "Comparison": "olp.comparing",
+    "FittedCalibration": "olp.calibrating",
+    "fit_calibration": "olp.calibrating",
     "correct": "olp.api",
     "error_at": "olp.api",
     "flatten": "olp.api",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from olp.calibration_rules import CALIBRATION
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
 from olp.rule import Rule as Rule
@@ -302,7 +303,9 @@ _TABLE = (
     ),
 )
 
-RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE, *METROLOGY), key=lambda rule: rule.code)}
+RULES = {
+    rule.code: rule for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY), key=lambda rule: rule.code)
+}
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine
 GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))

@@ -14,7 +14,7 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"gate_rules", "metrology_rules"},
+    {"calibration_rules", "gate_rules", "metrology_rules"},
     {"findings"},
     {"geometry", "tables"},
     {"machine"},
@@ -34,7 +34,7 @@ LAYERS = (
     {"metrology"},
     {"replanning"},
     {"comparing_parts"},
-    {"correction", "retiming", "comparing"},
+    {"calibrating", "correction", "retiming", "comparing"},
     {"gate"},
     {"api"},
     {"report_files"},

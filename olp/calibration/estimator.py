@@ -127,8 +127,8 @@ class Fit:
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def between_targets(self, name: str, q: Array) -> Array:
-        """(n,) variance of a component at q (n,) because nobody knows where between two targets a step is: with
-        probability u it lies before q, so J^2 u (1 - u)."""
+        """(n,) variance of a component at q (n,) because nobody knows where between two targets a step is:
+        with probability u it lies before q, so J^2 u (1 - u)."""
         space = self.parameters.spaces[name]
         raw = space.gauge @ self.theta[self.parameters.slices[name]]
         total = np.zeros(len(q))
@@ -191,8 +191,9 @@ def fit(
 
     normal = _gathered(blocks(), prior)
     prior.learn(normal)
-    matrix, logdet = prior.precision()
-    solved = solve(normal, matrix, logdet)
+    solved = solve(normal, *prior.precision())
+    if prior.size_from(solved.theta):
+        solved = solve(normal, *prior.precision())
     results, chi_square = [], 0.0
     for k, block in enumerate(blocks()):
         _, residual = locals_of(block, solved.theta, np.ones(len(block), bool))
@@ -296,7 +297,7 @@ def _ranges(
         box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
         if box[axis, 0] >= box[axis, 1]:
             raise CannotCompute(
-                f"the lines along {AXES[axis]} have no length in common within the travel; expected lines over "
+                f"the lines along {AXES[axis]} have no length in common within the travel; expected them over "
                 "the same length"
             )
     return ranges, box

@@ -85,8 +85,8 @@ def locals_of(block: Block, theta: Array, use: npt.NDArray[np.bool_]) -> tuple[A
         return np.zeros(0), rest
     weighted = block.local[use] / block.sigma[use, None]
     inner = weighted.T @ weighted + np.diag(block.precision)
-    nu = np.linalg.solve(inner, weighted.T @ (rest[use] / block.sigma[use]))
-    return nu, rest - block.local @ nu
+    nu = np.asarray(np.linalg.solve(inner, weighted.T @ (rest[use] / block.sigma[use])))
+    return nu, np.asarray(rest - block.local @ nu)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -147,3 +147,4 @@ class Measurements:
     temperature_degC: float = 20.0
     active_during_measurement: frozenset[str] = frozenset()
     measured: datetime.date | None = None
+    chain: str | None = None

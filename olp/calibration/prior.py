@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from olp.calibration.basis import slope_grid
 from olp.calibration.normal import Normal, evidence
 from olp.calibration.parameters import Parameters
 from olp.calibration.smoothing import AMPLITUDE, FEATURE, HALF, Shape
@@ -19,6 +20,8 @@ SQUARE = 1e-3
 POSE = 0.1
 #: Of a curve that no line reads, where no other curve of the machine tells: size and second differences.
 UNKNOWN = {"positioning": (0.1, 2e-3), "straightness": (0.03, 1e-3), "angle": (6e-5, 2e-6)}
+#: No curve is smaller than this.
+LEAST_SIZE = 1e-4, 1e-7
 #: How far the roughness of a class may leave its start, as a standard deviation of its logarithm.
 LOOSE = 1.5
 
@@ -32,8 +35,8 @@ def class_of(name: str) -> str:
 
 @dataclass(slots=True)
 class Prior:
-    """Roughness and amplitude of every curve. `shapes` are those that lines gave; `squares` the prior mean and
-    standard deviation of shared nuisances; `classes` holds (amplitude, roughness) for the other curves."""
+    """Roughness and amplitude of every curve. `shapes` are those that lines gave; `squares` the prior mean
+    and standard deviation of shared nuisances; `classes` (amplitude, roughness) for the other curves."""
 
     parameters: Parameters
     shapes: Mapping[str, Shape]
@@ -91,6 +94,24 @@ class Prior:
             ]
             if seen:
                 self.classes[kind] = self._best(kind, normal)
+
+    def size_from(self, theta: Array) -> bool:
+        """Take the size of curves without lines of their own to be that of the largest of their class with
+        lines; says whether there are such curves."""
+        found = False
+        for kind, (_, roughness) in self.classes.items():
+            own = [name for name in self.shapes if class_of(name) == kind]
+            if own and any(class_of(name) == kind and name not in self.shapes for name in COMPONENTS):
+                self.classes[kind] = (max(self.rms(name, theta) for name in own), roughness)
+                found = True
+        return found
+
+    def rms(self, name: str, theta: Array) -> float:
+        """Root mean square of a curve over its length."""
+        space = self.parameters.spaces[name]
+        q = slope_grid(space.spline)
+        values = space.values(q) @ theta[self.parameters.slices[name]]
+        return max(float(np.sqrt(np.mean(values**2))), LEAST_SIZE[class_of(name) == "angle"])
 
     def _best(self, kind: str, normal: Normal) -> tuple[float, float]:
         amplitude, start = self.classes[kind]

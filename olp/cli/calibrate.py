@@ -6,6 +6,7 @@ from olp.cli.late import LateGroup
 
 #: Verb to what it does; each is a module `olp.cli.calibrate_VERB`.
 VERBS: dict[str, str] = {
+    "fit": "Make a calibration from lines of lasers, levels and squares.",
     "read": "Show what is understood of the file of an instrument.",
     "evaluate": "ISO 230-2 figures, cyclic errors, reversal and squareness of measured lines.",
     "ballbar": "Squareness, scale and servo mismatch, and lost motion from circles (ISO 230-4).",

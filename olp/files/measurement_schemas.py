@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from olp.files.fields import Interval, IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
+from olp.files.fields import Chain, Interval, IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
 from olp.files.readings import SENSES
 from olp.files.schemas import Position, Table
 from olp.machine import COMPONENTS
@@ -148,6 +148,10 @@ class MeasurementsFile(Table):
         alias="schema", description='the format, "olp-measurements-1"'
     )
     machine: Text = Field(description="the name in the machine file")
+    chain: Chain | None = Field(
+        default=None,
+        description='the order of axes from workpiece to tool, such as "FXYZ"; the machine file says it too',
+    )
     measured: datetime.date = Field(description="the date of measuring, such as 2026-05-14, without quotes")
     temperature_degC: float = Field(description="the temperature of the scales while measuring, in degC")
     vertical: Literal["X", "Y", "Z"] = Field(

@@ -101,6 +101,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         temperature_degC=found.whole["temperature_degC"][0],
         active_during_measurement=found.whole.get("active_during_measurement", (frozenset(), ""))[0],
         measured=found.whole["measured"][0],
+        chain=found.chain,
     )
 
 
@@ -138,6 +139,12 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         return
     for name in ("machine", "measured", "temperature_degC", "active_during_measurement"):
         found.state(name, getattr(plan, name), str(path), line_of((name,), places))
+    if plan.chain is not None:
+        found.state("chain", plan.chain, str(path), line_of(("chain",), places))
+        if found.chain is not None and found.chain != plan.chain:
+            sentence = f'chain = "{plan.chain}", but the machine file says "{found.chain}"'
+            found.errors.append(config_error([(line_of(("chain",), places), sentence)], str(path)))
+        found.chain = found.chain or plan.chain
     for axis in AXES:
         found.periods[axis].update(getattr(plan.periods_mm, axis))
     problems: list[Problem] = []

@@ -66,9 +66,9 @@ _VALUES = {"value_um": "um", "value_urad": "urad"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
-    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad in the sense of the file until
-    `with_sense` makes it that of the contract; runs from 1, directions +1 or -1 (from which side the target
-    was approached).
+    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad in the sense of the file
+    until `with_sense` makes it that of the contract; runs from 1, directions +1 or -1 (from which side the
+    target was approached).
 
     `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name or
     None where the file does not tell; `angular` says that values are in rad, None where the file does not

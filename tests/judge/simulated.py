@@ -111,7 +111,7 @@ def machine(
 
 PITCH = (20.0, 10.0, 5.0)
 #: what makes a machine of a family off by about 100 um rms
-SIZE = {"smooth": 0.6, "rough": 1.0}
+SIZE = {"smooth": 0.6, "rough": 0.7}
 
 
 def _with_pitch(base: Curve, amplitude: float, period: float, phase: float) -> Curve:
