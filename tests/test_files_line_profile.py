@@ -48,7 +48,7 @@ def test_a_german_export_with_thousands_and_turns() -> None:
     found = parse_line(text.encode("utf-8-sig"), "a.txt", layout)
     assert rows(found) == RUNS
     assert found.line.tolist() == [4, 5, 6, 7, 8, 9]
-    assert found.angular is False and found.keys["sense"][0] == "actual-minus-commanded"
+    assert found.angular is False and found.sense_known
 
 
 def test_the_same_with_columns_for_run_and_direction_and_axis() -> None:

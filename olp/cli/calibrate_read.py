@@ -41,7 +41,7 @@ def command(file: str, profile: str | None, as_json: bool) -> None:
     put("".join(lines))
     runs = len(set(zip(found.run.tolist(), found.direction.tolist(), strict=True)))
     span = f"{found.target_mm.min():g} to {found.target_mm.max():g} mm"
-    stated = "actual minus commanded" if "sense" in found.keys else "as in the file, the plan must state it"
+    stated = "actual minus commanded" if found.sense_known else "as in the file, the plan must state it"
     talk(f"{len(rows)} readings in {runs} one-way runs, {span}; component {found.component or 'not stated'}; "
          f"sense: {stated}")  # fmt: skip
     for note in found.notes:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Literal
@@ -30,7 +31,7 @@ from olp.files.fields import Text, refusal
 from olp.files.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.problems import Problem, config_error, nearest, validate
 from olp.files.readings import ANGULAR, SENSES, UNITS, Readings, decoded, parse_readings
-from olp.files.renishaw import MARK, RecordingTable, line_of_recording, parse_rtx
+from olp.files.renishaw import MARK, RTX, RecordingTable, line_of_recording, parse_rtx, read_rtx
 from olp.files.schemas import Table
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
@@ -184,25 +185,31 @@ def read_line(path: PathLike, profile: LineProfile | None = None) -> Readings:
     Raises InputError where the file is of an instrument whose format is not public, and ConfigError with
     every problem and its line.
     """
+    if profile is not None:
+        return read_profiled(path, profile)
     ending = Path(path).suffix.lower()
-    data = read_bytes(path)
-    if data.startswith(MARK) or (profile is not None and profile.recording is not None):
-        if profile is None or profile.recording is None:
-            raise InputError(
-                "is a dynamic recording, which states neither its unit nor where the axis stood; give a "
-                "profile with unit and the table [recording]",
-                file=str(path),
-            )
-        recording = parse_rtx(data, str(path))
-        found = line_of_recording(recording, profile.recording, profile.unit, profile.holds)
-        return _in_sense(found, profile)
-    if profile is None and ending in WITHOUT_GRAMMAR:
+    if ending == RTX:
+        return read_rtx(path)
+    if ending in WITHOUT_GRAMMAR:
         raise InputError(
             f"is {WITHOUT_GRAMMAR[ending]} by its name, and no grammar of that format is public; export the "
             "readings as text and describe its columns with a profile (--profile)",
             file=str(path),
         )
-    return parse_readings(data, str(path)) if profile is None else parse_line(data, str(path), profile)
+    return parse_readings(read_bytes(path), str(path))
+
+
+def read_profiled(path: PathLike, profile: LineProfile) -> Readings:
+    """The readings of a text file, or of a dynamic recording, as a profile says. Raises as `read_line`."""
+    data = read_bytes(path)
+    if profile.recording is not None:
+        recording = parse_rtx(data, str(path))
+        return _in_sense(
+            line_of_recording(recording, profile.recording, profile.unit, profile.holds), profile
+        )
+    if data.startswith(MARK):
+        return read_rtx(path)
+    return parse_line(data, str(path), profile)
 
 
 def parse_line(data: bytes, file: str, profile: LineProfile) -> Readings:
@@ -360,12 +367,6 @@ def _readings(
 
 
 def _in_sense(found: Readings, profile: LineProfile) -> Readings:
-    """In the contract's sense where the profile states the file's; the stated keys say so."""
-    if profile.sense is None:
-        return found
-    same = found.with_sense(profile.sense)
-    keys = MappingProxyType({**same.keys, "sense": ("actual-minus-commanded", 0)})
-    return Readings(
-        same.file, same.target_mm, same.value, same.run, same.direction, same.line,
-        profile.component or same.component, same.angular, keys, same.notes,
-    )  # fmt: skip
+    """In the contract's sense where the profile states the file's, and with its component."""
+    known = found if profile.sense is None else found.with_sense(profile.sense)
+    return replace(known, component=profile.component or known.component)

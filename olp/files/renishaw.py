@@ -19,9 +19,11 @@ from pydantic import Field
 from olp.exceptions import InputError
 from olp.files.readings import ANGULAR, UNITS, Readings
 from olp.files.schemas import Table
+from olp.files.write import PathLike, read_bytes
 
 Array = npt.NDArray[np.float64]
 
+RTX = ".rtx"
 MARK = b"HEADER::"
 _DATA = b"Data:\r\n"
 _END = b"EOF::"
@@ -56,6 +58,20 @@ class Recording:
     samples: Array
     keys: Mapping[str, str]
     period_s: float
+
+
+def read_rtx(path: PathLike, unit: str | None = None) -> Readings:
+    """Refuses a recording that comes without a profile, once its bytes are known to be sound.
+
+    Raises InputError: the file states neither its unit nor where the axis stood.
+    """
+    recording = parse_rtx(read_bytes(path), str(path))
+    what = "where the axis stood" if unit else "its unit, nor where the axis stood"
+    raise InputError(
+        f"is a dynamic recording of {len(recording.samples)} samples, and does not state {what}; give a "
+        "profile with unit and the table [recording]",
+        file=str(path),
+    )
 
 
 def parse_rtx(data: bytes, file: str) -> Recording:
@@ -132,8 +148,9 @@ def line_of_recording(
         value = value[:whole].reshape(-1, group).mean(axis=1).astype(np.float64)
     direction = 1 if target[-1] > target[0] else -1
     ones = np.ones(len(value), np.int64)
+    target, value = np.asarray(target, np.float64), np.asarray(value, np.float64)
     return Readings(
-        file, np.asarray(target, np.float64), np.asarray(value, np.float64), ones, direction * ones, np.zeros(len(value), np.int64), None, unit in ANGULAR,
+        file, target, value, ones, direction * ones, 0 * ones, None, unit in ANGULAR,
         MappingProxyType({}), tuple(notes),
     )  # fmt: skip
 
