@@ -185,6 +185,8 @@ def _line(plan: FilePath, table: LineTable, defaults: LineKeys, vertical: str, f
         raise ConfigError("component is missing; expected a name such as EXX in the plan or the file")
     check_component(readings, component)
     said = _merged(table, stated, defaults, places, str(path))
+    if readings.sense_known and table.sense is not None:
+        raise ConfigError("sense is stated by the profile and by the line; expected it once", file=str(plan))
     found.lines.append(_as_line(readings, component, said, vertical, found.chain, str(path)))
 
 
@@ -282,12 +284,12 @@ def _together(positions: Sequence[Any]) -> Any:
 def _as_line(
     readings: Readings, component: str, said: LineKeys, vertical: str, chain: str | None, file: str
 ) -> Line:
-    problems = list(_line_problems(component, said, vertical, chain))
+    problems = list(_line_problems(component, said, vertical, chain, readings.sense_known))
     if problems:
         raise ConfigError("; ".join(problems), file=file, problems=tuple(problems))
     angular = component[1] in "ABC"
-    assert said.sense is not None
-    value = readings.with_sense(said.sense).value
+    known = readings.sense_known or said.sense is None
+    value = readings.value if known else readings.with_sense(str(said.sense)).value
     place = [0.0 if at is None else at for at in said.line_mm.values]
     sigma = (said.sigma_urad or 0.0) * RAD_PER_URAD if angular else (said.sigma_um or 0.0) * MM_PER_UM
     return Line(
@@ -310,7 +312,7 @@ def _as_line(
 
 def _line_problems(component: str, said: LineKeys, vertical: str, chain: str | None) -> Iterator[str]:
     axis, angular = component[2], component[1] in "ABC"
-    if said.sense is None:
+    if said.sense is None and not sense_known:
         yield (
             "sense is missing; expected what the values mean, such as sense = "
             '"actual-minus-commanded" (of the tool relative to the workpiece)'

@@ -73,7 +73,7 @@ class Readings:
     `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name or
     None where the file does not tell; `angular` says that values are in rad, None where the file does not
     tell. `keys` is what the file states about itself, each with its line; `notes` are sentences on what the
-    reader assumed.
+    reader assumed. `sense_known` says that the values are in the contract's sense.
     """
 
     file: str
@@ -86,12 +86,13 @@ class Readings:
     angular: bool | None = None
     keys: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    sense_known: bool = False
 
     def with_sense(self, sense: str) -> Readings:
         """The same in the contract's sense, for values stated in `sense`, a key of SENSES."""
         return Readings(
             self.file, self.target_mm, self.value * SENSES[sense], self.run, self.direction, self.line,
-            self.component, self.angular, self.keys, self.notes,
+            self.component, self.angular, self.keys, self.notes, sense_known=True,
         )  # fmt: skip
 
 
