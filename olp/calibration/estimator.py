@@ -297,7 +297,7 @@ def _ranges(
         box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
         if box[axis, 0] >= box[axis, 1]:
             raise CannotCompute(
-                f"the lines along {AXES[axis]} have no length in common within the travel; expected them over "
+                f"the lines along {AXES[axis]} have no length in common in the travel; expected them over "
                 "the same length"
             )
     return ranges, box

@@ -310,7 +310,9 @@ def _as_line(
     )
 
 
-def _line_problems(component: str, said: LineKeys, vertical: str, chain: str | None) -> Iterator[str]:
+def _line_problems(
+    component: str, said: LineKeys, vertical: str, chain: str | None, sense_known: bool
+) -> Iterator[str]:
     axis, angular = component[2], component[1] in "ABC"
     if said.sense is None and not sense_known:
         yield (
