@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import Fit
+from olp.calibration.estimator import Fit, LineResult
 from olp.calibration.parameters import SHEAR
 from olp.calibration.prior import class_of
 from olp.errormodel.base import Array
@@ -119,7 +119,8 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
             }
             for term in calibration.cyclic
         ],
-        "lines": [_line_row(result) for result in fit.lines],
+        "lines_of_lengths": [_line_row(r) for r in fit.lines if r.line.quantity != "angle"],
+        "lines_of_angles": [_line_row(r) for r in fit.lines if r.line.quantity == "angle"],
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
             for name, sigma in {**hidden, **squareness_unseen(fit)}.items()
@@ -159,7 +160,7 @@ def _square_row(fit: Fit, name: str) -> dict[str, Any]:
     }
 
 
-def _line_row(result: Any) -> dict[str, Any]:
+def _line_row(result: LineResult) -> dict[str, Any]:
     line, (unit, scale) = result.line, unit_of(result.line.component)
     return {
         "name": line.component,

@@ -84,10 +84,12 @@ def command(
 
 
 def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
-    """The report as people read it: lines by their file's name."""
-    lines = [
-        {"name": f"{row['name']} {Path(row['file']).name}"}
-        | {k: v for k, v in row.items() if k not in ("name", "file")}
-        for row in report["lines"]
-    ]
-    return {**report, "lines": lines}
+    """The report as people read it: lines by the names of their files."""
+    shown = dict(report)
+    for key in ("lines_of_lengths", "lines_of_angles"):
+        shown[key] = [
+            {"name": f"{row['name']} {Path(row['file']).name}"}
+            | {k: value for k, value in row.items() if k not in ("name", "file")}
+            for row in report[key]
+        ]
+    return shown
