@@ -22,6 +22,8 @@ from olp.units import AXES, UM_PER_MM
 
 #: A reversal whose dependence on position is less likely than this by chance depends on position.
 UNLIKELY = 0.01
+#: Runs from which on they tell their own scatter, and courses along the axis that are looked for.
+_RUNS, _COURSES = 3, 4
 #: an estimate this many standard uncertainties from zero is not zero
 _SURE = 3.0
 
@@ -108,15 +110,48 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     single, spread, rest_one, dof_one = _solve(one, line.value)
     if m > 1 and dof > 0:
         chance = _chance(rest_one - rest, dof_one - dof, rest, dof, float(np.abs(line.value).max()))
+    wander = extra @ found[2 * m :]
+    sigma = float(noise * np.sqrt(spread[m, m]))
+    between = _between_runs(line, place, line.value - wander) if m > 1 else None
+    if between is not None:
+        # a drift that is not straight within a run is no white noise: the runs themselves tell what it does
+        chance, scatter = between
+        sigma = max(sigma, scatter)
     at = found[m : 2 * m]
     sigma_at = noise * np.sqrt(np.diag(covariance)[m : 2 * m])
     constant = chance >= UNLIKELY
     mean = float(single[m]) if constant else float(at.mean())
-    wander = extra @ found[2 * m :]
     return Reversal(
-        line, target, at, sigma_at, mean, float(noise * np.sqrt(spread[m, m])), constant, chance, noise,
+        line, target, at, sigma_at, mean, sigma, constant, chance, noise,
         float(np.ptp(wander)) if len(wander) else 0.0,
     )  # fmt: skip
+
+
+def _between_runs(line: Line, place: Index, value: Array) -> tuple[float, float] | None:
+    """How likely the runs' reversals show such a course along the axis by chance, from how the runs differ (t
+    test of the first cosines along the targets, Bonferroni), and the standard uncertainty of their mean. None
+    for fewer than three runs, or where a run lacks a target."""
+    runs, row = np.unique(line.run, return_inverse=True)
+    m = int(place.max()) + 1
+    total, count = np.zeros((len(runs), m, 2)), np.zeros((len(runs), m, 2))
+    side = (line.direction < 0).astype(int)
+    np.add.at(total, (row, place, side), value)
+    np.add.at(count, (row, place, side), 1.0)
+    if len(runs) < _RUNS or (count == 0.0).any():
+        return None
+    mean = total / count
+    reversal = mean[:, :, 0] - mean[:, :, 1]
+    courses = min(_COURSES, m - 1)
+    cosines = np.cos(np.pi * np.outer((np.arange(m) + 0.5) / m, np.arange(courses + 1)))
+    part = reversal @ (cosines / (cosines**2).sum(axis=0))
+    spread = part.std(axis=0, ddof=1) / np.sqrt(len(runs))
+    floor = 1e-12 * max(float(np.abs(value).max()), 1e-12)
+    from scipy.special import stdtr
+
+    t = np.abs(part.mean(axis=0)) / np.maximum(spread, floor)
+    t[np.abs(part.mean(axis=0)) < floor] = 0.0
+    least = float(2.0 * stdtr(len(runs) - 1, -t[1:]).min())
+    return min(1.0, courses * least), float(spread[0])
 
 
 def _drift_columns(run: Index) -> Array:
