@@ -77,4 +77,14 @@ METROLOGY = (
         "Complete the run, or leave the incomplete one out; the message says what is missing.",
         "A line whose last run ended half way.",
     ),
+    Rule(
+        "OLP859",
+        "reading far from its repetitions",
+        Severity.WARNING,
+        "One reading differs from the others of its target and direction by many times what they differ "
+        "among themselves. It is part of the figures, as ISO 230-2 knows no outliers, and may be most of R "
+        "and A.",
+        "Look at the reading, and measure the run again; olp calibrate fit leaves such readings out by name.",
+        "A beam that was broken for a moment: +31 um in run 3.",
+    ),
 )

@@ -356,7 +356,7 @@ def residuals(found: Sequence[tuple[Line, Array]], kind: Format = "svg") -> byte
 def _readings(plot: Axes, x: Array, value: Array, direction: Index) -> None:
     for d, (colour, _) in _SIDES.items():
         rows = direction == d
-        plot.plot(x[rows], value[rows], ".", color=colour, markersize=2, alpha=0.5, markeredgewidth=0)
+        plot.plot(x[rows], value[rows], ".", color=colour, markersize=3.2, alpha=0.7, markeredgewidth=0)
 
 
 def _grid(figure: Figure, count: int) -> list[Axes]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -16,14 +16,14 @@ from olp.calibration.conventions import angle_words
 from olp.calibration.estimator import Fit
 from olp.calibration.evaluating import Evaluated
 from olp.calibration.iso230_2 import Evaluation, scale_of
-from olp.calibration.observations import Array, Line
+from olp.calibration.observations import Line
 from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
 from olp.errormodel.calibration import Calibration
 from olp.findings import RULES, Finding
-from olp.plots import Format
+from olp.plots import Format, calibration_curves
 from olp.plots_calibration import Fitted, name_of_straightness, name_of_turn
 from olp.report import findings_text, number, pairs, printable, table
-from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.units import AXES, RAD_PER_URAD
 
 _FIGURES = ("A", "E", "R", "M", "B", "B_mean")
 _ONE_SIDE = ("A_up", "E_up", "R_up", "A_down", "E_down", "R_down")
@@ -42,20 +42,13 @@ _LEGEND = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitSummary:
-    """What a fit found, for its report. `components` are rows of a table (component, and figures whose keys
-    end in units); `squareness` value and standard uncertainty in rad; `lines` and `residuals` as plots take
-    them; `outliers` and `unobserved` sentences; sum of squares and degrees of freedom of all readings."""
+    """What a fit found, for its report: the adjustment, the calibration made of it, its summary as a mapping
+    ("olp-fit-1") and its findings."""
 
+    fit: Fit
     calibration: Calibration
-    components: Sequence[Mapping[str, Any]]
-    squareness: Mapping[str, tuple[float, float]]
-    lines: Sequence[Fitted]
-    residuals: Sequence[tuple[Line, Array]]
-    chi_square: float
-    freedom: float
-    outliers: Sequence[str] = ()
-    unobserved: Sequence[str] = ()
-    findings: Sequence[Finding] = field(default_factory=tuple)
+    report: Mapping[str, Any]
+    findings: Sequence[Finding]
 
 
 def fitted_lines(fit: Fit) -> tuple[Fitted, ...]:
@@ -69,7 +62,20 @@ def fitted_lines(fit: Fit) -> tuple[Fitted, ...]:
         sigma = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", rows, fit.covariance, rows, optimize=True), 0.0))
         reading = fit.curve(line.component, line.target_mm) @ fit.theta + result.residual
         out.append(Fitted(line, x, np.asarray(rows @ fit.theta), sigma, np.asarray(reading)))
-    return tuple(out)
+    return tuple(sorted(out, key=lambda item: _place_in_order(item.line)))
+
+
+def _place_in_order(line: Line) -> tuple[int, int, str]:
+    return line.axis, _ORDER[line.quantity], line.component
+
+
+#: Plots of a fit in their order.
+_FIT_CAPTIONS = {
+    "curves": "The curves of the calibration, each on its measuring line.",
+    "fitted": "Readings, freed of zero, slope, drift and reversal (blue approached in +, red in -), and the "
+    "fitted curves with twice their standard uncertainty.",
+    "residuals": "What the fit leaves of every reading.",
+}
 
 
 # -- text ------------------------------------------------------------------------------------------------
@@ -98,7 +104,7 @@ def _plural(count: int, noun: str) -> str:
 
 
 def _sorted(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
-    return sorted(evaluations, key=lambda e: (e.line.axis, _ORDER[e.line.quantity], e.component))
+    return sorted(evaluations, key=lambda e: _place_in_order(e.line))
 
 
 def _rows(found: Evaluated, keys: Sequence[str], *, both: bool) -> list[list[str]]:
@@ -170,7 +176,7 @@ def _reversal_text(found: Evaluated) -> Iterator[str]:
 
 def _reversal_rows(found: Evaluated) -> list[list[str]]:
     rows = []
-    for r in sorted(found.reversals, key=lambda r: (r.line.axis, _ORDER[r.line.quantity], r.line.component)):
+    for r in sorted(found.reversals, key=lambda r: _place_in_order(r.line)):
         unit, scale = scale_of(r.line)
         rows.append([
             r.line.component, unit, number(r.mean * scale), number(2.0 * r.sigma * scale),
@@ -267,50 +273,34 @@ def calibration(
     version: str,
     date: datetime.date | None,
 ) -> Document:
-    """The document of a calibration: what was fitted, and the measured lines behind it. `plots` is
-    `fit_plots` and, where wanted, `plots_of`."""
-    notices = [
-        *summary.findings,
-        *(f for f in found.findings if f.code not in {g.code for g in summary.findings}),
+    """The document of a calibration: what was fitted, and the measured lines behind it. `plots` are those of
+    `fit_plots` and `plots_of`."""
+    report = summary.report
+    said = {f.code for f in summary.findings}
+    findings = [*summary.findings, *(f for f in found.findings if f.code not in said)]
+    worth = report["chi_square_per_freedom"]
+    box = ", ".join(f"{a} {low:g} to {high:g}" for a, (low, high) in report["box_mm"].items())
+    lost = ", ".join(f"{a} {number(v)}" for a, v in report["lost_motion_um"].items())
+    sigma = [
+        ("Readings", f"{report['readings']}, {report['left_out']} left out"),
+        ("Chi square", f"{number(worth)} a degree of freedom, of {number(report['degrees_of_freedom'], 0)}"),
+        ("Calibrated box", f"{box} mm"),
+        ("Datum", ", ".join(f"{a} {v:g}" for a, v in zip(AXES, report["datum_mm"], strict=True)) + " mm"),
+        ("Lost motion", f"{lost} um"),
     ]
-    worth = summary.chi_square / max(summary.freedom, 1.0)
-    fit_blocks: list[Block] = [
-        Pairs([
-            ("Readings over their noise", f"chi square {number(summary.chi_square, 0)} at "
-             f"{number(summary.freedom, 0)} degrees of freedom, {number(worth)} a degree"),
-            ("Calibrated box", _box(summary.calibration)),
-            ("Datum", ", ".join(f"{a} {v:g}" for a, v in zip(AXES, summary.calibration.datum_mm, strict=True))
-             + " mm"),
-            ("Lost motion", ", ".join(f"{a} {number(v * UM_PER_MM)}" for a, v in
-             zip(AXES, summary.calibration.backlash_mm, strict=True)) + " um"),
-        ]),
-        *_component_table(summary.components),
-        Grid(
-            ["squareness", "urad", "+-", "angle"],
-            [
-                [name, number(v / RAD_PER_URAD), number(2 * s / RAD_PER_URAD), angle_words(name, v)]
-                for name, (v, s) in summary.squareness.items()
-            ],
-        ),
-    ]  # fmt: skip
-    if "fitted" in plots:
-        fit_blocks.append(
-            Plot(plots["fitted"], "Readings, freed of zero, slope, drift and reversal (blue approached in +, "
-                 "red in -), and the fitted curves with twice their standard uncertainty.")
-        )  # fmt: skip
-    if "residuals" in plots:
-        fit_blocks.append(Plot(plots["residuals"], "What the fit leaves of every reading."))
-    limits: list[Block] = [Paragraph(sentence) for sentence in summary.unobserved]
-    limits += [Paragraph(sentence) for sentence in summary.outliers]
-    limits += list(_notices(notices))
+    fitted: list[Block] = [
+        Pairs(sigma),
+        *_component_tables(report),
+        *(Plot(plots[name], caption) for name, caption in _FIT_CAPTIONS.items() if name in plots),
+    ]
     return Document(
         "Calibration of a machine",
         _subtitle(found, date),
         None,
         [
             Section("Measurement", [Pairs(_measurement(found))]),
-            Section("Errors found", [b for b in fit_blocks if not isinstance(b, Grid) or b.rows]),
-            Section("Findings and limits", limits),
+            Section("Errors found", fitted),
+            Section("Findings and limits", [*_not_observed(report), *_notices(findings)]),
             *_evaluated(found, plots),
         ],
         _footer(version),
@@ -319,9 +309,13 @@ def calibration(
 
 def fit_plots(summary: FitSummary) -> dict[str, bytes]:
     """The plots of a fit as SVG."""
+    curves = calibration_curves(summary.calibration)
     return {
-        "fitted": plots_calibration.fitted(summary.lines),
-        "residuals": plots_calibration.residuals(summary.residuals),
+        "curves": curves[curves.index(b"<svg") :],
+        "fitted": plots_calibration.fitted(fitted_lines(summary.fit)),
+        "residuals": plots_calibration.residuals(
+            [(r.line, r.residual) for r in sorted(summary.fit.lines, key=lambda r: _place_in_order(r.line))]
+        ),
     }
 
 
@@ -370,12 +364,6 @@ def _place(line: Line) -> str:
 
 def _vector(values: Sequence[float]) -> str:
     return " ".join(f"{axis}{v:g}" for axis, v in zip(AXES, values, strict=True))
-
-
-def _box(calibration: Calibration) -> str:
-    return ", ".join(
-        f"{a} {low:g} to {high:g}" for a, (low, high) in zip(AXES, calibration.box_mm, strict=True)
-    ) + " mm"  # fmt: skip
 
 
 def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section]:
@@ -429,16 +417,36 @@ def _caption(name: str) -> str:
     }[kind]
 
 
-def _component_table(components: Sequence[Mapping[str, Any]]) -> list[Block]:
-    if not components:
-        return []
-    keys = list(dict.fromkeys(key for row in components for key in row))
-    rows = [
-        [str(v) if isinstance(v := row.get(key, ""), str) else number(v) for key in keys]
-        for row in components
-    ]
-    left = sum(all(isinstance(row.get(key, ""), str) for row in components) for key in keys)
-    return [Grid([key.replace("_", " ") for key in keys], rows, left=max(left, 1))]
+def _component_tables(report: Mapping[str, Any]) -> Iterator[Block]:
+    for key, unit in (("position_errors", "um"), ("angular_errors", "urad")):
+        columns = [f"{name}_{unit}" for name in ("range", "sigma", "residual", "half_reversal")]
+        yield Grid(
+            [f"in {unit}", "", "range", "sigma", "residual", "half reversal"],
+            [[r["name"], str(r["shape"]), *(number(r[c]) for c in columns)] for r in report[key]],
+            left=2,
+        )
+    rows = []
+    for row in report["squareness"]:
+        angle = angle_words(row["name"], row["value_urad"] * RAD_PER_URAD)
+        rows.append([row["name"], angle, number(row["value_urad"]), number(2.0 * row["sigma_urad"])])
+    yield Grid(["squareness", "", "urad", "+-"], rows, left=2)
+    if report["cyclic"]:
+        yield Grid(
+            ["cyclic", "period mm", "amplitude"],
+            [
+                [r["name"], f"{r['period_mm']:g}", *(number(v) for k, v in r.items() if "amplitude" in k)]
+                for r in report["cyclic"]
+            ],
+        )
+
+
+def _not_observed(report: Mapping[str, Any]) -> Iterator[Block]:
+    rows = [[row["name"], number(row["costs_um"])] for row in report["not_observed"]]
+    if rows:
+        yield Paragraph(
+            "Not observed, taken as zero, and what that may cost at the longest lever in the box."
+        )
+        yield Grid(["", "um"], rows)
 
 
 def _notices(findings: Sequence[Finding]) -> Iterator[Block]:

@@ -37,7 +37,7 @@ LAYERS = (
     {"calibrating", "correction", "retiming", "comparing"},
     {"gate"},
     {"api"},
-    {"report_files"},
+    {"report_files", "report_lines"},
     {"review"},
     {"cli"},
 )

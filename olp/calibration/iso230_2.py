@@ -29,6 +29,8 @@ SAME_MM = 0.05
 RUNS, PER_METRE, TARGETS, STEP_MM, LONG_MM = 5, 5, 5, 250.0, 2000.0
 #: Steps between targets that differ by less than this share of their mean are equal.
 _EQUAL = 0.01
+#: A reading so many usual deviations from at least so many repetitions is told, the first of them.
+_FAR, _REPEATED, _KEPT, _MOST = 7.0, 3, 0.95, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,8 +248,10 @@ def _hull_slopes(x: Array, y: Array) -> Iterator[float]:
 
 
 def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
-    """Where a line has less than ISO 230-2 asks for, and where its targets could hide a cyclic error."""
+    """Where a line has less than ISO 230-2 asks for, where its targets could hide a cyclic error, and
+    readings far from their repetitions."""
     line, x = evaluation.line, evaluation.target_mm
+    yield from _outliers(line)
     length = float(np.ptp(x))
     if length > LONG_MM:
         wanted = int(np.ceil(length / STEP_MM)) + 1
@@ -266,6 +270,31 @@ def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
         step = np.diff(x)
         if np.ptp(step) < _EQUAL * step.mean():
             yield Finding("OLP852", f"{_named(line)}: all {len(x)} targets stand {step.mean():g} mm apart")
+
+
+def _outliers(line: Line) -> Iterator[Finding]:
+    """Readings that their own repetitions speak against: from the median of their target and direction, the
+    level of their run taken out, in units of the usual deviation."""
+    place = targets_of(line.target_mm)[1] * 2 + (line.direction > 0)
+    run = np.unique(line.run, return_inverse=True)[1]
+    rest = line.value.copy()
+    for label in (place, run, place):
+        for one in np.unique(label):
+            rest[label == one] -= np.median(rest[label == one])
+    counts = np.bincount(place)[place]
+    size = np.where(counts >= _REPEATED, np.abs(rest), 0.0)
+    # the largest twentieth left out, which of normal readings makes it smaller by 0.87
+    kept = np.sort(size[counts >= _REPEATED])[: int(_KEPT * (counts >= _REPEATED).sum())]
+    usual = float(np.sqrt((kept**2).mean())) / 0.87 if len(kept) else 0.0
+    far: list[int] = np.flatnonzero(size > _FAR * usual).tolist() if usual > 0.0 else []
+    unit, scale = scale_of(line)
+    for k in far[:_MOST]:
+        yield Finding(
+            "OLP859",
+            f"{_named(line)}: the reading at {line.target_mm[k]:g} mm in run {line.run[k]} stands "
+            f"{rest[k] * scale:+.1f} {unit} off its repetitions",
+            int(line.row[k]),
+        )
 
 
 def _named(line: Line) -> str:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import datetime
-from pathlib import Path
 from typing import Any, cast
 
 import click
 
-from olp import __version__
 from olp.cli.common import STREAM, files_of, refuse_early, report_ending
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
 
@@ -42,11 +40,9 @@ def command(
     """ISO 230-2 figures, cyclic errors, reversal and squareness of measured lines.
 
     DATA are plans (measurements.toml), folders and files as olp calibrate fit takes them."""
-    from olp import report_calibration
-    from olp.document import to_html, to_markdown
+    from olp import report_calibration, report_lines
     from olp.files.measurements import files_of_measurements
     from olp.metrology import evaluate_lines
-    from olp.report import to_json
 
     kind = plot_kind(plot)
     inputs = (*files_of_measurements(data), *files_of(machine))
@@ -57,14 +53,7 @@ def command(
     result = found.as_dict()
     files: dict[str, bytes] = {}
     if report_file is not None and report_file != STREAM:
-        day = date.date() if date else None
-        ending = Path(report_file).suffix.lower()
-        if ending == ".json":
-            files[report_file] = to_json(result)
-        else:
-            plots = report_calibration.plots_of(found) if ending == ".html" else {}
-            document = report_calibration.evaluation(found, plots, __version__, day)
-            files[report_file] = to_html(document) if ending == ".html" else to_markdown(document)
+        files[report_file] = report_lines.evaluation(found, report_file, date.date() if date else None)
     if plot is not None:
         files |= numbered(plot, report_calibration.plots_of(found, cast(Any, kind)))
     text = report_calibration.to_text(found)
