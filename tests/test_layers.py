@@ -27,7 +27,8 @@ LAYERS = (
     {"checks", "nominal", "testpaths"},
     {"scene"},
     {"report", "plots"},
-    {"report_time", "plots_time", "report_check", "report_compare", "plots_path", "plots_calibration", "document"},
+    {"report_time", "plots_time", "report_check", "report_compare", "plots_path", "plots_calibration"}
+    | {"document"},
     {"report_document", "report_calibration"},
     {"files"},
     {"loading", "poses"},

@@ -151,10 +151,10 @@ class DiagonalFit:
     def findings(self) -> Iterator[Finding]:
         missing = [name for name in UNKNOWNS if name not in self.determined]
         if missing:
-            ways = "; ".join(_words(change) for change in self.free)
+            ways = ", or ".join(_words(change) for change in self.free)
             yield Finding(
                 "OLP856",
-                f"{', '.join(missing)} not determined by diagonals {self.names}: {ways} changes no reading; "
+                f"{', '.join(missing)} not determined by diagonals {self.names}: no reading sees {ways}; "
                 "measure face diagonals, or state scales with their uncertainty",
             )
         if self.dof > 0 and self.chi_square > self.dof + _TOO_MUCH * np.sqrt(2.0 * self.dof):
@@ -281,7 +281,7 @@ def _change(row: Array) -> Mapping[str, float]:
 
 
 def _words(change: Mapping[str, float]) -> str:
-    return "a change of " + " with ".join(
+    return " with ".join(
         f"{value:+.3g} {'um/m' if name in SCALES else 'urad'} in {name}" for name, value in change.items()
     )
 

@@ -55,6 +55,23 @@ def command(
             name = name if name not in plots else f"{name}-{len(plots) + 1}"
             plots[name] = plots_calibration.circle(found, cast(Any, kind))
         written |= numbered(plot, plots)
-    text = "\n".join(outline(c) for c in result["circles"])
+    text = "\n".join(outline(_shown(circle)) for circle in result["circles"])
     text += outline({"findings": result["findings"]}) if findings else ""
     end(result, text, written, files, findings, as_json=as_json, fail_on=fail_on, force=force)
+
+
+def _shown(circle: dict[str, Any]) -> dict[str, Any]:
+    """A circle as people read it: one column of values, with their units."""
+    rows = []
+    for row in circle["found"]:
+        key = next(k for k in row if k.startswith("value_"))
+        unit = key.removeprefix("value_")
+        rows.append(
+            {
+                "name": row["name"],
+                "value": row[key],
+                "sigma": row[f"sigma_{unit}"],
+                "unit": unit.replace("_", "/"),
+            }
+        )
+    return {k: v for k, v in circle.items() if v != []} | {"found": rows}

@@ -43,8 +43,36 @@ def command(
         "findings": [f.as_dict() for f in findings],
     }
     written = {} if output is None else {output: readings_toml(found.readings()).encode()}
-    shown = {k: v for k, v in result.items() if k != "unseen_changes"}
-    end(result, outline(shown), written, files, findings, as_json=as_json, fail_on=fail_on, force=force)
+    end(
+        result,
+        outline(_shown(result)),
+        written,
+        files,
+        findings,
+        as_json=as_json,
+        fail_on=fail_on,
+        force=force,
+    )
+
+
+def _shown(result: dict[str, Any]) -> dict[str, Any]:
+    """The result as people read it: the figures that tell most, and one column of values."""
+    kept = ("name", "length_mm", "elongation_um_m", "sigma_um_m", "E_um", "R_um", "M_um", "B_mean_um")
+    found = []
+    for row in result["found"]:
+        unit = "urad" if "value_urad" in row else "um_m"
+        found.append({
+            "name": row["name"], "value": row[f"value_{unit}"], "sigma": row[f"sigma_{unit}"],
+            "unit": unit.replace("_", "/"),
+        })  # fmt: skip
+    fitted = {k: result[k] for k in ("chi_square", "degrees_of_freedom") if result["degrees_of_freedom"] > 0}
+    return {
+        **fitted,
+        "diagonals": [{k: row[k] for k in kept if k in row} for row in result["diagonals"]],
+        "found": found,
+        "not_determined": result["not_determined"],
+        "findings": result["findings"],
+    }
 
 
 def _known(item: str) -> tuple[str, tuple[float, float]]:
