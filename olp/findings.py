@@ -191,7 +191,7 @@ _TABLE = (
         "OLP402",
         "outside travel",
         Severity.ERROR,
-        "A corrected command leaves the travel of an axis, so the control will stop with a limit alarm.",
+        "A command leaves the travel of an axis, so the control will stop with a limit alarm.",
         "Move the part, or leave the section out with (olp off).",
         "Travel of X up to 2000 mm, and the corrected program writes X2000.012.",
     ),

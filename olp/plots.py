@@ -82,7 +82,9 @@ def calibration_curves(calibration: Calibration, kind: Format = "svg") -> bytes:
                 if plot.get_legend_handles_labels()[0]:
                     plot.legend(frameon=False, ncols=3, loc="best")
             plots[0][column].set_title(f"axis {axis}")
-        figure.suptitle(f"{calibration.machine}: actual minus commanded, at the measuring lines")
+        title = f"{calibration.machine}: actual minus commanded, at the measuring lines"
+        # a name may hold a $
+        figure.suptitle(title, parse_math=False)
         out = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         figure.savefig(out, format=kind, dpi=130, metadata=metadata)

@@ -71,8 +71,8 @@ def _nominal(plot: Axes, path: Path) -> None:
 
     xy = path.vertex_mm[:, :2]
     step = max(len(path) // _DRAWN, 1)
-    kept = np.flatnonzero(path.cutting)[::step] if step == 1 else np.flatnonzero(path.cutting)
-    lines = np.stack((xy[kept], xy[kept + 1]), axis=1)[::step]
+    kept = np.flatnonzero(path.cutting)[::step]
+    lines = np.stack((xy[kept], xy[kept + 1]), axis=1)
     plot.add_collection(LineCollection(list(lines), colors=_NOMINAL, linewidths=0.5, rasterized=True))
 
 
