@@ -23,7 +23,7 @@ from olp.calibration.lines import (
     squareness_block,
     targets_of,
 )
-from olp.calibration.normal import Block, Normal, locals_of, solve
+from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
 from olp.calibration.observations import Line, Measurements
 from olp.calibration.parameters import CROSS, Parameters, Place
 from olp.calibration.prior import POSE, Prior
@@ -40,6 +40,8 @@ FEWEST, MOST = 6, 48
 HALF_CELLS = 5
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
 OUTLIER, SHARE = 6.0, 0.05
+#: A cyclic term below so many standard deviations is noise.
+CYCLIC_SEEN = 4.0
 #: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
 SWEEP = 0.3
 
@@ -181,40 +183,56 @@ def fit(
     splines = [_spline(lines, axis, ranges[axis]) for axis in range(3)]
     waves, unseen = _waves(measurements, lines)
     shapes = _shapes(lines, noises, splines, waves, tell)
-    parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
-    prior = Prior(parameters, shapes, _squares(measurements, parameters))
-    tell("adjustment", 0.0)
-
-    def blocks() -> list[Block]:
-        found = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
-        return found + [squareness_block(reading, parameters) for reading in measurements.squareness]
-
-    normal = _gathered(blocks(), prior)
-    prior.learn(normal)
-    solved = solve(normal, *prior.precision())
-    if prior.size_from(solved.theta):
-        solved = solve(normal, *prior.precision())
+    for again in (False, True):
+        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
+        prior = Prior(parameters, shapes, _squares(measurements, parameters))
+        blocks = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
+        blocks += [squareness_block(reading, parameters) for reading in measurements.squareness]
+        tell("adjustment", 0.5 * again)
+        normal, solved = _adjusted(blocks, prior)
+        seen = _waves_seen(parameters, solved)
+        if seen == waves:
+            break
+        waves = seen
     results, chi_square = [], 0.0
-    for k, block in enumerate(blocks()):
-        _, residual = locals_of(block, solved.theta, np.ones(len(block), bool))
-        part = float(np.sum((residual / block.sigma) ** 2))
+    for k, block in enumerate(blocks):
+        _, residual, sigma = residuals_of(block, solved.theta)
+        part = float(np.sum((residual / sigma) ** 2))
         chi_square += part
         if k < len(lines):
             results.append(LineResult(lines[k], noises[k], residual, part))
     # readings less what the fit used up of their freedom
-    used = float(np.trace(solved.covariance @ normal.H)) + normal.local
+    used = float(np.trace(solved.covariance @ normal.H)) + normal.free
     return Fit(
         measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(outliers),
         box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
     )  # fmt: skip
 
 
-def _gathered(blocks: Iterable[Block], prior: Prior) -> Normal:
+def _adjusted(blocks: Iterable[Block], prior: Prior) -> tuple[Normal, Solved]:
+    """The readings' normal equations and their solution, with what the prior learns from them."""
     normal = Normal.of(prior.parameters.size)
     for block in blocks:
         normal.add(block)
     prior.push(normal)
-    return normal
+    prior.learn(normal)
+    solved = solve(normal, *prior.precision())
+    if prior.size_from(solved.theta):
+        solved = solve(normal, *prior.precision())
+    return normal, solved
+
+
+def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave, ...]]:
+    """Cyclic terms that stand out of their noise."""
+    seen: dict[str, tuple[Wave, ...]] = {}
+    for name, waves in parameters.waves.items():
+        start = parameters.slices[f"wave {name}"].start
+        for k, wave in enumerate(waves):
+            at = slice(start + 2 * k, start + 2 * k + 2)
+            sigma = float(np.sqrt(np.trace(solved.covariance[at, at]) / 2.0))
+            if float(np.hypot(*solved.theta[at])) > CYCLIC_SEEN * sigma:
+                seen[name] = (*seen.get(name, ()), wave)
+    return seen
 
 
 def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:

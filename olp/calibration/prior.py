@@ -51,7 +51,9 @@ class Prior:
         classes = self.classes if classes is None else classes
         for name in COMPONENTS:
             shape = self.shapes.get(name)
-            amplitude, roughness = classes[class_of(name)]
+            size, roughness = classes[class_of(name)]
+            # coefficients that move together share one size
+            amplitude = size * np.sqrt(p.spaces[name].size)
             if shape is not None:
                 amplitude, roughness = AMPLITUDE[name[1] in "ABC"], shape.roughness
             block = p.spaces[name].prior(roughness, amplitude)

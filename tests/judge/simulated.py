@@ -1,9 +1,9 @@
 """Simulated machines and the readings that instruments would take of them: written from the contract, without
 the project's code.
 
-Two families. Smooth: harmonics of some waves over the travel. Rough: the same at half the size, with kinks, steps
-at rail joints that all six errors of an axis share, and the pitch of a screw. Curves hold on lines through the
-datum with no tool, zero there, straightness without a mean slope. Lengths in mm, angles in rad.
+Two families. Smooth: harmonics of some waves over the travel. Rough: the same at half the size, with kinks,
+steps at rail joints that all six errors of an axis share, and the pitch of a screw. Curves hold on lines
+through the datum with no tool, zero there, straightness without a mean slope. Lengths in mm, angles in rad.
 """
 
 from __future__ import annotations
@@ -165,8 +165,9 @@ def take(
     tool: Any = TOOL, runs: int = 5, slope: float | None = None, square: str | None = None,
     reference: str = "functional-point", drift: float = 1.0,
 ) -> Taken:  # fmt: skip
-    """Read a component there and back along a line through `at`: laser 0.5 um + 0.5 um/m (noise grows with the
-    distance for straightness; a scale of the line for positioning), angles 1 urad, drift over some um or urad."""
+    """Read a component there and back along a line through `at`: laser 0.5 um + 0.5 um/m (noise that grows
+    with the distance for straightness, a scale of the line for positioning), angles 1 urad, drift over some
+    um or urad."""
     d, axis = "XYZABC".index(component[1]), AXES.index(component[2])
     one = np.concatenate([targets, targets[::-1]])
     side = np.concatenate([np.ones(len(targets)), -np.ones(len(targets))])
@@ -208,7 +209,7 @@ def all_lines(
     m: Machine, seed: int, *, at: Any = LINE, tool: Any = TOOL, tables: str = "", jitter: float = 5.0,
     runs: int = 5, drift: float = 1.0,
 ) -> list[Taken]:  # fmt: skip
-    """The lines of a full set: positioning, eight angles (none of roll about the vertical), straightness pairs
+    """The lines of a full set: positioning, eight angles (not roll of the vertical axis), straightness pairs
     that share a square, and straightness of Z with the reflector at two offsets."""
     rng = np.random.default_rng([seed, 77])
     targets = []
@@ -222,11 +223,8 @@ def all_lines(
         axis = AXES.index(name[2])
         reference = "table" if name[2] in tables else "functional-point"
         more.setdefault("tool", tool)
-        out.append(
-            take(
-                m, rng, name, targets=targets[axis], at=at, runs=runs, drift=drift, reference=reference, **more
-            )
-        )
+        same: dict[str, Any] = {"at": at, "runs": runs, "drift": drift, "reference": reference}
+        out.append(take(m, rng, name, targets=targets[axis], **same, **more))
 
     for a in AXES:
         add(f"E{a}{a}")
