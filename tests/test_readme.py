@@ -16,6 +16,7 @@ import pytest
 from benchmarks import figures
 
 from olp.cli import VERBS
+from olp.cli.calibrate import VERBS as CALIBRATE
 from olp.findings import RULES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -140,7 +141,8 @@ def test_every_verb_is_listed() -> None:
 
 
 def test_every_option_that_is_named_exists(copy: Path) -> None:
-    helps = run("\n".join(f"olp {verb} --help" for verb in VERBS), copy)
+    verbs = [*VERBS, *(f"calibrate {verb}" for verb in CALIBRATE)]
+    helps = run("\n".join(f"olp {verb} --help" for verb in verbs), copy)
     ours = re.sub(r"(apt-get|pip|pytest)[^`\n]*", "", TEXT)
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", ours)) <= set(re.findall(r"--[a-z-]+", helps))
 
