@@ -162,6 +162,21 @@ def test_enough_readings_at_unequal_steps_are_no_finding() -> None:
     assert list(findings_of(evaluate(line(values, values, x)))) == []
 
 
+def test_a_slip_is_told_with_its_place_and_noise_is_not() -> None:
+    random = np.random.default_rng(4)
+    x = np.cumsum(random.uniform(40, 60, 12))
+    told = 0
+    for _ in range(30):
+        noise = random.normal(0, 1, (2, 5, 12)) * (0.5 + x / 600.0)
+        one = line(noise[0], noise[1], x)
+        told += sum(f.code == "OLP859" for f in findings_of(evaluate(one)))
+    assert told == 0
+    noise[0, 2, 7] += 31.0
+    [found] = findings_of(evaluate(line(noise[0], noise[1], x)))
+    assert found.code == "OLP859"
+    assert f"at {x[7]:g} mm in run 3" in found.message
+
+
 def test_incomplete_readings_are_refused_with_their_place() -> None:
     one = line([[0, 4, 6], [2, 4, 10]], [[-1, 0, 5], [-1, 2, 5]], [0, 100, 200])
     kept = np.arange(len(one.value)) != 4

@@ -82,22 +82,22 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     run, is taken out; without it the order of the rows does not matter. Raises ConfigError.
     """
     target, place = targets_of(line.target_mm)
-    for i, x in enumerate(target):
-        for d, side in ((1, "+"), (-1, "-")):
-            if not ((place == i) & (line.direction == d)).any():
-                raise ConfigError(
-                    f"line {line.component}: {x:g} mm was never approached in {side}; expected every target "
-                    "approached from both sides; leave it out, or measure it again",
-                    file=line.source,
-                )
+    side = place * 2 + (line.direction < 0)
+    lacking = np.flatnonzero(np.bincount(side, minlength=2 * len(target)) == 0)
+    if len(lacking):
+        raise ConfigError(
+            f"line {line.component}: {target[lacking[0] // 2]:g} mm was never approached in "
+            f"{'-' if lacking[0] % 2 else '+'}; expected every target approached from both sides; leave it "
+            "out, or measure it again",
+            file=line.source,
+        )
     n, m = len(line.value), len(target)
-    own = np.zeros((n, m))
-    own[np.arange(n), place] = 1.0
-    moved = own * (0.5 * line.direction)[:, None]
     extra = _drift_columns(line.run) if drift else np.zeros((n, 0))
-    free = np.hstack((own, moved, extra))
-    one = np.hstack((own, moved.sum(axis=1, keepdims=True), extra))
-    found, covariance, rest, dof = _solve(free, line.value)
+    # a mean for each target and side, or a mean for each target and one reversal: both are taken out first
+    found, cofactor, rest, dof = _within(side, extra, line.value)
+    single, spread, rest_one, dof_one = _within(
+        place, np.column_stack((0.5 * line.direction, extra)), line.value
+    )
     noise = float(np.sqrt(rest / dof)) if dof > 0 else line.sigma
     if noise == 0.0 and line.sigma == 0.0 and dof <= 0:
         raise ConfigError(
@@ -107,20 +107,25 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
         )
     noise = max(noise, line.sigma)
     chance = 1.0
-    single, spread, rest_one, dof_one = _solve(one, line.value)
     if m > 1 and dof > 0:
         chance = _chance(rest_one - rest, dof_one - dof, rest, dof, float(np.abs(line.value).max()))
-    wander = extra @ found[2 * m :]
-    sigma = float(noise * np.sqrt(spread[m, m]))
+    wander = extra @ found
+    sigma = float(noise * np.sqrt(spread[0, 0]))
     between = _between_runs(line, place, line.value - wander) if m > 1 else None
     if between is not None:
         # a drift that is not straight within a run is no white noise: the runs themselves tell what it does
         chance, scatter = between
         sigma = max(sigma, scatter)
-    at = found[m : 2 * m]
-    sigma_at = noise * np.sqrt(np.diag(covariance)[m : 2 * m])
+    count = np.bincount(side, minlength=2 * m)
+    level = np.bincount(side, line.value - wander) / count
+    slope = np.column_stack(
+        [np.bincount(side, column) / count for column in extra.T] or [np.zeros((2 * m, 0))]
+    )
+    at, lean = level[::2] - level[1::2], slope[::2] - slope[1::2]
+    own = 1.0 / count[::2] + 1.0 / count[1::2]
+    sigma_at = noise * np.sqrt(own + np.einsum("ik,kl,il->i", lean, cofactor, lean))
     constant = chance >= UNLIKELY
-    mean = float(single[m]) if constant else float(at.mean())
+    mean = float(single[0]) if constant else float(at.mean())
     return Reversal(
         line, target, at, sigma_at, mean, sigma, constant, chance, noise,
         float(np.ptp(wander)) if len(wander) else 0.0,
@@ -166,13 +171,25 @@ def _drift_columns(run: Index) -> Array:
     return np.column_stack([np.interp(rows, knots, hat) for hat in hats[1:]])
 
 
-def _solve(design: Array, value: Array) -> tuple[Array, Array, float, int]:
-    """(k,) estimates of least norm, (k, k) cofactors, sum of squares left and its degrees of freedom."""
+def _within(group: Index, columns: Array, value: Array) -> tuple[Array, Array, float, int]:
+    """Least squares of value (n,) on columns (n, k) beside a mean of its own for each group (n,): (k,)
+    estimates of least norm, (k, k) cofactors, sum of squares left and its degrees of freedom."""
+    count = np.bincount(group)
+
+    def free(one: Array) -> Array:
+        return np.asarray(one - (np.bincount(group, one) / count)[group])
+
+    design = np.column_stack([free(column) for column in columns.T] or [np.zeros((len(value), 0))])
     inverse = np.linalg.pinv(design, rcond=1e-10)
-    found = inverse @ value
-    rest = value - design @ found
-    rank = round(float(np.trace(design @ inverse)))
-    return found, np.asarray(inverse @ inverse.T), float(rest @ rest), len(value) - rank
+    found = inverse @ free(value)
+    rest = free(value) - design @ found
+    rank = round(float(np.einsum("ij,ji->", design, inverse)))
+    return (
+        found,
+        np.asarray(inverse @ inverse.T),
+        float(rest @ rest),
+        len(value) - int((count > 0).sum()) - rank,
+    )
 
 
 def _chance(more: float, more_dof: int, rest: float, dof: int, size: float) -> float:

@@ -27,6 +27,8 @@ from olp.findings import Finding
 SEEN = 0.25
 #: A smooth curve changes on no less than so many steps between targets, and so many periods.
 _STEPS, _PERIODS = 6.0, 3.0
+#: half-waves that stand for a smooth curve, at most
+_WAVES = 200
 #: Steps between targets this near to a multiple of half a period are called such in words.
 _NEAR = 0.35
 
@@ -180,7 +182,7 @@ def _fit(
     inverse = np.linalg.pinv(design, rcond=1e-10)
     estimate = inverse @ (y * weight)
     rest = y * weight - design @ estimate
-    dof = len(y) - round(float(np.trace(design @ inverse)))
+    dof = len(y) - round(float(np.einsum("ij,ji->", design, inverse)))
     variance = float(rest @ rest) / dof if dof > 0 else 0.0
     covariance = inverse @ inverse.T * max(variance, 1.0 if stated else 0.0)
     out = []
@@ -231,7 +233,7 @@ def _smooth_columns(x: Array, period: float) -> Array:
     if len(x) < 2 or length == 0.0:
         return np.ones((len(x), 1))
     shortest = max(_STEPS * length / (len(x) - 1), _PERIODS * period)
-    waves = int(2.0 * length / shortest)
+    waves = min(int(2.0 * length / shortest), _WAVES)
     u = (x - x.min()) / length
     return np.column_stack(
         [np.ones(len(x)), 2.0 * u - 1.0, *(np.cos(np.pi * k * u) for k in range(1, waves + 1))]
