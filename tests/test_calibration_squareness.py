@@ -3,6 +3,7 @@ cannot tell it says."""
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -91,6 +92,9 @@ def test_pairs_that_are_none_are_refused() -> None:
         squareness.from_straightness_pair(
             straightness(machine, "EZX", here), straightness(machine, "EXZ", there), Square("granite")
         )
+    table = dataclasses.replace(straightness(machine, "EXZ", here), reference="table")
+    with pytest.raises(ConfigError, match="stayed on the table"):
+        squareness.from_straightness_pair(straightness(machine, "EZX", here), table, Square("granite"))
     with pytest.raises(ConfigError, match="no pair"):
         squareness.from_straightness_pair(
             straightness(machine, "EZX", here), straightness(machine, "EYZ", here), Square("granite")

@@ -4,6 +4,7 @@ plots and reports."""
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -120,6 +121,32 @@ def test_a_period_that_the_targets_miss_is_flagged_never_fitted(tmp_path: Path) 
     assert found["cyclic"][0]["cyclic"] == []
     assert [row["period_mm"] for row in found["cyclic"][0]["not_seen"]] == [10.0, 5.0]
     assert "OLP853" in {f["code"] for f in found["findings"]}
+
+
+def test_a_fine_sweep_beside_an_aliased_line_is_used(tmp_path: Path) -> None:
+    """Targets at 50 mm miss a screw of 10 mm pitch; 20 mm in steps of 1 mm, a file of its own, see it."""
+    head = (
+        '# component = "EXX"\n# machine = "m"\n# measured = 2026-01-01\n# temperature_degC = 20\n'
+        '# sense = "actual-minus-commanded"\n# line_mm = { Y = 0, Z = 0 }\n# tool_mm = [0, 0, 0]\n'
+        "# period_mm = [10.0]\ntarget_mm,run,direction,value_um\n"
+    )
+
+    def rows(positions: list[float], runs: int) -> str:
+        return "".join(
+            f"{q},{run},{d},{4.0 * math.sin(math.tau * q / 10.0 + 0.5) + q / 100.0 + 0.1 * (run % 2):.4f}\n"
+            for run in range(1, runs + 1)
+            for d in (1, -1)
+            for q in positions[::d]
+        )
+
+    (tmp_path / "x.csv").write_text(head + rows([50.0 * k for k in range(21)], 5), "utf-8")
+    (tmp_path / "sweep.csv").write_text(head + rows([300.0 + k for k in range(21)], 2), "utf-8")
+    found = json.loads(good("evaluate", tmp_path, "--json"))
+    assert [Path(row["file"]).name for row in found["sweeps"]] == ["sweep.csv"]
+    [part] = found["cyclic"]
+    assert part["not_seen"] == []
+    assert part["cyclic"][0]["amplitude_um"] == pytest.approx(4.0, abs=0.05)
+    assert part["cyclic"][0]["phase_rad"] == pytest.approx(0.5, abs=0.02)
 
 
 def test_ballbar(tmp_path: Path) -> None:

@@ -86,6 +86,13 @@ def from_straightness_pair(first: Line, second: Line, square: Square) -> Squaren
     along = {line.axis: line for line in (first, second)}
     a, b = along[earlier], along[later]
     third = 3 - earlier - later
+    for line in (a, b):
+        if line.reference == "table":
+            raise ConfigError(
+                f"line {line.component} was read at a reflector that stayed on the table, so the angles of "
+                f"{AXES[line.axis]} lean it; give both lines to olp calibrate fit, which takes that out",
+                file=line.source,
+            )
     apart = abs(a.line_mm[third] - b.line_mm[third])
     levers = max(abs(p - q) for p, q in zip(a.tool_mm, b.tool_mm, strict=True))
     if max(apart, levers) > SAME_PLACE_MM:
