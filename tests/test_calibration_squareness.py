@@ -323,9 +323,27 @@ def test_both_ways_separate_squareness_and_servo_mismatch(plane: str) -> None:
     assert found.value[6:] == pytest.approx([lost[first], lost[second]], abs=2e-4)
     assert list(found.findings) == []
     low = min(first, second)
-    assert reading.span_mm[0] == pytest.approx((BOX[low].mean() - 150, BOX[low].mean() + 150))
+    half = 150 * math.sqrt(5 / 6)
+    assert reading.span_mm[0] == pytest.approx((BOX[low].mean() - half, BOX[low].mean() + half))
     assert found.hysteresis is not None
     assert found.hysteresis > 5e-3
+
+
+def test_a_circle_sees_the_mean_lines_over_its_span() -> None:
+    """Straightness of the third order: the reading is the lean of the mean lines over its span."""
+    random = np.random.default_rng(3)
+    size = random.normal(0, 1e-9, 2)
+    radius, t = 150.0, np.radians(np.arange(0.5, 360.0))
+    x, y = radius * np.cos(t), radius * np.sin(t)
+    value = (size[0] * y**3 * x + size[1] * x**3 * y) / radius
+    t, value = np.tile(t, 2), np.tile(value, 2)
+    way = np.repeat([1, -1], 360)
+    found = ballbar.fit(ballbar.Circles("XY", radius, (0, 0, 0), t, value, np.ones(720, int), way)).reading()
+    assert found is not None
+    (low, high), _ = found.span_mm
+    q = np.linspace(low, high, 4001)
+    slopes = [float(q @ (s * q**3) / (q @ q)) for s in size]
+    assert found.value_rad == pytest.approx(-sum(slopes), rel=2e-3)
 
 
 def test_one_way_gives_no_squareness_and_says_so() -> None:

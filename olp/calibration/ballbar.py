@@ -31,6 +31,8 @@ UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "lost_
 #: Readings this near to where an axis turns round are left out of the fit: there friction makes spikes.
 SKIP_DEG = 2.5
 _PLACES, _FEWEST = 720, 8
+#: A circle of radius R sees the slope R^2 / 2 of x^3, a mean line over +-s the slope 3 s^2 / 5.
+_MEAN_LINE = float(np.sqrt(5.0 / 6.0))
 _SHARE, _RANK, _TOO_MUCH = 1e-6, 1e-9, 5.0
 
 
@@ -104,14 +106,16 @@ class CircleFit:
         return PLANES[self.circles.plane][2]
 
     def reading(self) -> SquarenessReading | None:
-        """The squareness as at the centre, over the diameter; None where it is not determined."""
+        """The squareness as at the centre; None where it is not determined. Its span is that whose mean lines
+        have the slopes that the circle sees, for straightness up to the third order."""
         if "square" not in self.determined:
             return None
         c, r = self.circles, self.circles.radius_mm
         lean = 2.0 * self.value[4] / r
         first, second, name = PLANES[c.plane]
         low, high = sorted((first, second))
-        spans = [(c.centre_mm[i] - r, c.centre_mm[i] + r) for i in (low, high)]
+        half = _MEAN_LINE * r
+        spans = [(c.centre_mm[i] - half, c.centre_mm[i] + half) for i in (low, high)]
         return SquarenessReading(
             name, float(LEAN[name] * lean), c.centre_mm, (spans[0], spans[1]), c.tool_mm,
             float(2.0 * self.sigma[4] / r), c.source,
@@ -204,9 +208,24 @@ def fit(circles: Circles, *, skip_deg: float = SKIP_DEG) -> CircleFit:
     residual = circles.value - design @ found
     dof = len(value) - rank
     noise = float(np.sqrt((residual[used] ** 2).sum() / max(dof, 1)))
-    sigma = max(noise, circles.sigma) * np.sqrt(np.diag(inverse @ inverse.T))
+    spread = max(noise * _alike(circles, residual, used), circles.sigma)
+    sigma = spread * np.sqrt(np.diag(inverse @ inverse.T))
     circular, hysteresis = _figures(circles, found)
     return CircleFit(circles, found, sigma, determined, residual, used, noise, circular, hysteresis)
+
+
+def _alike(circles: Circles, residual: Array, used: Array) -> float:
+    """How much more uncertain a mean is because neighbours on the circle are alike: what straightness and
+    scales leave repeats, and is no noise (autocorrelation r of the first order, sqrt((1 + r) / (1 - r)))."""
+    product = square = 0.0
+    for d in (1, -1):
+        for run in np.unique(circles.run[circles.direction == d]):
+            rows = np.flatnonzero((circles.direction == d) & (circles.run == run) & used)
+            rest = residual[rows[np.argsort(circles.angle_rad[rows] % (2.0 * np.pi))]]
+            product += float(rest[:-1] @ rest[1:])
+            square += float(rest @ rest)
+    alike = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
+    return float(np.sqrt((1.0 + alike) / (1.0 - alike)))
 
 
 def columns(circles: Circles) -> Array:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.conventions import AXES_OF, LEAN
-from olp.calibration.iso230_2 import Statistics, statistics
+from olp.calibration.iso230_2 import Statistics, statistics, targets_of
 from olp.calibration.observations import Array, Index, SquarenessReading
 from olp.exceptions import ConfigError
 from olp.findings import Finding
@@ -95,8 +95,9 @@ class Diagonal:
         return statistics(self.distance_mm, self.value, self.direction, f"diagonal {self.name}", self.source)
 
     def elongation(self) -> tuple[float, float]:
-        """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty
-        from the scatter about the mean of each target, `sigma` where that is more."""
+        """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty:
+        from the scatter of the readings (`sigma` where that is more) or, where that is larger, from how far
+        the means of the targets are off the line."""
         x = self.distance_mm - self.distance_mm.mean()
         spread = float(x @ x)
         if spread == 0.0:
@@ -104,7 +105,11 @@ class Diagonal:
         slope = float(x @ self.value) / spread
         rest = self.value - self.value.mean() - slope * x
         noise = float(np.sqrt(rest @ rest / max(len(x) - 2, 1)))
-        return slope, max(noise, self.sigma) / np.sqrt(spread)
+        target, place = targets_of(self.distance_mm)
+        means = np.bincount(place, rest) / np.bincount(place)
+        bow = float(np.sqrt(means @ means / (len(target) - 2))) if len(target) > 2 else 0.0
+        apart = float(np.sqrt(((target - target.mean()) ** 2).sum()))
+        return slope, max(max(noise, self.sigma) / np.sqrt(spread), bow / apart)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
