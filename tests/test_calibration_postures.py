@@ -92,6 +92,18 @@ def test_errors_of_the_machine_are_taken_out() -> None:
     assert known.error_mm["left"] == pytest.approx(np.subtract(ERRORS["left"], ERRORS["down"]), abs=1e-9)
 
 
+def test_without_repetition_an_uncertainty_must_be_stated() -> None:
+    once = held(STYLI, ERRORS, ["down", "left"])
+    bare = postures.Postures(once.axis_mm, once.tool, once.vector_mm, once.turn)
+    with pytest.raises(ConfigError, match="sigma_um is not stated"):
+        postures.fit(bare)
+    assert postures.fit(once).sigma_mm["left"] == pytest.approx([2**0.5 * 1e-6] * 3)
+    two, way = np.array([0.0, 100.0]), np.ones(2, int)
+    plain = diagonals.Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), way, way)
+    with pytest.raises(ConfigError, match="nothing is repeated"):
+        diagonals.fit([plain])
+
+
 def test_program_of_postures() -> None:
     text = postures.program([1, 2], (10.0, 20.0, -30.0), clearance_mm=50.0, feed_mm_min=300.0, runs=1)
     assert text.count("M6") == 2 and "G1 Z-30.0000 F300" in text and "G0 Z20.0000" in text

@@ -235,8 +235,14 @@ def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] 
             file=diagonals[-1].source,
         )
     pairs = [d.elongation() for d in diagonals]
-    elongation = np.array([p[0] for p in pairs])
-    sigma = np.maximum(np.array([p[1] for p in pairs]), 1e-12)
+    elongation, sigma = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+    if (sigma == 0.0).any():
+        bare = diagonals[int(np.argmin(sigma))]
+        raise ConfigError(
+            f"diagonal {bare.name}: nothing is repeated and sigma_um is not stated; expected repeated runs, "
+            "or the uncertainty of a reading",
+            file=bare.source,
+        )
     design = np.array([row_of(d.unit) for d in diagonals])
     stated = np.array([[float(u == name) for u in UNKNOWNS] for name in known]).reshape(-1, len(UNKNOWNS))
     design = np.vstack((design, stated))

@@ -154,6 +154,12 @@ def fit(postures: Postures, error_mm: Array | None = None, reference: str | None
     residual = (right - system @ found).reshape(n, 3)
     dof = 3 * n - rank
     noise = float(np.sqrt((residual**2).sum() / dof)) if dof > 0 else postures.sigma
+    if dof <= 0 and postures.sigma == 0.0:
+        raise ConfigError(
+            f"{n} postures are just enough for what is unknown, and sigma_um is not stated; expected "
+            "repeated postures, or the uncertainty of a coordinate",
+            file=postures.source,
+        )
     sigma = max(noise, postures.sigma) * np.sqrt(np.diag(inverse @ inverse.T))
     value, spread = np.where(hidden, np.nan, found), np.where(hidden, np.nan, sigma)
     errors = {name: value[3 + 3 * k : 6 + 3 * k] for k, name in enumerate(fitted)}
