@@ -9,7 +9,7 @@ import numpy as np
 from judge import simulated
 
 from olp.calibration.estimator import Fit
-from olp.calibration.observations import Line, Measurements, Square
+from olp.calibration.observations import Line, Measurements, Points, Square
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
 #: tools of the judgement: the one measured with, and one that no line has seen
@@ -41,6 +41,19 @@ def case(seed: int, family: str, chain: str | None = None) -> tuple[simulated.Ma
     tables = chain[: chain.index("F")] if seed % 3 == 1 else ""
     taken = simulated.all_lines(machine, seed, tables=tables)
     return machine, measurements_of(taken, simulated.PITCH if family == "rough" else None)
+
+
+#: tools of the judgement of points: none of those of the plan
+FRESH = ((0.0, 0.0, -180.0), (90.0, 60.0, -220.0))
+
+
+def cloud(
+    machine: simulated.Machine, seed: int, n: int, sigma_um: float, tools: Sequence[object] | None = None
+) -> Points:
+    """Points of a tracker in a Latin hypercube, with three offsets of the reflector."""
+    tools = simulated.OFFSETS if tools is None else tools
+    at, tool, place = simulated.points(machine, seed, n, sigma_um * 1e-3, tools)
+    return Points(at, tool, place, sigma_um * 1e-3, source="points.csv")
 
 
 @dataclass(frozen=True)

@@ -139,6 +139,38 @@ def test_plan_and_file_must_agree(tmp_path: Path) -> None:
     assert load_measurements([tmp_path]).lines[0].tool_mm == (0.0, 0.0, -80.0)
 
 
+POINTS = "X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm\n" + "".join(
+    f"{x},{y},{z},{y + 7},{x - 3},{1 - z}\n" for x in (0, 500) for y in (0, 300) for z in (-100, 0)
+)
+
+
+def test_points_of_a_tracker(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("# a comment\n" + POINTS)
+    planned(tmp_path, '[[points]]\nfile = "t.csv"\nsigma_um = 8.0\ntool_mm = [0, 0, -90]\n')
+    (found,) = load_measurements([tmp_path]).points
+    assert found.axis_mm.shape == found.measured_mm.shape == (8, 3)
+    assert found.tool_mm[3].tolist() == [0.0, 0.0, -90.0]
+    assert found.sigma == 0.008
+    assert found.row.tolist() == list(range(3, 11))
+
+
+@pytest.mark.parametrize(
+    ("change", "more", "words"),
+    [
+        (("measured_X_mm", "seen_X_mm"), "", 'column 4 is "seen_X_mm"'),
+        (("500,0,0,", "500,0,"), "", "line 7: 5 values under 6 columns"),
+        (("500,0,0,", "500,0,x,"), "", 'line 7: Z_mm = "x"'),
+        (("", ""), "sigma_um = 0.0\n", "sigma_um"),
+    ],
+)
+def test_points_that_are_wrong(tmp_path: Path, change: tuple[str, str], more: str, words: str) -> None:
+    (tmp_path / "t.csv").write_text(POINTS.replace(*change) if change[0] else POINTS)
+    planned(tmp_path, '[[points]]\nfile = "t.csv"\n' + (more or "sigma_um = 8.0\n"))
+    with pytest.raises(ConfigError) as caught:
+        load_measurements([tmp_path])
+    assert words in str(caught.value)
+
+
 # -- the example, through the command line ---------------------------------------------------------------
 
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calibration_cases import TOOLS, case, left, line_of, measurements_of
+from calibration_cases import FRESH, TOOLS, case, cloud, left, line_of, measurements_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import simulated
@@ -120,6 +120,74 @@ def test_zeros_and_slopes_of_instruments_mean_nothing(
     again = fit(dataclasses.replace(measurements, lines=tuple(moved)), "FXYZ")
     at = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (100, 3))
     assert np.abs(again.error(at, TOOLS[1]) - found.error(at, TOOLS[1])).max() < 0.01 * UM
+
+
+# -- points of a tracker ---------------------------------------------------------------------------------
+
+
+def test_what_points_leave_alone_and_with_lines() -> None:
+    """The frame of the instrument is far away and turned; fresh tools."""
+    alone, both = [], []
+    for seed in range(4):
+        machine, measurements = case(seed, "smooth")
+        points = cloud(machine, seed, 120, 5.0)
+        found = fit(Measurements("m", points=(points,)), machine.chain)
+        alone += [left(machine, found, tool, 400) for tool in FRESH]
+        few = cloud(machine, seed, 40, 8.0)
+        found = fit(dataclasses.replace(measurements, points=(few,)), machine.chain)
+        both += [left(machine, found, tool, 400) for tool in FRESH]
+    assert np.median([one.after_framed for one in alone]) <= 6.0
+    assert np.median([one.after_framed for one in both]) <= 3.5
+    assert 0.5 < np.sqrt(np.mean([one.z**2 for one in alone])) < 1.5
+
+
+@pytest.mark.parametrize(("chain", "hidden"), [("FXYZ", "ECY"), ("YFXZ", "ECX"), ("ZXFY", "EBX")])
+def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None:
+    """All turns of the last axis, and of the one before about the last one's direction: they move no point of
+    one offset otherwise than its own displacement does. Two offsets hide the turn about their line."""
+    last = chain.replace("F", "")[2]
+    machine = simulated.machine(1, "smooth", chain)
+    one = fit(Measurements("m", points=(cloud(machine, 1, 250, 5.0, [(30.0, 0.0, 9.0)]),)), chain)
+    assert set(unseen(one)) == {hidden, *(f"E{d}{last}" for d in "ABC")}
+    assert all("one offset" in finding.message for finding in told(one, "OLP801"))
+    along_z = fit(
+        Measurements("m", points=(cloud(machine, 1, 250, 5.0, [(0.0, 0.0, -80.0), (0.0, 0.0, -400.0)]),)), chain
+    )
+    assert set(unseen(along_z)) == {f"EC{last}"}
+    assert "on one line" in told(along_z, "OLP801")[0].message
+    three = fit(Measurements("m", points=(cloud(machine, 1, 250, 5.0),)), chain)
+    assert not unseen(three)
+
+
+def test_where_the_instrument_stands_means_nothing() -> None:
+    machine = simulated.machine(2, "smooth", "FXYZ")
+    points = cloud(machine, 2, 60, 5.0)
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    moved = dataclasses.replace(points, measured_mm=points.measured_mm @ turn.T + 1234.5)
+    first, second = (fit(Measurements("m", points=(p,)), "FXYZ") for p in (points, moved))
+    at = np.random.default_rng(1).uniform(first.box_mm[:, 0], first.box_mm[:, 1], (50, 3))
+    assert first.error(at, FRESH[0]) == pytest.approx(second.error(at, FRESH[0]), abs=1e-6)
+
+
+def test_a_point_that_slipped_is_left_out_and_named() -> None:
+    machine = simulated.machine(2, "smooth", "FXYZ")
+    points = cloud(machine, 2, 150, 5.0)
+    measured = points.measured_mm.copy()
+    measured[17] += 0.2
+    found = fit(Measurements("m", points=(dataclasses.replace(points, measured_mm=measured),)), "FXYZ")
+    assert [outlier.row for outlier in found.outliers] == [18]
+    assert "points.csv: row 18" in told(found, "OLP802")[0].message
+
+
+def test_a_forgotten_scale_is_caught_by_chi_square() -> None:
+    """A tracker that is off by 50 um/m beside a laser's lines; stated as unknown it fits."""
+    machine, measurements = case(0, "smooth", "FXYZ")
+    points = cloud(machine, 0, 60, 5.0)
+    points = dataclasses.replace(points, measured_mm=points.measured_mm * (1.0 + 5e-5))
+    forgotten = fit(dataclasses.replace(measurements, points=(points,)), "FXYZ")
+    assert told(forgotten, "OLP808") or forgotten.outliers
+    known = dataclasses.replace(points, sigma_scale=5e-5)
+    assert not told(fit(dataclasses.replace(measurements, points=(known,)), "FXYZ"), "OLP808")
 
 
 # -- what was not seen -----------------------------------------------------------------------------------

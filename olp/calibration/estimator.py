@@ -24,8 +24,9 @@ from olp.calibration.lines import (
     targets_of,
 )
 from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
-from olp.calibration.observations import Line, Measurements
+from olp.calibration.observations import Line, Measurements, Points
 from olp.calibration.parameters import CROSS, Parameters, Place
+from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
 from olp.calibration.separation import aliased
 from olp.calibration.smoothing import Shape, shape_of
@@ -38,6 +39,12 @@ from olp.units import AXES
 #: Cells of the spline of a curve: as many as a line has targets between these.
 FEWEST, MOST = 6, 48
 HALF_CELLS = 5
+#: Cells where no lines but points tell of an axis.
+POINT_CELLS = 12
+#: What stands for the component of a point.
+POINT = "point"
+#: The adjustment is made anew after cyclic terms or points were left out, so often at most.
+PASSES = 4
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
 OUTLIER, SHARE = 6.0, 0.05
 #: A cyclic term below so many standard deviations is noise.
@@ -68,6 +75,16 @@ class LineResult:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PointsResult:
+    """Points after the fit: residuals (n, 3) in mm in the machine's frame, sum of squares of standardised
+    residuals."""
+
+    points: Points
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """theta with its covariance and layout; see `error`, `sigma`, `design`.
 
@@ -82,6 +99,7 @@ class Fit:
     covariance: Array
     prior: Prior
     lines: tuple[LineResult, ...]
+    points: tuple[PointsResult, ...]
     outliers: tuple[Outlier, ...]
     box_mm: Array
     slopes: Mapping[str, Array]
@@ -178,34 +196,44 @@ def fit(
     tell = progress or silent
     tell("noise", 0.0)
     lines, noises, outliers = _screened(measurements.lines)
-    ranges, box = _ranges(lines, travel_mm)
+    clouds = list(measurements.points)
+    ranges, box = _ranges(lines, clouds, travel_mm)
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
     splines = [_spline(lines, axis, ranges[axis]) for axis in range(3)]
     waves, unseen = _waves(measurements, lines)
     shapes = _shapes(lines, noises, splines, waves, tell)
-    for again in (False, True):
+    for _ in range(PASSES):
         parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
         prior = Prior(parameters, shapes, _squares(measurements, parameters))
         blocks = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
         blocks += [squareness_block(reading, parameters) for reading in measurements.squareness]
-        tell("adjustment", 0.5 * again)
+        blocks += [points_block(cloud, parameters) for cloud in clouds]
+        tell("adjustment", 0.5)
         normal, solved = _adjusted(blocks, prior)
         seen = _waves_seen(parameters, solved)
-        if seen == waves:
+        slips = [
+            _slips(block, cloud, solved)
+            for block, cloud in zip(blocks[len(blocks) - len(clouds) :], clouds, strict=True)
+        ]
+        outliers += [slip for some in slips for slip in some]
+        if seen == waves and not any(slips):
             break
         waves = seen
-    results, chi_square = [], 0.0
+        clouds = [_without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
+    results, points, chi_square = [], [], 0.0
     for k, block in enumerate(blocks):
         _, residual, sigma = residuals_of(block, solved.theta)
         part = float(np.sum((residual / sigma) ** 2))
         chi_square += part
         if k < len(lines):
             results.append(LineResult(lines[k], noises[k], residual, part))
+        elif k >= len(blocks) - len(clouds):
+            points.append(PointsResult(clouds[k - len(blocks)], residual.reshape(-1, 3), part))
     # readings less what the fit used up of their freedom
     used = float(np.trace(solved.covariance @ normal.H)) + normal.free
     return Fit(
-        measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(outliers),
-        box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
+        measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(points),
+        tuple(outliers), box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
     )  # fmt: skip
 
 
@@ -233,6 +261,25 @@ def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave,
             if float(np.hypot(*solved.theta[at])) > CYCLIC_SEEN * sigma:
                 seen[name] = (*seen.get(name, ()), wave)
     return seen
+
+
+def _slips(block: Block, cloud: Points, solved: Solved) -> list[Outlier]:
+    """Points whose residual is no noise, the worst ones first."""
+    _, residual, sigma = residuals_of(block, solved.theta)
+    rest = residual.reshape(-1, 3)
+    off = np.abs(residual / sigma).reshape(-1, 3).max(axis=1)
+    worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
+    return [
+        Outlier(cloud.source, int(cloud.row[k]), POINT, float(np.linalg.norm(rest[k])), float(off[k]))
+        for k in worst.tolist()
+        if off[k] > OUTLIER and off[k] > 0.3 * off.max()
+    ]
+
+
+def _without(cloud: Points, slips: Sequence[Outlier]) -> Points:
+    use = ~np.isin(cloud.row, [slip.row for slip in slips])
+    names = ("axis_mm", "tool_mm", "measured_mm", "row")
+    return dataclasses.replace(cloud, **{name: getattr(cloud, name)[use] for name in names})
 
 
 def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:
@@ -288,21 +335,23 @@ def _medians(values: Array, labels: np.ndarray) -> Array:
 
 
 def _ranges(
-    lines: Sequence[Line], travel_mm: Sequence[tuple[float, float]] | None
+    lines: Sequence[Line], clouds: Sequence[Points], travel_mm: Sequence[tuple[float, float]] | None
 ) -> tuple[list[tuple[float, float]], Array]:
-    """What the lines of each axis reach together, and the box that every one of its components covers."""
+    """What the readings of each axis reach together, and the box: what every component with lines covers, or
+    the points where an axis has no lines."""
     ranges, box = [], np.zeros((3, 2))
     for axis in range(3):
         own = [line for line in lines if line.axis == axis]
-        if not own:
+        reached = [line.target_mm for line in own] + [cloud.axis_mm[:, axis] for cloud in clouds]
+        if not reached:
             raise CannotCompute(
                 f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
-                "every axis"
+                "every axis, or points"
             )
-        low = min(float(line.target_mm.min()) for line in own)
-        high = max(float(line.target_mm.max()) for line in own)
+        low = min(float(q.min()) for q in reached)
+        high = max(float(q.max()) for q in reached)
         ranges.append((low, high))
-        sides = []
+        sides = [] if own else [(low, high)]
         for name in {line.component for line in own}:
             same = [line for line in own if line.component == name]
             side = (
@@ -315,7 +364,7 @@ def _ranges(
         box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
         if box[axis, 0] >= box[axis, 1]:
             raise CannotCompute(
-                f"the lines along {AXES[axis]} have no length in common in the travel; expected them over "
+                f"the readings along {AXES[axis]} have no length in common in the travel; expected them over "
                 "the same length"
             )
     return ranges, box
@@ -328,6 +377,8 @@ def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float]) -> Spli
         for line in lines
         if line.axis == axis and np.ptp(line.target_mm) > SWEEP * (span[1] - span[0])
     ]
+    if not own:
+        return Spline(*span, POINT_CELLS)
     return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
 
 

@@ -14,17 +14,21 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-from olp.calibration.observations import Line, Measurements, Square, SquarenessReading
+import numpy as np
+
+from olp.calibration.observations import Line, Measurements, Points, Square, SquarenessReading
 from olp.exceptions import ConfigError, InputError
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
     LineKeys,
     LineTable,
     MeasurementsFile,
+    PointsTable,
     SquarenessReadingTable,
     SquareTable,
     Stated,
 )
+from olp.files.point_readings import read_point_readings
 from olp.files.problems import Problem, config_error, validate
 from olp.files.readings import Readings, check_component, decoded, parse_readings, stated_keys
 from olp.files.schemas import Position
@@ -47,6 +51,7 @@ class _Gathered:
 
     chain: str | None
     lines: list[Line] = field(default_factory=list)
+    points: list[Points] = field(default_factory=list)
     squares: dict[str, Square] = field(default_factory=dict)
     squareness: list[SquarenessReading] = field(default_factory=list)
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
@@ -102,6 +107,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         active_during_measurement=found.whole.get("active_during_measurement", (frozenset(), ""))[0],
         measured=found.whole["measured"][0],
         chain=found.chain,
+        points=tuple(found.points),
     )
 
 
@@ -118,8 +124,8 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
         if plan.suffix.lower() != ".toml":
             continue
         try:
-            tables = tomllib.loads(read_bytes(plan).decode("utf-8-sig")).get("lines")
-            for table in tables or ():
+            stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
+            for table in (*stated.get("lines", ()), *stated.get("points", ())):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader says what is wrong with it.
@@ -157,20 +163,23 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    for index, line in enumerate(plan.lines):
-        key = ("lines", index)
-        at = line_of(key, places)
+    tables: list[tuple[Path, LineTable | PointsTable]] = [(("lines", k), t) for k, t in enumerate(plan.lines)]
+    tables += [(("points", k), table) for k, table in enumerate(plan.points)]
+    for key, item in tables:
         try:
-            _line(path, line, plan.defaults, plan.vertical, found)
+            if isinstance(item, LineTable):
+                _line(path, item, plan.defaults, plan.vertical, found)
+            else:
+                found.points.append(_points(path, item, plan.defaults))
         except ConfigError as error:
             if error.file not in (None, str(path)):
                 found.errors.append(error)
             else:
-                problems += [(at, f"{dotted(key)} ({line.file}): {text}") for text in error.problems]
+                at = line_of(key, places)
+                problems += [(at, f"{dotted(key)} ({item.file}): {text}") for text in error.problems]
         except InputError as error:
-            problems.append(
-                (line_of((*key, "file"), places), f'{dotted(key)}.file = "{line.file}": {error.message}')
-            )
+            sentence = f'{dotted(key)}.file = "{item.file}": {error.message}'
+            problems.append((line_of((*key, "file"), places), sentence))
     if problems:
         found.errors.append(config_error(problems, str(path)))
 
@@ -192,6 +201,25 @@ def _line(plan: FilePath, table: LineTable, defaults: LineKeys, vertical: str, f
 
 def _read(path: FilePath, profile: FilePath | None) -> Readings:
     return read_line(path, None if profile is None else load_line_profile(profile))
+
+
+def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
+    path = plan.parent / table.file
+    readings = read_point_readings(path)
+    tool = table.tool_mm or defaults.tool_mm
+    if readings.tool_mm is None and tool is None:
+        raise ConfigError("tool_mm is missing; expected it here, or the columns tool_X_mm ... in the file")
+    if readings.tool_mm is not None and table.tool_mm is not None:
+        raise ConfigError("tool_mm is stated here and in columns of the file; expected it once")
+    return Points(
+        axis_mm=readings.axis_mm,
+        tool_mm=np.array(tool) if readings.tool_mm is None else readings.tool_mm,
+        measured_mm=readings.measured_mm,
+        sigma=table.sigma_um * MM_PER_UM,
+        sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+        source=str(path),
+        row=readings.row,
+    )
 
 
 # -- files that describe themselves ----------------------------------------------------------------------

@@ -260,3 +260,24 @@ def off_frame(position: np.ndarray, error: np.ndarray) -> np.ndarray:
 def rms_um(error: np.ndarray) -> float:
     """Root mean square length of errors (n, 3) in mm, in um."""
     return float(np.sqrt((error**2).sum(axis=1).mean()) * 1e3)
+
+
+#: tools of a planned set of points: not on one line, so that every angle acts
+OFFSETS = ((0.0, 0.0, -120.0), (150.0, 0.0, -120.0), (-60.0, 130.0, -260.0))
+
+
+def points(
+    m: Machine, seed: int, n: int, sigma: float, tools: Any = OFFSETS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Axis positions, tool vectors and places (n, 3) in a tracker's frame: a Latin hypercube, with noise."""
+    rng = np.random.default_rng([seed, n, 11])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    place = at + tool + rng.normal(0.0, sigma, (n, 3))
+    for vector in np.array(tools):
+        own = (tool == vector).all(axis=1)
+        place[own] += m.error(at[own], vector)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    return at, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
