@@ -33,7 +33,12 @@ def evaluate_lines(
     moving tables is checked against its chain. Raises InputError, ConfigError.
     """
     chain = None if machine is None else setup_of(machine, None).machine.chain
-    return evaluate_all(load_measurements(sources, chain), zone)
+    found = load_measurements(sources, chain)
+    if not found.lines:
+        raise ConfigError(
+            "no lines to evaluate; expected [[lines]] in a plan, or files of readings along axes"
+        )
+    return evaluate_all(found, zone)
 
 
 def fit_ballbar(sources: Sequence[PathLike], *, skip_deg: float = ballbar.SKIP_DEG) -> tuple[CircleFit, ...]:

@@ -16,14 +16,14 @@ from olp.calibration.conventions import angle_words
 from olp.calibration.estimator import Fit
 from olp.calibration.evaluating import Evaluated
 from olp.calibration.iso230_2 import Evaluation, scale_of
-from olp.calibration.observations import Line
+from olp.calibration.observations import Array, Line
 from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
 from olp.errormodel.calibration import Calibration
 from olp.findings import RULES, Finding
 from olp.plots import Format, calibration_curves
 from olp.plots_calibration import Fitted, name_of_straightness, name_of_turn
 from olp.report import findings_text, number, pairs, printable, table
-from olp.units import AXES, RAD_PER_URAD
+from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 
 _FIGURES = ("A", "E", "R", "M", "B", "B_mean")
 _ONE_SIDE = ("A_up", "E_up", "R_up", "A_down", "E_down", "R_down")
@@ -32,6 +32,8 @@ _CYCLIC = "Cyclic errors of at least three times their standard uncertainty"
 _SURE = 3.0
 _ORDER = {"positioning": 0, "straightness": 1, "angle": 2}
 _DENSE = 200
+#: places in the box where errors are stated
+_PLACES = 400
 #: What the figures say, for who reads them once a year.
 _LEGEND = (
     "A accuracy, E systematic deviation, R repeatability, M mean systematic deviation, B reversal (largest, "
@@ -287,6 +289,7 @@ def calibration(
         ("Calibrated box", f"{box} mm"),
         ("Datum", ", ".join(f"{a} {v:g}" for a, v in zip(AXES, report["datum_mm"], strict=True)) + " mm"),
         ("Lost motion", f"{lost} um"),
+        ("Over the box", _volume(summary.fit)),
     ]
     fitted: list[Block] = [
         Pairs(sigma),
@@ -307,16 +310,35 @@ def calibration(
     )
 
 
+def _volume(fit: Fit) -> str:
+    """How far the tool is off over the box, and how well that is known: rms lengths at places of a Latin
+    hypercube, with the tool vector that most lines were read with."""
+    random = np.random.default_rng(0)
+    share = (np.argsort(random.random((3, _PLACES)), axis=1).T + random.random((_PLACES, 3))) / _PLACES
+    at = fit.box_mm[:, 0] + share * np.ptp(fit.box_mm, axis=1)
+    tools = [line.tool_mm for line in fit.measurements.lines if line.quantity != "angle"]
+    tool = np.array(max(set(tools), key=tools.count) if tools else (0.0, 0.0, 0.0))
+    size = np.linalg.norm(fit.error(at, tool), axis=1) * UM_PER_MM
+    known = np.linalg.norm(fit.sigma(at, tool), axis=1) * UM_PER_MM
+    return (
+        f"{number(_rms(size))} um rms as it is, {number(float(size.max()))} um at most; known within "
+        f"{number(_rms(known))} um rms, with the tool vector {_vector(tool.tolist())}"
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values**2).mean()))
+
+
 def fit_plots(summary: FitSummary) -> dict[str, bytes]:
-    """The plots of a fit as SVG."""
+    """The plots of a fit as SVG; those of lines where it had any."""
     curves = calibration_curves(summary.calibration)
-    return {
-        "curves": curves[curves.index(b"<svg") :],
-        "fitted": plots_calibration.fitted(fitted_lines(summary.fit)),
-        "residuals": plots_calibration.residuals(
-            [(r.line, r.residual) for r in sorted(summary.fit.lines, key=lambda r: _place_in_order(r.line))]
-        ),
-    }
+    out = {"curves": curves[curves.index(b"<svg") :]}
+    results = sorted(summary.fit.lines, key=lambda r: _place_in_order(r.line))
+    if results:
+        out["fitted"] = plots_calibration.fitted(fitted_lines(summary.fit))
+        out["residuals"] = plots_calibration.residuals([(r.line, r.residual) for r in results])
+    return out
 
 
 def _subtitle(found: Evaluated, date: datetime.date | None) -> str:
@@ -367,6 +389,8 @@ def _vector(values: Sequence[float]) -> str:
 
 
 def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section]:
+    if not found.evaluations:
+        return
     blocks: list[Block] = [Paragraph(_LEGEND)]
     for keys, both in ((_FIGURES, True), (_ONE_SIDE, False)):
         rows = _rows(found, keys, both=both)
@@ -430,6 +454,13 @@ def _component_tables(report: Mapping[str, Any]) -> Iterator[Block]:
         angle = angle_words(row["name"], row["value_urad"] * RAD_PER_URAD)
         rows.append([row["name"], angle, number(row["value_urad"]), number(2.0 * row["sigma_urad"])])
     yield Grid(["squareness", "", "urad", "+-"], rows, left=2)
+    sets = report.get("sets_of_points") or ()
+    if sets:
+        keys = [key for key in sets[0] if key != "name"]
+        yield Grid(
+            ["points of a tracker", *(key.replace("_", " ") for key in keys)],
+            [[FilePath(row["name"]).name, *(number(row[key]) for key in keys)] for row in sets],
+        )
     if report["cyclic"]:
         yield Grid(
             ["cyclic", "period mm", "amplitude"],
