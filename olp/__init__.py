@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from olp.api import inspect as inspect
     from olp.api import simulate as simulate
     from olp.api import verify as verify
+    from olp.calibrating import FittedCalibration as FittedCalibration
+    from olp.calibrating import fit_calibration as fit_calibration
     from olp.comparing import Comparison as Comparison
     from olp.comparing import compare as compare
     from olp.exceptions import CannotCompute as CannotCompute
@@ -31,10 +33,20 @@ if TYPE_CHECKING:
     from olp.exceptions import InputError as InputError
     from olp.exceptions import OlpError as OlpError
     from olp.exceptions import ProgramError as ProgramError
+    from olp.exchanging import TableExport as TableExport
+    from olp.exchanging import TableImport as TableImport
+    from olp.exchanging import compare_tables as compare_tables
+    from olp.exchanging import export_table as export_table
+    from olp.exchanging import import_table as import_table
     from olp.files.config import load_setup as load_setup
     from olp.findings import Finding as Finding
     from olp.gate import Check as Check
     from olp.gate import check as check
+    from olp.metrology import evaluate_lines as evaluate_lines
+    from olp.metrology import fit_ballbar as fit_ballbar
+    from olp.metrology import fit_diagonals as fit_diagonals
+    from olp.metrology import fit_postures as fit_postures
+    from olp.metrology import go_return as go_return
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -51,7 +63,14 @@ _HOME = {
     "Verification": "olp.api",
     "compare": "olp.comparing",
     "Comparison": "olp.comparing",
+    "FittedCalibration": "olp.calibrating",
+    "fit_calibration": "olp.calibrating",
     "correct": "olp.api",
+    "compare_tables": "olp.exchanging",
+    "export_table": "olp.exchanging",
+    "import_table": "olp.exchanging",
+    "TableExport": "olp.exchanging",
+    "TableImport": "olp.exchanging",
     "error_at": "olp.api",
     "flatten": "olp.api",
     "inspect": "olp.api",
@@ -71,6 +90,11 @@ _HOME = {
     "ProgramError": "olp.exceptions",
     "Finding": "olp.findings",
     "load_setup": "olp.files.config",
+    "evaluate_lines": "olp.metrology",
+    "fit_ballbar": "olp.metrology",
+    "fit_diagonals": "olp.metrology",
+    "fit_postures": "olp.metrology",
+    "go_return": "olp.metrology",
 }
 
 __all__ = sorted(_HOME)

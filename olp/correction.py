@@ -19,7 +19,7 @@ from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
 from olp.compensation.writer import Writer
 from olp.errormodel.base import Array
-from olp.exceptions import AlreadyCorrected, OlpError, ProgramError
+from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, naming
 from olp.findings import Finding
 from olp.loading import Loaded, unrolled
 from olp.machine import Setup
@@ -148,7 +148,8 @@ def verify_programs(
     where the second is no correction of the first."""
     (first, name), (second, other) = nominal, corrected
     limits = Limits(tolerance_um * MM_PER_UM, refuse_outside=False)
-    rows = plan(first.toolpath, loaded.model, limits)
+    with naming(name or "<nominal>"):
+        rows = plan(first.toolpath, loaded.model, limits)
     digit = last_digit_mm(second, loaded.setup)
     try:
         proof = prove(

@@ -8,10 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from olp.calibration_rules import CALIBRATION
 from olp.gate_rules import GATE
+from olp.metrology_rules import METROLOGY
 from olp.model_rules import MODEL
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
+from olp.table_rules import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +193,7 @@ _TABLE = (
         "OLP402",
         "outside travel",
         Severity.ERROR,
-        "A corrected command leaves the travel of an axis, so the control will stop with a limit alarm.",
+        "A command leaves the travel of an axis, so the control will stop with a limit alarm.",
         "Move the part, or leave the section out with (olp off).",
         "Travel of X up to 2000 mm, and the corrected program writes X2000.012.",
     ),
@@ -302,7 +305,12 @@ _TABLE = (
     ),
 )
 
-RULES = {rule.code: rule for rule in sorted((*_TABLE, *GATE, *MODEL), key=lambda rule: rule.code)}
+RULES = {
+    rule.code: rule
+    for rule in sorted(
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL), key=lambda rule: rule.code
+    )
+}
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine
 GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))

@@ -54,7 +54,7 @@ MODEL = (
         "range_degC = [19, 30] of a sensor that says 33 degC.",
     ),
     Rule(
-        "OLP850",
+        "OLP881",
         "shape of a drift not identified",
         Severity.WARNING,
         "The readings of this component stand at too few positions, or over too little of the axis, to tell "
@@ -63,7 +63,7 @@ MODEL = (
         "`EXX@500_um` alone: only an offset can be told.",
     ),
     Rule(
-        "OLP851",
+        "OLP882",
         "bend without its angle",
         Severity.WARNING,
         "A straightness drifts, so a guide bends, and what rides on a bent guide turns. No angle of that "
@@ -72,7 +72,7 @@ MODEL = (
         "`EZX@1000_um` and no `EBX@..._urad`: 40 urad at 300 mm are 12 um.",
     ),
     Rule(
-        "OLP852",
+        "OLP883",
         "drift that the sensors do not explain",
         Severity.WARNING,
         "Held out of the fit, much of the drift of this component is left.",

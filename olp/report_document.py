@@ -10,7 +10,7 @@ from typing import Any
 
 from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
 from olp.findings import RULES
-from olp.report import Report, number
+from olp.report import Report, by_severity, number
 from olp.report_compare import change, figure, table_rows, taken_by_fit
 
 Plots = Mapping[str, bytes]
@@ -242,8 +242,7 @@ def _tests(report: Report, plots: Plots) -> Iterator[Section]:
 
 
 def _notices(report: Report) -> Iterator[Block]:
-    order = {"error": 0, "warning": 1, "info": 2}
-    found = sorted(report.get("findings") or (), key=lambda f: order.get(str(f["severity"]), 3))
+    found = by_severity(report.get("findings") or ())
     for f in found:
         rule = RULES[f["code"]]
         lines = f["lines"][:8]

@@ -246,22 +246,33 @@ def smooth(rng: random.Random, length: float) -> Callable[[float], float]:
     return lambda q: sum(a * math.sin(2 * math.pi * f * q + phase) for a, f, phase in waves) / scale
 
 
+def curve_values(spec: Curves, axis: int) -> Callable[[float], list[float]]:
+    """The six errors of one axis by position, in um and urad."""
+    low, high = spec.box_mm[axis]
+    datum = spec.datum_mm[axis]
+    rng = random.Random(1000 * spec.seed + axis)
+    amplitudes = [spec.um[axis][0 if i == axis else 1] for i in range(3)] + list(spec.urad[axis])
+    slopes = [spec.slope_um_m[axis] * 1e-3 if i == axis else 0.0 for i in range(6)]
+    waves = [smooth(rng, high - low) for _ in range(6)]
+
+    def values(q: float) -> list[float]:
+        parts = zip(slopes, amplitudes, waves, strict=True)
+        return [slope * (q - datum) + peak * (wave(q) - wave(datum)) for slope, peak, wave in parts]
+
+    return values
+
+
 def curve_rows(spec: Curves, axis: int) -> Iterator[str]:
     """The CSV file of one axis: header, then a row per measured position."""
     letter = "XYZ"[axis]
     low, high = spec.box_mm[axis]
-    datum = spec.datum_mm[axis]
-    rng = random.Random(1000 * spec.seed + axis)
+    errors = curve_values(spec, axis)
     names = [f"E{d}{letter}_um" for d in "XYZ"] + [f"E{d}{letter}_urad" for d in "ABC"]
-    amplitudes = [spec.um[axis][0 if i == axis else 1] for i in range(3)] + list(spec.urad[axis])
-    slopes = [spec.slope_um_m[axis] * 1e-3 if i == axis else 0.0 for i in range(6)]
-    waves = [smooth(rng, high - low) for _ in names]
     yield ",".join([f"{letter}_mm", *names])
     count = math.ceil((high - low) / spec.step_mm[axis] - 1e-9)
     for i in range(count + 1):
         q = low + (high - low) * i / count
-        parts = zip(slopes, amplitudes, waves, strict=True)
-        values = [slope * (q - datum) + peak * (wave(q) - wave(datum)) for slope, peak, wave in parts]
+        values = errors(q)
         # + 0.0 turns a rounded -0.0 into 0.0
         yield ",".join([f"{q:.3f}", *(f"{round(v, spec.decimals) + 0.0:.{spec.decimals}f}" for v in values)])
 

@@ -197,11 +197,11 @@ def test_what_the_logs_do_not_tell_is_refused_or_said() -> None:
         identify([log], BOX, 20.0, sensors=["spindle"])
     few = {k: v for k, v in log.readings.items() if k in {("EXX", 0.0), ("EXX", 500.0), ("EZX", 500.0)}}
     fit = identify([DriftLog(log.time_s, log.sensors_degC, few)], BOX, 20.0)
-    assert {f.code for f in findings(fit)} == {"OLP850", "OLP851"}
+    assert {f.code for f in findings(fit)} == {"OLP881", "OLP882"}
     assert fit.structure.distortions[0].bow == 0.0
     deaf = {k: np.random.default_rng(3).normal(0, 0.01, len(v)) for k, v in log.readings.items()}
     fit = identify([DriftLog(log.time_s, log.sensors_degC, deaf)], BOX, 20.0)
-    assert "OLP852" in {f.code for f in findings(fit)}
+    assert "OLP883" in {f.code for f in findings(fit)}
 
 
 # -- files -----------------------------------------------------------------------------------------------

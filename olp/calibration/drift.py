@@ -444,19 +444,19 @@ def findings(fit: ThermalFit) -> tuple[Finding, ...]:
         if len(c.shapes) < len(SHAPES):
             missing = " and ".join(SHAPES[len(c.shapes) :])
             what = f"{c.component} was read at {c.positions} positions: its {missing} is not known"
-            out.append(Finding("OLP850", what))
+            out.append(Finding("OLP881", what))
         elif c.covered < _COVERED:
             what = f"{c.component} was read over {c.covered:.0%} of its axis; beyond, its shape is continued"
-            out.append(Finding("OLP850", what))
+            out.append(Finding("OLP881", what))
         if c.held_out_drift_rms > 0.0 and c.held_out_rms > _POOR * c.held_out_drift_rms:
             share = c.held_out_rms / c.held_out_drift_rms
             what = f"{c.component}: {share:.0%} of the drift is left where the model was not fitted"
-            out.append(Finding("OLP852", what))
+            out.append(Finding("OLP883", what))
     known = {c.component for c in fit.components}
     for axis in AXES:
         bent = sorted(n for n in known if n[2] == axis and n[1] in AXES and n[1] != axis)
         if bent and not any(n[2] == axis and n[1] in "ABC" for n in known):
-            out.append(Finding("OLP851", f"{', '.join(bent)} was read, and no angle of {axis}"))
+            out.append(Finding("OLP882", f"{', '.join(bent)} was read, and no angle of {axis}"))
     return tuple(out)
 
 

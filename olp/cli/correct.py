@@ -5,24 +5,26 @@ from __future__ import annotations
 import datetime
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from olp.cli.common import (
     STREAM,
-    Length,
     exit_for,
     files_of,
     given,
+    outside_box_option,
     proof_options,
     put,
     refuse_early,
     refuse_twice,
     report_ending,
+    report_option,
     setup_options,
     source,
     talk,
+    unroll_options,
 )
 from olp.cli.progress import progress
 from olp.exceptions import ProgramError, UsageError
@@ -41,22 +43,10 @@ LAST_DIGITS_UM = 10.0
 @setup_options
 @click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
-@click.option(
-    "--outside-box",
-    type=click.Choice(["refuse", "hold"]),
-    default="refuse",
-    show_default=True,
-    help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
-)
-@click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
-@click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
-@click.option(
-    "--peck-clearance-mm",
-    type=Length(),
-    help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; for --expand-cycles.",
-)
+@outside_box_option("refuse the program", "take the error at the box's face")
+@unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
-@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
+@report_option
 @click.option(
     "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
 )
@@ -69,9 +59,9 @@ def command(
     job: str | None,
     output: str | None,
     tolerance_um: float,
-    outside_box: str,
+    outside_box: Literal["refuse", "hold"],
     contour: bool,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     flatten: bool,
@@ -100,9 +90,8 @@ def command(
         )
     for name in files_of(report_file):
         report_ending(name)
-    inputs = (*call.inputs, *(mesh.file for mesh in call.setup.job.meshes))
     outputs = files_of(output, report_file, review_file)
-    refuse_early(outputs, inputs, force=force)
+    refuse_early(outputs, call.inputs, force=force)
     refuse_twice(outputs)
 
     from olp import api, report
@@ -115,13 +104,13 @@ def command(
                 nominal,
                 call.setup,
                 tolerance_um=tolerance_um,
-                outside_box="hold" if outside_box == "hold" else "refuse",
+                outside_box=outside_box,
                 flatten=flatten,
                 expand_cycles=expand_cycles,
                 peck_clearance_mm=peck_clearance_mm,
                 contour=contour,
                 split_rapids=split_rapids,
-                date=date.date() if date else None,
+                date=date,
                 progress=show,
             )
             written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
@@ -130,9 +119,8 @@ def command(
 
                 written[Path(review_file)] = view(
                     nominal, call.setup, correction=result, corrected_name="" if output == STREAM else output,
-                    tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
-                    contour=contour, flatten=flatten, expand_cycles=expand_cycles,
-                    peck_clearance_mm=peck_clearance_mm, progress=show,
+                    tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, progress=show,
                 ).parts()  # fmt: skip
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
@@ -144,10 +132,9 @@ def command(
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
             text = unrolled(text, origin, call.setup, expand_cycles, peck_clearance_mm)
-        day = date.date() if date else None
-        filed = report_files.correction(result, text, call.setup, name, day, contour=contour)
+        filed = report_files.correction(result, text, call.setup, name, date, contour=contour)
         written[Path(name)] = filed
-    write_files(written, force=force, inputs=inputs)
+    write_files(written, force=force, inputs=call.inputs)
     on_stderr = output == STREAM
     if on_stderr:
         put(result.data)

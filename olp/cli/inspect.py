@@ -11,6 +11,7 @@ import click
 from olp.cli.common import (
     files_of,
     machine_given,
+    plot_ending,
     put,
     refuse_early,
     setup_options,
@@ -22,8 +23,6 @@ from olp.exceptions import UsageError
 if TYPE_CHECKING:
     from olp.errormodel import Calibration
     from olp.machine import Setup
-
-_FORMATS = (".svg", ".png")
 
 
 @click.command("inspect")
@@ -62,8 +61,8 @@ def command(
         file = setup.job.program
     if tool is not None and at is None:
         raise UsageError("--tool belongs to --at; give the axis position with --at X Y Z")
-    if plot is not None and Path(plot).suffix.lower() not in _FORMATS:
-        raise UsageError(f"the plot {plot!r} ends in no known format; expected .svg or .png")
+    if plot is not None:
+        plot_ending(plot)
     refuse_early(files_of(plot), (*inputs, *files_of(file)), force=force)
 
     if plot is not None:

@@ -30,7 +30,7 @@ def command(
     job: str | None,
     tolerance_um: float,
     contour: bool,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
 ) -> None:
@@ -51,7 +51,7 @@ def command(
         call.setup,
         tolerance_um=tolerance_um,
         contour=contour,
-        date=date.date() if date else None,
+        date=date,
     )
     put(report.to_json(result.report) if as_json else report.to_text(result.report))
     exit_for(result.findings, fail_on)

@@ -1,0 +1,86 @@
+"""A calibration from the files of measurements: read, fit, and the files to write."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from olp.calibration.curves import calibration_of, sigmas_of
+from olp.calibration.estimator import Fit, fit
+from olp.calibration.observations import Measurements
+from olp.calibration.summary import findings_of, summary
+from olp.errormodel import Calibration
+from olp.exceptions import ConfigError
+from olp.files.calibration_writer import calibration_files
+from olp.files.measurements import load_measurements
+from olp.findings import Finding
+from olp.loading import PathLike, setup_of
+from olp.machine import Setup, Vector
+from olp.progress import Progress
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedCalibration:
+    """A calibration with what it was made from.
+
+    `fit` holds all parameters with their covariance (`fit.sigma(axis_mm, tool_mm)` is the uncertainty of the
+    error anywhere), `report` what was found as a mapping ("olp-fit-1"), `findings` what to know about it.
+    """
+
+    calibration: Calibration
+    fit: Fit
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+
+    def files(self, target: PathLike) -> dict[Path, bytes]:
+        """The bytes of the calibration file `target` and of its curves beside it."""
+        sigma = sigmas_of(self.fit, self.calibration)
+        notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
+        return calibration_files(self.calibration, Path(target), sigma=sigma, notes=notes)
+
+
+def fit_calibration(
+    data: PathLike | Sequence[PathLike] | Measurements,
+    machine: PathLike | Setup | None = None,
+    *,
+    datum_mm: Vector | None = None,
+    valid_until: datetime.date | None = None,
+    progress: Progress | None = None,
+) -> FittedCalibration:
+    """The calibration of a machine from its measurements.
+
+    `data` are plans (olp-measurements-1), folders or files of readings that describe themselves, or
+    Measurements. Chain, travel and tools come from the machine file; without one the plan states the chain.
+    `datum_mm` is where the curves are zero, by default the place of the calibrated box nearest to zero.
+    Raises InputError, ConfigError with every problem of the files, and CannotCompute.
+    """
+    described = None if machine is None else setup_of(machine, None).machine
+    if isinstance(data, Measurements):
+        measurements = data
+    else:
+        sources = [data] if isinstance(data, str | Path) else list(data)
+        measurements = load_measurements(sources, None if described is None else described.chain)
+    chain = described.chain if described is not None else measurements.chain
+    if chain is None:
+        raise ConfigError(
+            "the chain is stated nowhere; give the machine file (-m), or the key chain of the plan"
+        )
+    if described is not None and described.name != measurements.machine:
+        raise ConfigError(
+            f'the measurements are of machine "{measurements.machine}", and the machine file is of '
+            f'"{described.name}"; expected one machine'
+        )
+    travel = None if described is None else [described.axes[axis].travel_mm for axis in "XYZ"]
+    found = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
+    calibration = calibration_of(found, valid_until)
+    tools = [] if described is None else [tool.lever_mm for tool in described.tools.values()]
+    levers = [lever for lever in tools if lever is not None]
+    return FittedCalibration(
+        calibration, found, summary(found, calibration, levers), findings_of(found, levers, travel)
+    )
+
+
+__all__ = ["FittedCalibration", "fit_calibration"]

@@ -1,0 +1,153 @@
+"""The functions that make a curve: uniform cubic B-splines, steps between two targets, kinks at a target.
+
+P-splines after P. H. C. Eilers and B. D. Marx (Statist. Sci. 11, 1996): many equally spaced knots, and a
+prior on the second differences of the coefficients in place of a choice of knots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.errormodel.base import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """0 before `low_mm`, 1 from `high_mm` on, straight between: a joint somewhere between two targets."""
+
+    low_mm: float
+    high_mm: float
+
+    def values(self, q: Array) -> Array:
+        return np.asarray(np.clip((q - self.low_mm) / (self.high_mm - self.low_mm), 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Kink:
+    """0 before `at_mm`, then a slope of 1 over `length_mm`."""
+
+    at_mm: float
+    length_mm: float
+
+    def values(self, q: Array) -> Array:
+        return np.asarray(np.maximum(q - self.at_mm, 0.0) / self.length_mm)
+
+
+Feature = Step | Kink
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """Sine and cosine of one period."""
+
+    period_mm: float
+
+    def values(self, q: Array) -> Array:
+        angle = 2.0 * np.pi * q / self.period_mm
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Spline:
+    """Cubic B-splines over [low_mm, high_mm] with `cells` equal cells; end values outside."""
+
+    low_mm: float
+    high_mm: float
+    cells: int
+
+    @property
+    def count(self) -> int:
+        return self.cells + 3
+
+    def values(self, q: Array) -> Array:
+        """(n, count) values at q (n,)."""
+        u = (np.clip(q, self.low_mm, self.high_mm) - self.low_mm) * (
+            self.cells / (self.high_mm - self.low_mm)
+        )
+        cell = np.minimum(u.astype(np.intp), self.cells - 1)
+        s = u - cell
+        rest = 1.0 - s
+        four = np.stack(
+            [
+                rest**3,
+                3.0 * s**3 - 6.0 * s**2 + 4.0,
+                3.0 * rest**3 - 6.0 * rest**2 + 4.0,
+                s**3,
+            ],
+            axis=1,
+        ) / 6.0  # fmt: skip
+        out = np.zeros((len(q), self.count))
+        rows = np.arange(len(q))
+        for k in range(4):
+            out[rows, cell + k] = four[:, k]
+        return out
+
+    def roughness(self) -> Array:
+        """(count, count) sum of squares of second differences of the coefficients."""
+        second = np.diff(np.eye(self.count), 2, axis=0)
+        return np.asarray(second.T @ second)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveSpace:
+    """All functions that one curve may be: `spline` and `features`, restricted by the gauge.
+
+    `gauge` (spline + features, size) spans what is left: without "free" the value at the datum is zero, with
+    "straight" the least-squares slope over the spline's range is zero too, because it is squareness.
+    """
+
+    spline: Spline
+    features: tuple[Feature, ...]
+    gauge: Array
+
+    @classmethod
+    def of(cls, spline: Spline, features: tuple[Feature, ...], datum_mm: float, kind: str) -> CurveSpace:
+        """`kind` is "straight", "zero" or "free"."""
+        raw = cls(spline, features, np.zeros((0, 0)))
+        size = spline.count + len(features)
+        constraints = []
+        if kind != "free":
+            constraints.append(raw.raw_values(np.array([datum_mm]))[0])
+        if kind == "straight":
+            constraints.append(slope_weights(spline) @ raw.raw_values(slope_grid(spline)))
+        if not constraints:
+            return cls(spline, features, np.eye(size))
+        _, _, right = np.linalg.svd(np.array(constraints))
+        return cls(spline, features, np.ascontiguousarray(right[len(constraints) :].T))
+
+    @property
+    def size(self) -> int:
+        return int(self.gauge.shape[1])
+
+    def raw_values(self, q: Array) -> Array:
+        columns = [self.spline.values(q), *(f.values(q)[:, None] for f in self.features)]
+        return np.concatenate(columns, axis=1)
+
+    def values(self, q: Array) -> Array:
+        """(n, size) values at q (n,)."""
+        return np.asarray(self.raw_values(q) @ self.gauge)
+
+    def prior(self, roughness: float, amplitude: float) -> Array:
+        """(size, size) precision for a standard deviation `roughness` of second differences, and `amplitude`
+        of every coefficient."""
+        m = self.spline.count
+        full = np.eye(m + len(self.features)) / amplitude**2
+        full[:m, :m] += self.spline.roughness() / roughness**2
+        return np.asarray(self.gauge.T @ full @ self.gauge)
+
+
+_SLOPE_POINTS = 401
+
+
+def slope_grid(spline: Spline) -> Array:
+    """Positions over which a least-squares slope is taken."""
+    return np.linspace(spline.low_mm, spline.high_mm, _SLOPE_POINTS)
+
+
+def slope_weights(spline: Spline) -> Array:
+    """Weights that make the least-squares slope of values at `slope_grid`."""
+    q = slope_grid(spline)
+    centred = q - q.mean()
+    return np.asarray(centred / (centred @ centred))

@@ -1,0 +1,564 @@
+"""One linear Gaussian adjustment of all readings of a machine.
+
+theta holds the 18 curves, their half differences of directions, cyclic terms and squareness; every reading
+is a linear functional of it and of nuisances (zeros, slopes, squares, drift, scale). The result carries the
+covariance of all of it, so that what was not measured is known as unknown.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
+from olp.calibration.lengths import STILL_MM, Station, first_station, lengths_block
+from olp.calibration.lines import (
+    Noise,
+    group_of,
+    line_block,
+    noise_of,
+    square_names,
+    squareness_block,
+    targets_of,
+)
+from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
+from olp.calibration.observations import Lengths, Line, Measurements, Points
+from olp.calibration.parameters import CROSS, Parameters, Place
+from olp.calibration.points import points_block
+from olp.calibration.prior import POSE, Prior
+from olp.calibration.separation import aliased
+from olp.calibration.smoothing import Shape, shape_of
+from olp.errormodel.base import Array
+from olp.exceptions import CannotCompute
+from olp.machine import COMPONENTS, ZERO, Vector
+from olp.progress import Progress, silent
+from olp.units import AXES
+
+#: Cells of the spline of a curve: as many as a line has targets between these.
+FEWEST, MOST = 6, 48
+HALF_CELLS = 5
+#: Cells where no lines but points or lengths tell of an axis, to begin with; they double as long as
+#: chi-square is off by more than MISFIT standard deviations and becomes BETTER by it.
+POINT_CELLS, MISFIT, BETTER = 12, 5.0, 0.8
+#: What stands for the component of a point.
+POINT = "point"
+#: The adjustment is made anew after cyclic terms or points were left out, so often at most.
+PASSES = 6
+#: A reading whose residual is so many standard deviations is left out, at most this share of a line.
+OUTLIER, SHARE = 6.0, 0.05
+#: A cyclic term below so many standard deviations is noise.
+CYCLIC_SEEN = 4.0
+#: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
+SWEEP = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """A reading left out: its file, the line there, and how many standard deviations it is off."""
+
+    source: str
+    row: int
+    component: str
+    value: float
+    deviations: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineResult:
+    """A line after the fit: residuals (n,) in mm or rad, noise, sum of squares of standardised residuals."""
+
+    line: Line
+    noise: Noise
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointsResult:
+    """Points after the fit: residuals in mm in the machine's frame, x, y, z of each point by turns, and the
+    sum of squares of standardised residuals."""
+
+    points: Points
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LengthsResult:
+    """Lengths after the fit: where their station is, residuals (n,) in mm, sum of squares of standardised
+    residuals."""
+
+    lengths: Lengths
+    station: Station
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """theta with its covariance and layout; see `error`, `sigma`, `design`.
+
+    `slopes` are the mean slopes of the straightness curves on lines through the datum, as functionals of
+    theta: the gauge takes them as squareness. `box_mm` (3, 2) is what the lines covered. `cyclic_unseen` says
+    by component why a period was not fitted.
+    """
+
+    measurements: Measurements
+    parameters: Parameters
+    theta: Array
+    covariance: Array
+    prior: Prior
+    lines: tuple[LineResult, ...]
+    points: tuple[PointsResult, ...]
+    lengths: tuple[LengthsResult, ...]
+    outliers: tuple[Outlier, ...]
+    box_mm: Array
+    slopes: Mapping[str, Array]
+    chi_square: float
+    freedom: float
+    cyclic_unseen: Mapping[tuple[str, float], str]
+
+    def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3, size) dependence of the error on theta, in the gauge of the datum: on lines through it X has
+        no mean slope, nor has Y towards Z."""
+        position = np.atleast_2d(np.asarray(axis_mm, float))
+        out = self.parameters.design(position, np.asarray(tool_mm, float), play)
+        turn = self.turn
+        arm = position - np.array(self.parameters.datum_mm)
+        for row in range(3):
+            k, m = (row + 1) % 3, (row + 2) % 3
+            out[:, row] += arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
+        return out
+
+    @property
+    def turn(self) -> Array:
+        """(3, size) rotation of the frame that the gauge asks for, as functionals of theta."""
+        return np.stack([-self.slopes["EZY"], self.slopes["EZX"], -self.slopes["EYX"]])
+
+    def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3) estimated error in mm, to first order."""
+        return np.asarray(self.design(axis_mm, tool_mm, play) @ self.theta)
+
+    def sigma(self, axis_mm: Array, tool_mm: Array) -> Array:
+        """(n, 3) standard uncertainty of `error` in mm."""
+        position, tool = np.atleast_2d(np.asarray(axis_mm, float)), np.asarray(tool_mm, float)
+        rows = self.design(position, tool)
+        variance = np.einsum("nik,kl,nil->ni", rows, self.covariance, rows, optimize=True)
+        for name in self.parameters.spaces:
+            axis = AXES.index(name[2])
+            between = self.between_targets(name, position[:, axis])
+            if not between.any():
+                continue
+            if name[1] in AXES:
+                variance[:, AXES.index(name[1])] += between
+                continue
+            for i, a, k, _ in CROSS:
+                if "ABC"[a] == name[1]:
+                    variance[:, i] += between * self.parameters.lever(i, axis, k, position, tool) ** 2
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def between_targets(self, name: str, q: Array) -> Array:
+        """(n,) variance of a component at q (n,) because nobody knows where between two targets a step is:
+        with probability u it lies before q, so J^2 u (1 - u)."""
+        space = self.parameters.spaces[name]
+        raw = space.gauge @ self.theta[self.parameters.slices[name]]
+        total = np.zeros(len(q))
+        for feature, jump in zip(space.features, raw[space.spline.count :], strict=True):
+            if isinstance(feature, Step):
+                u = feature.values(q)
+                total += jump**2 * u * (1.0 - u)
+        return total
+
+    def curve(self, name: str, q: Array) -> Array:
+        """(n, size) mean of a component at q (n,) on its own line, in the gauge of the datum, without cyclic
+        terms, as functionals of theta."""
+        out = np.zeros((len(q), self.parameters.size))
+        out[:, self.parameters.slices[name]] = self.parameters.spaces[name].values(q)
+        if name in self.slopes:
+            axis = AXES.index(name[2])
+            out -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+        return out
+
+    def squareness(self, name: str) -> Array:
+        """(size,) a squareness in the gauge of the datum, as functional of theta."""
+        out = np.zeros(self.parameters.size)
+        out[self.parameters.slices[name]] = 1.0
+        first, second, sign = {
+            "C0Y": ("EXY", "EYX", -1.0),
+            "B0Z": ("EXZ", "EZX", 1.0),
+            "A0Z": ("EYZ", "EZY", -1.0),
+        }[name]
+        return np.asarray(out + sign * (self.slopes[first] + self.slopes[second]))
+
+
+def fit(
+    measurements: Measurements,
+    chain: str,
+    *,
+    travel_mm: Sequence[tuple[float, float]] | None = None,
+    datum_mm: Vector | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Estimate the errors of a machine from all its readings.
+
+    `travel_mm` bounds the box; the datum is the place in the box nearest to zero if left out. Where points or
+    lengths alone tell of an axis and do not fit, its curves are given more freedom. Raises ConfigError where
+    a line cannot be used, CannotCompute where nothing tells of an axis.
+    """
+    cells = POINT_CELLS
+    found = _fit(measurements, chain, travel_mm, datum_mm, progress or silent, cells)
+    alone = {line.component[2] for line in measurements.lines} != set(AXES)
+    while alone and misfit(found) > MISFIT and cells < MOST:
+        cells *= 2
+        finer = _fit(measurements, chain, travel_mm, datum_mm, progress or silent, cells)
+        if finer.chi_square / finer.freedom > BETTER * found.chi_square / found.freedom:
+            break
+        found = finer
+    return found
+
+
+def misfit(found: Fit) -> float:
+    """By how many standard deviations chi-square is above what noise gives: by its cube root, which is nearly
+    normal (E. B. Wilson and M. M. Hilferty, 1931)."""
+    part = 2.0 / (9.0 * found.freedom)
+    ratio = found.chi_square / found.freedom
+    return float((ratio ** (1.0 / 3.0) - (1.0 - part)) / np.sqrt(part))
+
+
+def _fit(
+    measurements: Measurements,
+    chain: str,
+    travel_mm: Sequence[tuple[float, float]] | None,
+    datum_mm: Vector | None,
+    tell: Progress,
+    cells: int,
+) -> Fit:
+    tell("noise", 0.0)
+    lines, noises, outliers = _screened(measurements.lines)
+    clouds = list(measurements.points)
+    ranges, box = _ranges(lines, [*clouds, *measurements.lengths], travel_mm)
+    datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
+    splines = [_spline(lines, axis, ranges[axis], cells) for axis in range(3)]
+    scattered: list[Points | Lengths] = [*clouds, *measurements.lengths]
+    waves, unseen = _waves(measurements, lines, scattered)
+    shapes = _shapes(lines, noises, splines, waves, tell)
+    stations = [first_station(rays) for rays in measurements.lengths]
+    theta = np.zeros(0)
+    learnt: dict[str, tuple[float, float]] | None = None
+    for _ in range(PASSES):
+        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
+        prior = Prior(parameters, shapes, _squares(measurements, parameters))
+        if learnt is not None:
+            prior.classes = learnt
+        theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
+        of_lines = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
+        of_points = [points_block(cloud, parameters) for cloud in clouds]
+        of_lengths = [
+            lengths_block(rays, parameters, theta, station)
+            for rays, station in zip(measurements.lengths, stations, strict=True)
+        ]
+        others = [squareness_block(reading, parameters) for reading in measurements.squareness]
+        tell("adjustment", 0.5)
+        normal, solved = _adjusted([*of_lines, *of_points, *of_lengths, *others], prior, learnt is None)
+        learnt = prior.classes
+        theta = solved.theta
+        seen = _waves_seen(parameters, solved)
+        slips = [_slips(block, cloud, solved) for block, cloud in zip(of_points, clouds, strict=True)]
+        steps = [residuals_of(block, theta)[0] for block in of_lengths]
+        if seen == waves and not any(slips) and all(np.abs(step[:3]).max() < STILL_MM for step in steps):
+            break
+        waves = seen
+        outliers += [slip for some in slips for slip in some]
+        clouds = [_without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
+        stations = [station.moved(step) for station, step in zip(stations, steps, strict=True)]
+    results = [
+        LineResult(line, noise, *_left(block, theta))
+        for line, noise, block in zip(lines, noises, of_lines, strict=True)
+    ]
+    points = [
+        PointsResult(cloud, *_left(block, theta)) for cloud, block in zip(clouds, of_points, strict=True)
+    ]
+    rays_left = [
+        LengthsResult(rays, station, *_left(block, theta))
+        for rays, station, block in zip(measurements.lengths, stations, of_lengths, strict=True)
+    ]
+    chi_square = sum((_left(block, theta)[1] for block in (*of_lines, *of_points, *of_lengths, *others)), 0.0)
+    # readings less what the fit used up of their freedom
+    freedom = max(normal.count - float(np.trace(solved.covariance @ normal.H)) - normal.free, 1.0)
+    # readings that fit worse than their noise say that the model is not all there is
+    covariance = solved.covariance * max(1.0, chi_square / freedom)
+    return Fit(
+        measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
+        tuple(rays_left), tuple(outliers), box, _slopes(parameters), chi_square, freedom, unseen,
+    )  # fmt: skip
+
+
+def _adjusted(blocks: Iterable[Block], prior: Prior, learn: bool) -> tuple[Normal, Solved]:
+    """The readings' normal equations and their solution, with what the prior is to learn from them."""
+    normal = Normal.of(prior.parameters.size)
+    for block in blocks:
+        normal.add(block)
+    prior.push(normal)
+    if learn:
+        prior.learn(normal)
+    solved = solve(normal, *prior.precision())
+    if learn and prior.size_from(solved.theta):
+        solved = solve(normal, *prior.precision())
+    return normal, solved
+
+
+def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave, ...]]:
+    """Cyclic terms that stand out of their noise."""
+    seen: dict[str, tuple[Wave, ...]] = {}
+    for name, waves in parameters.waves.items():
+        start = parameters.slices[f"wave {name}"].start
+        for k, wave in enumerate(waves):
+            at = slice(start + 2 * k, start + 2 * k + 2)
+            sigma = float(np.sqrt(np.trace(solved.covariance[at, at]) / 2.0))
+            if float(np.hypot(*solved.theta[at])) > CYCLIC_SEEN * sigma:
+                seen[name] = (*seen.get(name, ()), wave)
+    return seen
+
+
+def _left(block: Block, theta: Array) -> tuple[Array, float]:
+    """Residuals of a block and the sum of squares of the standardised ones."""
+    _, residual, sigma = residuals_of(block, theta)
+    return residual, float(np.sum((residual / sigma) ** 2))
+
+
+def _slips(block: Block, cloud: Points, solved: Solved) -> list[Outlier]:
+    """Points whose residual is no noise, the worst ones first."""
+    _, residual, sigma = residuals_of(block, solved.theta)
+    rest = residual.reshape(-1, 3)
+    off = np.abs(residual / sigma).reshape(-1, 3).max(axis=1)
+    worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
+    return [
+        Outlier(cloud.source, int(cloud.row[k]), POINT, float(np.linalg.norm(rest[k])), float(off[k]))
+        for k in worst.tolist()
+        if off[k] > OUTLIER and off[k] > 0.3 * off.max()
+    ]
+
+
+def _without(cloud: Points, slips: Sequence[Outlier]) -> Points:
+    use = ~np.isin(cloud.row, [slip.row for slip in slips])
+    names = ("axis_mm", "tool_mm", "measured_mm", "row")
+    return dataclasses.replace(cloud, **{name: getattr(cloud, name)[use] for name in names})
+
+
+def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:
+    """Lines without the readings that their own repetitions speak against."""
+    kept, noises, outliers = [], [], []
+    for line in lines:
+        noise = noise_of(line)
+        use = np.ones(len(line.value), bool)
+        for _ in range(max(1, int(SHARE * len(use)))):
+            some = _part(line, use)
+            noise = noise_of(some)
+            rest = _about_group(some)
+            worst = int(np.argmax(np.abs(rest)))
+            if abs(rest[worst]) <= OUTLIER * noise.sigma:
+                break
+            k = int(np.flatnonzero(use)[worst])
+            use[k] = False
+            outliers.append(
+                Outlier(
+                    line.source, int(line.row[k]), line.component, float(line.value[k]),
+                    float(abs(rest[worst]) / noise.sigma),
+                )
+            )  # fmt: skip
+        kept.append(_part(line, use))
+        noises.append(noise)
+    return kept, noises, outliers
+
+
+def _part(line: Line, use: np.ndarray) -> Line:
+    if use.all():
+        return line
+    columns = ("target_mm", "value", "run", "direction", "row")
+    return dataclasses.replace(line, **{name: getattr(line, name)[use] for name in columns})
+
+
+def _about_group(line: Line) -> Array:
+    """(n,) deviation from the others of the same target and direction, freed of the level of its run; zero
+    where fewer than three were read."""
+    group = group_of(line)
+    rest = line.value.copy()
+    for _ in range(3):
+        for labels in (group, line.run - line.run.min()):
+            rest -= _medians(rest, labels)[labels]
+    counts = np.bincount(group)[group]
+    return np.where(counts >= 3, rest, 0.0)
+
+
+def _medians(values: Array, labels: np.ndarray) -> Array:
+    out = np.zeros(int(labels.max()) + 1)
+    for label in np.unique(labels):
+        out[label] = np.median(values[labels == label])
+    return out
+
+
+def _ranges(
+    lines: Sequence[Line], clouds: Sequence[Points | Lengths], travel_mm: Sequence[tuple[float, float]] | None
+) -> tuple[list[tuple[float, float]], Array]:
+    """What the readings of each axis reach together, and the box: what every component with lines covers, or
+    the points where an axis has no lines."""
+    ranges, box = [], np.zeros((3, 2))
+    for axis in range(3):
+        own = [line for line in lines if line.axis == axis]
+        reached = [line.target_mm for line in own] + [cloud.axis_mm[:, axis] for cloud in clouds]
+        if not reached:
+            raise CannotCompute(
+                f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
+                "every axis, or points"
+            )
+        low = min(float(q.min()) for q in reached)
+        high = max(float(q.max()) for q in reached)
+        ranges.append((low, high))
+        sides = [] if own else [(low, high)]
+        for name in {line.component for line in own}:
+            same = [line for line in own if line.component == name]
+            side = (
+                min(float(line.target_mm.min()) for line in same),
+                max(float(line.target_mm.max()) for line in same),
+            )
+            if side[1] - side[0] > SWEEP * (high - low):
+                sides.append(side)
+        limits = travel_mm[axis] if travel_mm is not None else (-np.inf, np.inf)
+        box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
+        if box[axis, 0] >= box[axis, 1]:
+            raise CannotCompute(
+                f"the readings along {AXES[axis]} have no length in common in the travel; expected them over "
+                "the same length"
+            )
+    return ranges, box
+
+
+def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float], cells: int) -> Spline:
+    own = [len(targets_of(line)) for line in lines if line.axis == axis]
+    long = [
+        len(targets_of(line))
+        for line in lines
+        if line.axis == axis and np.ptp(line.target_mm) > SWEEP * (span[1] - span[0])
+    ]
+    if not own:
+        return Spline(*span, cells)
+    return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
+
+
+def _half(spline: Spline) -> Spline:
+    return Spline(spline.low_mm, spline.high_mm, HALF_CELLS)
+
+
+def _shapes(
+    lines: Sequence[Line],
+    noises: Sequence[Noise],
+    splines: Sequence[Spline],
+    waves: Mapping[str, tuple[Wave, ...]],
+    tell: Progress,
+) -> dict[str, Shape]:
+    """The shape of every component with lines: each by itself, then again where others have their steps."""
+    shapes: dict[str, Shape] = {}
+    for again in (False, True):
+        for k, name in enumerate(COMPONENTS):
+            tell("shapes of curves", (k + again * len(COMPONENTS)) / (2 * len(COMPONENTS)))
+            own = _own_lines(name, lines, noises)
+            others = [s for other, s in shapes.items() if other[2] == name[2] and other != name]
+            joints = sorted(
+                {f for shape in others for f in shape.features if isinstance(f, Step)},
+                key=lambda step: step.low_mm,
+            )
+            if own and (joints or not again):
+                spline = splines[AXES.index(name[2])]
+                shapes[name] = shape_of(
+                    own, spline, _half(spline), waves.get(name, ()), joints if again else ()
+                )
+    return shapes
+
+
+def _waves(
+    measurements: Measurements, lines: Sequence[Line], scattered: Sequence[Points | Lengths]
+) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
+    """Cyclic terms that the targets can see, and why others cannot be seen."""
+    waves: dict[str, tuple[Wave, ...]] = {}
+    unseen: dict[tuple[str, float], str] = {}
+    for name in COMPONENTS:
+        own = [targets_of(line) for line in lines if line.component == name]
+        if name[1] == name[2]:
+            own += [np.unique(part.axis_mm[:, AXES.index(name[2])]) for part in scattered]
+        for period in measurements.periods_mm[AXES.index(name[2])] if own else ():
+            reasons = [aliased(targets, period) for targets in own]
+            if None in reasons:
+                waves[name] = (*waves.get(name, ()), Wave(period))
+            else:
+                unseen[name, period] = str(reasons[0])
+    return waves, unseen
+
+
+def _own_lines(name: str, lines: Sequence[Line], noises: Sequence[Noise]) -> list[tuple[Line, Noise]]:
+    """The lines of a component that were taken at its own place."""
+    own = [(line, noise) for line, noise in zip(lines, noises, strict=True) if line.component == name]
+    if not own:
+        return []
+    place = _place(own[0][0])
+    return [(line, noise) for line, noise in own if name[1] in "ABC" or _place(line) == place]
+
+
+def _place(line: Line) -> Place:
+    at = list(line.line_mm)
+    at[line.axis] = 0.0
+    return Place((at[0], at[1], at[2]), line.tool_mm)
+
+
+def _parameters(
+    chain: str,
+    datum: Vector,
+    lines: Sequence[Line],
+    splines: Sequence[Spline],
+    shapes: Mapping[str, Shape],
+    waves: Mapping[str, tuple[Wave, ...]],
+) -> Parameters:
+    spaces, halves, places = {}, {}, {}
+    for name in COMPONENTS:
+        axis = AXES.index(name[2])
+        shape = shapes.get(name)
+        kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
+        spaces[name] = CurveSpace.of(splines[axis], shape.features if shape else (), datum[axis], kind)
+        if shape is not None and shape.half != "none":
+            half = _half(splines[axis])
+            gauge = np.eye(half.count) if shape.half == "curve" else np.ones((half.count, 1))
+            halves[name] = CurveSpace(half, (), gauge)
+        if name[1] in AXES:
+            own = [line for line in lines if line.component == name]
+            near = own or [line for line in lines if line.axis == axis and line.quantity != "angle"]
+            place = _place(near[0]) if near else Place(datum, ZERO)
+            at = list(place.line_mm)
+            at[axis] = datum[axis]
+            places[name] = Place((at[0], at[1], at[2]), place.tool_mm)
+    shared = sorted({n for line in lines if line.square is not None for n in square_names(line)})
+    return Parameters(chain, datum, spaces, places, halves, dict(waves), tuple(shared))
+
+
+def _squares(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:
+    known = {f"error of square {s.name}": (s.error_rad, max(s.sigma_rad, 1e-9)) for s in measurements.squares}
+    return {name: known.get(name, (0.0, POSE)) for name in parameters.shared}
+
+
+def _slopes(parameters: Parameters) -> dict[str, Array]:
+    """Mean slopes of the straightness curves on lines through the datum with no tool."""
+    slopes: dict[str, Array] = {}
+    for name in COMPONENTS:
+        if name[1] not in AXES or name[1] == name[2]:
+            continue
+        axis, row = AXES.index(name[2]), AXES.index(name[1])
+        spline = parameters.spaces[name].spline
+        position = np.tile(np.array(parameters.datum_mm), (len(slope_grid(spline)), 1))
+        position[:, axis] = slope_grid(spline)
+        out = np.zeros(parameters.size)
+        for part, values in parameters.displacement(row, axis, position, np.zeros(3)):
+            if part != parameters.slices.get(f"wave {name}"):
+                out[part] += slope_weights(spline) @ values
+        slopes[name] = out
+    return slopes

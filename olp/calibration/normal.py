@@ -1,0 +1,137 @@
+"""Normal equations of a linear Gaussian adjustment, gathered block by block.
+
+What only one block knows (the zero of a line, its drift, the scale of its laser) is eliminated at once, by
+the Schur complement; so a hundred thousand readings cost one matrix of the size of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+
+Index = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunk:
+    """Some readings of a block: y (n,) = rows (n, k) @ theta[columns] + local (n, l) @ nu + noise of standard
+    deviation sigma (n,)."""
+
+    rows: Array
+    y: Array
+    sigma: Array
+    local: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Readings that share local unknowns nu, in as many chunks as memory likes; `chunks` makes them anew.
+
+    `columns` (k,) of theta that they depend on, `precision` (l,) the prior precision of nu, whose mean is
+    zero; a precision of 0 leaves it free.
+    """
+
+    columns: Index
+    precision: Array
+    chunks: Callable[[], Iterable[Chunk]]
+    label: str = ""
+
+    @classmethod
+    def of(cls, chunk: Chunk, columns: Index, precision: Array, label: str = "") -> Block:
+        """A block of one chunk."""
+        return cls(columns, precision, lambda: (chunk,), label)
+
+
+@dataclass(slots=True, eq=False)
+class Normal:
+    """H theta = g over n parameters; `square` is the weighted sum of y^2 that locals do not explain, `count`
+    the readings, and `free` the local unknowns without a prior."""
+
+    H: Array
+    g: Array
+    square: float = 0.0
+    count: int = 0
+    free: int = 0
+
+    @classmethod
+    def of(cls, n: int) -> Normal:
+        return cls(np.zeros((n, n)), np.zeros(n))
+
+    def add(self, block: Block) -> None:
+        """Add the readings of a block."""
+        k, m = len(block.columns), len(block.precision)
+        gram = np.zeros((k + m + 1, k + m + 1))
+        for chunk in block.chunks():
+            table = np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1)
+            table /= chunk.sigma[:, None]
+            gram += table.T @ table
+            self.count += len(chunk.y)
+        kept = [*range(k), k + m]
+        inner = gram[k : k + m, k : k + m] + np.diag(block.precision)
+        outer = gram[np.ix_(kept, range(k, k + m))]
+        reduced = gram[np.ix_(kept, kept)] - outer @ np.linalg.solve(inner, outer.T)
+        self.H[np.ix_(block.columns, block.columns)] += reduced[:k, :k]
+        self.g[block.columns] += reduced[:k, k]
+        self.square += float(reduced[k, k])
+        self.free += int(np.sum(block.precision == 0.0))
+
+
+def residuals_of(block: Block, theta: Array) -> tuple[Array, Array, Array]:
+    """(nu, residuals, their standard deviations) of all readings of a block at the solution."""
+    own = theta[block.columns]
+    inner, right = np.diag(block.precision), np.zeros(len(block.precision))
+    for chunk in block.chunks():
+        weighted = chunk.local / chunk.sigma[:, None]
+        inner = inner + weighted.T @ weighted
+        right = right + weighted.T @ ((chunk.y - chunk.rows @ own) / chunk.sigma)
+    nu = np.asarray(np.linalg.solve(inner, right))
+    rest = [chunk.y - chunk.rows @ own - chunk.local @ nu for chunk in block.chunks()]
+    return nu, np.concatenate(rest), np.concatenate([chunk.sigma for chunk in block.chunks()])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    """theta (n,), its covariance (n, n), and the log evidence up to a constant."""
+
+    theta: Array
+    covariance: Array
+    evidence: float
+
+
+def evidence(normal: Normal, prior: Array, prior_logdet: float) -> float:
+    """Log marginal likelihood of the readings under theta ~ N(0, prior^-1), up to a constant."""
+    factor, scale = _factor(normal.H + prior)
+    explained = _forward(factor, normal.g / scale)
+    logdet = 2.0 * float(np.log(np.diag(factor)).sum() + np.log(scale).sum())
+    return -0.5 * (normal.square - float(explained @ explained)) - 0.5 * logdet + 0.5 * prior_logdet
+
+
+def solve(normal: Normal, prior: Array, prior_logdet: float = 0.0) -> Solved:
+    """The posterior of theta ~ N(0, prior^-1) given the readings."""
+    from scipy.linalg import cho_solve
+
+    factor, scale = _factor(normal.H + prior)
+    theta = cho_solve((factor, True), normal.g / scale) / scale
+    covariance = cho_solve((factor, True), np.eye(len(scale))) / np.outer(scale, scale)
+    explained = _forward(factor, normal.g / scale)
+    logdet = 2.0 * float(np.log(np.diag(factor)).sum() + np.log(scale).sum())
+    found = -0.5 * (normal.square - float(explained @ explained)) - 0.5 * logdet + 0.5 * prior_logdet
+    return Solved(theta, 0.5 * (covariance + covariance.T), found)
+
+
+def _factor(matrix: Array) -> tuple[Array, Array]:
+    """Lower Cholesky factor of the matrix scaled to a unit diagonal, and the scale."""
+    scale = np.sqrt(np.diag(matrix))
+    scaled = matrix / np.outer(scale, scale) + 1e-13 * np.eye(len(scale))
+    return np.asarray(np.linalg.cholesky(scaled)), scale
+
+
+def _forward(factor: Array, g: Array) -> Array:
+    from scipy.linalg import solve_triangular
+
+    return np.asarray(solve_triangular(factor, g, lower=True))

@@ -1,0 +1,106 @@
+"""`olp calibrate fit`."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from olp.cli.common import STREAM, exit_for, files_of, put, refuse_early, report_ending, talk
+from olp.cli.progress import progress
+from olp.exceptions import UsageError
+
+
+@click.command("fit")
+@click.argument("data", nargs=-1, required=True)
+@click.option("-o", "--output", metavar="calibration.toml", help="Where to write; curves go beside it.")
+@click.option("-m", "--machine", metavar="machine.toml", help="The machine file: chain, travel, tools.")
+@click.option(
+    "--datum", type=(float, float, float), metavar="X Y Z",
+    help="Axis position where the curves are zero. Default: the place in the box nearest to zero.",
+)  # fmt: skip
+@click.option(
+    "--valid-until", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
+    help="The last day of the calibration's validity.",
+)  # fmt: skip
+@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
+@click.option(
+    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
+    help="Exit with 1 where a finding is at least this severe.",
+)  # fmt: skip
+@click.option("-q", "--quiet", is_flag=True, help="No table and no progress.")
+@click.option("--force", is_flag=True, help="Overwrite the calibration and its curves.")
+def command(
+    data: tuple[str, ...],
+    output: str | None,
+    machine: str | None,
+    datum: tuple[float, float, float] | None,
+    valid_until: datetime.datetime | None,
+    report_file: str | None,
+    as_json: bool,
+    fail_on: str,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """Make a calibration from measurements.
+
+    DATA are plans (olp-measurements-1), folders with measurements.toml, or folders and files of readings that
+    describe themselves. All readings go into one adjustment: curves, squareness, lost motion and cyclic
+    errors with their uncertainties.
+    """
+    if STREAM in (output, report_file, *data):
+        raise UsageError("a calibration is several files; name files, - is none")
+    from olp.files.measurements import files_of_measurements
+
+    inputs = (*files_of_measurements(data), *files_of(machine))
+    for name in files_of(report_file):
+        report_ending(name)
+    refuse_early(files_of(output, report_file), inputs, force=force)
+
+    from olp.calibrating import fit_calibration
+    from olp.files.write import write_files
+    from olp.report import to_json
+
+    with progress(quiet) as tell:
+        fitted = fit_calibration(
+            [Path(name) for name in data],
+            machine,
+            datum_mm=datum,
+            valid_until=valid_until.date() if valid_until else None,
+            progress=tell,
+        )
+    files: dict[Path, bytes] = {} if output is None else fitted.files(output)
+    curves = len(files) - 1
+    if report_file is not None:
+        from olp.report_lines import fit as fit_report
+
+        files[Path(report_file)] = fit_report(fitted, report_file, None)
+    write_files(files, force=force, inputs=inputs)
+    if output is not None:
+        talk(f"wrote {output} and {curves} curves beside it")
+    if report_file is not None:
+        talk(f"wrote {report_file}")
+    report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
+    if as_json:
+        put(to_json(report))
+    elif not quiet:
+        from olp.cli.outline import outline
+
+        put(outline(_shown(report)))
+    exit_for(fitted.findings, fail_on)
+
+
+def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
+    """The report as people read it: lines by the names of their files."""
+    shown = dict(report)
+    for key in ("lines_of_lengths", "lines_of_angles"):
+        shown[key] = [
+            {"name": f"{row['name']} {Path(row['file']).name}"}
+            | {k: value for k, value in row.items() if k not in ("name", "file")}
+            for row in report[key]
+        ]
+    return shown

@@ -1,0 +1,48 @@
+"""`olp calibrate read`."""
+
+from __future__ import annotations
+
+import click
+
+from olp.cli.common import put, talk
+
+
+@click.command("read")
+@click.argument("file")
+@click.option("--profile", metavar="FILE.toml", help="How the file is laid out (olp-line-profile-1).")
+@click.option("--json", "as_json", is_flag=True, help="Print the readings as JSON.")
+def command(file: str, profile: str | None, as_json: bool) -> None:
+    """Show what is understood of an instrument's FILE: one row a reading, and what was assumed.
+
+    Without --profile the file is native CSV: target_mm,run,direction,value_um or value_urad.
+    """
+    from olp.files.line_profile import load_line_profile, read_line
+
+    found = read_line(file, None if profile is None else load_line_profile(profile))
+    unit, scale = ("urad", 1e6) if found.angular else ("um", 1e3)
+    rows = list(
+        zip(found.line.tolist(), found.target_mm.tolist(), found.run.tolist(), found.direction.tolist(),
+            (found.value * scale).tolist(), strict=True)
+    )  # fmt: skip
+    if as_json:
+        import json
+
+        names = ("line", "target_mm", "run", "direction", f"value_{unit}")
+        out = {
+            "file": found.file,
+            "component": found.component,
+            "notes": list(found.notes),
+            "readings": [dict(zip(names, row, strict=True)) for row in rows],
+        }
+        put(json.dumps(out, indent=1) + "\n")
+        return
+    lines = [f"{'line':>6} {'target_mm':>12} {'run':>4} {'dir':>4} {'value_' + unit:>12}\n"]
+    lines += [f"{n:6d} {q:12.4f} {run:4d} {sign:+4d} {value:12.3f}\n" for n, q, run, sign, value in rows]
+    put("".join(lines))
+    runs = len(set(zip(found.run.tolist(), found.direction.tolist(), strict=True)))
+    span = f"{found.target_mm.min():g} to {found.target_mm.max():g} mm"
+    stated = "actual minus commanded" if found.sense_known else "as in the file, the plan must state it"
+    talk(f"{len(rows)} readings in {runs} one-way runs, {span}; component {found.component or 'not stated'}; "
+         f"sense: {stated}")  # fmt: skip
+    for note in found.notes:
+        talk(f"note: {note}")
