@@ -42,6 +42,11 @@ if TYPE_CHECKING:
     from olp.findings import Finding as Finding
     from olp.gate import Check as Check
     from olp.gate import check as check
+    from olp.metrology import evaluate_lines as evaluate_lines
+    from olp.metrology import fit_ballbar as fit_ballbar
+    from olp.metrology import fit_diagonals as fit_diagonals
+    from olp.metrology import fit_postures as fit_postures
+    from olp.metrology import go_return as go_return
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -81,6 +86,11 @@ _HOME = {
     "ProgramError": "olp.exceptions",
     "Finding": "olp.findings",
     "load_setup": "olp.files.config",
+    "evaluate_lines": "olp.metrology",
+    "fit_ballbar": "olp.metrology",
+    "fit_diagonals": "olp.metrology",
+    "fit_postures": "olp.metrology",
+    "go_return": "olp.metrology",
 }
 
 __all__ = sorted(_HOME)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.calibration.normal import Block
+from olp.calibration.normal import Block, Chunk
 from olp.calibration.observations import Line, SquarenessReading
 from olp.calibration.parameters import SHEAR, Parameters, gathered
 from olp.errormodel.base import Array
@@ -148,10 +148,8 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
         local += list(ramps.T)
         precision += [1.0 / noise.drift**2] * ramps.shape[1]
     rows, columns = gathered(parts, n)
-    return Block(
-        rows, columns, line.value, np.full(n, noise.sigma), np.stack(local, axis=1), np.array(precision),
-        line.source or line.component,
-    )  # fmt: skip
+    chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
+    return Block.of(chunk, columns, np.array(precision), line.source or line.component)
 
 
 def squareness_block(reading: SquarenessReading, parameters: Parameters) -> Block:
@@ -169,7 +167,5 @@ def squareness_block(reading: SquarenessReading, parameters: Parameters) -> Bloc
     parts.append((parameters.slices[reading.component], np.ones((1, 1))))
     rows, columns = gathered(parts, 1)
     sigma = max(reading.sigma_rad, LEAST[1])
-    return Block(
-        rows, columns, np.array([reading.value_rad]), np.array([sigma]), np.zeros((1, 0)), np.zeros(0),
-        reading.source or reading.component,
-    )  # fmt: skip
+    chunk = Chunk(rows, np.array([reading.value_rad]), np.array([sigma]), np.zeros((1, 0)))
+    return Block.of(chunk, columns, np.zeros(0), reading.source or reading.component)

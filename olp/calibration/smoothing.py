@@ -15,7 +15,7 @@ import numpy as np
 
 from olp.calibration.basis import Feature, Kink, Spline, Step, Wave
 from olp.calibration.lines import Noise, drift_ramps, targets_of
-from olp.calibration.normal import Block, Normal
+from olp.calibration.normal import Block, Chunk, Normal
 from olp.calibration.observations import Line
 from olp.errormodel.base import Array
 
@@ -111,10 +111,8 @@ def _block(rows: Array, line: Line, noise: Noise, waves: Sequence[Wave], amplitu
         ramps = drift_ramps(line)
         local += list(ramps.T)
         precision += [1.0 / noise.drift**2] * ramps.shape[1]
-    return Block(
-        rows, np.arange(rows.shape[1]), line.value, np.full(n, noise.sigma),
-        np.stack(local, axis=1), np.array(precision),
-    )  # fmt: skip
+    chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
+    return Block.of(chunk, np.arange(rows.shape[1]), np.array(precision))
 
 
 class _Choice:
