@@ -74,7 +74,8 @@ def test_squareness_as_slopes_is_the_same_error() -> None:
 @given(st.integers(0, 10**6), st.sampled_from([None, 30, 256]), st.booleans())
 def test_rows_follow_the_curve_as_far_as_they_say(seed: int, most: int | None, even: bool) -> None:
     rng = np.random.default_rng(seed)
-    position = np.unique(np.round(np.r_[0.0, 800.0, rng.uniform(0, 800, 12)], 3))
+    inner = np.arange(60.0, 780.0, 60.0)
+    position = np.round(np.r_[0.0, inner + rng.uniform(-25.0, 25.0, len(inner)), 800.0], 3)
     curve = Curve("X", position, {"EXX": rng.normal(0, 0.01, len(position))})
     calibration = Calibration("g", BOX, curves=(curve,), backlash_mm=(0.004, 0.0, 0.0))
     rows = component_rows(calibration, "EXX", most=most, even=even)

@@ -136,7 +136,7 @@ def test_every_finding_is_listed_as_it_is() -> None:
 
 
 def test_every_verb_is_listed() -> None:
-    listed = [re.findall(r"`olp (\w+(?: \w+)?)", row[0]) for row in rows_below("### Verbs")]
+    listed = [re.findall(r"`olp (\w+(?: [\w-]+)?)", row[0]) for row in rows_below("### Verbs")]
     assert list(dict.fromkeys(name.split()[0] for names in listed for name in names)) == list(VERBS)
     groups = [name.split()[1] for names in listed for name in names if name.startswith("calibrate ")]
     assert sorted(groups) == sorted(calibrate.VERBS)
