@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from olp.review.job import Review as Review
     from olp.review.job import view as view
     from olp.review.notebook import add_layers as add_layers
+    from olp.thermal_fitting import ThermalFitting as ThermalFitting
+    from olp.thermal_fitting import fit_thermal as fit_thermal
 
 _HOME = {
     "Check": "olp.gate",
@@ -79,6 +81,8 @@ _HOME = {
     "Retiming": "olp.retiming",
     "simulate": "olp.api",
     "verify": "olp.api",
+    "fit_thermal": "olp.thermal_fitting",
+    "ThermalFitting": "olp.thermal_fitting",
     "CannotCompute": "olp.exceptions",
     "ConfigError": "olp.exceptions",
     "InputError": "olp.exceptions",

@@ -14,9 +14,9 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"calibration_rules", "gate_rules", "metrology_rules", "table_rules"},
+    {"calibration_rules", "gate_rules", "metrology_rules", "model_rules", "table_rules"},
     {"findings"},
-    {"geometry", "tables"},
+    {"geometry", "grids", "tables"},
     {"machine"},
     {"toolpath"},
     {"program"},
@@ -35,7 +35,7 @@ LAYERS = (
     {"metrology"},
     {"replanning"},
     {"comparing_parts"},
-    {"calibrating", "correction", "retiming", "comparing"},
+    {"calibrating", "correction", "retiming", "comparing", "thermal_fitting"},
     {"exchanging"},
     {"gate"},
     {"api"},

@@ -17,6 +17,7 @@ VERBS: dict[str, str] = {
     "squareness": "Squareness in the senses of controls and instruments.",
     "postures": "Test A: errors of tool vectors from one point held in several postures.",
     "go-return": "Test B: lost motion of each axis from targets approached from both sides.",
+    "thermal": "Identify how the structure distorts with temperatures, from logs of sensors and drift.",
 }
 
 _HELP = (

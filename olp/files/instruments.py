@@ -17,7 +17,7 @@ from olp.files.fields import NotNegative, Positive, Text, Triple
 from olp.files.measurement_schemas import Sense
 from olp.files.problems import config_error
 from olp.files.readings import SENSES
-from olp.files.schemas import Table
+from olp.files.schema_base import Table
 from olp.files.write import PathLike
 from olp.machine import Tool
 from olp.units import MM_PER_UM

@@ -18,7 +18,7 @@ from pydantic import Field
 
 from olp.exceptions import InputError
 from olp.files.readings import ANGULAR, UNITS, Readings
-from olp.files.schemas import Table
+from olp.files.schema_base import Table
 from olp.files.write import PathLike, read_bytes
 
 Array = npt.NDArray[np.float64]
