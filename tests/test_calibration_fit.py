@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calibration_cases import FRESH, TOOLS, case, cloud, left, line_of, measurements_of, rays
+from calibration_cases import FRESH, TOOLS, case, cloud, left, line_of, measurements_of, rays, two_pods
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import simulated
@@ -143,8 +143,8 @@ def test_what_points_leave_alone_and_with_lines() -> None:
 
 @pytest.mark.parametrize(("chain", "hidden"), [("FXYZ", "ECY"), ("YFXZ", "ECX"), ("ZXFY", "EBX")])
 def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None:
-    """All turns of the last axis, and of the one before about the last one's direction: they move no point of
-    one offset otherwise than its own displacement does. Two offsets hide the turn about their line."""
+    """All turns of the last axis, and of the one before about the last one's direction: they move no point
+    of one offset otherwise than its own displacement does. Two offsets hide the turn about their line."""
     last = chain.replace("F", "")[2]
     machine = simulated.machine(1, "smooth", chain)
     one = fit(Measurements("m", points=(cloud(machine, 1, 250, 5.0, [(30.0, 0.0, 9.0)]),)), chain)
@@ -217,6 +217,43 @@ def test_lengths_of_points_in_a_plane_are_refused() -> None:
         fit(Measurements("m", lengths=(dataclasses.replace(one, axis_mm=flat),)), "FXYZ")
 
 
+# -- directions from pods --------------------------------------------------------------------------------
+
+
+def test_what_two_pods_leave() -> None:
+    """Poses unknown, one distance known: 10 urad at 4 m; the pods are found too."""
+    rows = []
+    for seed, n in ((0, 250), (1, 250)):
+        machine = simulated.machine(seed, "smooth", "FXYZ")
+        found = fit(Measurements("m", pods=(two_pods(machine, seed, n),)), "FXYZ")
+        rows += [left(machine, found, tool, 400).after_framed for tool in FRESH]
+        for pose, place in zip(found.pods[0].poses, simulated.PODS, strict=True):
+            assert pose.place_mm == pytest.approx(place, abs=0.5)
+        assert not told(found, "OLP808")
+    assert np.median(rows) <= 25.0
+
+
+def test_without_a_distance_the_scale_stays_unknown() -> None:
+    """With one offset of the reflector nobody knows the mean of the three scales then, but their
+    differences."""
+    machine = simulated.machine(1, "smooth", "FXYZ")
+    pods = two_pods(machine, 1, 500, [(0.0, 0.0, -100.0)])
+    known = fit(Measurements("m", pods=(pods,)), "FXYZ")
+    free = fit(Measurements("m", pods=(dataclasses.replace(pods, baselines=()),)), "FXYZ")
+
+    def scales(found: Fit, weights: tuple[float, float, float]) -> float:
+        """Standard uncertainty of a combination of the scales of X, Y, Z, in um/m."""
+        row = np.zeros(found.parameters.size)
+        for axis, weight in enumerate(weights):
+            ends = found.curve(f"E{'XYZ'[axis]}{'XYZ'[axis]}", found.box_mm[axis])
+            row += weight * (ends[1] - ends[0]) / np.ptp(found.box_mm[axis])
+        return float(np.sqrt(row @ found.covariance @ row)) * 1e6
+
+    third = 1.0 / 3.0
+    assert scales(free, (third, third, third)) > 3.0 * scales(known, (third, third, third))
+    assert scales(free, (1.0, -1.0, 0.0)) < 1.3 * scales(known, (1.0, -1.0, 0.0))
+
+
 # -- what was not seen -----------------------------------------------------------------------------------
 
 
@@ -277,6 +314,26 @@ def test_an_aliased_period_is_never_fitted() -> None:
     assert not found.parameters.waves
     assert {f.message[:3] for f in told(found, "OLP853")} >= {"EXX", "EYY", "EZZ"}
     assert not calibration_of(found).cyclic
+
+
+def test_a_fine_sweep_shows_what_the_targets_cannot_see() -> None:
+    """Targets at multiples of the pitch, and a sweep over two pitches: amplitude and phase of X, judged by
+    what the machine does in the sweep's place and far from it."""
+    machine = simulated.machine(3, "rough", "FXYZ")
+    taken = simulated.all_lines(machine, 3, jitter=0.0)
+    sweep = simulated.take(
+        machine, np.random.default_rng(8), "EXX", targets=np.arange(1400.0, 1440.5, 1.0), runs=3
+    )
+    found = fit(measurements_of([*taken, sweep], simulated.PITCH), "FXYZ")
+    assert set(found.parameters.waves) == {"EXX"}
+    (term,) = calibration_of(found).cyclic
+    for start in (1410.0, 130.0):
+        q = start + np.linspace(0.0, 20.0, 81)
+        true = machine.curves["EXX"](q)
+        cyclic = term.amplitude * np.sin(2 * np.pi * q / term.period_mm + term.phase_rad)
+        rest = (true - cyclic) - np.polyval(np.polyfit(q, true - cyclic, 1), q)
+        assert np.std(rest) < 0.4 * UM
+        assert np.std(true - np.polyval(np.polyfit(q, true, 1), q)) > 0.7 * UM
 
 
 def test_an_axis_without_lines_has_no_answer() -> None:
