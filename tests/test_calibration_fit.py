@@ -237,7 +237,7 @@ def test_without_a_distance_the_scale_stays_unknown() -> None:
     """With one offset of the reflector nobody knows the mean of the three scales then, but their
     differences."""
     machine = simulated.machine(1, "smooth", "FXYZ")
-    pods = two_pods(machine, 1, 500, [(0.0, 0.0, -100.0)])
+    pods = two_pods(machine, 1, 1000, [(0.0, 0.0, -100.0)])
     known = fit(Measurements("m", pods=(pods,)), "FXYZ")
     free = fit(Measurements("m", pods=(dataclasses.replace(pods, baselines=()),)), "FXYZ")
 
