@@ -178,15 +178,15 @@ class BaselineTable(Table):
 
 class PodsTable(Table):
     file: Text = Field(
-        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and azimuth_1_deg, "
-        "elevation_1_deg, azimuth_2_deg ..., relative to this file"
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
+        "azimuth_1_deg, elevation_1_deg, azimuth_2_deg ..., relative to this file"
     )
     pods: Annotated[int, Field(ge=1)] = Field(default=2, description="how many pods; 2 if left out")
     sigma_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
     baselines: list[BaselineTable] = Field(
-        default=[], description="tables [[pods.baselines]]: distances that are known; without one nothing tells "
-        "the scale"
-    )  # fmt: skip
+        default=[],
+        description="tables [[pods.baselines]]: known distances; without one nothing tells the scale",
+    )
     tool_mm: Triple | None = Field(
         default=None,
         description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "

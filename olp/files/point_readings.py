@@ -40,8 +40,9 @@ def directions(pods: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointReadings:
-    """(n, 3) columns in mm, `measured` (n, k) as in the file; `tool_mm` is None where the file has no such columns. `row`
-    (n,) is the line of each point, `keys` what the file states in comments, each with its line."""
+    """(n, 3) columns in mm, `measured` (n, k) as in the file; `tool_mm` is None where the file has no such
+    columns. `row` (n,) is the line of each point, `keys` what the file states in comments, each with its
+    line."""
 
     file: str
     axis_mm: Array
