@@ -14,6 +14,7 @@ from judge import simulated
 from olp.calibration.basis import CurveSpace, Kink, Spline, Step
 from olp.calibration.curves import calibration_of, sigmas_of
 from olp.calibration.estimator import Fit, fit
+from olp.calibration.lines import drift_ramps, group_of, noise_of
 from olp.calibration.normal import Block, Chunk, Normal, residuals_of, solve
 from olp.calibration.observations import Line, Measurements, SquarenessReading
 from olp.calibration.summary import findings_of, unseen
@@ -249,6 +250,7 @@ def test_without_a_distance_the_scale_stays_unknown() -> None:
             row += weight * (ends[1] - ends[0]) / np.ptp(found.box_mm[axis])
         return float(np.sqrt(row @ found.covariance @ row)) * 1e6
 
+    assert told(free, "OLP809") and not told(known, "OLP809")
     third = 1.0 / 3.0
     assert scales(free, (third, third, third)) > 3.0 * scales(known, (third, third, third))
     assert scales(free, (1.0, -1.0, 0.0)) < 1.3 * scales(known, (1.0, -1.0, 0.0))
@@ -401,6 +403,36 @@ def test_runs_that_scatter_more_than_stated_are_said(
     found = fit(dataclasses.replace(measurements, lines=tuple(lines)), "FXYZ")
     (finding,) = told(found, "OLP803")
     assert finding.message.startswith("exx.csv")
+
+
+def test_noise_and_drift_of_a_line() -> None:
+    """Against one least-squares problem with a mean for each target and direction."""
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    q = np.linspace(0.0, 3000.0, 16)
+    line = line_of(simulated.take(machine, np.random.default_rng(3), "EXX", targets=q))
+    groups, ramps = group_of(line), drift_ramps(line)
+    table = np.hstack([np.eye(groups.max() + 1)[groups], ramps])
+    found, _, rank, _ = np.linalg.lstsq(table, line.value, rcond=1e-9)
+    rest = line.value - table @ found
+    noise = noise_of(line)
+    assert noise.spread == pytest.approx(np.sqrt(rest @ rest / (len(rest) - rank)), rel=1e-6)
+    assert noise.sigma == pytest.approx(0.5 * UM, rel=0.2)
+
+
+def test_recordings_of_many_samples_are_read_in_reasonable_memory() -> None:
+    """Sweeps of 2000 places there and back: no table of samples by places."""
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    rng = np.random.default_rng(3)
+    fine = [
+        line_of(simulated.take(machine, rng, f"E{a}{a}", targets=np.linspace(*machine.box[k], 2000), runs=3))
+        for k, a in enumerate("XYZ")
+    ]
+    found = fit(Measurements("m", tuple(fine)), "FXYZ")
+    q = np.linspace(100.0, 2900.0, 50)
+    at = np.tile(np.array(simulated.LINE), (len(q), 1))
+    at[:, 0] = q
+    rest = found.curve("EXX", q) @ found.theta - machine.error(at, np.array(simulated.TOOL))[:, 0]
+    assert np.std(rest - np.polyval(np.polyfit(q, rest, 1), q)) < 0.3 * UM
 
 
 def test_one_run_without_sigma_is_refused() -> None:

@@ -59,6 +59,17 @@ def unseen(fit: Fit) -> dict[str, float]:
     return found
 
 
+def scale_unseen(fit: Fit) -> float | None:
+    """Standard deviation of the common scale of all axes, where no reading tells of it."""
+    prior = np.linalg.inv(fit.prior.precision()[0])
+    row = np.zeros(fit.parameters.size)
+    for axis, letter in enumerate(AXES):
+        ends = fit.curve(f"E{letter}{letter}", fit.box_mm[axis])
+        row += (ends[1] - ends[0]) / float(np.ptp(fit.box_mm, axis=1).sum())
+    before, after = float(row @ prior @ row), float(row @ fit.covariance @ row)
+    return math.sqrt(after) if after > UNSEEN**2 * before else None
+
+
 def squareness_unseen(fit: Fit) -> dict[str, float]:
     """Values of squareness that no reading tells of, with their standard deviation in rad."""
     matrix, _ = fit.prior.precision()
@@ -221,6 +232,7 @@ def findings_of(
     """What a person should know about an adjustment."""
     return (
         *_unseen_findings(fit, tools),
+        *_scale_findings(fit),
         *_outlier_findings(fit),
         *_scatter_findings(fit),
         *_step_findings(fit),
@@ -252,6 +264,12 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
             "OLP806",
             f"{name} stands as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
         )
+
+
+def _scale_findings(fit: Fit) -> Iterator[Finding]:
+    scale = scale_unseen(fit)
+    if scale is not None:
+        yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
 
 
 def _why(fit: Fit, name: str) -> str:
