@@ -25,8 +25,10 @@ from olp.calibration.lines import (
     targets_of,
 )
 from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
-from olp.calibration.observations import Lengths, Line, Measurements, Points
+from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points
 from olp.calibration.parameters import CROSS, Parameters, Place
+from olp.calibration.pods import STILL_MM as POD_STILL_MM
+from olp.calibration.pods import Pose, first_poses, pods_block
 from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
 from olp.calibration.separation import aliased
@@ -46,7 +48,7 @@ POINT_CELLS, MISFIT, BETTER = 12, 5.0, 0.8
 #: What stands for the component of a point.
 POINT = "point"
 #: The adjustment is made anew after cyclic terms or points were left out, so often at most.
-PASSES = 6
+PASSES = 8
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
 OUTLIER, SHARE = 6.0, 0.05
 #: A cyclic term below so many standard deviations is noise.
@@ -98,6 +100,17 @@ class LengthsResult:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PodsResult:
+    """Directions after the fit: the poses of their pods, residuals in rad (and mm of baselines, last), sum of
+    squares of standardised residuals."""
+
+    pods: Pods
+    poses: tuple[Pose, ...]
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """theta with its covariance and layout; see `error`, `sigma`, `design`.
 
@@ -114,6 +127,7 @@ class Fit:
     lines: tuple[LineResult, ...]
     points: tuple[PointsResult, ...]
     lengths: tuple[LengthsResult, ...]
+    pods: tuple[PodsResult, ...]
     outliers: tuple[Outlier, ...]
     box_mm: Array
     slopes: Mapping[str, Array]
@@ -239,13 +253,14 @@ def _fit(
     tell("noise", 0.0)
     lines, noises, outliers = _screened(measurements.lines)
     clouds = list(measurements.points)
-    ranges, box = _ranges(lines, [*clouds, *measurements.lengths], travel_mm)
+    ranges, box = _ranges(lines, [*clouds, *measurements.lengths, *measurements.pods], travel_mm)
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
     splines = [_spline(lines, axis, ranges[axis], cells) for axis in range(3)]
-    scattered: list[Points | Lengths] = [*clouds, *measurements.lengths]
+    scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
     waves, unseen = _waves(measurements, lines, scattered)
     shapes = _shapes(lines, noises, splines, waves, tell)
     stations = [first_station(rays) for rays in measurements.lengths]
+    poses = [first_poses(pods) for pods in measurements.pods]
     theta = np.zeros(0)
     learnt: dict[str, tuple[float, float]] | None = None
     for _ in range(PASSES):
@@ -260,20 +275,33 @@ def _fit(
             lengths_block(rays, parameters, theta, station)
             for rays, station in zip(measurements.lengths, stations, strict=True)
         ]
+        of_pods = [
+            pods_block(pods, parameters, theta, own)
+            for pods, own in zip(measurements.pods, poses, strict=True)
+        ]
         others = [squareness_block(reading, parameters) for reading in measurements.squareness]
         tell("adjustment", 0.5)
-        normal, solved = _adjusted([*of_lines, *of_points, *of_lengths, *others], prior, learnt is None)
+        normal, solved = _adjusted(
+            [*of_lines, *of_points, *of_lengths, *of_pods, *others], prior, learnt is None
+        )
         learnt = prior.classes
         theta = solved.theta
         seen = _waves_seen(parameters, solved)
         slips = [_slips(block, cloud, solved) for block, cloud in zip(of_points, clouds, strict=True)]
         steps = [residuals_of(block, theta)[0] for block in of_lengths]
-        if seen == waves and not any(slips) and all(np.abs(step[:3]).max() < STILL_MM for step in steps):
+        turns = [residuals_of(block, theta)[0].reshape(-1, 6) for block in of_pods]
+        still = all(np.abs(step[:3]).max() < STILL_MM for step in steps)
+        still = still and all(np.abs(turn[:, :3]).max() < POD_STILL_MM for turn in turns)
+        if seen == waves and not any(slips) and still:
             break
         waves = seen
         outliers += [slip for some in slips for slip in some]
         clouds = [_without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
         stations = [station.moved(step) for station, step in zip(stations, steps, strict=True)]
+        poses = [
+            [pose.moved(step) for pose, step in zip(own, turn, strict=True)]
+            for own, turn in zip(poses, turns, strict=True)
+        ]
     results = [
         LineResult(line, noise, *_left(block, theta))
         for line, noise, block in zip(lines, noises, of_lines, strict=True)
@@ -285,14 +313,21 @@ def _fit(
         LengthsResult(rays, station, *_left(block, theta))
         for rays, station, block in zip(measurements.lengths, stations, of_lengths, strict=True)
     ]
-    chi_square = sum((_left(block, theta)[1] for block in (*of_lines, *of_points, *of_lengths, *others)), 0.0)
+    pods_left = [
+        PodsResult(pods, tuple(own), *_left(block, theta))
+        for pods, own, block in zip(measurements.pods, poses, of_pods, strict=True)
+    ]
+    chi_square = sum(
+        (_left(block, theta)[1] for block in (*of_lines, *of_points, *of_lengths, *of_pods, *others)), 0.0
+    )
     # readings less what the fit used up of their freedom
     freedom = max(normal.count - float(np.trace(solved.covariance @ normal.H)) - normal.free, 1.0)
     # readings that fit worse than their noise say that the model is not all there is
     covariance = solved.covariance * max(1.0, chi_square / freedom)
     return Fit(
         measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
-        tuple(rays_left), tuple(outliers), box, _slopes(parameters), chi_square, freedom, unseen,
+        tuple(rays_left), tuple(pods_left), tuple(outliers), box, _slopes(parameters), chi_square, freedom,
+        unseen,
     )  # fmt: skip
 
 
@@ -394,14 +429,20 @@ def _about_group(line: Line) -> Array:
 
 
 def _medians(values: Array, labels: np.ndarray) -> Array:
-    out = np.zeros(int(labels.max()) + 1)
-    for label in np.unique(labels):
-        out[label] = np.median(values[labels == label])
-    return out
+    """Median of the values of each label from 0."""
+    ordered = values[np.lexsort((values, labels))]
+    counts = np.bincount(labels)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    last = len(ordered) - 1
+    below, above = starts + np.maximum(counts - 1, 0) // 2, starts + counts // 2
+    middle = 0.5 * (ordered[np.minimum(below, last)] + ordered[np.minimum(above, last)])
+    return np.asarray(np.where(counts > 0, middle, 0.0))
 
 
 def _ranges(
-    lines: Sequence[Line], clouds: Sequence[Points | Lengths], travel_mm: Sequence[tuple[float, float]] | None
+    lines: Sequence[Line],
+    clouds: Sequence[Points | Lengths | Pods],
+    travel_mm: Sequence[tuple[float, float]] | None,
 ) -> tuple[list[tuple[float, float]], Array]:
     """What the readings of each axis reach together, and the box: what every component with lines covers, or
     the points where an axis has no lines."""
@@ -479,7 +520,7 @@ def _shapes(
 
 
 def _waves(
-    measurements: Measurements, lines: Sequence[Line], scattered: Sequence[Points | Lengths]
+    measurements: Measurements, lines: Sequence[Line], scattered: Sequence[Points | Lengths | Pods]
 ) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
     """Cyclic terms that the targets can see, and why others cannot be seen."""
     waves: dict[str, tuple[Wave, ...]] = {}

@@ -47,17 +47,17 @@ def noise_of(line: Line) -> Noise:
     spread: float | None = None
     drift = 0.0
     if several:
-        table = np.zeros((n, groups.max() + 1 + ramps.shape[1]))
-        table[np.arange(n), groups] = 1.0
-        table[:, groups.max() + 1 :] = ramps
-        found, _, rank, _ = np.linalg.lstsq(table, line.value, rcond=1e-9)
-        free = n - int(rank)
+        # the mean of each target and direction is taken out of both sides: what is left is the drift
+        count = int(groups.max()) + 1
+        own = ramps - _means(ramps, groups, count)[groups]
+        value = line.value - _means(line.value[:, None], groups, count)[groups, 0]
+        steps, _, rank, _ = np.linalg.lstsq(own, value, rcond=1e-9)
+        free = n - count - int(rank)
         if free >= 3:
-            rest = line.value - table @ found
+            rest = value - own @ steps
             # by the median, so that one slip of the hand does not blunt all readings
             robust = 1.4826 * float(np.median(np.abs(rest))) * np.sqrt(n / free)
             spread = min(float(np.sqrt(rest @ rest / free)), 1.3 * robust)
-            steps = found[groups.max() + 1 :]
             drift = float(np.sqrt(np.mean(steps**2)))
     least = LEAST[line.quantity == "angle"]
     if spread is None and line.sigma <= 0.0:
@@ -68,6 +68,12 @@ def noise_of(line: Line) -> Noise:
         )
     sigma = max(line.sigma, spread or 0.0, least)
     return Noise(sigma, max(drift, 0.2 * sigma) if several else 0.0, spread)
+
+
+def _means(columns: Array, groups: np.ndarray, count: int) -> Array:
+    """(count, k) mean of columns (n, k) in each group."""
+    sums = np.stack([np.bincount(groups, column, count) for column in columns.T], axis=1)
+    return np.asarray(sums / np.bincount(groups, minlength=count)[:, None])
 
 
 def group_of(line: Line) -> np.ndarray:
