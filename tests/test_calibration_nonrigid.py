@@ -134,9 +134,7 @@ def test_the_sines_make_the_kernel() -> None:
 
 
 def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
-    """Against the log density of the readings themselves, by scipy, with every unknown marginalised."""
-    from scipy.stats import multivariate_normal
-
+    """Against the log density of the readings themselves, with every unknown marginalised."""
     machine = simulated.machine(4, "smooth")
     before = of_points(machine, 4, 45)
     modes = Modes(BOX.mean(axis=1), np.ptp(BOX, axis=1), np.array([[1.0, 1, 1], [2, 1, 1], [1, 2, 2]]))
@@ -144,12 +142,14 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
     log = np.array([[np.log(s), *np.log(0.5 * np.ptp(BOX, axis=1))] for s in (0.01, 0.004, 0.02)])
 
     def ours(size: float) -> float:
-        return log_evidence(work.reduced(), modes, log + [np.log(size), 0, 0, 0], np.log(1.3))[0]
+        return log_evidence(
+            work.reduced(), modes, log + np.array([np.log(size), 0.0, 0.0, 0.0]), np.log(1.3)
+        )[0]
 
     points = before.points[0].points
     (_, block), size = work.sets[0], before.parameters.size
     (chunk,) = block.chunks()
-    nominal = 1e4 * chunk.local @ chunk.local.T  # the frame: any
+    nominal = chunk.local @ chunk.local.T  # the frame: any
 
     def dense(factor: float) -> float:
         variance = np.concatenate([np.exp(modes.log_variance(h[0] + np.log(factor), h[1:])[0]) for h in log])
@@ -157,7 +157,8 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
         rigid = chunk.rows[:, :size] @ curves @ chunk.rows[:, :size].T + nominal
         field = (chunk.rows[:, size:] * variance) @ chunk.rows[:, size:].T
         noise = np.eye(len(chunk.y)) * points.sigma**2
-        return float(multivariate_normal(cov=1.69 * (rigid + noise) + field).logpdf(chunk.y))
+        cov = 1.69 * (rigid + noise) + field
+        return float(-0.5 * np.linalg.slogdet(cov)[1] - 0.5 * chunk.y @ np.linalg.solve(cov, chunk.y))
 
     assert ours(1.0) - ours(0.1) == pytest.approx(dense(1.0) - dense(0.1), abs=2e-2)
 
@@ -192,7 +193,7 @@ def test_without_a_field_the_adjustment_is_that_of_the_fit() -> None:
 
 def test_the_map_loses_no_more_than_stated(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
     _, before, found = bent
-    wanted = Measurements("simulated", points=before.measurements.points, map=MapWish(within_mm=5e-5))
+    wanted = Measurements("simulated", points=before.measurements.points, map=MapWish(within_mm=2e-4))
     fitted = olp.fit_calibration(dataclasses.replace(wanted, chain=before.parameters.chain))
     (described,) = fitted.calibration.maps
     assert described.sigma is not None
@@ -201,7 +202,7 @@ def test_the_map_loses_no_more_than_stated(bent: tuple[simulated.Machine, Fit, N
         fitted.calibration.box_mm, axis=1
     )
     model = build(dataclasses.replace(fitted.calibration, curves=(), squareness={}), before.parameters.chain)
-    assert np.abs(model.error(at, np.zeros(3)) - found.value(at)).max() < 1e-4
+    assert np.abs(model.error(at, np.zeros(3)) - found.value(at)).max() < 2.5e-4
     with pytest.raises(CannotCompute, match="within_um"):
         residual_map(found, fitted.calibration, 1e-9)
 
@@ -211,23 +212,23 @@ def test_sigmas_of_curves_and_map_add_up_to_that_of_both(
 ) -> None:
     _, before, found = bent
     fitted = olp.fit_calibration(
-        dataclasses.replace(before.measurements, chain=before.parameters.chain), map=True
+        dataclasses.replace(before.measurements, chain=before.parameters.chain), map=MapWish(within_mm=1e-3)
     )
     (described,) = fitted.calibration.maps
     assert described.sigma is not None
-    tool, at = np.array(described.tool_mm), np.array([[k[2] for k in described.knots_mm]])
-    whole = np.sqrt(described.sigma[2, 2, 2] ** 2 + found.fit.sigma(at, tool)[0] ** 2)
+    tool, at = np.array(described.tool_mm), np.array([[k[0] for k in described.knots_mm]])
+    whole = np.sqrt(described.sigma[0, 0, 0] ** 2 + found.fit.sigma(at, tool)[0] ** 2)
     assert np.all(whole >= found.sigma(at, tool)[0] - 1e-6)
     assert whole == pytest.approx(found.sigma(at, tool)[0], rel=0.15)
 
 
-def written(folder: Path, machine: simulated.Machine, more: str = "", tools: object = None) -> Path:
+def written(
+    folder: Path, machine: simulated.Machine, more: str = "[map]\nwithin_um = 1.0\n", tools: object = None
+) -> Path:
     points = cloud(machine, 1, 120, 5.0, tools)
     table = np.column_stack([points.axis_mm, points.measured_mm, points.tool_mm])
     columns = [f"{a}{b}_mm" for a in ("", "measured_", "tool_") for b in "XYZ"]
-    np.savetxt(
-        folder / "points.csv", table, delimiter=",", fmt="%.6f", header=",".join(columns), comments=""
-    )
+    np.savetxt(folder / "points.csv", table, delimiter=",", fmt="%.6f", header=",".join(columns), comments="")
     (folder / "measurements.toml").write_text(
         'schema = "olp-measurements-1"\nmachine = "m"\nchain = "YFXZ"\nmeasured = 2026-05-14\n'
         f'temperature_degC = 20.0\n{more}\n[[points]]\nfile = "points.csv"\nsigma_um = 5.0\n'
@@ -266,7 +267,7 @@ def test_one_offset_says_what_the_map_holds_for(tmp_path: Path) -> None:
     plan = written(tmp_path, machine, tools=[simulated.OFFSETS[0]])
     said = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "--map"])
     assert "OLP843" in said.output
-    assert "[0, 0, -120] mm" in said.output
+    assert "[0, 0, -120] mm" in " ".join(said.output.split())
 
 
 def test_no_map_is_said(tmp_path: Path) -> None:

@@ -23,8 +23,8 @@ from olp.units import UM_PER_MM
 WITHIN_MM = 2e-4
 #: Levels along an axis: the fewest that lose no more, between these.
 FEWEST, MOST = 5, 41
-#: Places of a grid at once.
-_BLOCK = 1000
+#: Levels along an axis at which uncertainties are worked out.
+SIGMA_LEVELS = 7
 #: Offsets of the reflector that differ by less than this are one.
 _ONE_MM = 1.0
 
@@ -42,10 +42,11 @@ def residual_map(found: NonRigid, calibration: Calibration, within_mm: float = W
         knots = [np.linspace(low, high, n) for (low, high), n in zip(box.tolist(), counts, strict=True)]
         grid = Grid.through(knots, _values(found, knots), "cubic")
         missed = [_missed(found, grid, axis) for axis in range(3)]
-        if max(missed) <= within_mm:
+        # what is lost along each axis adds up within a cell
+        if sum(missed) <= within_mm:
             break
         worst = int(np.argmax(missed))
-        counts[worst] += 2
+        counts[worst] += max(2, counts[worst] // 4)
         if counts[worst] > MOST:
             raise CannotCompute(
                 f"a grid of {MOST} levels along {'XYZ'[worst]} still loses {missed[worst] * UM_PER_MM:.2g} "
@@ -76,19 +77,16 @@ def _places(knots: list[Array]) -> Array:
 
 
 def _values(found: NonRigid, knots: list[Array]) -> Array:
-    places = _places(knots)
-    parts = [found.value(places[k : k + _BLOCK]) for k in range(0, len(places), _BLOCK)]
-    return np.concatenate(parts).reshape(*(len(k) for k in knots), 3)
+    return found.value(_places(knots)).reshape(*(len(k) for k in knots), 3)
 
 
 def _sigma(found: NonRigid, knots: list[Array], tool: Array) -> Array:
-    places = _places(knots)
-    parts = []
-    for start in range(0, len(places), _BLOCK):
-        at = places[start : start + _BLOCK]
-        rest = found.sigma(at, tool) ** 2 - found.fit.sigma(at, tool) ** 2
-        parts.append(np.sqrt(np.maximum(rest, 0.0)))
-    return np.concatenate(parts).reshape(*(len(k) for k in knots), 3)
+    """At the nodes, from a coarser grid: uncertainties change slowly."""
+    coarse = [np.linspace(k[0], k[-1], SIGMA_LEVELS) for k in knots]
+    at = _places(coarse)
+    rest = found.sigma(at, tool) ** 2 - found.fit.sigma(at, tool) ** 2
+    values = np.sqrt(np.maximum(rest, 0.0)).reshape(*(len(k) for k in coarse), 3)
+    return Grid.through(coarse, values, "linear")(_places(knots)).reshape(*(len(k) for k in knots), 3)
 
 
 def _missed(found: NonRigid, grid: Grid, axis: int) -> float:
