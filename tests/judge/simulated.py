@@ -348,8 +348,8 @@ PODS = ((-500.0, -1500.0, -300.0), (3500.0, -1500.0, -100.0))
 
 
 def bent(m: Machine, sag_mm: float = 0.030, twist_mm: float = 0.015) -> Machine:
-    """The same machine, and what no rigid bodies make: a sag of Z in the middle of X and Y that depends on the
-    ram, and X that twists with all three axes."""
+    """The same machine, and what no rigid bodies make: a sag of Z in the middle of X and Y that depends on
+    the ram, and X that twists with all three axes."""
 
     @dataclass
     class Bent(Machine):
