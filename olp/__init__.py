@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from olp.findings import Finding as Finding
     from olp.gate import Check as Check
     from olp.gate import check as check
+    from olp.result_correction import ResultCorrection as ResultCorrection
+    from olp.result_correction import correct_results as correct_results
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -58,6 +60,8 @@ _HOME = {
     "view": "olp.review.job",
     "add_layers": "olp.review.notebook",
     "Retiming": "olp.retiming",
+    "ResultCorrection": "olp.result_correction",
+    "correct_results": "olp.result_correction",
     "simulate": "olp.api",
     "verify": "olp.api",
     "CannotCompute": "olp.exceptions",

@@ -21,6 +21,7 @@ from olp.measured.path import Path
 from olp.nominal import nominal_of
 from olp.program.reader import Options, read
 from olp.report import to_json
+from olp.result_correction import ResultCorrection
 from olp.testpaths import predicted
 
 #: points of a predicted path in a picture, about
@@ -51,6 +52,15 @@ def comparison(result: Comparison, setup: Setup | None, name: str, date: datetim
     return _written(
         report_document.comparison(report, plots | _test_plots(report, name), __version__, date), name
     )
+
+
+def results(result: ResultCorrection, name: str, date: datetime.date | None) -> bytes:
+    """The report of a correction of results in the form that `name` ends in."""
+    from olp import report_results
+
+    if FilePath(name).suffix.lower() == ".json":
+        return to_json(result.report)
+    return _written(report_results.to_document(result.report, __version__, date), name)
 
 
 def correction(

@@ -16,7 +16,7 @@ LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
-    *("view", "Review", "add_layers"),
+    *("view", "Review", "add_layers", "correct_results", "ResultCorrection"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

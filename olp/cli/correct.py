@@ -25,6 +25,8 @@ from olp.cli.common import (
     talk,
 )
 from olp.cli.progress import progress
+from olp.cli.results import Asked, default_output
+from olp.cli.results import run as run_results
 from olp.exceptions import ProgramError, UsageError
 
 if TYPE_CHECKING:
@@ -60,6 +62,18 @@ LAST_DIGITS_UM = 10.0
 @click.option(
     "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
 )
+@click.option("--results", is_flag=True, help="PROGRAM holds points that a measuring machine reported.")
+@click.option("--profile", metavar="NAME|FILE", help="How a table of points is laid out.")
+@click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
+@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a table.")
+@click.option(
+    "--frame", "frames", multiple=True, metavar="[NAME=]FRAME",
+    help="Work offset that results are stated in, or machine; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--tool", "tools", multiple=True, metavar="[NAME=]N", help="Stylus of results; may be repeated."
+)
+@click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
@@ -80,6 +94,13 @@ def command(
     split_rapids: bool,
     report_file: str | None,
     review_file: str | None,
+    results: bool,
+    profile: str | None,
+    columns: tuple[str, ...],
+    unit: str | None,
+    frames: tuple[str, ...],
+    tools: tuple[str, ...],
+    decimals: int | None,
     show_diff: bool,
     quiet: bool,
     force: bool,
@@ -88,9 +109,26 @@ def command(
 
     PROGRAM and the machine file may come from the job file; what the command line says wins. OUT is written
     also where the proof ends above the tolerance; the exit code is 1 then.
+
+    With --results, PROGRAM is a table of points or DMIS output of a measuring machine, and the error is added
+    to what it reported.
     """
+    if results:
+        for name in ("flatten", "expand_cycles", "split_rapids", "contour", "show_diff", "review_file"):
+            if click.get_current_context().params[name]:
+                raise UsageError(
+                    f"--{name.removesuffix('_file').replace('show_', '').replace('_', '-')} is of "
+                    "programs and does not go with --results"
+                )
+        run_results(program, machine, job, Asked(
+            profile, columns, unit, frames, tools, decimals, outside_box == "hold",
+            date.date() if date else None, output, report_file, as_json, fail_on, quiet, force,
+        ))  # fmt: skip
+        return
+    if frames or tools or decimals is not None:
+        raise UsageError("--frame, --tool and --decimals are of reported results; add --results")
     call = given(program, machine, job)
-    output = output or _default_output(call.program)
+    output = output or default_output(call.program)
     as_json = as_json or report_file == STREAM
     if review_file == STREAM:
         raise UsageError("the page of --review goes to a file; olp view writes one to stdout")
@@ -143,8 +181,7 @@ def command(
 
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
-            profile = profile_of(call.setup)
-            text = unrolled(text, origin, profile, expand_cycles, peck_clearance_mm)
+            text = unrolled(text, origin, profile_of(call.setup), expand_cycles, peck_clearance_mm)
         day = date.date() if date else None
         filed = report_files.correction(result, text, call.setup, name, day, contour=contour)
         written[Path(name)] = filed
@@ -162,11 +199,6 @@ def command(
         for path in written:
             talk(f"wrote {path}")
     exit_for(result.findings, fail_on)
-
-
-def _default_output(program: str) -> str:
-    path = Path(program)
-    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
 
 
 def _diff(nominal: str | bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:

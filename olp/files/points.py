@@ -14,13 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import InputError
-from olp.files.point_profile import DELIMITERS, MM, SECONDS, PointProfile, looked_at
+from olp.files.point_profile import MEASURED, PointProfile, looked_at
 from olp.files.problems import nearest
 from olp.files.write import PathLike, read_bytes
+from olp.program.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
 
 Array = npt.NDArray[np.float64]
-
-_LOOK = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +53,7 @@ def read_points(path: PathLike, profile: PointProfile | None = None) -> Points:
 
 def suggested(path: PathLike) -> PointProfile | None:
     """The layout that the first rows of a file tell, None where they leave a choice. Raises InputError."""
-    return looked_at(read_bytes(path)[: 1 << 14].decode("utf-8-sig", "replace").splitlines()[:_LOOK])
+    return looked_at(first_lines(read_bytes(path)))
 
 
 def parse_points(data: bytes, file: str, profile: PointProfile | None = None) -> Points:
@@ -67,7 +66,7 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8",
             file=file, line=line,
         ) from None  # fmt: skip
-    first = list(itertools.islice(io.StringIO(text), _LOOK))
+    first = list(itertools.islice(io.StringIO(text), LOOK))
     found = profile or looked_at(first)
     if not text.strip():
         raise InputError("holds no points; expected a row a point", file=file)
@@ -77,11 +76,12 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
-    stated = re.search(r"^[#/;\s]*frame\s*=\s*(\S+)", "".join(first), re.MULTILINE)
     skip, header = _header(first, found, file)
     if next(_rows(text, found, skip), None) is None:
         raise InputError("holds no points; expected a row a point", file=file)
-    columns = {key: _place(column, header, file) for key, column in found.columns.given.items()}
+    columns = {
+        key: _place(column, header, file) for key, column in found.columns.given.items() if key in MEASURED
+    }
     numbers = [key for key in columns if key != "name"]
     table = _table(text, file, found, skip, [columns[key] for key in numbers])
     column = dict(zip(numbers, table.T, strict=True))
@@ -97,7 +97,7 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         time,
         names,
         column["line"].astype(np.int64) if "line" in column else None,
-        stated[1] if stated else found.frame,
+        stated_frame(first) or found.frame,
         found,
         hashlib.sha256(data).hexdigest(),
     )

@@ -1,0 +1,75 @@
+"""Where reported points lie on the machine: frames and styli of a job, by the names that a file gives
+them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.exceptions import ConfigError, InputError
+from olp.geometry import rotation_matrix
+from olp.machine import ZERO, Setup, Tool, Vector, WorkOffset
+from olp.results.forward import Place, Stylus
+
+#: the frame whose points are axis positions
+MACHINE = "machine"
+
+
+def place_of(setup: Setup, name: str | None) -> Place:
+    """The frame with a name. Raises InputError where the file names none, ConfigError where nothing defines
+    it."""
+    if name is None:
+        raise InputError(
+            "states no frame, so where its points lie on the machine is not known; name one of "
+            "[work_offsets] with --frame, or --frame machine for axis positions"
+        )
+    if name == MACHINE:
+        return Place(MACHINE, np.eye(3), ZERO, None)
+    work = setup.work_offset(name)
+    if work is None:
+        raise ConfigError(
+            f'frame {name} is not defined; give [work_offsets."{name}"] in the job file: where the part '
+            "lies, "
+            "with X_mm, Y_mm, Z_mm and A_deg, B_deg, C_deg"
+        )
+    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, _touched(setup, work))
+
+
+def _touched(setup: Setup, work: WorkOffset) -> tuple[Vector, Vector] | None:
+    """Axis position and lever at the touch that set a zero, None where it was set by other means."""
+    if work.set_by == "true":
+        return None
+    length = lever = ZERO
+    if work.touch_tool is not None:
+        tool = setup.tool(work.touch_tool)
+        if tool is None or tool.lever_mm is None:
+            raise ConfigError(
+                f"frame {work.name} was touched off with tool {work.touch_tool}, whose lever is not defined; "
+                "give its Z_mm or gauge_to_tip_mm"
+            )
+        length, lever = tool.length_mm, tool.lever_mm
+    x, y, z = (work.offset_mm[i] + length[i] if at is None else at for i, at in enumerate(work.touched_at_mm))
+    return (x, y, z), lever
+
+
+def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
+    """The stylus that a file calls `label`, None for the tool in the spindle at the start. With `by_row` the
+    rows state their vectors, and a tool only gives the radius. Raises ConfigError."""
+    number = setup.machine.default_tool if label is None else label
+    if number is None and by_row:
+        return Stylus(ZERO, ZERO, 0.0)
+    if number is None:
+        raise ConfigError(
+            "no stylus is known, and angular errors act through it; give job_defaults.tool in the machine "
+            "file, --tool, or columns SX, SY, SZ (gauge point to tip)"
+        )
+    if number == 0:
+        return Stylus(ZERO, ZERO, 0.0)
+    tool: Tool | None = setup.tool(number) if isinstance(number, int) else None
+    if tool is None:
+        raise ConfigError(
+            f"stylus {number} is not defined; give [tools.N] in the machine or job file and name it by its "
+            "number, or name one stylus for all points with --tool"
+        )
+    if tool.lever_mm is None and not by_row:
+        raise ConfigError(f"stylus {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm")
+    return Stylus(tool.length_mm, tool.lever_mm or ZERO, tool.radius_mm)
