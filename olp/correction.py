@@ -12,12 +12,13 @@ import numpy as np
 
 from olp import checks
 from olp.checks import state
+from olp.compensation.lettered import LetteredWriter
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
 from olp.compensation.writer import Writer
 from olp.errormodel.base import Array
-from olp.exceptions import AlreadyCorrected, OlpError, ProgramError
+from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, UsageError
 from olp.findings import Finding
 from olp.loading import Loaded, unrolled
 from olp.machine import Setup
@@ -81,12 +82,18 @@ def correct_bytes(
         data = unrolled(data, name, loaded.dialect, expand, clearance)
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
+    if rapids and program.lettering is not None:
+        raise UsageError(
+            "--split-rapids does not go with this dialect: nothing says how the machine goes between its "
+            "places; "
+            'state joined = "lines" and insert = true in the profile'
+        )
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
     limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
-    writer = Writer(
+    writer = (Writer if program.lettering is None else LetteredWriter)(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
         stamp=stamp_line(loaded.digest, loaded.dialect.comment),
@@ -115,6 +122,7 @@ def correct_bytes(
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
+        *checks.between_findings(nominal, proof),
         *checks.hole_findings(holes, limits.tolerance_mm),
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
@@ -156,6 +164,7 @@ def verify_programs(
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
+        *checks.between_findings(first, proof),
         *checks.program_findings(first, loaded.setup, contour=contour),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)

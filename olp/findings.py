@@ -178,6 +178,35 @@ _TABLE = (
         "`G0 X10`, then `G1 X50 F600`, with Y and Z unknown at the G0.",
     ),
     Rule(
+        "OLP331",
+        "told from the text",
+        Severity.INFO,
+        "The file does not state this; it was told from its rows or taken from the machine file.",
+        "Look whether it is so; state it in the header, or in a profile (--profile).",
+        "`10;20;30` as the first row: the delimiter is a semicolon, the columns are X, Y and Z.",
+    ),
+    Rule(
+        "OLP332",
+        "orientation changes",
+        Severity.WARNING,
+        "Three linear axes cannot turn the tool: orientations are carried as they are, and the lever of the "
+        "tool is taken as the same all along.",
+        "Correct lists of one orientation at a time, each with the tool vector that it has there.",
+        "A column C that goes from 0 to 90 degrees.",
+    ),
+    Rule(
+        "OLP333",
+        "between places of a list",
+        Severity.INFO,
+        "A list says where the machine goes and not how. If it goes straight, its errors bend the way "
+        "between "
+        "two corrected places by more than the tolerance.",
+        'State joined = "lines" and insert = true in the profile, if the machine goes straight and rows '
+        "may be "
+        "inserted.",
+        "Two tag points 2 m apart on a machine whose straightness is 5 um.",
+    ),
+    Rule(
         "OLP401",
         "calibration expired",
         Severity.WARNING,

@@ -74,6 +74,9 @@ def control_of(setup: Setup) -> Dialect:
 def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
     """The dialect of a program, and the setup with it named, so that what is made of the program later is
     read alike. Raises ProgramError where it cannot be told, UsageError for a name that there is not."""
+    described = setup.job.described
+    if isinstance(described, Dialect):
+        return setup, described
     dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
     return replace(setup, job=replace(setup.job, dialect=dialect.name)), dialect
 

@@ -154,8 +154,9 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `dialect` is that of
-    the program, None: what its text and the ending of its file say."""
+    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `dialect` is that
+    of the program, None: what its text and the ending of its file say; `described` is a dialect that a file
+    describes (`olp.program.dialect.Dialect`)."""
 
     program: str | None = None
     machine: str | None = None
@@ -165,6 +166,7 @@ class Job:
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
     dialect: str | None = None
+    described: object | None = None
     meshes: tuple[Mesh, ...] = ()
 
 

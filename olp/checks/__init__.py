@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks.base import finding, lines_of
+from olp.checks.listed import between_findings as between_findings
+from olp.checks.listed import told_findings
 from olp.compensation.holes import HolePlan
 from olp.errormodel import ErrorModel
 from olp.findings import Finding
@@ -41,8 +43,9 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
                     [line],
                 )
             )
+    out += told_findings(program)
     whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
-    if whole.any():
+    if whole.any() and program.lettering is None:
         lines = lines_of(path, whole)
         out.append(
             finding(

@@ -115,7 +115,11 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
 
     setup = load_setup(machine, job)
     named = click.get_current_context().meta.get(_DIALECT)
-    if named is not None:
+    if named is not None and named.endswith(".toml"):
+        from olp.files.described import load_described
+
+        setup = replace(setup, job=replace(setup.job, described=load_described(named)))
+    elif named is not None:
         setup = replace(setup, job=replace(setup.job, dialect=named))
     inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
     if setup.machine.calibration is not None:

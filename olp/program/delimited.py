@@ -194,7 +194,8 @@ class Cells:
         mark = DELIMITERS[layout.delimiter]
         self._mark = None if mark is None else mark.encode()
         self._comments = (b"#", layout.comment.encode())
-        self._skipped = False
+        #: where the row that was last given begins and ends
+        self.bounds: Span = (0, 0)
         self.header: list[str] = []
         self.header_line = 0
         if layout.header:
@@ -221,6 +222,7 @@ class Cells:
         """Line (from 1) and cells of each row of data."""
         for number, start, end in self._lines():
             if number > self.header_line:
+                self.bounds = (start, end)
                 yield number, self.split(start, end)
 
     def text(self, span: Span) -> str:

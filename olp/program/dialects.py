@@ -14,6 +14,7 @@ from olp.machine import Setup
 from olp.program import reader
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
+from olp.program.pointlist import POINT_LIST, read_list
 from olp.program.profiles import PROFILES, Profile
 from olp.program.program import Program
 
@@ -25,11 +26,11 @@ def _rs274(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, wor
     return reader.read(data, setup, dialect, options, words=words)
 
 
-READERS: Mapping[str, Reader] = {"rs274": _rs274}
-DIALECTS: Mapping[str, Dialect] = {**PROFILES}
+READERS: Mapping[str, Reader] = {"rs274": _rs274, "list": read_list}
+DIALECTS: Mapping[str, Dialect] = {**PROFILES, "list": POINT_LIST}
 
 #: Endings of files that only one family has. The ending of a version (`.ncl.3`) does not count.
-_ENDINGS: Mapping[str, str] = {}
+_ENDINGS: Mapping[str, str] = {"csv": "list", "tsv": "list"}
 #: What only texts of a family say at the start of a line.
 _SIGNS: Mapping[str, re.Pattern[bytes]] = {}
 #: What only texts of statements say, without saying of which family.

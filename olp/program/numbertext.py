@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-Spans = npt.NDArray[np.int64]
+Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
+#: Decimals beyond these say nothing that a double holds.
+MOST_DECIMALS = 10
 _NUMBER = re.compile(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
 _BLANKS = b" \t"
 
@@ -28,6 +31,11 @@ class Number:
     letter: bytes
     exponent_digits: int
     exponent_plus: bool
+
+    @property
+    def places(self) -> int:
+        """Decimals of the number without its exponent."""
+        return -round(math.log10(self.digit))
 
 
 def number(text: bytes, decimal: bytes = b".") -> Number | None:
@@ -119,10 +127,11 @@ class Placing:
 
 
 def spliced(data: bytes, edits: list[tuple[int, int, bytes]]) -> bytes:
-    """The text with edits (start, end, new bytes) made; none may overlap another."""
+    """The text with edits (start, end, new bytes) made; none may overlap another. What is inserted at one
+    place comes in the order of the edits."""
     out: list[bytes] = []
     at = 0
-    for start, end, text in sorted(edits):
+    for start, end, text in sorted(edits, key=lambda edit: edit[:2]):
         out += (data[at:start], text)
         at = end
     out.append(data[at:])

@@ -73,6 +73,30 @@ class Hole:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Lettering:
+    """How a text that is no blocks of words writes its positions. (n,) `begin`, `end`: the bytes that say
+    each move, -1 where nothing of the text does; `decimal` is the decimal mark. `padded`: numbers keep the
+    edges of their columns. `shared`: one number may be that of several moves."""
+
+    begin: Small
+    end: Small
+    decimal: bytes = b"."
+    padded: bool = False
+    shared: bool = False
+
+    @staticmethod
+    def of(
+        data: bytes, bounds: Index, spans: Index, *, decimal: bytes = b".", shared: bool = False
+    ) -> Lettering:
+        """With `bounds` (n, 2) of the statements and `spans` (m, 2) or more of the numbers."""
+        start = spans.reshape(-1, 2)[:, 0]
+        padded = any(data[max(at - 2, 0) : at] in (b"  ", b"\t ", b" \t") for at in start.tolist())
+        return Lettering(
+            bounds[:, 0].astype(np.int32), bounds[:, 1].astype(np.int32), decimal, padded, shared
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
     a decimal point are whole units."""
@@ -91,6 +115,7 @@ class Program:
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
     calculator: bool = True
+    lettering: Lettering | None = None
 
     @property
     def lines(self) -> int:

@@ -7,7 +7,8 @@ import numpy as np
 
 from olp.exceptions import ConfigError, InputError
 from olp.geometry import rotation_matrix
-from olp.machine import ZERO, Setup, Tool, Vector, WorkOffset
+from olp.machine import ZERO, Setup, Tool
+from olp.program.places import touched
 from olp.results.forward import Place, Stylus
 
 #: the frame whose points are axis positions
@@ -31,24 +32,7 @@ def place_of(setup: Setup, name: str | None) -> Place:
             "lies, "
             "with X_mm, Y_mm, Z_mm and A_deg, B_deg, C_deg"
         )
-    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, _touched(setup, work))
-
-
-def _touched(setup: Setup, work: WorkOffset) -> tuple[Vector, Vector] | None:
-    """Axis position and lever at the touch that set a zero, None where it was set by other means."""
-    if work.set_by == "true":
-        return None
-    length = lever = ZERO
-    if work.touch_tool is not None:
-        tool = setup.tool(work.touch_tool)
-        if tool is None or tool.lever_mm is None:
-            raise ConfigError(
-                f"frame {work.name} was touched off with tool {work.touch_tool}, whose lever is not defined; "
-                "give its Z_mm or gauge_to_tip_mm"
-            )
-        length, lever = tool.length_mm, tool.lever_mm
-    x, y, z = (work.offset_mm[i] + length[i] if at is None else at for i, at in enumerate(work.touched_at_mm))
-    return (x, y, z), lever
+    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, touched(setup, work))
 
 
 def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:

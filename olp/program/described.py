@@ -1,0 +1,423 @@
+"""Reads line-oriented languages of motion that a file describes: forms of statements, and what each does.
+
+Nothing is guessed: a statement that no form of the dialect matches refuses the program with its line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from olp.exceptions import ProgramError
+from olp.machine import Setup
+from olp.program.delimited import MM
+from olp.program.dialect import Dialect, Options, Row, Support
+from olp.program.forms import Form
+from olp.program.numbertext import MOST_DECIMALS, Number, number
+from olp.program.places import frame_of
+from olp.program.program import ArcSlots, Lettering, Program, Words
+from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
+
+NAN = float("nan")
+_AXES = ("x", "y", "z")
+_TURNS = ("a", "b", "c")
+
+#: what a statement may do, and what becomes of it
+DOES = {
+    "line": (Support.CORRECTED, "a straight move"),
+    "rapid": (Support.CORRECTED, "a move whose way is not stated; corrected at its end"),
+    "point": (Support.CORRECTED, "a named position; corrected where moves use it"),
+    "away": (Support.READ, "moves the machine where the text does not say"),
+    "tool": (Support.READ, "the tool from here on"),
+    "frame": (Support.READ, "the frame from here on"),
+    "unit": (Support.READ, "the unit from here on"),
+    "section": (Support.READ, "begins or ends a part of the text"),
+    "carry": (Support.CARRIED, ""),
+    "refuse": (Support.REFUSED, ""),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One form and what its statements do. `inside` is the section where it holds (None: in all), `enters` the
+    one that it begins; `frame` and `unit` are fixed by the form where it has no field for them."""
+
+    form: Form
+    does: str
+    why: str = ""
+    inside: str | None = None
+    enters: str | None = None
+    frame: str | None = None
+    unit: str | None = None
+    incremental: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UserDialect(Dialect):
+    """A language that a file describes."""
+
+    family: str = "described"
+    statements: tuple[Rule, ...]
+    unit: str | None
+    comments: tuple[str, ...] = ()
+    quote: str = ""
+    continuation: str = ""
+    terminator: str = ""
+    label: re.Pattern[str] | None = None
+    ignore_case: bool = True
+    about: str = ""
+    by_word: Mapping[str, tuple[Rule, ...]] = field(default_factory=dict)
+
+    def rows(self) -> Sequence[Row]:
+        out = []
+        for rule in self.statements:
+            support, usual = DOES[rule.does]
+            where = f" (in {rule.inside})" if rule.inside else ""
+            out.append(Row(rule.form.text + where, support, rule.why or usual))
+        return [*out, Row("any other statement", Support.REFUSED, "it may move the machine")]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A statement: its first line from 1, its text without comment, and where each character is in the bytes."""
+
+    number: int
+    text: str
+    at: tuple[tuple[int, int], ...]
+    begin: int
+    end: int
+
+    def place(self, index: int) -> int:
+        for first, start in reversed(self.at):
+            if index >= first:
+                return start + index - first
+        return self.begin
+
+
+@dataclass(slots=True)
+class _Point:
+    """A named position: its numbers, and where they stand; `twice` where the text says it again."""
+
+    line: int
+    slots: tuple[int, ...]
+    values: tuple[float, ...]
+    unit_mm: float
+    turn: tuple[str, ...]
+    twice: int = 0
+
+
+@dataclass(slots=True)
+class _Out:
+    """Columns of moves and numbers on their way."""
+
+    numbers: list[Number] = field(default_factory=list)
+    spans: list[tuple[int, int]] = field(default_factory=list)
+    kind: list[int] = field(default_factory=list)
+    flag: list[int] = field(default_factory=list)
+    line: list[int] = field(default_factory=list)
+    frame: list[int] = field(default_factory=list)
+    end: list[tuple[float, ...]] = field(default_factory=list)
+    slot: list[tuple[int, ...]] = field(default_factory=list)
+    bounds: list[tuple[int, int]] = field(default_factory=list)
+
+
+def read_described(
+    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a program. Raises ProgramError with the line of the first statement that cannot be read right."""
+    assert isinstance(dialect, UserDialect)
+    return _Reader(data, setup, dialect).run(words=words)
+
+
+def lines_of(data: bytes, dialect: UserDialect) -> Iterator[Line]:
+    """The statements of a text: comments off, continued lines joined."""
+    text, at, number_, begin = "", [], 0, 0
+    position = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+    for count, raw in enumerate(data[position:].splitlines(keepends=True), 1):
+        body = raw.rstrip(b"\r\n").decode("latin-1")
+        start, position = position, position + len(raw)
+        code = _without_comment(body, dialect)
+        kept = code.rstrip()
+        goes_on = bool(dialect.continuation) and kept.endswith(dialect.continuation)
+        if not text:
+            number_, begin = count, start
+        at.append((len(text), start))
+        text += kept[: -len(dialect.continuation)] + " " if goes_on else code
+        if goes_on:
+            continue
+        if text.strip():
+            yield Line(number_, text, tuple(at), begin, start + len(body))
+        text, at = "", []
+    if text.strip():
+        yield Line(number_, text, tuple(at), begin, position)
+
+
+def _without_comment(body: str, dialect: UserDialect) -> str:
+    first = min((p for mark in dialect.comments if (p := body.find(mark)) >= 0), default=-1)
+    if first < 0 or not dialect.quote or dialect.quote not in body[:first]:
+        return body if first < 0 else body[:first]
+    quoted = False
+    for i, letter in enumerate(body):
+        if letter == dialect.quote:
+            quoted = not quoted
+        elif not quoted and any(body.startswith(mark, i) for mark in dialect.comments):
+            return body[:i]
+    return body
+
+
+class _Reader:
+    """One reading of one program."""
+
+    def __init__(self, data: bytes, setup: Setup, dialect: UserDialect) -> None:
+        self.data, self.setup, self.dialect = data, setup, dialect
+        self.out = _Out()
+        self.points: dict[str, _Point] = {}
+        self.section = ""
+        self.unit = dialect.unit
+        self.frame_name = setup.machine.default_work_offset
+        self.tool: int | None = None
+        self.frames: list[Frame] = []
+        self.position: list[float] = [NAN if v is None else v for v in setup.job.start_mm]
+        self.turns: dict[tuple[str, ...], int] = {}
+        self.told = False
+        self.moved_in: set[int] = set()
+        self.sections = 0
+
+    def run(self, *, words: bool) -> Program:
+        if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise ProgramError("the text is UTF-16; expected one byte a character; save it as plain text", line=1)
+        found = [(line, *self._rule(line)) for line in lines_of(self.data, self.dialect)]
+        unit = self.unit
+        for line, rule, match in found:
+            if rule.does == "point":
+                self._point(line, match)
+            elif rule.does == "unit":
+                self.unit = rule.unit
+        self.unit = unit
+        for line, rule, match in found:
+            self._statement(line, rule, match)
+        return self._program(words=words)
+
+    def _rule(self, line: Line) -> tuple[Rule, re.Match[str]]:
+        """The rule of a statement, and its fields; follows the sections. Raises ProgramError where there is
+        none."""
+        text, dialect = line.text, self.dialect
+        stop = len(text.rstrip())
+        if dialect.terminator and text[:stop].endswith(dialect.terminator):
+            stop -= len(dialect.terminator)
+        start = 0
+        if dialect.label is not None and (label := dialect.label.match(text, 0, stop)):
+            start = label.end()
+        first = re.compile(r"\s*([\w.$#%]*)").match(text, start, stop)
+        word = (first[1] if first else "").upper() if dialect.ignore_case else (first[1] if first else "")
+        for rule in dialect.by_word.get(word, dialect.by_word[""]):
+            if rule.inside is not None and rule.inside != self.section:
+                continue
+            match = rule.form.pattern.fullmatch(text, start, stop)
+            if match is None:
+                continue
+            if rule.enters is not None:
+                self.section = rule.enters
+            return rule, match
+        raise ProgramError(
+            f"`{text.strip()[:60]}` is no statement that the dialect {dialect.name} knows, and it may move the "
+            "machine; describe it in the dialect file, or take it out",
+            line=line.number,
+        )
+
+    def _statement(self, line: Line, rule: Rule, match: re.Match[str]) -> None:
+        fields = match.groupdict()
+        if rule.does == "refuse":
+            raise ProgramError(
+                f"`{line.text.strip()[:60]}` is not read: {rule.why or 'it may move the machine'}", line=line.number
+            )
+        if rule.does == "unit":
+            self.unit = rule.unit
+        elif rule.does == "frame":
+            self.frame_name = fields.get("frame") or rule.frame or self.setup.machine.default_work_offset
+        elif rule.does == "tool":
+            self.tool = self._integer(line, fields.get("tool") or "0")
+        elif rule.does == "section":
+            self.sections += 1
+        elif rule.does == "away":
+            self._put(line, Kind.RAPID, Flag.CONTROL, [NAN] * 3, (-1, -1, -1), inline=False)
+        elif rule.does in ("line", "rapid"):
+            self._move(line, rule, match)
+
+    @staticmethod
+    def _integer(line: Line, text: str) -> int:
+        if not text.isdigit():
+            raise ProgramError(f"tool {text} is no tool number; expected a whole number", line=line.number)
+        return int(text)
+
+    def _unit_mm(self, line: Line) -> float:
+        if self.unit is None:
+            raise ProgramError(
+                "no unit is stated before this position; give the key unit in the dialect file", line=line.number
+            )
+        return MM[self.unit]
+
+    # -- positions -----------------------------------------------------------------------------------
+
+    def _slots(self, line: Line, match: re.Match[str]) -> tuple[list[int], list[float]]:
+        """Words and values of the axes that a statement says; -1 and NaN where it leaves one out."""
+        slots, values = [], []
+        for axis in _AXES:
+            said = match.groupdict().get(axis)
+            if said is None:
+                slots.append(-1)
+                values.append(NAN)
+                continue
+            start, end = (line.place(match.start(axis)), line.place(match.end(axis) - 1) + 1)
+            form = number(self.data[start:end])
+            if form is None:
+                raise ProgramError(
+                    f"the number {said} goes on in another line; write it in one", line=line.number
+                )
+            slots.append(len(self.out.numbers))
+            values.append(form.value)
+            self.out.numbers.append(form)
+            self.out.spans.append((start, end))
+        return slots, values
+
+    def _point(self, line: Line, match: re.Match[str]) -> None:
+        fields = match.groupdict()
+        name = self._name(fields["target"])
+        before = self.points.get(name)
+        if before is not None:
+            before.twice = line.number
+            return
+        slots, values = self._slots(line, match)
+        turn = tuple(fields.get(a) or "" for a in _TURNS)
+        self.points[name] = _Point(line.number, tuple(slots), tuple(values), self._unit_mm(line), turn)
+
+    def _name(self, text: str) -> str:
+        return text.upper() if self.dialect.ignore_case else text
+
+    def _move(self, line: Line, rule: Rule, match: re.Match[str]) -> None:
+        fields = match.groupdict()
+        inline = fields.get("target") is None
+        if inline:
+            slots, values = self._slots(line, match)
+            unit, turn = self._unit_mm(line), tuple(fields.get(a) or "" for a in _TURNS)
+        else:
+            point = self._target(line, fields["target"])
+            slots, values, unit, turn = list(point.slots), list(point.values), point.unit_mm, point.turn
+        frame = self._frame(line, unit)
+        offset = self.frames[frame].offset_mm
+        end = list(self.position)
+        for i, value in enumerate(values):
+            if value == value:
+                end[i] = end[i] + value * unit if rule.incremental else value * unit + offset[i]
+            elif not rule.incremental and inline and rule.form.fields & set(_AXES):
+                continue
+        flag = Flag.INCREMENTAL if rule.incremental else Flag(0)
+        if rule.does == "line" and (not inline or -1 in slots):
+            flag |= Flag.WHOLE
+        if any(turn):
+            self.turns.setdefault(turn, line.number)
+        kind = Kind.LINE if rule.does == "line" else Kind.RAPID
+        self._put(line, kind, flag, end, tuple(slots), inline=inline, frame=frame)
+
+    def _target(self, line: Line, text: str) -> _Point:
+        point = self.points.get(self._name(text))
+        if point is None:
+            raise ProgramError(
+                f"the position {text} is not in this text; put its definition in, or correct the list of "
+                "positions that holds it",
+                line=line.number,
+            )
+        if point.twice:
+            raise ProgramError(
+                f"the position {text} is defined in line {point.line} and again in line {point.twice}, so which "
+                "one holds here depends on the run; give each its own name",
+                line=line.number,
+            )
+        return point
+
+    def _frame(self, line: Line, unit_mm: float) -> int:
+        found = frame_of(self.setup, self.frame_name, self.tool, unit_mm, line.number)
+        if found not in self.frames:
+            self.frames.append(found)
+        return self.frames.index(found)
+
+    def _put(
+        self, line: Line, kind: Kind, flag: Flag, end: list[float], slots: tuple[int, ...], *, inline: bool,
+        frame: int | None = None,
+    ) -> None:  # fmt: skip
+        out = self.out
+        self.position = list(end)
+        out.kind.append(int(kind))
+        out.flag.append(int(flag))
+        out.line.append(line.number)
+        out.frame.append(self._frame(line, self._unit_mm(line)) if frame is None else frame)
+        out.end.append(tuple(end))
+        out.slot.append(slots)
+        out.bounds.append((line.begin, line.end) if inline else (-1, -1))
+        self.moved_in.add(self.sections)
+
+    # -- the end -------------------------------------------------------------------------------------
+
+    def _program(self, *, words: bool) -> Program:
+        out, data = self.out, self.data
+        starts, stops = line_bounds(data)
+        spans = np.array(out.spans, np.int64).reshape(-1, 2)
+        remarks = []
+        if out.line:
+            remarks.append(("told", out.line[0], f"positions are stated in {self.frame_name}"))
+        if len(self.turns) > 1:
+            remarks.append(("turning", list(self.turns.values())[1], "the orientation changes from move to move"))
+        x, y, z = (NAN if v is None else v for v in self.setup.job.start_mm)
+        shared = [s for row in out.slot for s in row if s >= 0]
+        return Program(
+            data=data,
+            dialect=self.dialect,
+            toolpath=Toolpath(
+                kind=np.array(out.kind, np.uint8), flag=np.array(out.flag, np.uint8),
+                line=np.array(out.line, np.int32), frame=np.array(out.frame, np.int32),
+                end_mm=np.array(out.end, float).reshape(-1, 3), frames=tuple(self.frames),
+                arcs=Arcs.none(), start_mm=(x, y, z),
+            ),
+            words=words_of(out.numbers, spans, len(starts)) if words else None,
+            slot=np.array(out.slot, np.int32).reshape(-1, 3),
+            arc_slots=ArcSlots(np.zeros((0, 5), np.int32), np.zeros(0, bool)),
+            line_start=starts,
+            line_end=stops,
+            remarks=tuple(remarks),
+            end_line=len(starts),
+            lettering=Lettering.of(
+                data, np.array(out.bounds, np.int64).reshape(-1, 2), spans,
+                shared=len(set(shared)) < len(shared),
+            ),
+        )  # fmt: skip
+
+
+def words_of(numbers: Sequence[Number], spans: np.ndarray, lines: int) -> Words:  # type: ignore[type-arg]
+    """Numbers as words without letters."""
+    decimals = np.array([min(max(n.places, 0), MOST_DECIMALS) for n in numbers], np.int64)
+    value = np.array([n.value for n in numbers], float)
+    start = spans[:, 0].astype(np.int32)
+    return Words(
+        letter=np.zeros(len(start), np.uint8),
+        mantissa=np.rint(value * 10.0**decimals).astype(np.int64),
+        decimals=decimals.astype(np.int8),
+        pointed=np.ones(len(start), bool),
+        start=start,
+        number=start,
+        end=spans[:, 1].astype(np.int32),
+        first_word=np.zeros(lines + 1, np.int32),
+    )
+
+
+def line_bounds(data: bytes) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """(lines,) where each line begins and where its text ends."""
+    starts, stops = [], []
+    at = 0
+    for raw in data.splitlines(keepends=True):
+        starts.append(at)
+        stops.append(at + len(raw.rstrip(b"\r\n")))
+        at += len(raw)
+    return np.array(starts or [0], np.int32), np.array(stops or [0], np.int32)
