@@ -226,7 +226,7 @@ def _write(reported: Reported, added_mm: Array, digest: str, decimals: int | Non
     text = spliced(reported.data, edits)
     if reported.comment is not None and edits:
         eol = b"\r\n" if b"\r\n" in reported.data[:4096] else b"\n"
-        text = stamped(text, stamp_line(digest, reported.comment), eol)
+        text = stamped(text, stamp_line(digest, reported.comment), eol, ())
     return text, rounding
 
 

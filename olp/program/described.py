@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from olp.exceptions import ProgramError
-from olp.machine import Setup
+from olp.machine import ZERO, Setup
 from olp.program.delimited import MM
 from olp.program.dialect import Dialect, Options, Row, Support
 from olp.program.forms import Form
-from olp.program.numbertext import MOST_DECIMALS, Number, number
-from olp.program.places import frame_of
-from olp.program.program import ArcSlots, Lettering, Program, Words
-from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
+from olp.program.frames import FrameTable
+from olp.program.lettered import Moves
+from olp.program.numbertext import number
+from olp.program.places import frame_index
+from olp.program.program import Program
+from olp.toolpath import Flag, Kind
 
 NAN = float("nan")
 _AXES = ("x", "y", "z")
@@ -42,8 +44,8 @@ DOES = {
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One form and what its statements do. `inside` is the section where it holds (None: in all), `enters` the
-    one that it begins; `frame` and `unit` are fixed by the form where it has no field for them."""
+    """One form and what its statements do. `inside` is the section where it holds (None: in all), `enters`
+    the one that it begins; `frame` and `unit` are fixed by the form where it has no field for them."""
 
     form: Form
     does: str
@@ -82,7 +84,8 @@ class UserDialect(Dialect):
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A statement: its first line from 1, its text without comment, and where each character is in the bytes."""
+    """A statement: its first line from 1, its text without comment, and where each character is in the
+    bytes."""
 
     number: int
     text: str
@@ -107,21 +110,6 @@ class _Point:
     unit_mm: float
     turn: tuple[str, ...]
     twice: int = 0
-
-
-@dataclass(slots=True)
-class _Out:
-    """Columns of moves and numbers on their way."""
-
-    numbers: list[Number] = field(default_factory=list)
-    spans: list[tuple[int, int]] = field(default_factory=list)
-    kind: list[int] = field(default_factory=list)
-    flag: list[int] = field(default_factory=list)
-    line: list[int] = field(default_factory=list)
-    frame: list[int] = field(default_factory=list)
-    end: list[tuple[float, ...]] = field(default_factory=list)
-    slot: list[tuple[int, ...]] = field(default_factory=list)
-    bounds: list[tuple[int, int]] = field(default_factory=list)
 
 
 def read_described(
@@ -173,13 +161,13 @@ class _Reader:
 
     def __init__(self, data: bytes, setup: Setup, dialect: UserDialect) -> None:
         self.data, self.setup, self.dialect = data, setup, dialect
-        self.out = _Out()
+        self.out = Moves()
         self.points: dict[str, _Point] = {}
         self.section = ""
         self.unit = dialect.unit
         self.frame_name = setup.machine.default_work_offset
         self.tool: int | None = None
-        self.frames: list[Frame] = []
+        self.table = FrameTable(setup)
         self.position: list[float] = [NAN if v is None else v for v in setup.job.start_mm]
         self.turns: dict[tuple[str, ...], int] = {}
         self.told = False
@@ -188,7 +176,9 @@ class _Reader:
 
     def run(self, *, words: bool) -> Program:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise ProgramError("the text is UTF-16; expected one byte a character; save it as plain text", line=1)
+            raise ProgramError(
+                "the text is UTF-16; expected one byte a character; save it as plain text", line=1
+            )
         found = [(line, *self._rule(line)) for line in lines_of(self.data, self.dialect)]
         unit = self.unit
         for line, rule, match in found:
@@ -223,7 +213,8 @@ class _Reader:
                 self.section = rule.enters
             return rule, match
         raise ProgramError(
-            f"`{text.strip()[:60]}` is no statement that the dialect {dialect.name} knows, and it may move the "
+            f"`{text.strip()[:60]}` is no statement that the dialect {dialect.name} knows, and it may move "
+            "the "
             "machine; describe it in the dialect file, or take it out",
             line=line.number,
         )
@@ -232,7 +223,8 @@ class _Reader:
         fields = match.groupdict()
         if rule.does == "refuse":
             raise ProgramError(
-                f"`{line.text.strip()[:60]}` is not read: {rule.why or 'it may move the machine'}", line=line.number
+                f"`{line.text.strip()[:60]}` is not read: {rule.why or 'it may move the machine'}",
+                line=line.number,
             )
         if rule.does == "unit":
             self.unit = rule.unit
@@ -256,7 +248,8 @@ class _Reader:
     def _unit_mm(self, line: Line) -> float:
         if self.unit is None:
             raise ProgramError(
-                "no unit is stated before this position; give the key unit in the dialect file", line=line.number
+                "no unit is stated before this position; give the key unit in the dialect file",
+                line=line.number,
             )
         return MM[self.unit]
 
@@ -307,13 +300,7 @@ class _Reader:
             point = self._target(line, fields["target"])
             slots, values, unit, turn = list(point.slots), list(point.values), point.unit_mm, point.turn
         frame = self._frame(line, unit)
-        offset = self.frames[frame].offset_mm
-        end = list(self.position)
-        for i, value in enumerate(values):
-            if value == value:
-                end[i] = end[i] + value * unit if rule.incremental else value * unit + offset[i]
-            elif not rule.incremental and inline and rule.form.fields & set(_AXES):
-                continue
+        end = self._end(frame, values, incremental=rule.incremental)
         flag = Flag.INCREMENTAL if rule.incremental else Flag(0)
         if rule.does == "line" and (not inline or -1 in slots):
             flag |= Flag.WHOLE
@@ -321,6 +308,21 @@ class _Reader:
             self.turns.setdefault(turn, line.number)
         kind = Kind.LINE if rule.does == "line" else Kind.RAPID
         self._put(line, kind, flag, end, tuple(slots), inline=inline, frame=frame)
+
+    def _end(self, frame: int, values: list[float], *, incremental: bool) -> list[float]:
+        """Where a move ends, as axis positions; an axis that is left out stays."""
+        where = self.table.frames[frame]
+        left = [v != v for v in values]
+        if incremental:
+            step = replace(where, offset_mm=ZERO).placed_mm([0.0 if v != v else v for v in values])
+            return [p + s for p, s in zip(self.position, step, strict=True)]
+        if any(left):
+            now = where.tip_mm(np.array([self.position]) - np.array(where.length_mm))[0] / where.unit_mm
+            values = [float(n) if v != v else v for n, v in zip(now, values, strict=True)]
+            if where.turn is None:
+                placed = where.placed_mm(values)
+                return [p if gone else q for p, q, gone in zip(self.position, placed, left, strict=True)]
+        return list(where.placed_mm(values))
 
     def _target(self, line: Line, text: str) -> _Point:
         point = self.points.get(self._name(text))
@@ -332,17 +334,15 @@ class _Reader:
             )
         if point.twice:
             raise ProgramError(
-                f"the position {text} is defined in line {point.line} and again in line {point.twice}, so which "
+                f"the position {text} is defined in line {point.line} and again in line {point.twice}, so "
+                "which "
                 "one holds here depends on the run; give each its own name",
                 line=line.number,
             )
         return point
 
     def _frame(self, line: Line, unit_mm: float) -> int:
-        found = frame_of(self.setup, self.frame_name, self.tool, unit_mm, line.number)
-        if found not in self.frames:
-            self.frames.append(found)
-        return self.frames.index(found)
+        return frame_index(self.table, self.setup, self.frame_name, self.tool, unit_mm, line.number)
 
     def _put(
         self, line: Line, kind: Kind, flag: Flag, end: list[float], slots: tuple[int, ...], *, inline: bool,
@@ -363,61 +363,13 @@ class _Reader:
 
     def _program(self, *, words: bool) -> Program:
         out, data = self.out, self.data
-        starts, stops = line_bounds(data)
-        spans = np.array(out.spans, np.int64).reshape(-1, 2)
         remarks = []
         if out.line:
             remarks.append(("told", out.line[0], f"positions are stated in {self.frame_name}"))
         if len(self.turns) > 1:
-            remarks.append(("turning", list(self.turns.values())[1], "the orientation changes from move to move"))
-        x, y, z = (NAN if v is None else v for v in self.setup.job.start_mm)
-        shared = [s for row in out.slot for s in row if s >= 0]
-        return Program(
-            data=data,
-            dialect=self.dialect,
-            toolpath=Toolpath(
-                kind=np.array(out.kind, np.uint8), flag=np.array(out.flag, np.uint8),
-                line=np.array(out.line, np.int32), frame=np.array(out.frame, np.int32),
-                end_mm=np.array(out.end, float).reshape(-1, 3), frames=tuple(self.frames),
-                arcs=Arcs.none(), start_mm=(x, y, z),
-            ),
-            words=words_of(out.numbers, spans, len(starts)) if words else None,
-            slot=np.array(out.slot, np.int32).reshape(-1, 3),
-            arc_slots=ArcSlots(np.zeros((0, 5), np.int32), np.zeros(0, bool)),
-            line_start=starts,
-            line_end=stops,
-            remarks=tuple(remarks),
-            end_line=len(starts),
-            lettering=Lettering.of(
-                data, np.array(out.bounds, np.int64).reshape(-1, 2), spans,
-                shared=len(set(shared)) < len(shared),
-            ),
-        )  # fmt: skip
-
-
-def words_of(numbers: Sequence[Number], spans: np.ndarray, lines: int) -> Words:  # type: ignore[type-arg]
-    """Numbers as words without letters."""
-    decimals = np.array([min(max(n.places, 0), MOST_DECIMALS) for n in numbers], np.int64)
-    value = np.array([n.value for n in numbers], float)
-    start = spans[:, 0].astype(np.int32)
-    return Words(
-        letter=np.zeros(len(start), np.uint8),
-        mantissa=np.rint(value * 10.0**decimals).astype(np.int64),
-        decimals=decimals.astype(np.int8),
-        pointed=np.ones(len(start), bool),
-        start=start,
-        number=start,
-        end=spans[:, 1].astype(np.int32),
-        first_word=np.zeros(lines + 1, np.int32),
-    )
-
-
-def line_bounds(data: bytes) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
-    """(lines,) where each line begins and where its text ends."""
-    starts, stops = [], []
-    at = 0
-    for raw in data.splitlines(keepends=True):
-        starts.append(at)
-        stops.append(at + len(raw.rstrip(b"\r\n")))
-        at += len(raw)
-    return np.array(starts or [0], np.int32), np.array(stops or [0], np.int32)
+            remarks.append(
+                ("turning", list(self.turns.values())[1], "the orientation changes from move to move")
+            )
+        return out.program(
+            data, self.dialect, self.setup, self.table.frames, remarks, decimal=b".", words=words
+        )

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 
 from olp.exceptions import ProgramError, UsageError
 from olp.machine import Setup
-from olp.program import reader
+from olp.program import apt, reader
+from olp.program.apt_table import APT
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
 from olp.program.pointlist import POINT_LIST, read_list
@@ -26,13 +27,22 @@ def _rs274(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, wor
     return reader.read(data, setup, dialect, options, words=words)
 
 
-READERS: Mapping[str, Reader] = {"rs274": _rs274, "list": read_list}
-DIALECTS: Mapping[str, Dialect] = {**PROFILES, "list": POINT_LIST}
+READERS: Mapping[str, Reader] = {"rs274": _rs274, "apt": apt.read, "list": read_list}
+DIALECTS: Mapping[str, Dialect] = {**PROFILES, APT.name: APT, POINT_LIST.name: POINT_LIST}
 
 #: Endings of files that only one family has. The ending of a version (`.ncl.3`) does not count.
-_ENDINGS: Mapping[str, str] = {"csv": "list", "tsv": "list"}
+_ENDINGS: Mapping[str, str] = {
+    **dict.fromkeys(("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"), "apt"),
+    **dict.fromkeys(("csv", "tsv"), "list"),
+}
 #: What only texts of a family say at the start of a line.
-_SIGNS: Mapping[str, re.Pattern[bytes]] = {}
+_SIGNS: Mapping[str, re.Pattern[bytes]] = {
+    "apt": re.compile(
+        rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
+        rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
+        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/)"
+    ),
+}
 #: What only texts of statements say, without saying of which family.
 _STATEMENTS = re.compile(rb"(?im)^[ \t]*(GOTO|RAPID|FROM)[ \t]*/")
 _VERSION = re.compile(r"\.\d+$")

@@ -1,8 +1,9 @@
 """Forms of statements: a small language that says how a statement is written, and what its fields are.
 
 `LMOVE TRANS({x}, {y}, {z} [, {a}, {b}, {c}])` reads: the words, the marks, numbers where `{x}` and the others
-stand, and an optional part in brackets. Blanks in a text are free around marks; between words there is at least
-one. `<MOVE|MOVES>` is either word, `...` whatever follows. `{target}`, `{frame}` and `{word}` are names.
+stand, and an optional part in brackets. Blanks in a text are free around marks; between words there is at
+least one. `<MOVE|MOVES>` is either word, `...` whatever follows. `{target}`, `{frame}` and `{word}` are
+names.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ _NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form and the pattern that it means; `first` is the word that it begins with, "" where it may begin with
-    several."""
+    """A form and the pattern that it means; `first` is the word that it begins with, "" where it may begin
+    with several."""
 
     text: str
     pattern: re.Pattern[str]

@@ -72,34 +72,53 @@ class Hole:
     rests: tuple[tuple[int, float], ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ArcText:
+    """How a program of statements says an arc: bytes `begin`..`end` of what says it beside its end point,
+    indices of the words of its centre (two of them where it stands twice), of its `radius` and of its `angle`
+    in degrees (-1 where not said) and of the direction in which it begins (empty where not said). `whole`:
+    its end point is said in there too."""
+
+    begin: int
+    end: int
+    centres: tuple[tuple[int, int, int], ...]
+    radius: int = -1
+    angle: int = -1
+    direction: tuple[int, ...] = ()
+    whole: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Lettering:
-    """How a text that is no blocks of words writes its positions. (n,) `begin`, `end`: the bytes that say
-    each move, -1 where nothing of the text does; `decimal` is the decimal mark. `padded`: numbers keep the
-    edges of their columns. `shared`: one number may be that of several moves."""
+class Statements:
+    """What a program of whole statements has beside its words.
+
+    (n,) `begin`, `end`: the bytes that say the end of each move, -1 where no statement does. (n,)
+    `feed_mm_s`, inf for rapids and NaN where it is not known; (n + 1,) `rest` and `dwell_s` of the places
+    before, between and after the moves. `arcs` by move. `broken`: the marks of continuation inside words,
+    by word. `rapid` is the line that makes the next statement a rapid; `mark` joins lines, none of which
+    becomes longer than `width` bytes (0: as long as they come). `strokes` (k, 2): the moves to the place and
+    to the bottom of each hole. `decimal` is the decimal mark of texts whose numbers keep their own form and
+    column, empty for others.
+    """
 
     begin: Small
     end: Small
-    decimal: bytes = b"."
-    padded: bool = False
-    shared: bool = False
-
-    @staticmethod
-    def of(
-        data: bytes, bounds: Index, spans: Index, *, decimal: bytes = b".", shared: bool = False
-    ) -> Lettering:
-        """With `bounds` (n, 2) of the statements and `spans` (m, 2) or more of the numbers."""
-        start = spans.reshape(-1, 2)[:, 0]
-        padded = any(data[max(at - 2, 0) : at] in (b"  ", b"\t ", b" \t") for at in start.tolist())
-        return Lettering(
-            bounds[:, 0].astype(np.int32), bounds[:, 1].astype(np.int32), decimal, padded, shared
-        )
+    feed_mm_s: npt.NDArray[np.float64]
+    rest: npt.NDArray[np.bool_]
+    dwell_s: npt.NDArray[np.float64]
+    arcs: Mapping[int, ArcText]
+    broken: Mapping[int, bytes]
+    strokes: npt.NDArray[np.int64]
+    rapid: bytes = b""
+    mark: bytes = b"$"
+    width: int = 0
+    decimal: bytes = b""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
-    a decimal point are whole units."""
+    a decimal point are whole units. `statements` is there where the text is no blocks of words."""
 
     data: bytes
     dialect: Dialect
@@ -115,7 +134,7 @@ class Program:
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
     calculator: bool = True
-    lettering: Lettering | None = None
+    statements: Statements | None = None
 
     @property
     def lines(self) -> int:

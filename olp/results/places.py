@@ -8,7 +8,7 @@ import numpy as np
 from olp.exceptions import ConfigError, InputError
 from olp.geometry import rotation_matrix
 from olp.machine import ZERO, Setup, Tool
-from olp.program.places import touched
+from olp.program.frames import touch_of
 from olp.results.forward import Place, Stylus
 
 #: the frame whose points are axis positions
@@ -32,7 +32,7 @@ def place_of(setup: Setup, name: str | None) -> Place:
             "lies, "
             "with X_mm, Y_mm, Z_mm and A_deg, B_deg, C_deg"
         )
-    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, touched(setup, work))
+    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, touch_of(setup, work, None))
 
 
 def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
