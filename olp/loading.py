@@ -11,6 +11,7 @@ from olp.errormodel import Calibration, ErrorModel, build
 from olp.exceptions import ConfigError, UsageError
 from olp.files.calibration import load_calibration
 from olp.files.config import load_setup
+from olp.files.described import described
 from olp.files.write import read_bytes
 from olp.machine import Setup
 from olp.program.dialect import Dialect
@@ -63,7 +64,7 @@ def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
 
 def control_of(setup: Setup) -> Dialect:
     """What the control of a machine reads and writes."""
-    dialect = DIALECTS.get(setup.machine.controller)
+    dialect = DIALECTS.get(setup.machine.controller) or described(setup.machine.controller)
     if dialect is None:
         raise ConfigError(
             f"controller {setup.machine.controller!r} has no dialect; expected one of {', '.join(DIALECTS)}"
@@ -74,11 +75,12 @@ def control_of(setup: Setup) -> Dialect:
 def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
     """The dialect of a program, and the setup with it named, so that what is made of the program later is
     read alike. Raises ProgramError where it cannot be told, UsageError for a name that there is not."""
-    described = setup.job.described
-    if isinstance(described, Dialect):
-        return setup, described
+    own = setup.job.described
+    if isinstance(own, Dialect):
+        return setup, own
     dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
-    return replace(setup, job=replace(setup.job, dialect=dialect.name)), dialect
+    own = None if dialect.name in DIALECTS else dialect
+    return replace(setup, job=replace(setup.job, dialect=dialect.name, described=own)), dialect
 
 
 def _digest(calibration: str, machine: object) -> str:

@@ -45,7 +45,7 @@ def setup_options(function: F) -> F:
         metavar="NAME",
         expose_value=False,
         callback=_keep_dialect,
-        help="The dialect of the program, such as apt. Default: what its text and its ending say.",
+        help="The dialect, such as apt, or a file that describes it. Default: what text and ending say.",
     )(function)
     function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
     return click.option("-m", "--machine", metavar="machine.toml", help="The machine file.")(function)
@@ -115,12 +115,10 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
 
     setup = load_setup(machine, job)
     named = click.get_current_context().meta.get(_DIALECT)
-    if named is not None and named.endswith(".toml"):
-        from olp.files.described import load_described
+    if named is not None:
+        from olp.files.described import described
 
-        setup = replace(setup, job=replace(setup.job, described=load_described(named)))
-    elif named is not None:
-        setup = replace(setup, job=replace(setup.job, dialect=named))
+        setup = replace(setup, job=replace(setup.job, dialect=named, described=described(named)))
     inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
     if setup.machine.calibration is not None:
         try:

@@ -24,6 +24,7 @@ from olp.cli.common import (
     source,
     talk,
 )
+from olp.cli.layouts import with_layout_of
 from olp.cli.progress import progress
 from olp.cli.results import Asked, default_output
 from olp.cli.results import run as run_results
@@ -127,7 +128,7 @@ def command(
         return
     if frames or tools or decimals is not None:
         raise UsageError("--frame, --tool and --decimals are of reported results; add --results")
-    call = given(program, machine, job)
+    call = with_layout_of(given(program, machine, job), profile, columns, unit)
     output = output or default_output(call.program)
     as_json = as_json or report_file == STREAM
     if review_file == STREAM:

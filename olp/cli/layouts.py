@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from olp.exceptions import InputError
+from olp.cli.common import STREAM, Given, files_of
+from olp.exceptions import InputError, UsageError
 
 if TYPE_CHECKING:
     from olp.program.delimited import Layout
@@ -36,3 +37,18 @@ def layout_of(
         start = start.model_copy(update={"header": False})
     stated = unit or (found.unit if found else None)
     return replace(with_options(start, columns).layout, unit=stated)
+
+
+def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], unit: str | None) -> Given:
+    """A call about a list of positions that is laid out as it says; the same call where it says nothing."""
+    from olp.program.pointlist import with_layout
+
+    if profile is None and not columns and unit is None:
+        return call
+    if call.program == STREAM:
+        raise UsageError("a list of positions on stdin takes its layout from --dialect FILE.toml")
+    layout = layout_of(profile, columns, unit, call.program)
+    assert layout is not None
+    job = replace(call.setup.job, described=with_layout(layout))
+    setup = replace(call.setup, job=job)
+    return replace(call, setup=setup, inputs=(*call.inputs, *files_of(profile)))

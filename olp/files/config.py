@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 
 from olp.exceptions import UsageError
 from olp.files.calibration import load_calibration
+from olp.files.described import described
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
@@ -127,10 +128,12 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
             missing.append((line_of(key, lines), sentence))
     if missing:
         raise config_error(missing, str(path))
+    own = described(file.dialect, beside(path, file.dialect)) if file.dialect is not None else None
     job = Job(
         program=beside(path, file.program),
         machine=beside(path, file.machine),
-        dialect=file.dialect,
+        dialect=None if own is not None else file.dialect,
+        described=own,
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),

@@ -10,7 +10,7 @@ from typing import Literal
 from pydantic import Field
 
 from olp.exceptions import ConfigError
-from olp.files.fields import Text
+from olp.files.fields import SHIPPED, Text
 from olp.files.point_profile import PointProfile
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import Table
@@ -21,8 +21,6 @@ from olp.program.dialect import Dialect
 from olp.program.forms import Form, form
 from olp.program.pointlist import with_layout
 
-#: Dialects that come with `olp`, as files beside the readers of programs.
-SHIPPED = ("kawasaki-as", "val2", "karel", "irl")
 FOLDER = Path(__file__).parents[1] / "program" / "dialects_described"
 
 Does = Literal["line", "rapid", "point", "away", "tool", "frame", "unit", "section", "carry", "refuse"]
@@ -120,9 +118,12 @@ def load_described(path: PathLike) -> Dialect:
     )  # fmt: skip
 
 
-def shipped(name: str) -> Dialect:
-    """A dialect that comes with `olp`."""
-    return load_described(FOLDER / f"{name}.toml")
+def described(name: str, path: PathLike | None = None) -> Dialect | None:
+    """The dialect that a name stands for, where a file describes it: one that comes with `olp`, or a path
+    (`path` where it is to be read from). None for the others. Raises InputError."""
+    if name in SHIPPED:
+        return load_described(FOLDER / f"{name}.toml")
+    return load_described(path or name) if name.endswith(".toml") else None
 
 
 def _problem(table: StatementTable, made: Form) -> str | None:

@@ -108,7 +108,7 @@ class _Point:
     slots: tuple[int, ...]
     values: tuple[float, ...]
     unit_mm: float
-    turn: tuple[str, ...]
+    turn: tuple[float, ...]
     twice: int = 0
 
 
@@ -156,6 +156,11 @@ def _without_comment(body: str, dialect: UserDialect) -> str:
     return body
 
 
+def _turn(fields: Mapping[str, str | None]) -> tuple[float, ...]:
+    """The orientation that a statement says."""
+    return tuple(float(said) for a in _TURNS if (said := fields.get(a)))
+
+
 class _Reader:
     """One reading of one program."""
 
@@ -169,10 +174,10 @@ class _Reader:
         self.tool: int | None = None
         self.table = FrameTable(setup)
         self.position: list[float] = [NAN if v is None else v for v in setup.job.start_mm]
-        self.turns: dict[tuple[str, ...], int] = {}
-        self.told = False
-        self.moved_in: set[int] = set()
+        self.turns: dict[tuple[float, ...], int] = {}
+        #: how many parts the text has had, and where the first moves stand
         self.sections = 0
+        self.moved: tuple[int, int] | None = None
 
     def run(self, *, words: bool) -> Program:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -284,7 +289,7 @@ class _Reader:
             before.twice = line.number
             return
         slots, values = self._slots(line, match)
-        turn = tuple(fields.get(a) or "" for a in _TURNS)
+        turn = _turn(fields)
         self.points[name] = _Point(line.number, tuple(slots), tuple(values), self._unit_mm(line), turn)
 
     def _name(self, text: str) -> str:
@@ -295,7 +300,7 @@ class _Reader:
         inline = fields.get("target") is None
         if inline:
             slots, values = self._slots(line, match)
-            unit, turn = self._unit_mm(line), tuple(fields.get(a) or "" for a in _TURNS)
+            unit, turn = self._unit_mm(line), _turn(fields)
         else:
             point = self._target(line, fields["target"])
             slots, values, unit, turn = list(point.slots), list(point.values), point.unit_mm, point.turn
@@ -304,8 +309,7 @@ class _Reader:
         flag = Flag.INCREMENTAL if rule.incremental else Flag(0)
         if rule.does == "line" and (not inline or -1 in slots):
             flag |= Flag.WHOLE
-        if any(turn):
-            self.turns.setdefault(turn, line.number)
+        self.turns.setdefault(turn, line.number)
         kind = Kind.LINE if rule.does == "line" else Kind.RAPID
         self._put(line, kind, flag, end, tuple(slots), inline=inline, frame=frame)
 
@@ -357,7 +361,13 @@ class _Reader:
         out.end.append(tuple(end))
         out.slot.append(slots)
         out.bounds.append((line.begin, line.end) if inline else (-1, -1))
-        self.moved_in.add(self.sections)
+        first = self.moved = self.moved or (self.sections, line.number)
+        if first[0] != self.sections:
+            raise ProgramError(
+                f"moves stand in two parts of this text, here and from line {first[1]} on, and which of them "
+                "runs when is not known; give each part a file of its own",
+                line=line.number,
+            )
 
     # -- the end -------------------------------------------------------------------------------------
 

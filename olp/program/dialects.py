@@ -13,6 +13,7 @@ from olp.exceptions import ProgramError, UsageError
 from olp.machine import Setup
 from olp.program import apt, reader
 from olp.program.apt_table import APT
+from olp.program.described import read_described
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
 from olp.program.pointlist import POINT_LIST, read_list
@@ -27,7 +28,12 @@ def _rs274(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, wor
     return reader.read(data, setup, dialect, options, words=words)
 
 
-READERS: Mapping[str, Reader] = {"rs274": _rs274, "apt": apt.read, "list": read_list}
+READERS: Mapping[str, Reader] = {
+    "rs274": _rs274,
+    "apt": apt.read,
+    "list": read_list,
+    "described": read_described,
+}
 DIALECTS: Mapping[str, Dialect] = {**PROFILES, APT.name: APT, POINT_LIST.name: POINT_LIST}
 
 #: Endings of files that only one family has. The ending of a version (`.ncl.3`) does not count.

@@ -18,7 +18,7 @@ NAMES = ("target", "frame", "word")
 
 _TOKEN = re.compile(
     r"(?P<blank>\s+)|(?P<field>\{(?P<name>\w+)\})|(?P<rest>\.\.\.)|(?P<either><[^<>]+>)|(?P<open>\[)|(?P<close>\])|"
-    r"(?P<word>[\w.$#%]+)|(?P<mark>[^\w\s])"
+    r"(?P<word>(?:(?!\.\.\.)[\w.$#%])+)|(?P<mark>[^\w\s])"
 )
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
