@@ -120,7 +120,7 @@ def correct_bytes(
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
-        *checks.between_findings(nominal, proof),
+        *checks.between_findings(nominal, proof, loaded.model),
         *checks.hole_findings(holes, limits.tolerance_mm),
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
@@ -162,7 +162,7 @@ def verify_programs(
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
-        *checks.between_findings(first, proof),
+        *checks.between_findings(first, proof, loaded.model),
         *checks.program_findings(first, loaded.setup, contour=contour),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from olp.checks.base import finding, lines_of
+from olp.compensation.plan import targets, zero_shifts
+from olp.errormodel import ErrorModel
 from olp.findings import Finding
+from olp.geometry import segment_distance
 from olp.program.program import Program
 from olp.proof import Proof
-from olp.toolpath import Kind
 
+#: Where the way between two places is looked at.
+_SHARES = np.linspace(0.0, 1.0, 18)[1:-1]
 _CODES = {"told": "OLP331", "turning": "OLP332"}
 
 
@@ -18,13 +22,18 @@ def told_findings(program: Program) -> list[Finding]:
     return [finding(_CODES[name], said, [line]) for name, line, said in program.remarks if name in _CODES]
 
 
-def between_findings(program: Program, proof: Proof) -> list[Finding]:
+def between_findings(program: Program, proof: Proof, model: ErrorModel) -> list[Finding]:
     """How far a straight way between places would leave the nominal one; nobody says that it is straight."""
-    if not any(name == "joined" for name, _, _ in program.remarks):
+    if not any(name == "joined" for name, _, _ in program.remarks) or len(proof.written) < 2:
         return []
-    path = program.toolpath
-    away = np.where(proof.after.judged & (path.kind == Kind.RAPID), np.nan_to_num(proof.after.path), 0.0)
-    away[:1] = 0.0
+    path, command = program.toolpath, proof.written.end_mm
+    target = targets(path, zero_shifts(path.frames, model))
+    tool = path.tool_mm(1)
+    away = np.zeros(len(path))
+    for share in _SHARES:
+        at = command[:-1] + share * np.diff(command, axis=0)
+        actual = at + model.error(at, tool)
+        away[1:] = np.fmax(away[1:], segment_distance(actual, target[:-1], target[1:]))
     far = away > proof.allowed_mm
     if not far.any():
         return []

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.statements import Index, StatementWriter
+from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
 from olp.program.edits import Edits
 from olp.program.numbertext import Number, Placing, number, spliced, written
@@ -56,9 +57,21 @@ class LetteredWriter(StatementWriter):
                 start, stop = int(self.words.number[word]) - begin, int(self.words.end[word]) - begin
                 edits.append((start, stop, self._number(rows, row, axis, word)))
             text = self.program.eol(line) + spliced(self.program.data[begin:end], edits)
-            self.replaced.append((end, end, text))
+            at = self._line_end(end)
+            self.replaced.append((at, at, text))
             self.tally.inserted_blocks += 1
         return []
+
+    def _line_end(self, at: int) -> int:
+        """The end of the line in which a byte stands: what is inserted comes behind a comment."""
+        ends = self.program.line_end
+        return int(ends[min(int(np.searchsorted(ends, at)), len(ends) - 1)])
+
+    def _fewest(self, unit: Array) -> Index:
+        """(n, 3) the fewest decimals of numbers in units (n,), which are any here."""
+        finest = self.finest
+        known = {u: [max(self.style.least(axis, u), finest) for axis in range(3)] for u in set(unit.tolist())}
+        return np.array([known[u] for u in unit.tolist()], np.int64).reshape(-1, 3)
 
     def _share(
         self, rows: Rows, new: dict[int, tuple[int, int, int]], row: int, axis: int, word: int

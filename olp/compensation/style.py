@@ -11,6 +11,7 @@ import numpy.typing as npt
 from olp.machine import Vector
 from olp.program.program import Program
 from olp.toolpath import Flag
+from olp.units import MM_PER_INCH
 
 _MOST_DECIMALS = 9
 _SPACE = (b"", b" ", b"\t")
@@ -20,6 +21,8 @@ Slots = npt.NDArray[np.int32] | npt.NDArray[np.int64]
 
 def fewest_decimals(increment_mm: float, unit_mm: float, inch_decimals: int) -> int:
     """Decimals that a least increment needs: 0.001 mm needs 3, and in inch what the control takes for it."""
+    if unit_mm not in (1.0, MM_PER_INCH):
+        return max(0, math.ceil(-math.log10(increment_mm / unit_mm) - 1e-9))
     metric = max(0, math.ceil(-math.log10(increment_mm) - 1e-9))
     return metric if unit_mm == 1.0 else metric + inch_decimals - 3
 

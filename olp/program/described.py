@@ -171,6 +171,9 @@ class _Reader:
         self.section = ""
         self.unit = dialect.unit
         self.frame_name = setup.machine.default_work_offset
+        #: whether a statement has named a frame, and the line of the first move without one
+        self.framed = False
+        self.assumed: int | None = None
         self.tool: int | None = None
         self.table = FrameTable(setup)
         self.position: list[float] = [NAN if v is None else v for v in setup.job.start_mm]
@@ -184,7 +187,7 @@ class _Reader:
             raise ProgramError(
                 "the text is UTF-16; expected one byte a character; save it as plain text", line=1
             )
-        found = [(line, *self._rule(line)) for line in lines_of(self.data, self.dialect)]
+        found = [self._rule(line) for line in lines_of(self.data, self.dialect)]
         unit = self.unit
         for line, rule, match in found:
             if rule.does == "point":
@@ -196,11 +199,11 @@ class _Reader:
             self._statement(line, rule, match)
         return self._program(words=words)
 
-    def _rule(self, line: Line) -> tuple[Rule, re.Match[str]]:
-        """The rule of a statement, and its fields; follows the sections. Raises ProgramError where there is
-        none."""
+    def _rule(self, line: Line) -> tuple[Line, Rule, re.Match[str]]:
+        """A statement without its label, its rule and its fields; follows the sections. Raises ProgramError
+        where there is no rule."""
         text, dialect = line.text, self.dialect
-        stop = len(text.rstrip())
+        last = stop = len(text.rstrip())
         if dialect.terminator and text[:stop].endswith(dialect.terminator):
             stop -= len(dialect.terminator)
         start = 0
@@ -216,7 +219,8 @@ class _Reader:
                 continue
             if rule.enters is not None:
                 self.section = rule.enters
-            return rule, match
+            bare = replace(line, begin=line.place(start), end=line.place(last - 1) + 1)
+            return bare, rule, match
         raise ProgramError(
             f"`{text.strip()[:60]}` is no statement that the dialect {dialect.name} knows, and it may move "
             "the "
@@ -234,6 +238,7 @@ class _Reader:
         if rule.does == "unit":
             self.unit = rule.unit
         elif rule.does == "frame":
+            self.framed = True
             self.frame_name = fields.get("frame") or rule.frame or self.setup.machine.default_work_offset
         elif rule.does == "tool":
             self.tool = self._integer(line, fields.get("tool") or "0")
@@ -309,7 +314,8 @@ class _Reader:
         flag = Flag.INCREMENTAL if rule.incremental else Flag(0)
         if rule.does == "line" and (not inline or -1 in slots):
             flag |= Flag.WHOLE
-        self.turns.setdefault(turn, line.number)
+        if turn:
+            self.turns.setdefault(turn, line.number)
         kind = Kind.LINE if rule.does == "line" else Kind.RAPID
         self._put(line, kind, flag, end, tuple(slots), inline=inline, frame=frame)
 
@@ -362,6 +368,8 @@ class _Reader:
         out.slot.append(slots)
         out.bounds.append((line.begin, line.end) if inline else (-1, -1))
         first = self.moved = self.moved or (self.sections, line.number)
+        if not self.framed and self.assumed is None:
+            self.assumed = line.number
         if first[0] != self.sections:
             raise ProgramError(
                 f"moves stand in two parts of this text, here and from line {first[1]} on, and which of them "
@@ -374,8 +382,10 @@ class _Reader:
     def _program(self, *, words: bool) -> Program:
         out, data = self.out, self.data
         remarks = []
-        if out.line:
-            remarks.append(("told", out.line[0], f"positions are stated in {self.frame_name}"))
+        if self.assumed is not None:
+            remarks.append(
+                ("told", self.assumed, f"positions are stated in {self.setup.machine.default_work_offset}")
+            )
         if len(self.turns) > 1:
             remarks.append(
                 ("turning", list(self.turns.values())[1], "the orientation changes from move to move")
