@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 from olp.machine import CHAINS, COMPONENTS, SQUARENESS
 
 #: Dialect profiles that can be read and written today.
-CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "list")
+CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list")
 #: Dialects that are described by files which come with `olp`.
 SHIPPED = ("kawasaki-as", "val2", "karel", "irl")
 ISO_NAMES = COMPONENTS + SQUARENESS
