@@ -32,6 +32,13 @@ _ROUNDING_MM = 2e-4
 #: Doubt about the touch above this is a warning.
 _DOUBT_MM = 1e-4
 
+#: where axis positions count, in words
+_COUNTED = {
+    "tip": "axis positions count at the tip: no tool length is active (job_defaults.length_active)",
+    "tool": "axis positions stand off the tip by the length of the tool",
+    "ram": "axis positions count at the end of the ram, from which the stylus leads to the tip",
+}
+
 WHY = (
     "what a measuring machine reports is where its scales say that the tip is; the tip was there plus the "
     "error "
@@ -64,6 +71,7 @@ def correct_results(
     profile: PathLike | Layout | None = None,
     frame: str | Mapping[str, str] | None = None,
     tool: int | Mapping[str, int] | None = None,
+    tip_radius_mm: float | None = None,
     decimals: int | None = None,
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
@@ -72,57 +80,68 @@ def correct_results(
 
     `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset that the
     points are stated in ("machine": axis positions), `tool` the number of the stylus; where a file names
-    several, each is a mapping from the file's names to those of machine and job.
-    `decimals` is the least number of decimals written. Only the numbers of points change. Raises InputError
-    with the line (AlreadyCorrected, OutsideBox, ConfigError).
+    several, each is a mapping from the file's names to those of machine and job. `tip_radius_mm` stands for
+    that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
+    Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
     """
     data, name = source_of(results)
     loaded = load(machine, job, outside_box)
     layout = load_profile(profile).layout if isinstance(profile, str | Path) else profile
+    asked = _Asked(layout, frame, tool, tip_radius_mm, decimals, outside_box == "hold", date)
     try:
-        return _corrected(data, name, loaded, layout, frame, tool, decimals, outside_box == "hold", date)
+        return _corrected(data, name, loaded, asked)
     except OlpError as error:
         raise error.in_file(name or "<results>") from None
 
 
-def _corrected(
-    data: bytes,
-    name: str,
-    loaded: Loaded,
-    profile: Layout | None,
-    frame: str | Mapping[str, str] | None,
-    tool: int | Mapping[str, int] | None,
-    decimals: int | None,
-    hold: bool,
-    date: datetime.date | None,
-) -> ResultCorrection:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a caller of `correct_results` asks for."""
+
+    layout: Layout | None
+    frame: str | Mapping[str, str] | None
+    tool: int | Mapping[str, int] | None
+    tip_radius_mm: float | None
+    decimals: int | None
+    hold: bool
+    date: datetime.date | None
+
+
+def _corrected(data: bytes, name: str, loaded: Loaded, asked: _Asked) -> ResultCorrection:
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
             f"the results carry the stamp `{stamp.group().decode()}`; correcting them again would add the "
-            "error "
-            "twice; correct the file as the machine wrote it",
+            "error twice; correct the file as the machine wrote it",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
-    reported = _read(data, profile)
+    reported = _read(data, asked.layout)
+    radius = asked.tip_radius_mm if asked.tip_radius_mm is not None else reported.tip_radius_mm
     reported = replace(
         reported,
-        frames=_named("frame", reported.frames, frame),
-        tools=_named("tool", reported.tools, tool),
+        frames=_named("frame", reported.frames, asked.frame),
+        tools=_named("tool", reported.tools, asked.tool),
+        tip_radius_mm=radius,
     )
     setup = loaded.setup
+    axes = _axes(reported, setup)
+    reported = replace(reported, assumed=(*reported.assumed, _COUNTED[axes]))
     findings = _already(reported, loaded)
     own = bool(np.isfinite(reported.stylus_mm).all())
     places = [place_of(setup, n) for n in reported.frames]
     styli = [stylus_of(setup, t, own) for t in reported.tools]
-    found = forward(reported, places, styli, loaded.model, lengths=setup.machine.length_active, hold=hold)
-    text, rounding = _write(reported, found.added_mm, loaded.digest, decimals)
+    found = forward(reported, places, styli, loaded.model, axes=axes, hold=asked.hold)
+    if radius is None and any(s.radius_mm == 0.0 and any(s.lever_mm) for s in styli):
+        findings.append(
+            Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
+        )
+    text, rounding = _write(reported, found.added_mm, loaded.digest, asked.decimals)
     turned = sorted(
         {p.name for p in places if p.touched is not None and not np.allclose(p.rotation, np.eye(3))}
     )
     findings += [
         *_findings(reported, found, rounding, turned),
-        *state.calibration_findings(loaded.calibration, date, setup.machine.sanity.calibration_days),
+        *state.calibration_findings(loaded.calibration, asked.date, setup.machine.sanity.calibration_days),
     ]
     outside = ~loaded.model.inside(found.axis_mm).all(axis=1)
     if outside.any():
@@ -130,6 +149,14 @@ def _corrected(
         findings.append(_finding("OLP403", f"{len(lines)} touches lie outside the calibrated box", lines))
     report = _report(reported, found, loaded, name, text, rounding, findings)
     return ResultCorrection(text, report, tuple(findings))
+
+
+def _axes(reported: Reported, setup: Setup) -> Literal["tip", "tool", "ram"]:
+    """Where axis positions count. On a machine that takes DMIS programs it is the end of the ram, as
+    there."""
+    if "dmis" in (reported.dialect, setup.machine.controller):
+        return "ram"
+    return "tool" if setup.machine.length_active else "tip"
 
 
 def _named(what: str, told: tuple[Any, ...], given: object) -> tuple[Any, ...]:

@@ -26,6 +26,7 @@ from judge.path import match
 import olp
 from olp.exceptions import OlpError, ProgramError
 from olp.files.config import load_setup
+from olp.files.described import described
 from olp.machine import Setup
 
 #: 1 nm, within which the two independent models agree
@@ -116,6 +117,44 @@ CASES = {
             b"$$ a $\nGOTO/1,2,3", b"D(A)=DATSET/DAT(A),ZDIR\nGOTO/1,2,3", b"BEGIN/CHFILE\nX = 3\nEND/CHFILE",
         ),
     ),
+    "list": Case(
+        "list", "list", "XYZ_mminch,;.+-# 0123456789\r\n\t\"eE=",
+        ["X_mm,Y_mm,Z_mm"], [],
+        _list, None, lambda text: f"# {text}",
+        re.compile(rb"(?m)^(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
+        (),
+        (
+            b"X_mm;Y_mm;Z_mm\n1,5;2,5;3,5\n", b"X_inch Y_inch Z_inch\n 1.50  2.5  -3\n", b"1,2,3",
+            b"X_mm,Y_mm,Z_mm", b'X_mm,Y_mm,Z_mm\n"1","2","3"', b"X_mm,Y_mm,Z_mm\n1,2,3,\n",
+            b"\xef\xbb\xbfX_mm,Y_mm,Z_mm\r\n1e1,2E-1,.5\r", b"X_mm,Y_mm,Z_mm\n1,2,\n",
+            b"# frame=G55\nX_mm,Y_mm,Z_mm\n1,2,3", b"X_mm,Y_mm,Z_mm\n1e99,2,3",
+            b"X_mm,Y_mm,Z_mm\n" + b"0" * 50 + b"1,2,3", b'X_mm,Y_mm,Z_mm\n"1,2,3',
+        ),
+    ),
+    "kawasaki-as": Case(
+        "kawasaki-as", "kawasaki-as", "LMOVETRANSPOINDW().,;\"+-= #0123456789\r\n\tp",
+        [".PROGRAM test()", "SPEED 100 MM/S ALWAYS"], [".END"],
+        lambda p, d: f"LMOVE TRANS({_list(p, d)})", lambda p, d: f"DRAW {_list(p, d)}",
+        lambda text: f"; {text}",
+        re.compile(rb"(?m)^LMOVE TRANS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\)"),
+        (),
+        (
+            b"LMOVE p\n.TRANS\np 1 2 3\n.END", b"LMOVE TRANS(1,2,3,0,180,0) ; x",
+            b"JMOVE #a\nLMOVE TRANS(1,2,3)",
+            b'PRINT ";"\nLMOVE TRANS(1,2,3)', b"LMOVE TRANS(1E400,2,3)", b"DRAW 1,2,3",
+            b".TRANS\np 1 2 3\np 1 2 3\n.END\nLMOVE p", b"TOOL 99\nLMOVE TRANS(1,2,3)",
+            b"LMOVE TRANS(1,2,3)\rLMOVE TRANS(1,2,3)",
+        ),
+    ),
+    "val2": Case(
+        "val2", "val2", "MOVESTRANSPD().,;\"+-= #0123456789\r\n\tp",
+        ["SPEED 100 ALWAYS"], [],
+        lambda p, d: f"MOVES TRANS({_list(p, d)})", lambda p, d: f"DRAW {_list(p, d)}",
+        lambda text: f"; {text}",
+        re.compile(rb"(?m)^MOVES TRANS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\)"),
+        (),
+        (b"10 SET a = TRANS(1,2,3)\n20 MOVES a\n30 MOVES a", b"MOVE #p\nMOVES TRANS(1,2,3)"),
+    ),
 }  # fmt: skip
 FRAMES = {
     name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
@@ -130,7 +169,7 @@ def recipe(case: Case, **more: object) -> Recipe:
 def pinned(path: Path, case: Case) -> Setup:
     """The setup with the dialect named, so that any bytes are read in it."""
     setup = load_setup(path)
-    return replace(setup, job=replace(setup.job, dialect=case.name))
+    return replace(setup, job=replace(setup.job, dialect=case.name, described=described(case.name)))
 
 
 @pytest.fixture(scope="module")
@@ -142,9 +181,7 @@ def zero(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Setup]:
 @pytest.fixture(scope="module")
 def shifted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Setup]:
     folder = tmp_path_factory.mktemp("shift")
-    return {
-        n: pinned(machines.shift_machine(folder / n, recipe=recipe(c)), c) for n, c in CASES.items()
-    }
+    return {n: pinned(machines.shift_machine(folder / n, recipe=recipe(c)), c) for n, c in CASES.items()}
 
 
 @pytest.fixture(scope="module")
@@ -327,8 +364,8 @@ def test_l6_distances_do_not_drift(bent: dict[str, Path], name: str) -> None:
     said = [case.distance(s, 3) for s in steps.tolist()]
     text = "\n".join([*case.head, case.point((0.0, 0.0, 0.0), 3), *said, *case.tail]) + "\n"
     out = olp.correct(text.encode(), pinned(bent[name], case)).data
-    three = rb"X?([^,\s]+)[,\s]Y?([^,\s]+)[,\s]Z?([^,\s]+)"
-    found = re.findall(rb"(?m)^(?:G91 )?(?:G1 |GODLTA/|GOTO/)" + three, out)
+    three = rb"X?([^,\s]+)[,\s]Y?([^,\s]+)[,\s]Z?([^,\s)]+)"
+    found = re.findall(rb"(?m)^(?:G91 )?(?:G1 |GODLTA/|GOTO/|DRAW |LMOVE TRANS\(|MOVES TRANS\()" + three, out)
     own = np.cumsum([[float(n) for n in row] for row in found], axis=0)
     nominal = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
     assert commanded(nominal, out, bent[name], case, own) <= HALF_DIGIT

@@ -22,7 +22,7 @@ from olp.cli import main
 from olp.exceptions import AlreadyCorrected, ConfigError, InputError, OlpError, OutsideBox, UsageError
 from olp.program.delimited import told
 from olp.program.numbertext import number, written
-from olp.results.dmis import read_dmis, statements
+from olp.results.dmis import read_dmis
 from olp.results.table import read_table
 
 OFFSET = np.array([210.0, 180.0, -260.0])
@@ -32,7 +32,7 @@ FRAMES = {
     "TOUCHED": {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -260.0},
     "TURNED": {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -260.0, "A_deg": 3.0, "B_deg": -8.0, "C_deg": 31.0,
                "set_by": "true"},
-    '"D(PART)"': {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -260.0, "set_by": "true"},
+    "PART": {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -380.0, "set_by": "true"},
 }  # fmt: skip
 STYLI = {
     1: {"Z_mm": 120.0, "radius_mm": 2.5},
@@ -175,7 +175,15 @@ def dmo(points: np.ndarray, normal: np.ndarray) -> bytes:
 def test_dmis_output_is_corrected_point_by_point(machine: Path) -> None:
     model = JudgeModel(machine)
     true, normal = truth(2)
-    reported = cmm.report(model, true, normal, offset_mm=OFFSET, stylus_mm=model.lever_mm(1), radius_mm=2.5)
+    reported = cmm.report(
+        model,
+        true,
+        normal,
+        offset_mm=OFFSET - [0, 0, 120],
+        stylus_mm=model.lever_mm(1),
+        radius_mm=2.5,
+        ram=True,
+    )
     source = dmo(reported, normal)
     result = olp.correct_results(source, machine)
     again = read_dmis(result.data)
@@ -195,10 +203,10 @@ def test_dmis_output_is_corrected_point_by_point(machine: Path) -> None:
     (("UNITS/MM,", "UNITS/FURLONG,"), 2, "FURLONG is no unit"),
     (("POINT,CART, ", "POINT,POL, "), 7, "stated in POL"),
     (("ENDFIL", "GOTO/1,2,3"), 13, "part program"),
-    (("D(PART)=DATSET/DAT(A),ZDIR,ZORIG\r\n", ""), None, "states no frame"),
+    (("D(PART)=DATSET/DAT(A),ZDIR,ZORIG\r\n", ""), None, "frame MCS is not defined"),
     (("DECPL/ALL,6", "TECOMP/MACHIN,ON"), None, ""),
     (("DECPL/ALL,6", "$$ volumetric compensation: ON"), 3, "corrected twice"),
-    (("F(P1)=FEAT", "$$ a comment that goes on $\r\nF(P1)=FEAT"), 7, "may be part of the comment"),
+    (("F(P1)=FEAT", "$$ a comment that goes on $\r\nF(P1)=FEAT"), 7, "may be part of it"),
 ])  # fmt: skip
 def test_what_cannot_be_right_is_refused(
     machine: Path, change: tuple[str, str], line: int | None, words: str
@@ -212,6 +220,24 @@ def test_what_cannot_be_right_is_refused(
     with pytest.raises(OlpError, match=words) as caught:
         olp.correct_results(source, machine)
     assert caught.value.line == line
+
+
+def test_a_stylus_of_a_file_is_looked_up_by_its_label(machine: Path, tmp_path: Path) -> None:
+    true, normal = truth(2)
+    source = dmo(true, normal).replace(b"SNSET/", b"SNSLCT/SA(Star_X)\r\nSNSET/")
+    with pytest.raises(ConfigError, match="stylus Star_X is not defined"):
+        olp.correct_results(source, machine)
+    for file in machine.parent.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    here = tmp_path / "machine.toml"
+    here.write_text(machine.read_text() + "[styli.STAR_X]\noffset_mm = [40.0, -60.0, -120.0]\n")
+    model = JudgeModel(machine)
+    lever = np.array([40.0, -60.0, -120.0])
+    result = olp.correct_results(source, here, tip_radius_mm=1.0)
+    axis = true + 1.0 * normal + OFFSET - [0, 0, 120] - lever
+    assert np.abs(read_dmis(result.data).value_mm - true - model.error_mm(axis, lever)).max() < 2e-6
+    found = np.array([p["axis_mm"] for p in result.report["points"]])
+    assert found == pytest.approx(axis, abs=2e-6)
 
 
 def test_results_are_never_corrected_twice(machine: Path, tmp_path: Path) -> None:
@@ -295,19 +321,6 @@ def test_any_bytes_are_read_or_refused(data: bytes) -> None:
     for reader in (read_dmis, lambda d: read_table(d, told(["X_mm,Y_mm,Z_mm"]))):  # type: ignore[arg-type]
         with contextlib.suppress(InputError):
             reader(data)
-
-
-@given(
-    st.lists(
-        st.sampled_from([b"FA(A)=FEAT/POINT,CART,1.5,2,3", b"$", b"$$", b"\r\n", b"\n", b",", b"'", b" x"])
-    )
-)
-def test_statements_lead_back_to_the_file(parts: list[bytes]) -> None:
-    data = b"".join(parts)
-    with contextlib.suppress(InputError):
-        for found, _ in statements(data):
-            for i in range(len(found.text)):
-                assert data[found.place(i) : found.place(i) + 1] == found.text[i : i + 1]
 
 
 def test_the_command_line(machine: Path, tmp_path: Path) -> None:

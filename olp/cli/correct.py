@@ -74,6 +74,9 @@ LAST_DIGITS_UM = 10.0
 @click.option(
     "--tool", "tools", multiple=True, metavar="[NAME=]N", help="Stylus of results; may be repeated."
 )
+@click.option(
+    "--tip-radius-mm", type=click.FloatRange(min=0.0), help="Radius of the tip of results, 0 for centres."
+)
 @click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
@@ -101,6 +104,7 @@ def command(
     unit: str | None,
     frames: tuple[str, ...],
     tools: tuple[str, ...],
+    tip_radius_mm: float | None,
     decimals: int | None,
     show_diff: bool,
     quiet: bool,
@@ -122,7 +126,7 @@ def command(
                     "programs and does not go with --results"
                 )
         run_results(program, machine, job, Asked(
-            profile, columns, unit, frames, tools, decimals, outside_box == "hold",
+            profile, columns, unit, frames, tools, tip_radius_mm, decimals, outside_box == "hold",
             date.date() if date else None, output, report_file, as_json, fail_on, quiet, force,
         ))  # fmt: skip
         return

@@ -20,6 +20,7 @@ class Asked:
     unit: str | None
     frames: tuple[str, ...]
     tools: tuple[str, ...]
+    tip_radius_mm: float | None
     decimals: int | None
     hold: bool
     date: datetime.date | None
@@ -50,7 +51,8 @@ def run(results: str | None, machine: str | None, job: str | None, asked: Asked)
     text = source(call.program)
     result = correct_results(
         text, call.setup, profile=layout_of(asked.profile, asked.columns, asked.unit, text),
-        frame=_names("--frame", asked.frames), tool=_numbers(asked.tools), decimals=asked.decimals,
+        frame=_names("--frame", asked.frames), tool=_numbers(asked.tools), tip_radius_mm=asked.tip_radius_mm,
+        decimals=asked.decimals,
         outside_box="hold" if asked.hold else "refuse", date=asked.date,
     )  # fmt: skip
     written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}

@@ -13,6 +13,8 @@ Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
 #: Decimals beyond these say nothing that a double holds.
 MOST_DECIMALS = 10
+#: No position is that large, whatever its unit.
+_MOST = 1e8
 _NUMBER = re.compile(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
 _BLANKS = b" \t"
 
@@ -39,7 +41,8 @@ class Number:
 
 
 def number(text: bytes, decimal: bytes = b".") -> Number | None:
-    """What a number says, None where the text is none. `decimal` is its decimal mark."""
+    """What a number says, None where the text is none, or where no position could be so large. `decimal` is
+    its decimal mark."""
     found = _NUMBER.fullmatch(text)
     if found is None or not (found[2] or found[4]) or (found[3] and found[3] != decimal):
         return None
@@ -48,6 +51,8 @@ def number(text: bytes, decimal: bytes = b".") -> Number | None:
     if abs(power) > 99 or len(whole) + len(fraction) > 40:
         return None
     value = float(sign + (whole or b"0") + b"." + (fraction or b"0") + b"e%d" % power)
+    if abs(value) >= _MOST:
+        return None
     return Number(
         value=value, digit=10.0 ** (power - len(fraction)), plus=sign == b"+", whole=len(whole),
         bare=whole == b"", mark=mark, decimals=len(fraction), letter=letter,

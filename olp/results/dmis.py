@@ -8,13 +8,14 @@ nominals (`F`, `T`) are nobody's error.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NoReturn, TypeVar
 
 import numpy as np
 
 from olp.exceptions import InputError
+from olp.program.dmis import MACHINE_FRAME
 from olp.program.numbertext import Number, number
+from olp.program.statement_lexer import Comment, Statement, chunks
 from olp.results.reported import Carried, Reported, Stated
 from olp.results.table import stated_in
 
@@ -27,26 +28,12 @@ _IS_DMIS = re.compile(
     re.MULTILINE | re.IGNORECASE,
 )
 _MOTION = {b"GOTO", b"FROM", b"RAPID", b"PTMEAS", b"GOHOME", b"RMEAS", b"PATH"}
+#: In DMIS text stands in quotes.
+_NO_TEXT = re.compile(rb"(?!)")
+T = TypeVar("T")
 _COMPOSED = "its touches are not in it one by one; correct the touch points and evaluate the feature again"
 _EVALUATED = "it was evaluated from values before correction; evaluate it again"
 _LOOK = 1 << 16
-
-
-@dataclass(frozen=True, slots=True)
-class Statement:
-    """One statement: its first line, its text without continuation marks and comment, and where in the file
-    each byte of the text is."""
-
-    line: int
-    text: bytes
-    at: tuple[tuple[int, int], ...]
-
-    def place(self, index: int) -> int:
-        """The position in the file of a byte of the text."""
-        for first, start in reversed(self.at):
-            if index >= first:
-                return start + index - first
-        return self.at[0][1]
 
 
 def is_dmis(data: bytes) -> bool:
@@ -54,45 +41,12 @@ def is_dmis(data: bytes) -> bool:
     return _IS_DMIS.search(data[:_LOOK]) is not None
 
 
-def statements(data: bytes) -> Iterator[tuple[Statement, bytes]]:
-    """The statements of a text with the comment behind each; `$` at the end of a line continues it, also
-    inside a word or a number, and `$$` begins a comment."""
-    text, at, first, comment = b"", [], 0, False
-    position = 3 if data[:3] == b"\xef\xbb\xbf" else 0
-    for line, raw in enumerate(data[position:].splitlines(keepends=True), 1):
-        body = raw.rstrip(b"\r\n")
-        start, position = position, position + len(raw)
-        if comment and not body.lstrip().startswith(b"$$") and _HEAD.match(body):
-            raise InputError(
-                "a comment that ends in $ stands before this statement, so it may be part of the comment; "
-                "take the $ off the comment, or begin this line with $$",
-                line=line,
-            )
-        code, remark = _without_comment(body)
-        comment = remark is not None and remark.rstrip().endswith(b"$")
-        if not text:
-            first = line
-        kept = code.rstrip()
-        continues = remark is None and kept.endswith(b"$")
-        piece = kept[:-1] if continues else code
-        at.append((len(text), start))
-        text += piece
-        if continues:
-            continue
-        yield Statement(first, text, tuple(at)), remark or b""
-        text, at = b"", []
-    if text:
-        yield Statement(first, text, tuple(at)), b""
-
-
-def _without_comment(body: bytes) -> tuple[bytes, bytes | None]:
-    quoted = False
-    for i, byte in enumerate(body):
-        if byte == 39:
-            quoted = not quoted
-        elif byte == 36 and not quoted and body[i + 1 : i + 2] == b"$":
-            return body[:i], body[i + 2 :]
-    return body, None
+def _refuse_motion(major: bytes, line: int) -> NoReturn:
+    raise InputError(
+        f"{major.decode('latin-1')} makes this a part program, no file of results; correct it without "
+        "--results",
+        line=line,
+    )
 
 
 class _Reader:
@@ -101,11 +55,11 @@ class _Reader:
     def __init__(self, data: bytes) -> None:
         self.data = data
         self.unit_mm: float | None = None
-        self.frame: str | None = None
-        self.tool: str | int | None = None
+        self.frame = MACHINE_FRAME
+        self.tool: str | None = None
         self.approach = float("nan")
-        self.frames: list[str | None] = []
-        self.tools: list[str | int | None] = []
+        self.frames: list[str] = []
+        self.tools: list[str | None] = []
         self.lines: list[int] = []
         self.spans: list[list[tuple[int, int]]] = []
         self.forms: list[tuple[Number, ...]] = []
@@ -134,7 +88,7 @@ class _Reader:
             name = f"TA({(label or b'').decode('latin-1')})"
             self.carried.append(Carried(found.line, name, _EVALUATED))
         elif kind in (b"D", b"DA"):
-            self.frame = f"D({(label or b'').decode('latin-1')})"
+            self.frame = (label or b"").decode("latin-1")
         elif kind is None:
             self._state(found, major or b"", rest)
 
@@ -154,9 +108,9 @@ class _Reader:
                 return
             kind, name = label[1].upper().decode("latin-1"), label[2].decode("latin-1")
             if major == b"SNSLCT":
-                self.tool = int(name) if name.isdigit() else f"{kind}({name})"
+                self.tool = name
             elif kind in ("D", "DA"):
-                self.frame = f"D({name})"
+                self.frame = name
         elif major == b"SNSET" and words[0] == b"APPRCH" and len(words) > 1:
             told = number(words[1])
             self.approach = float("nan") if told is None else told.value * (self.unit_mm or 1.0)
@@ -164,12 +118,15 @@ class _Reader:
             text = found.text.strip().decode("latin-1")
             self.stated.append(Stated(found.line, "temperature", text))
         elif major in _MOTION:
-            raise InputError(
-                f"{major.decode('latin-1')} makes this a part program, no file of results; correct it "
-                "without "
-                "--results",
-                line=found.line,
-            )
+            _refuse_motion(major, found.line)
+
+    def remarks(self) -> None:
+        """What comments say of compensation that was active."""
+        for line, raw in enumerate(self.data.splitlines(), 1):
+            at = raw.find(b"$$")
+            said = stated_in(line, raw[at + 2 :].decode("latin-1").strip()) if at >= 0 else None
+            if said is not None:
+                self.stated.append(said)
 
     def _actual(self, found: Statement, label: str, rest: bytes, at: int) -> None:
         name = f"FA({label})"
@@ -226,7 +183,7 @@ class _Reader:
         self.names.append(name)
 
 
-def _index(known: list, value: object) -> int:  # type: ignore[type-arg]
+def _index(known: list[T], value: T) -> int:
     if value not in known:
         known.append(value)
     return known.index(value)
@@ -235,11 +192,23 @@ def _index(known: list, value: object) -> int:  # type: ignore[type-arg]
 def read_dmis(data: bytes) -> Reported:
     """The points of DMIS output. Raises InputError with the line of what is wrong."""
     reader = _Reader(data)
-    for found, remark in statements(data):
-        said = stated_in(found.line, remark.decode("latin-1").strip())
-        if said is not None:
-            reader.stated.append(said)
-        reader.statement(found)
+    reader.remarks()
+    for chunk in chunks(data):
+        if len(chunk.point):
+            _refuse_motion(b"GOTO", chunk.first_line + int(chunk.point[0]) + 1)
+        goes_on = 0
+        for found in chunk.statements(_NO_TEXT):
+            if isinstance(found, Comment):
+                text = found.text.rstrip()
+                goes_on = found.line + 1 if text.endswith(b"$") and text.strip() != b"$$" else 0
+                continue
+            if found.line == goes_on:
+                raise InputError(
+                    "a comment that ends in $ stands before this statement, which may be part of it then; "
+                    "take the $ off the comment, or begin this line with $$",
+                    line=found.line,
+                )
+            reader.statement(found)
     if not reader.lines:
         why = f" ({reader.carried[0].name} {reader.carried[0].reason})" if reader.carried else ""
         raise InputError(f"holds no points (FA(..)=FEAT/POINT or PTDATA){why}")

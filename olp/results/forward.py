@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -69,11 +70,12 @@ def forward(
     styli: Sequence[Stylus],
     model: ErrorModel,
     *,
-    lengths: bool,
+    axes: Literal["tip", "tool", "ram"],
     hold: bool,
 ) -> Forward:
-    """What has to be added to each point. `places` are the frames, `styli` the tools of `reported`; with
-    `lengths` those of the styli enter axis positions.
+    """What has to be added to each point. `places` are the frames, `styli` the tools of `reported`. Axis
+    positions count at the tip, or stand off it by the lengths of the tools, or count at the end of the ram,
+    which the stylus leads from to the tip.
 
     Raises OutsideBox, with the line, for a touch outside the calibrated box unless it is held at its face.
     """
@@ -85,7 +87,9 @@ def forward(
     own = np.isfinite(reported.stylus_mm).all(axis=1)
     # a row's own stylus vector stands for the tool's, whose length is minus its vector
     length[own], lever[own] = -reported.stylus_mm[own], reported.stylus_mm[own]
-    if not lengths:
+    if axes == "ram":
+        length = -lever
+    elif axes == "tip":
         length[:] = 0.0
     if reported.tip_radius_mm is not None:
         radius = np.full(len(reported), reported.tip_radius_mm)

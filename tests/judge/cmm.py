@@ -34,17 +34,19 @@ def report(
     noise_mm: float = 0.0,
     seed: int = 0,
     play: bool = False,
+    ram: bool = False,
 ) -> np.ndarray:
     """(n, 3) reported surface points, in the part frame, of true ones with directions `normal`, both (n, 3).
 
-    `stylus_mm` (3,) or (n, 3) runs from gauge point to tip; scales count at the tip (no length is active).
+    `stylus_mm` (3,) or (n, 3) runs from gauge point to tip; scales count at the tip, or at the end of the ram.
     `zero_shift_mm` is where the part really lies off what its offset says.
     """
     rotation = turn(angles_deg)
     shift = np.zeros(3) if zero_shift_mm is None else zero_shift_mm
     centre = (true_mm + radius_mm * normal) @ rotation.T + offset_mm + shift
     state = -np.sign(np.round(normal @ rotation.T, 12)) if play else None
-    scales = model.command_for(centre, stylus_mm, state)
+    arm = stylus_mm if ram else np.zeros(3)
+    scales = model.command_for(centre - arm, stylus_mm, state) + arm
     scales = scales + np.random.default_rng(seed).normal(0.0, 1.0, scales.shape) * noise_mm
     return (scales - offset_mm) @ rotation - radius_mm * normal
 
