@@ -38,6 +38,7 @@ schema = "olp-dialect-1"
 name = "own"
 title = "A language of our own"
 unit = "mm"
+speed_unit = "mm/min"
 comments = ["!"]
 stamp = ["! ", ""]
 quote = '"'
@@ -148,6 +149,8 @@ def test_every_statement_does_what_its_form_says(machine: Path, own: Path) -> No
     assert path.end_mm[6] == pytest.approx(turned + np.array([300.0, 200.0, -250.0]))
     assert np.isnan(path.end_mm[7]).all()
     assert [path.frames[f].tool for f in path.frame] == [1, 1, 1, 1, 1, 2, 2, 2]
+    assert found.statements is not None
+    assert found.statements.feed_mm_s[1:7] == pytest.approx([10 / 60] * 6)
 
 
 def test_a_corrected_program_brings_the_tip_there(machine: Path, own: Path) -> None:

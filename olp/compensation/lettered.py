@@ -20,8 +20,11 @@ class LetteredWriter(StatementWriter):
 
     def text(self) -> bytes:
         self.replaced: list[tuple[int, int, bytes]] = []
-        if len(self.plan):
+        if len(self.words.start):
             self._edits(0, len(self.plan))
+        else:
+            # nothing but moves that the text says no place of
+            self.parts[:] = 1
         if not self.replaced:
             return self.program.data
         text = spliced(self.program.data, self.replaced)

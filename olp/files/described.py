@@ -23,7 +23,10 @@ from olp.program.pointlist import with_layout
 
 FOLDER = Path(__file__).parents[1] / "program" / "dialects_described"
 
-Does = Literal["line", "rapid", "point", "away", "tool", "frame", "unit", "section", "carry", "refuse"]
+Does = Literal[
+    "line", "rapid", "point", "away", "tool", "frame", "unit", "speed", "section", "carry", "refuse"
+]
+Speed = Literal["mm/s", "mm/min", "m/s", "m/min", "inch/min"]
 
 
 class StatementTable(Table):
@@ -38,6 +41,9 @@ class StatementTable(Table):
     unit: Literal["mm", "um", "m", "inch"] | None = Field(
         default=None, description="the unit that the statement makes active"
     )
+    speed_unit: Speed | None = Field(
+        default=None, description="the unit of its speed; that of the dialect if left out"
+    )
     incremental: bool = Field(default=False, description="whether its numbers are distances")
 
 
@@ -51,6 +57,7 @@ class DialectFile(Table):
     unit: Literal["mm", "um", "m", "inch"] | None = Field(
         default=None, description="the unit of positions, where no statement says it"
     )
+    speed_unit: Speed | None = Field(default=None, description="the unit of speeds; not known if left out")
     comments: list[Text] = Field(default=[], description="what begins a comment, to the end of its line")
     stamp: list[str] = Field(
         default=[], description="the marks before and behind the comment that marks a corrected program"
@@ -93,7 +100,7 @@ def load_described(path: PathLike) -> Dialect:
             found.append((line_of(("statements", index), lines), f'the form "{table.form}" {wrong}'))
         rules.append(Rule(
             made, table.does, table.why or "", table.inside, table.enters, table.frame, table.unit,
-            table.incremental,
+            table.speed_unit, table.incremental,
         ))  # fmt: skip
     for text, why in file.refuse.items():
         made = formed(text, ("refuse", text))
@@ -112,6 +119,7 @@ def load_described(path: PathLike) -> Dialect:
     return UserDialect(
         name=file.name, title=file.title, path_mode=file.path_mode, about=file.about or "",
         comment=(stamp[0].encode(), stamp[1].encode()), statements=tuple(rules), unit=file.unit,
+        speed_unit=file.speed_unit,
         comments=tuple(file.comments), quote=file.quote, continuation=file.continuation,
         terminator=file.terminator, label=re.compile(label.pattern) if label else None,
         ignore_case=file.ignore_case, by_word=_by_word(rules),

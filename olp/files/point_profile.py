@@ -21,7 +21,7 @@ MEASURED = ("X", "Y", "Z", "t", "name", "line")
 
 #: keys that a profile and a layout have alike
 _SAME = (
-    "delimiter", "decimal", "time_unit", "header", "comment", "frame", "point", "tip_radius_mm",
+    "delimiter", "decimal", "time_unit", "speed_unit", "header", "comment", "frame", "point", "tip_radius_mm",
     "approach_mm", "joined", "insert", "stamp",
 )  # fmt: skip
 
@@ -72,6 +72,9 @@ class PointProfile(Table):
     )
     unit: Literal["mm", "um", "m", "inch"] = Field(default="mm", description="the unit of X, Y and Z")
     time_unit: Literal["s", "ms", "us"] = Field(default="s", description="the unit of time")
+    speed_unit: Literal["mm/s", "mm/min", "m/s", "m/min", "inch/min"] | None = Field(
+        default=None, description="the unit of speed; not known if left out"
+    )
     sample_period_s: Positive | None = Field(
         default=None, description="seconds from point to point, where points come without time"
     )

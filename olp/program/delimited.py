@@ -21,6 +21,7 @@ Span = tuple[int, int]
 
 MM = {"mm": 1.0, "um": 1e-3, "m": 1e3, "inch": 25.4}
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+MM_S = {"mm/s": 1.0, "mm/min": 1 / 60, "m/s": 1e3, "m/min": 1e3 / 60, "inch/min": 25.4 / 60}
 #: "space" is any run of blanks
 DELIMITERS: dict[str, str | None] = {"comma": ",", "semicolon": ";", "tab": "\t", "space": None}
 
@@ -52,7 +53,8 @@ LOOK = 40
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _COMMA_NUMBER = re.compile(r"[-+]?\d+,\d+")
 _AXIS = re.compile(r"([xyz])(?:[ _]*[\[(]?(mm|um|m|inch)[\])]?)?")
-_OTHER = re.compile(r"(.+?)(?:(?:[ _]+|[ _]*[\[(])(?:mm|deg|rad|s|ms|us|mm/s|mm_s|mm/min|mm_min)[\])]?)?")
+_OTHER = re.compile(r"(.+?)(?:(?:[ _]+|[ _]*[\[(])(?:mm|deg|rad|s|ms|us|(?:mm|m|inch)[/_](?:s|min))[\])]?)?")
+_SPEED = re.compile(r".+?[ _]*[\[(]?(mm|m|inch)[/_](s|min)[\])]?")
 _MARKS = ("#", "//", "%")
 
 
@@ -68,6 +70,7 @@ class Layout:
     decimal: Literal["point", "comma"] = "point"
     unit: str | None = None
     time_unit: str = "s"
+    speed_unit: str | None = None
     header: bool = True
     comment: str = "#"
     frame: str | None = None
@@ -118,7 +121,11 @@ def told(lines: Sequence[str]) -> Layout | None:
     if found is not None:
         columns, unit = found
         said.append(_columns_said(columns, unit))
-        return Layout(mapping(columns), delimiter, decimal, unit, comment=comment, assumed=tuple(said))
+        speed = _SPEED.fullmatch(str(columns.get("speed", "")).lower())
+        return Layout(
+            mapping(columns), delimiter, decimal, unit, comment=comment, assumed=tuple(said),
+            speed_unit=None if speed is None else f"{speed[1]}/{speed[2]}",
+        )  # fmt: skip
     number = [bool(_NUMBER.fullmatch(c.replace(",", "."))) for c in cells[0]]
     columns = {}
     if number == [True] * 3:

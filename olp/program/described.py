@@ -13,7 +13,7 @@ import numpy as np
 
 from olp.exceptions import ProgramError
 from olp.machine import ZERO, Setup
-from olp.program.delimited import MM
+from olp.program.delimited import MM, MM_S
 from olp.program.dialect import Dialect, Options, Row, Support
 from olp.program.forms import Form
 from olp.program.frames import FrameTable
@@ -36,6 +36,7 @@ DOES = {
     "tool": (Support.READ, "the tool from here on"),
     "frame": (Support.READ, "the frame from here on"),
     "unit": (Support.READ, "the unit from here on"),
+    "speed": (Support.READ, "the speed from here on, where it is stated in a unit of speed"),
     "section": (Support.READ, "begins or ends a part of the text"),
     "carry": (Support.CARRIED, ""),
     "refuse": (Support.REFUSED, ""),
@@ -54,6 +55,7 @@ class Rule:
     enters: str | None = None
     frame: str | None = None
     unit: str | None = None
+    speed_unit: str | None = None
     incremental: bool = False
 
 
@@ -64,6 +66,7 @@ class UserDialect(Dialect):
     family: str = "described"
     statements: tuple[Rule, ...]
     unit: str | None
+    speed_unit: str | None = None
     comments: tuple[str, ...] = ()
     quote: str = ""
     continuation: str = ""
@@ -175,6 +178,7 @@ class _Reader:
         self.framed = False
         self.assumed: int | None = None
         self.tool: int | None = None
+        self.feed = NAN
         self.table = FrameTable(setup)
         self.position: list[float] = [NAN if v is None else v for v in setup.job.start_mm]
         self.turns: dict[tuple[float, ...], int] = {}
@@ -242,12 +246,20 @@ class _Reader:
             self.frame_name = fields.get("frame") or rule.frame or self.setup.machine.default_work_offset
         elif rule.does == "tool":
             self.tool = self._integer(line, fields.get("tool") or "0")
+        elif rule.does == "speed":
+            self.feed = self._speed(rule, fields)
         elif rule.does == "section":
             self.sections += 1
         elif rule.does == "away":
             self._put(line, Kind.RAPID, Flag.CONTROL, [NAN] * 3, (-1, -1, -1), inline=False)
         elif rule.does in ("line", "rapid"):
             self._move(line, rule, match)
+
+    def _speed(self, rule: Rule, fields: Mapping[str, str | None]) -> float:
+        """A speed in mm/s, NaN where it is none in a unit of speed."""
+        unit = rule.speed_unit or self.dialect.speed_unit
+        said = fields.get("speed")
+        return float(said) * MM_S[unit] if said is not None and unit is not None else NAN
 
     @staticmethod
     def _integer(line: Line, text: str) -> int:
@@ -317,6 +329,8 @@ class _Reader:
         if turn:
             self.turns.setdefault(turn, line.number)
         kind = Kind.LINE if rule.does == "line" else Kind.RAPID
+        if fields.get("speed") is not None:
+            self.feed = self._speed(rule, fields)
         self._put(line, kind, flag, end, tuple(slots), inline=inline, frame=frame)
 
     def _end(self, frame: int, values: list[float], *, incremental: bool) -> list[float]:
@@ -366,6 +380,7 @@ class _Reader:
         out.frame.append(self._frame(line, self._unit_mm(line)) if frame is None else frame)
         out.end.append(tuple(end))
         out.slot.append(slots)
+        out.feed.append(self.feed)
         out.bounds.append((line.begin, line.end) if inline else (-1, -1))
         first = self.moved = self.moved or (self.sections, line.number)
         if not self.framed and self.assumed is None:

@@ -31,6 +31,7 @@ class Moves:
     end: list[tuple[float, ...]] = field(default_factory=list)
     slot: list[tuple[int, ...]] = field(default_factory=list)
     bounds: list[tuple[int, int]] = field(default_factory=list)
+    feed: list[float] = field(default_factory=list)
 
     def program(
         self,
@@ -66,7 +67,7 @@ class Moves:
             end_line=len(starts),
             statements=Statements(
                 begin=bounds[:, 0], end=bounds[:, 1],
-                feed_mm_s=np.where(kind == Kind.RAPID, np.inf, np.nan),
+                feed_mm_s=np.where(kind == Kind.RAPID, np.inf, np.array(self.feed, float)),
                 rest=np.zeros(count + 1, bool), dwell_s=np.zeros(count + 1), arcs={}, broken={},
                 strokes=np.zeros((0, 2), np.int64), decimal=decimal,
             ),

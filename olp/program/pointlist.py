@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from olp.exceptions import InputError, ProgramError
 from olp.machine import Setup
-from olp.program.delimited import AXES, Cells, Layout, first_lines, stated_frame, told
+from olp.program.delimited import AXES, MM_S, Cells, Layout, first_lines, stated_frame, told
 from olp.program.dialect import Dialect, Options, Row, Support
 from olp.program.frames import FrameTable
 from olp.program.lettered import Moves
@@ -121,7 +121,9 @@ def _rows(data: bytes, layout: Layout) -> _Found:
     if None in places:
         raise InputError("has no columns for X, Y and Z; name them with --column X=.. or in a profile")
     xyz = [p for p in places if p is not None]
-    tool = cells.place("tool")
+    tool, speed = cells.place("tool"), cells.place("speed")
+    factor = MM_S[layout.speed_unit] if layout.speed_unit else float("nan")
+    feed = float("nan")
     turning = [p for role in _TURNING if (p := cells.place(role)) is not None]
     found = _Found()
     moves = found.moves
@@ -143,14 +145,18 @@ def _rows(data: bytes, layout: Layout) -> _Found:
             raise InputError(
                 f'"{text}" is no tool number; expected the number of a table [tools.N]', line=line
             )
+        said = number(data[slice(*row[speed])], decimal) if speed is not None and speed < len(row) else None
+        # a row without a speed keeps that of the row before
+        feed = feed if said is None else said.value * factor
+        moves.feed.append(feed)
         first = len(moves.numbers)
-        said = [n for n in numbers if n is not None]
-        moves.numbers += said
+        known = [n for n in numbers if n is not None]
+        moves.numbers += known
         moves.spans += [row[p] for p in xyz]
         moves.slot.append((first, first + 1, first + 2))
         moves.line.append(line)
         moves.bounds.append(cells.bounds)
-        found.values.append(tuple(n.value for n in said))
+        found.values.append(tuple(n.value for n in known))
         found.turns.setdefault(tuple(cells.text(row[p]) for p in turning if p < len(row)), line)
         found.tool.append(int(text) if text else None)
         found.tools.setdefault(found.tool[-1], line)

@@ -38,7 +38,8 @@ def report(
 ) -> np.ndarray:
     """(n, 3) reported surface points, in the part frame, of true ones with directions `normal`, both (n, 3).
 
-    `stylus_mm` (3,) or (n, 3) runs from gauge point to tip; scales count at the tip, or at the end of the ram.
+    `stylus_mm` (3,) or (n, 3) runs from gauge point to tip; scales count at the tip, or at the end of
+    the ram.
     `zero_shift_mm` is where the part really lies off what its offset says.
     """
     rotation = turn(angles_deg)
