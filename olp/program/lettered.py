@@ -11,10 +11,12 @@ import numpy.typing as npt
 from olp.machine import Setup
 from olp.program.dialect import Dialect
 from olp.program.numbertext import MOST_DECIMALS, Number
-from olp.program.program import ArcSlots, Program, Statements, Words
+from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Words
 from olp.toolpath import Arcs, Frame, Kind, Toolpath
 
 Small = npt.NDArray[np.int32]
+#: speeds are read, and none is written back
+_UNWRITTEN = StatedFeeds(np.zeros(1, np.int64), np.ones(1, np.int64), np.full(1, -1))
 
 
 @dataclass(slots=True)
@@ -69,7 +71,7 @@ class Moves:
                 begin=bounds[:, 0], end=bounds[:, 1],
                 feed_mm_s=np.where(kind == Kind.RAPID, np.inf, np.array(self.feed, float)),
                 rest=np.zeros(count + 1, bool), dwell_s=np.zeros(count + 1), arcs={}, broken={},
-                strokes=np.zeros((0, 2), np.int64), decimal=decimal,
+                strokes=np.zeros((0, 2), np.int64), feeds=_UNWRITTEN, decimal=decimal,
             ),
         )  # fmt: skip
 
