@@ -95,7 +95,7 @@ def correct_bytes(
     written = write(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.dialect.comment),
+        stamp=stamp_line(loaded.digest, loaded.dialect.comment) if loaded.dialect.marks else b"",
     )  # fmt: skip
     text, parts, tally, holes = written.text, written.parts, written.tally, written.holes
     del written

@@ -377,7 +377,10 @@ def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
     run = CliRunner()
     words = ["-m", str(machine), "--dialect", str(own)]
     assert run.invoke(main, ["correct", str(source), *words, "-o", str(out)]).exit_code == 0
-    for verb, more in (("verify", [str(out)]), ("inspect", []), ("simulate", ["-o", "-"])):
+    for verb, more in (
+        ("verify", [str(out)]), ("inspect", []), ("simulate", ["-o", "-"]), ("check", []), ("retime", []),
+        ("view", ["-o", str(tmp_path / "v.html")]),
+    ):  # fmt: skip
         done = run.invoke(main, [verb, str(source), *more, *words])
         assert done.exit_code == 0, (verb, done.output)
     matrix = run.invoke(main, ["inspect", str(source), *words]).stdout

@@ -161,6 +161,12 @@ def test_no_row_is_inserted_where_rows_have_a_time(machine: Path) -> None:
     assert olp.correct(text, setup_of(machine, dialect)).data.count(b"\n") == text.count(b"\n") + 1
 
 
+def test_a_list_without_comments_is_not_marked(machine: Path) -> None:
+    result = olp.correct(TABLES[0], setup_of(machine, layout(stamp=False)))
+    assert b"olp" not in result.data
+    assert "OLP626" in {f.code for f in result.findings}
+
+
 def test_what_is_told_is_said(machine: Path) -> None:
     found = olp.correct(TABLES[1], setup_of(machine)).findings
     said = " ".join(f.message for f in found if f.code == "OLP331")
@@ -246,7 +252,10 @@ def test_the_command_line(machine: Path, tmp_path: Path) -> None:
     assert by_profile.exit_code == 0, by_profile.output
     corrected = (tmp_path / "out.txt").read_bytes()
     dialect = ["--dialect", str(profile), "-m", str(machine)]
-    for verb, more in (("verify", [str(tmp_path / "out.txt")]), ("inspect", []), ("simulate", ["-o", "-"])):
+    for verb, more in (
+        ("verify", [str(tmp_path / "out.txt")]), ("inspect", []), ("simulate", ["-o", "-"]), ("check", []),
+        ("retime", []), ("view", ["-o", str(tmp_path / "v.html")]),
+    ):  # fmt: skip
         done = run.invoke(main, [verb, str(source), *more, *dialect])
         assert done.exit_code == 0, (verb, done.output)
     job = tmp_path / "job.toml"

@@ -14,7 +14,7 @@ from olp.proof import Proof
 
 #: Where the way between two places is looked at.
 _SHARES = np.linspace(0.0, 1.0, 18)[1:-1]
-_CODES = {"told": "OLP331", "turning": "OLP332"}
+_CODES = {"told": "OLP331", "turning": "OLP332", "unmarked": "OLP626"}
 
 
 def told_findings(program: Program) -> list[Finding]:

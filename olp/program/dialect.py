@@ -48,6 +48,7 @@ class Dialect:
     """A dialect of programs. `family` says which reader takes it; `path_mode` is how the control passes from
     move to move where a program does not say; `inch_decimals` are the decimals of inch programs for a least
     increment of 0.001 mm, `free_digits` those that centres of arcs may have beyond those of positions.
+    `marks`: a corrected program says so in a comment.
     `comment` are the marks around a comment, and `first` the beginnings of lines, in capitals, that have to
     stay in front of any other, in their order (`|` between such as stand for each other)."""
 
@@ -59,6 +60,7 @@ class Dialect:
     free_digits: int = 1
     comment: tuple[bytes, bytes] = (b"(", b")")
     first: tuple[bytes, ...] = ()
+    marks: bool = True
 
     def rows(self) -> Sequence[Row]:
         """The support matrix, from the table that the reader uses."""

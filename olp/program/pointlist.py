@@ -61,7 +61,8 @@ POINT_LIST = PointList(
 
 def with_layout(layout: Layout) -> PointList:
     """The dialect of lists that are laid out so."""
-    return replace(POINT_LIST, layout=layout, comment=(layout.comment.encode() + b" ", b""))
+    comment = (layout.comment.encode() + b" ", b"")
+    return replace(POINT_LIST, layout=layout, comment=comment, marks=layout.stamp)
 
 
 @dataclass(slots=True)
@@ -172,6 +173,8 @@ def _remarks(
         out.append(("told", line, f"positions are stated in {setup.machine.default_work_offset}"))
     if len(found.turns) > 1:
         out.append(("turning", list(found.turns.values())[1], "the orientation changes from row to row"))
+    if not layout.stamp:
+        out.append(("unmarked", line, "the profile allows no comment, so nothing marks the corrected list"))
     if layout.joined == "points":
         out.append(("joined", line, "how the machine goes from row to row is not stated"))
     return out
