@@ -28,12 +28,16 @@ def between_findings(program: Program, proof: Proof, model: ErrorModel) -> list[
         return []
     path, command = program.toolpath, proof.written.end_mm
     target = targets(path, zero_shifts(path.frames, model))
-    tool = path.tool_mm(1)
+    tool, step = path.tool_mm(), np.diff(command, axis=0)
     away = np.zeros(len(path))
-    for share in _SHARES:
-        at = command[:-1] + share * np.diff(command, axis=0)
-        actual = at + model.error(at, tool)
-        away[1:] = np.fmax(away[1:], segment_distance(actual, target[:-1], target[1:]))
+    # the ends are right but for rounding: only what the error may bend has to be looked at
+    bound = model.chord_bound(step, tool if tool.ndim == 1 else tool[1:])
+    some = np.flatnonzero(bound > proof.tolerance_mm)
+    lever = tool if tool.ndim == 1 else tool[some + 1]
+    for share in _SHARES if some.size else ():
+        at = command[some] + share * step[some]
+        actual = at + model.error(at, lever)
+        away[some + 1] = np.fmax(away[some + 1], segment_distance(actual, target[some], target[some + 1]))
     far = away > proof.allowed_mm
     if not far.any():
         return []

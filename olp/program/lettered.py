@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Word
 from olp.toolpath import Arcs, Frame, Kind, Toolpath
 
 Small = npt.NDArray[np.int32]
+Index = npt.NDArray[np.int64]
 #: speeds are read, and none is written back
 _UNWRITTEN = StatedFeeds(np.zeros(1, np.int64), np.ones(1, np.int64), np.full(1, -1))
 
@@ -22,18 +24,20 @@ _UNWRITTEN = StatedFeeds(np.zeros(1, np.int64), np.ones(1, np.int64), np.full(1,
 @dataclass(slots=True)
 class Moves:
     """Moves on their way: `kind`, `flag`, `line`, `frame`, `end` and the `slot` of each, the bytes of its
-    statement (-1, -1 where none may be copied), its feed; and the numbers of the text with their bytes."""
+    statement (-1, -1 where none may be copied), its feed, each a list or a column; and the numbers of the
+    text with their bytes, or `plain`: mantissa, decimals, first byte and last of each, as columns."""
 
     numbers: list[Number] = field(default_factory=list)
     spans: list[tuple[int, int]] = field(default_factory=list)
-    kind: list[int] = field(default_factory=list)
-    flag: list[int] = field(default_factory=list)
-    line: list[int] = field(default_factory=list)
-    frame: list[int] = field(default_factory=list)
-    end: list[tuple[float, ...]] = field(default_factory=list)
-    slot: list[tuple[int, ...]] = field(default_factory=list)
-    bounds: list[tuple[int, int]] = field(default_factory=list)
-    feed: list[float] = field(default_factory=list)
+    kind: Any = field(default_factory=list)
+    flag: Any = field(default_factory=list)
+    line: Any = field(default_factory=list)
+    frame: Any = field(default_factory=list)
+    end: Any = field(default_factory=list)
+    slot: Any = field(default_factory=list)
+    bounds: Any = field(default_factory=list)
+    feed: Any = field(default_factory=list)
+    plain: tuple[Index, npt.NDArray[np.int8], Index, Index] | None = None
 
     def program(
         self,
@@ -77,23 +81,36 @@ class Moves:
 
     def _words(self, lines: int) -> Words:
         """Numbers as words without letters."""
-        decimals = np.array([min(max(n.places, 0), MOST_DECIMALS) for n in self.numbers], np.int64)
-        value = np.array([n.value for n in self.numbers], float)
-        span = np.array(self.spans, np.int32).reshape(-1, 2)
+        if self.plain is not None:
+            mantissa, decimals, start, stop = self.plain
+            fine = decimals > MOST_DECIMALS
+            if fine.any():
+                mantissa = np.where(fine, np.rint(mantissa / 10.0 ** (decimals - MOST_DECIMALS)), mantissa)
+                decimals = np.minimum(decimals, MOST_DECIMALS)
+        else:
+            decimals = np.array([min(max(n.places, 0), MOST_DECIMALS) for n in self.numbers], np.int8)
+            value = np.array([n.value for n in self.numbers], float)
+            mantissa = np.rint(value * 10.0 ** decimals.astype(np.int64))
+            start, stop = np.array(self.spans, np.int64).reshape(-1, 2).T
         return Words(
-            letter=np.zeros(len(span), np.uint8),
-            mantissa=np.rint(value * 10.0**decimals).astype(np.int64),
+            letter=np.zeros(len(start), np.uint8),
+            mantissa=mantissa.astype(np.int64),
             decimals=decimals.astype(np.int8),
-            pointed=np.ones(len(span), bool),
-            start=span[:, 0],
-            number=span[:, 0],
-            end=span[:, 1],
+            pointed=np.ones(len(start), bool),
+            start=start.astype(np.int32),
+            number=start.astype(np.int32),
+            end=stop.astype(np.int32),
             first_word=np.zeros(lines + 1, np.int32),
         )
 
 
 def _line_bounds(data: bytes) -> tuple[Small, Small]:
     """(lines,) where each line begins and where its text ends."""
+    if b"\r" not in data:
+        text = np.frombuffer(data, np.uint8)
+        newline = np.flatnonzero(text == 10)
+        ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
+        return np.concatenate(([0], ends[:-1] + 1)).astype(np.int32), ends.astype(np.int32)
     starts, stops = [], []
     at = 0
     for raw in data.splitlines(keepends=True):

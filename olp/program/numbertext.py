@@ -101,11 +101,12 @@ class Placing:
 
     def __init__(self, data: bytes, start: Spans, end: Spans) -> None:
         self.data = data
-        self.padded = any(self._gap(int(at)) >= 2 for at in np.ravel(start).tolist())
+        text = np.concatenate(([0, 0], np.frombuffer(data, np.uint8), [0, 0]))
+        blank = (text == 32) | (text == 9)
+        first, last = np.ravel(start) + 2, np.ravel(end) + 2
+        self.padded = bool((blank[first - 1] & blank[first - 2]).any())
         # a column whose numbers all begin at once is one of left edges
-        self.trailing = not self.padded and any(
-            data[int(at) : int(at) + 2] == b"  " for at in np.ravel(end).tolist()
-        )
+        self.trailing = not self.padded and bool(((text[last] == 32) & (text[last + 1] == 32)).any())
 
     def place(self, start: int, end: int, text: bytes) -> tuple[int, int, bytes]:
         """Start, end and text of the edit that puts a number in the place of another."""

@@ -9,16 +9,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+import numpy.typing as npt
+
 from olp.exceptions import InputError, ProgramError
 from olp.machine import Setup
 from olp.program.delimited import AXES, MM_S, Cells, Layout, first_lines, stated_frame, told
 from olp.program.dialect import Dialect, Options, Row, Support
 from olp.program.frames import FrameTable
 from olp.program.lettered import Moves
+from olp.program.listcolumns import columns
 from olp.program.numbertext import number
 from olp.program.places import frame_index
 from olp.program.program import Program
-from olp.toolpath import Flag, Kind
+from olp.toolpath import Array, Flag, Frame, Kind
 
 _TURNING = ("A", "B", "C", "I", "J", "K")
 _SUPPORT = {
@@ -71,7 +75,7 @@ class _Found:
     and the line where each tool comes first."""
 
     moves: Moves = field(default_factory=Moves)
-    values: list[tuple[float, ...]] = field(default_factory=list)
+    values: Sequence[Sequence[float]] | Array = ()
     tool: list[int | None] = field(default_factory=list)
     tools: dict[int | None, int] = field(default_factory=dict)
     turns: dict[tuple[str, ...], int] = field(default_factory=dict)
@@ -100,19 +104,68 @@ def read_list(
     kind = Kind.LINE if layout.joined == "lines" else Kind.RAPID
     whole = kind is Kind.LINE and (not layout.insert or "t" in layout.columns)
     name = frame_name or setup.machine.default_work_offset
-    moves = found.moves
+    moves, count = found.moves, len(found.moves.line)
     index = {tool: frame_index(table, setup, name, tool, unit, line) for tool, line in found.tools.items()}
-    moves.frame = [index[tool] for tool in found.tool]
     frames = table.frames
-    for n, values in enumerate(found.values):
-        frame = frames[moves.frame[n]]
-        moves.end.append(frame.placed_mm(values))
-        moves.kind.append(int(kind if n else Kind.RAPID))
-        moves.flag.append(int(Flag.WHOLE if whole else Flag(0)))
+    one = len(index) == 1
+    moves.frame = np.zeros(count, np.int32) if one else [index[tool] for tool in found.tool]
+    moves.end = _placed(frames, np.asarray(moves.frame), np.array(found.values, float).reshape(-1, 3))
+    moves.kind = np.full(count, kind, np.uint8)
+    moves.kind[:1] = Kind.RAPID
+    moves.flag = np.full(count, Flag.WHOLE if whole else 0, np.uint8)
     return moves.program(
         data, dialect, setup, frames, _remarks(layout, found, frame_name, setup),
         decimal=b"," if layout.decimal == "comma" else b".", words=words,
     )  # fmt: skip
+
+
+def _placed(frames: Sequence[Frame], index: npt.NDArray[np.int32], values: Array) -> Array:
+    """(n, 3) axis positions of the numbers of rows (n, 3)."""
+    out = np.empty_like(values)
+    for i, frame in enumerate(frames):
+        rows = index == i
+        said = values[rows] * frame.unit_mm
+        turned = said if frame.turn is None else said @ np.array(frame.turn).T
+        out[rows] = turned + np.array(frame.offset_mm)
+    return out
+
+
+def _in_columns(
+    data: bytes, layout: Layout, cells: Cells, xyz: list[int], tool: int | None, speed: int | None,
+    turning: list[int],
+) -> _Found | None:  # fmt: skip
+    """The rows of a plain table, None where it is not plain."""
+    speed = speed if layout.speed_unit is not None else None
+    others = [*turning, *(p for p in (tool, speed) if p is not None)]
+    plain = columns(data, layout, cells.header_line, xyz, others)
+    if plain is None:
+        return None
+    count = len(plain.line)
+    texts = [[data[a:b] for a, b in plain.cells[:, k].tolist()] for k in range(len(others))]
+    found = _Found(values=plain.value)
+    rows = texts[: len(turning)]
+    for k, turn in enumerate(zip(*rows, strict=True) if rows else [()]):
+        found.turns.setdefault(tuple(t.decode("latin-1") for t in turn), int(plain.line[k]))
+    found.tools[None] = int(plain.line[0])
+    if tool is not None:
+        said = texts[len(turning)]
+        if not all(t.isdigit() for t in said):
+            return None
+        found.tool = [int(t) for t in said]
+        first = dict(zip(reversed(found.tool), reversed(plain.line.tolist()), strict=True))
+        found.tools = {t: first[t] for t in dict.fromkeys(found.tool)}
+    feed = np.full(count, np.nan)
+    if speed is not None and layout.speed_unit is not None:
+        known = [number(t, b"," if layout.decimal == "comma" else b".") for t in texts[-1]]
+        if None in known:
+            return None
+        feed = np.array([k.value for k in known if k is not None]) * MM_S[layout.speed_unit]
+    moves = found.moves
+    moves.line, moves.feed = plain.line, feed
+    moves.bounds = np.column_stack((plain.begin, plain.end))
+    moves.slot = np.arange(3 * count).reshape(-1, 3)
+    moves.plain = (plain.mantissa.ravel(), plain.decimals.ravel(), plain.start.ravel(), plain.stop.ravel())
+    return found
 
 
 def _rows(data: bytes, layout: Layout) -> _Found:
@@ -126,8 +179,12 @@ def _rows(data: bytes, layout: Layout) -> _Found:
     factor = MM_S[layout.speed_unit] if layout.speed_unit else float("nan")
     feed = float("nan")
     turning = [p for role in _TURNING if (p := cells.place(role)) is not None]
+    plain = _in_columns(data, layout, cells, xyz, tool, speed, turning)
+    if plain is not None:
+        return plain
     found = _Found()
     moves = found.moves
+    values: list[tuple[float, ...]] = []
     for line, row in cells.rows():
         if max(xyz) >= len(row):
             raise InputError(
@@ -157,17 +214,18 @@ def _rows(data: bytes, layout: Layout) -> _Found:
         moves.slot.append((first, first + 1, first + 2))
         moves.line.append(line)
         moves.bounds.append(cells.bounds)
-        found.values.append(tuple(n.value for n in known))
+        values.append(tuple(n.value for n in known))
         found.turns.setdefault(tuple(cells.text(row[p]) for p in turning if p < len(row)), line)
         found.tool.append(int(text) if text else None)
         found.tools.setdefault(found.tool[-1], line)
+    found.values = values
     return found
 
 
 def _remarks(
     layout: Layout, found: _Found, frame_name: str | None, setup: Setup
 ) -> list[tuple[str, int, str]]:
-    line = found.moves.line[0] if found.moves.line else 1
+    line = int(found.moves.line[0]) if len(found.moves.line) else 1
     out = [("told", line, said) for said in layout.assumed]
     if frame_name is None:
         out.append(("told", line, f"positions are stated in {setup.machine.default_work_offset}"))
