@@ -13,7 +13,7 @@ from olp.exceptions import ProgramError, UsageError
 from olp.machine import Setup
 from olp.program import apt, dmis, reader
 from olp.program.apt_table import APT
-from olp.program.described import read_described
+from olp.program.described_reader import read_described
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
 from olp.program.dmis_table import DMIS

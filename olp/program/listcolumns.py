@@ -65,7 +65,7 @@ def columns(
     if spans is None:
         return None
     start, stop = spans[:, :3, 0], spans[:, :3, 1]
-    found = _numbers(text, start, stop, layout.decimal == "comma")
+    found = plain_numbers(text, start, stop, layout.decimal == "comma")
     if found is None:
         return None
     mantissa, decimals = found
@@ -116,10 +116,11 @@ def _cells(
     return out
 
 
-def _numbers(
+def plain_numbers(
     text: Bytes, start: Index, stop: Index, comma: bool
 ) -> tuple[Index, npt.NDArray[np.int8]] | None:
-    """Mantissa and decimals of the numbers; None where one is not plain."""
+    """Mantissa and decimals of numbers at the bytes `start`..`stop` of a text; None where one is not
+    plain."""
     order = np.argsort(start, axis=None, kind="stable")
     first, last = start.ravel()[order], stop.ravel()[order]
     step = np.zeros(len(text) + 1, np.int8)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -71,10 +72,14 @@ def with_layout(layout: Layout) -> PointList:
 
 @dataclass(slots=True)
 class _Found:
-    """Rows of a list: moves without frame and end, the `values` of each as written, its tool and orientation;
-    and the line where each tool comes first."""
+    """Rows of a list: line, bytes, feed and numbers of each, as lists or columns, the `values` as written,
+    tools and orientations; and the line where each tool comes first."""
 
-    moves: Moves = field(default_factory=Moves)
+    line: Any = field(default_factory=list)
+    bounds: Any = field(default_factory=list)
+    feed: Any = field(default_factory=list)
+    spans: Any = field(default_factory=list)
+    plain: tuple[Any, Any, Any, Any] | None = None
     values: Sequence[Sequence[float]] | Array = ()
     tool: list[int | None] = field(default_factory=list)
     tools: dict[int | None, int] = field(default_factory=dict)
@@ -104,15 +109,20 @@ def read_list(
     kind = Kind.LINE if layout.joined == "lines" else Kind.RAPID
     whole = kind is Kind.LINE and (not layout.insert or "t" in layout.columns)
     name = frame_name or setup.machine.default_work_offset
-    moves, count = found.moves, len(found.moves.line)
+    count = len(found.line)
     index = {tool: frame_index(table, setup, name, tool, unit, line) for tool, line in found.tools.items()}
     frames = table.frames
-    one = len(index) == 1
-    moves.frame = np.zeros(count, np.int32) if one else [index[tool] for tool in found.tool]
-    moves.end = _placed(frames, np.asarray(moves.frame), np.array(found.values, float).reshape(-1, 3))
-    moves.kind = np.full(count, kind, np.uint8)
-    moves.kind[:1] = Kind.RAPID
-    moves.flag = np.full(count, Flag.WHOLE if whole else 0, np.uint8)
+    frame = np.zeros(count, np.int32)
+    if len(index) > 1:
+        frame[:] = [index[tool] for tool in found.tool]
+    kinds = np.full(count, kind, np.uint8)
+    kinds[:1] = Kind.RAPID
+    moves = Moves(plain=found.plain)
+    moves.put_all(
+        kind=kinds, flag=np.full(count, Flag.WHOLE if whole else 0), line=found.line, frame=frame,
+        end=_placed(frames, frame, np.array(found.values, float).reshape(-1, 3)),
+        slot=np.arange(3 * count), bounds=found.bounds, feed=found.feed, spans=found.spans,
+    )  # fmt: skip
     return moves.program(
         data, dialect, setup, frames, _remarks(layout, found, frame_name, setup),
         decimal=b"," if layout.decimal == "comma" else b".", words=words,
@@ -160,11 +170,10 @@ def _in_columns(
         if None in known:
             return None
         feed = np.array([k.value for k in known if k is not None]) * MM_S[layout.speed_unit]
-    moves = found.moves
-    moves.line, moves.feed = plain.line, feed
-    moves.bounds = np.column_stack((plain.begin, plain.end))
-    moves.slot = np.arange(3 * count).reshape(-1, 3)
-    moves.plain = (plain.mantissa.ravel(), plain.decimals.ravel(), plain.start.ravel(), plain.stop.ravel())
+    found.line, found.feed = plain.line, feed
+    found.bounds = np.column_stack((plain.begin, plain.end))
+    found.spans = np.column_stack((plain.start.ravel(), plain.stop.ravel()))
+    found.plain = (plain.mantissa.ravel(), plain.decimals.ravel(), plain.start.ravel(), plain.stop.ravel())
     return found
 
 
@@ -183,7 +192,6 @@ def _rows(data: bytes, layout: Layout) -> _Found:
     if plain is not None:
         return plain
     found = _Found()
-    moves = found.moves
     values: list[tuple[float, ...]] = []
     for line, row in cells.rows():
         if max(xyz) >= len(row):
@@ -206,14 +214,11 @@ def _rows(data: bytes, layout: Layout) -> _Found:
         said = number(data[slice(*row[speed])], decimal) if speed is not None and speed < len(row) else None
         # a row without a speed keeps that of the row before
         feed = feed if said is None else said.value * factor
-        moves.feed.append(feed)
-        first = len(moves.numbers)
+        found.feed.append(feed)
         known = [n for n in numbers if n is not None]
-        moves.numbers += known
-        moves.spans += [row[p] for p in xyz]
-        moves.slot.append((first, first + 1, first + 2))
-        moves.line.append(line)
-        moves.bounds.append(cells.bounds)
+        found.spans += [row[p] for p in xyz]
+        found.line.append(line)
+        found.bounds.append(cells.bounds)
         values.append(tuple(n.value for n in known))
         found.turns.setdefault(tuple(cells.text(row[p]) for p in turning if p < len(row)), line)
         found.tool.append(int(text) if text else None)
@@ -225,7 +230,7 @@ def _rows(data: bytes, layout: Layout) -> _Found:
 def _remarks(
     layout: Layout, found: _Found, frame_name: str | None, setup: Setup
 ) -> list[tuple[str, int, str]]:
-    line = int(found.moves.line[0]) if len(found.moves.line) else 1
+    line = int(found.line[0]) if len(found.line) else 1
     out = [("told", line, said) for said in layout.assumed]
     if frame_name is None:
         out.append(("told", line, f"positions are stated in {setup.machine.default_work_offset}"))
