@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from judge.machines import Recipe, random_machine, zero_machine
 from judge.model import JudgeModel
+from test_lists import same
 
 import olp
 from olp.cli import main
@@ -230,6 +231,37 @@ def test_any_bytes_are_read_or_refused(perfect: Path, own: Path, text: bytes, wh
     with contextlib.suppress(OlpError):
         assert read(text, setup_of(perfect, dialect), dialect).data == text
         assert olp.correct(text, setup_of(perfect, dialect)).data == text
+
+
+LINES = st.sampled_from([
+    "GO X1.5 Y-2 Z3", "GO X-1 Y2 Z30.25", "N10 CUT X1.5 Y.5 Z-3. F20", "N2000 CUT X11.5 Y5. Z-33.5 F7",
+    "CUT X1 Y2 Z3 A4", "CUT X1 Y2 Z3 A15 ! note", "CUT X1 Y2 Z3 A15 ! note 2.0.1", "CUT X1e1 Y2 Z3",
+    "GO X 1 Y2 Z3", "GO X1 Y 2 Z3", "TOOL 2", "TOOL 1", "INCH", "STEP X1 Y1 Z1", "CUT X1 Y2 &", "Z3",
+    "FRAME TABLE", "SPEED 5", "  cut x7 y8 z9", "PARK", "",
+])  # fmt: skip
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None)
+@given(lines=st.lists(LINES, max_size=14), end=st.sampled_from(["\n", "\r\n", "\r"]))
+def test_lines_that_are_alike_say_what_each_says_alone(
+    perfect: Path, own: Path, monkeypatch: pytest.MonkeyPatch, lines: list[str], end: str
+) -> None:
+    dialect = load_described(own)
+    text, setup = end.join(lines).encode(), setup_of(perfect, dialect)
+    found: list[object] = []
+    for alone in (False, True):
+        with monkeypatch.context() as patch:
+            if alone:
+                patch.setattr("olp.program.described_reader.kin_of", lambda *_: None)
+            try:
+                found.append(read(text, setup, dialect))
+            except ProgramError as error:
+                found.append(str(error))
+    fast, slow = found
+    if isinstance(fast, str) or isinstance(slow, str):
+        assert fast == slow
+    else:
+        same(fast, slow)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("text", "matches", "fails"), [

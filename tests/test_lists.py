@@ -23,6 +23,7 @@ from olp.files.point_profile import PointProfile
 from olp.program.delimited import told
 from olp.program.dialects import read
 from olp.program.pointlist import POINT_LIST, with_layout
+from olp.program.program import Program
 
 FRAMES = {
     "G54": {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -260.0, "set_by": "true"},
@@ -233,6 +234,55 @@ def test_a_list_read_back_says_what_was_meant(
     model = JudgeModel(machine)
     wanted = model.command_for(np.array(rows) / 1000 + OFFSET, model.lever_mm(1))
     assert np.abs(positions(result.data, machine) - wanted).max() <= 0.5 * 10.0**-places * 1.001 + 2e-6
+
+
+ODD = st.sampled_from(["1", "-2.5", "3.", ".25", "+4", "5e1", "0012.50", " 7 "])
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40, deadline=None)
+@given(
+    rows=st.lists(st.lists(ODD, min_size=5, max_size=5), min_size=1, max_size=6),
+    mark=st.sampled_from(",;\t "), end=st.sampled_from(["\n", "\r\n"]), comma=st.booleans(),
+    noise=st.sampled_from(["", "# x", "\n", "   "]),
+)  # fmt: skip
+def test_rows_read_in_columns_say_what_rows_read_alone_say(
+    perfect: Path, monkeypatch: pytest.MonkeyPatch, rows: list[list[str]], mark: str, end: str, comma: bool,
+    noise: str,
+) -> None:  # fmt: skip
+    if comma:
+        mark = ";" if mark == "," else mark
+        rows = [[cell.replace(".", ",") for cell in row] for row in rows]
+    head = mark.join(["X_mm", "speed (mm/s)" if mark != " " else "speed_mm/s", "Z_mm", "Y_mm", "tool"])
+    body = [mark.join([*row[:4], "1"]) for row in rows]
+    text = end.join([head, *body[:1], noise, *body[1:], ""]).encode()
+    dialect = layout(
+        delimiter={",": "comma", ";": "semicolon", "\t": "tab", " ": "space"}[mark],
+        decimal="comma" if comma else "point", speed_unit="mm/s",
+        columns={"X": "X_mm", "Y": "Y_mm", "Z": "Z_mm", "tool": "tool", "speed": head.split(mark)[1]},
+    )  # fmt: skip
+    setup = setup_of(perfect, dialect)
+    fast = read(text, setup, dialect)
+    with monkeypatch.context() as patch:
+        patch.setattr("olp.program.pointlist.columns", lambda *_: None)
+        slow = read(text, setup, dialect)
+    same(fast, slow)
+
+
+def same(one: Program, other: Program) -> None:
+    """Two readings say the same."""
+    assert one.toolpath.end_mm == pytest.approx(other.toolpath.end_mm, nan_ok=True)
+    for name in ("kind", "flag", "line", "frame"):
+        assert getattr(one.toolpath, name).tolist() == getattr(other.toolpath, name).tolist(), name
+    assert one.toolpath.frames == other.toolpath.frames
+    assert one.slot.tolist() == other.slot.tolist()
+    for name in ("mantissa", "decimals", "number", "end"):
+        assert getattr(one.words, name).tolist() == getattr(other.words, name).tolist(), name
+    for name in ("begin", "end"):
+        assert getattr(one.statements, name).tolist() == getattr(other.statements, name).tolist(), name
+    assert one.statements is not None
+    assert other.statements is not None
+    assert one.statements.feed_mm_s == pytest.approx(other.statements.feed_mm_s, nan_ok=True)
+    assert one.remarks == other.remarks
 
 
 def test_the_command_line(machine: Path, tmp_path: Path) -> None:

@@ -52,8 +52,7 @@ def columns(
     ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
     starts = np.concatenate(([0], ends[:-1] + 1))
     content = ends - ((ends > starts) & (text[np.maximum(ends - 1, 0)] == 13))
-    printed = np.append(np.flatnonzero(text > 32), len(text))
-    lead = printed[np.searchsorted(printed, starts)]
+    lead = _forward(text, starts, content)
     row = (lead < content) & (np.arange(len(starts)) >= header_line)
     for mark in {b"#", layout.comment.encode()}:
         row &= ~_begins(text, lead, mark)
@@ -61,7 +60,7 @@ def columns(
     if not chosen.size:
         return None
     begin, end = starts[chosen], content[chosen]
-    spans = _cells(text, printed, begin, end, layout, [*xyz, *others])
+    spans = _cells(text, begin, end, layout, [*xyz, *others])
     if spans is None:
         return None
     start, stop = spans[:, :3, 0], spans[:, :3, 1]
@@ -80,9 +79,31 @@ def _begins(text: Bytes, at: Index, mark: bytes) -> Mask:
     return out
 
 
-def _cells(
-    text: Bytes, printed: Index, begin: Index, end: Index, layout: Layout, places: list[int]
-) -> Index | None:
+def _forward(text: Bytes, at: Index, stop: Index) -> Index:
+    """The first place from `at` that holds no blank, `stop` where all do."""
+    at = at.copy()
+    todo = np.arange(len(at))
+    while True:
+        todo = todo[at[todo] < stop[todo]]
+        todo = todo[text[at[todo]] <= 32]
+        if not todo.size:
+            return at
+        at[todo] += 1
+
+
+def _backward(text: Bytes, at: Index, start: Index) -> Index:
+    """The place behind the last one before `at` that holds no blank, `start` where all do."""
+    at = at.copy()
+    todo = np.arange(len(at))
+    while True:
+        todo = todo[at[todo] > start[todo]]
+        todo = todo[text[at[todo] - 1] <= 32]
+        if not todo.size:
+            return at
+        at[todo] -= 1
+
+
+def _cells(text: Bytes, begin: Index, end: Index, layout: Layout, places: list[int]) -> Index | None:
     """(n, k, 2) the bytes of cells, without blanks around them; None where a row has too few, or empty
     ones."""
     mark = DELIMITERS[layout.delimiter]
@@ -106,13 +127,10 @@ def _cells(
     for k, place in enumerate(places):
         a = begin if place == 0 else marks[base + place - 1] + 1
         b = np.where(place < count, marks[np.minimum(base + place, len(marks) - 1)], end)
-        first_dark = np.searchsorted(printed, a)
-        last_dark = np.searchsorted(printed, b) - 1
-        empty = last_dark < first_dark
-        if empty.any() and k < 3:
+        out[:, k, 0] = first_ = _forward(text, a, b)
+        out[:, k, 1] = last_ = _backward(text, b, first_)
+        if k < 3 and (first_ >= last_).any():
             return None
-        out[:, k, 0] = np.where(empty, a, printed[np.minimum(first_dark, len(printed) - 1)])
-        out[:, k, 1] = np.where(empty, a, printed[np.maximum(last_dark, 0)] + 1)
     return out
 
 
