@@ -21,8 +21,8 @@ from olp.exceptions import AlreadyCorrected, OlpError, ProgramError
 from olp.findings import Finding
 from olp.loading import Loaded, unrolled
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.progress import Progress
 from olp.proof import Proof, prove
 from olp.toolpath import Flag, Index, Toolpath
@@ -76,10 +76,11 @@ def correct_bytes(
             "model twice; correct the nominal program",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
+    loaded = loaded.reading(data, name)
     if unroll or expand:
-        data = unrolled(data, name, loaded.profile, expand, clearance)
+        data = unrolled(data, name, loaded.dialect, expand, clearance)
     tell("read", 0.0)
-    program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
+    program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
     limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
@@ -88,7 +89,7 @@ def correct_bytes(
     writer = Writer(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.profile.comment),
+        stamp=stamp_line(loaded.digest, loaded.dialect.comment),
     )  # fmt: skip
     text = writer.text()
     parts, tally, holes = writer.parts, writer.tally, writer.holes
@@ -100,7 +101,7 @@ def correct_bytes(
     passed = rows.passed
     corrections = _largest_correction(path, _ends(rows, len(path)))
     del rows
-    corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    corrected = read(text, loaded.setup, loaded.dialect, Options(contour=contour), words=False)
     proof = prove(
         nominal,
         corrected,
@@ -184,8 +185,8 @@ def _prove_without_deleted(
         return
     options = Options(block_delete=True, contour=contour)
     line = int(path.line[deleted][0])
-    nominal = read(program.data, loaded.setup, loaded.profile, options, words=False)
-    corrected = read(text, loaded.setup, loaded.profile, options, words=False)
+    nominal = read(program.data, loaded.setup, loaded.dialect, options, words=False)
+    corrected = read(text, loaded.setup, loaded.dialect, options, words=False)
     try:
         rows = plan(nominal.toolpath, loaded.model, replace(limits, refuse_outside=False))
         proof = prove(
@@ -228,7 +229,7 @@ def report_of(
             "name": Path(name).name if name else "",
             "sha256": hashlib.sha256(data).hexdigest(),
             "lines": program.lines,
-            "dialect": loaded.profile.name,
+            "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),
         },
         "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
@@ -277,7 +278,7 @@ def _largest_correction(path: Toolpath, command_mm: Array) -> float:
 def last_digit_mm(program: Program, setup: Setup) -> float:
     """The coarsest last digit that the corrected program is written with."""
     units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
-    inch = program.profile.inch_decimals
+    inch = program.dialect.inch_decimals
     return max(
         10.0 ** -fewest_decimals(least, unit, inch) * unit
         for least in setup.machine.least_increment_mm

@@ -3,30 +3,38 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from olp.errormodel import Calibration, ErrorModel, build
-from olp.exceptions import ConfigError
+from olp.exceptions import ConfigError, UsageError
 from olp.files.calibration import load_calibration
 from olp.files.config import load_setup
 from olp.files.write import read_bytes
 from olp.machine import Setup
-from olp.program.profiles import PROFILES, Profile
+from olp.program.dialect import Dialect
+from olp.program.dialects import DIALECTS, dialect_of
 
 PathLike = str | Path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """Everything loaded that a run needs."""
+    """Everything loaded that a run needs. `dialect` is that of the control until a program is there
+    (`reading`)."""
 
     setup: Setup
-    profile: Profile
+    dialect: Dialect
     calibration: Calibration
     model: ErrorModel
     digest: str
+
+    def reading(self, data: bytes, name: str) -> Loaded:
+        """The same for a program: its dialect is settled here, also for what is made of it later. Raises
+        ProgramError where it cannot be told."""
+        setup, dialect = reading(self.setup, data, name)
+        return replace(self, setup=setup, dialect=dialect)
 
 
 def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refuse", "hold"]) -> Loaded:
@@ -45,7 +53,7 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
     skip = described.compensated_by_controller - calibration.active_during_measurement
     model = build(calibration, described.chain, outside=outside, skip_components=frozenset(skip))
-    return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
+    return Loaded(setup, control_of(setup), calibration, model, _digest(described.calibration, described))
 
 
 def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
@@ -53,14 +61,21 @@ def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
     return machine if isinstance(machine, Setup) else load_setup(machine, job)
 
 
-def profile_of(setup: Setup) -> Profile:
+def control_of(setup: Setup) -> Dialect:
     """What the control of a machine reads and writes."""
-    profile = PROFILES.get(setup.machine.controller)
-    if profile is None:
+    dialect = DIALECTS.get(setup.machine.controller)
+    if dialect is None:
         raise ConfigError(
-            f"controller {setup.machine.controller!r} has no profile; expected one of {', '.join(PROFILES)}"
+            f"controller {setup.machine.controller!r} has no dialect; expected one of {', '.join(DIALECTS)}"
         )
-    return profile
+    return dialect
+
+
+def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
+    """The dialect of a program, and the setup with it named, so that what is made of the program later is
+    read alike. Raises ProgramError where it cannot be told, UsageError for a name that there is not."""
+    dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
+    return replace(setup, job=replace(setup.job, dialect=dialect.name)), dialect
 
 
 def _digest(calibration: str, machine: object) -> str:
@@ -82,9 +97,13 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it."""
+def unrolled(data: bytes, name: str, dialect: Dialect, expand: bool, clearance: float | None = None) -> bytes:
+    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
+    Raises UsageError for a dialect that has none of them."""
     from olp.program.flatten import flatten as unroll
+
+    if dialect.family != "rs274":
+        raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
 
     folder = Path(name).parent if name else None
 
@@ -98,7 +117,7 @@ def unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: 
         return None
 
     return unroll(
-        data, profile=profile.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
+        data, profile=dialect.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
     )
 
 

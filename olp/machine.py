@@ -154,7 +154,8 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What changes per job. `work_offsets` and `tools` override the machine's, one by one."""
+    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `dialect` is that of
+    the program, None: what its text and the ending of its file say."""
 
     program: str | None = None
     machine: str | None = None
@@ -163,6 +164,7 @@ class Job:
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
+    dialect: str | None = None
     meshes: tuple[Mesh, ...] = ()
 
 

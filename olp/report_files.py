@@ -19,7 +19,7 @@ from olp.measured.figures import Run
 from olp.measured.pairing import pair
 from olp.measured.path import Path
 from olp.nominal import nominal_of
-from olp.program.reader import Options, read
+from olp.program.dialects import Options, read
 from olp.report import to_json
 from olp.testpaths import predicted
 
@@ -110,8 +110,9 @@ def _path_plots(path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float 
 
 def _predicted_plots(result: api.Correction, nominal: bytes, setup: Setup, contour: bool) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
-    loaded = load(setup, None, "hold")
-    program = read(nominal, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    loaded = load(setup, None, "hold").reading(nominal, str(result.report["program"]["name"]))
+    setup = loaded.setup
+    program = read(nominal, setup, loaded.dialect, Options(contour=contour), words=False)
     try:
         path = nominal_of(program.toolpath, loaded.model, "tip").path
     except CannotCompute:

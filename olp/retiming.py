@@ -10,7 +10,7 @@ from typing import Any, Literal
 from olp.exceptions import CannotCompute, UsageError
 from olp.files import trajectory as files
 from olp.files.write import write_files
-from olp.loading import PathLike, profile_of, setup_of, source_of
+from olp.loading import PathLike, setup_of, source_of
 from olp.machine import Setup
 from olp.plots import Format as Picture
 from olp.program.feed_words import Shared
@@ -207,7 +207,6 @@ def retime(
     ConfigError), UsageError and CannotCompute.
     """
     setup = setup_of(machine, job)
-    profile_of(setup)
     tell = progress or silent
 
     def case_of(source: PathLike | bytes) -> Case:

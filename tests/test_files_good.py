@@ -18,7 +18,7 @@ from olp.files.starter import machine_toml, starter_machine, starter_set, write_
 from olp.files.tables import parse_curves
 from olp.files.toml_text import key_lines, read_toml, toml_value
 from olp.machine import CHAINS, COMPONENTS, SQUARENESS, Axis, Job, Machine, Mesh, Setup, Tool, WorkOffset
-from olp.program.profiles import PROFILES
+from olp.program.dialects import DIALECTS
 
 GOOD = Path(__file__).parent / "broken" / "good"
 TRAVEL = {"X": (-5.0, 300.0), "Y": (0.0, 200.0), "Z": (-120.5, 0.0)}
@@ -165,7 +165,7 @@ def test_all_compensated_errors_stay_recognisable(tmp_path: Path) -> None:
 
 
 def test_controllers_are_the_profiles_that_programs_are_read_with() -> None:
-    assert set(CONTROLLERS) == set(PROFILES)
+    assert set(CONTROLLERS) == set(DIALECTS)
 
 
 @pytest.mark.parametrize("chain", sorted(CHAINS))

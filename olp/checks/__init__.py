@@ -75,13 +75,13 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     """Does the control leave the path by more than it is corrected?"""
     out: list[Finding] = []
-    if program.profile.name != "linuxcnc":
+    if program.dialect.name != "linuxcnc":
         return out
     if not program.path_modes and len(program.toolpath):
         out.append(
             finding(
                 "OLP201",
-                f"no path mode is stated: {program.profile.path_mode}",
+                f"no path mode is stated: {program.dialect.path_mode}",
                 [int(program.toolpath.line[0])],
             )
         )

@@ -6,7 +6,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -39,9 +39,23 @@ class Length(click.FloatRange):
 
 
 def setup_options(function: F) -> F:
-    """-m and -j, which every verb that needs a machine takes."""
+    """-m, -j and --dialect, which every verb that needs a machine takes."""
+    function = click.option(
+        "--dialect",
+        metavar="NAME",
+        expose_value=False,
+        callback=_keep_dialect,
+        help="The dialect of the program, such as apt. Default: what its text and its ending say.",
+    )(function)
     function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
     return click.option("-m", "--machine", metavar="machine.toml", help="The machine file.")(function)
+
+
+_DIALECT = "olp.dialect"
+
+
+def _keep_dialect(context: click.Context, _: click.Parameter, value: str | None) -> None:
+    context.meta[_DIALECT] = value
 
 
 def proof_options(function: F) -> F:
@@ -100,6 +114,9 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
     from olp.files.write import read_bytes
 
     setup = load_setup(machine, job)
+    named = click.get_current_context().meta.get(_DIALECT)
+    if named is not None:
+        setup = replace(setup, job=replace(setup.job, dialect=named))
     inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
     if setup.machine.calibration is not None:
         try:

@@ -139,12 +139,12 @@ def command(
 
     for name in files_of(report_file):
         from olp import report_files
-        from olp.loading import profile_of, source_of, unrolled
+        from olp.loading import reading, source_of, unrolled
 
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
-            profile = profile_of(call.setup)
-            text = unrolled(text, origin, profile, expand_cycles, peck_clearance_mm)
+            dialect = reading(call.setup, text, origin)[1]
+            text = unrolled(text, origin, dialect, expand_cycles, peck_clearance_mm)
         day = date.date() if date else None
         filed = report_files.correction(result, text, call.setup, name, day, contour=contour)
         written[Path(name)] = filed

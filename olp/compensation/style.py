@@ -89,7 +89,7 @@ class Style:
         return letters.lower() if int(self.separators(np.array([word]), self.program)[0]) >= 3 else letters
 
     def least(self, axis: int, unit_mm: float) -> int:
-        return fewest_decimals(self.increments_mm[axis], unit_mm, self.program.profile.inch_decimals)
+        return fewest_decimals(self.increments_mm[axis], unit_mm, self.program.dialect.inch_decimals)
 
     def usual(self, axis: int, unit_mm: float) -> int:
         """Digits of an inserted word."""
@@ -102,7 +102,7 @@ class Style:
     def centre(self, axis: int, unit_mm: float) -> int:
         """Digits of a centre word: one more than positions where the control takes it, since the far side of
         an arc moves by twice what its centre does."""
-        return min(self.usual(axis, unit_mm) + self.program.profile.free_digits, _MOST_DECIMALS)
+        return min(self.usual(axis, unit_mm) + self.program.dialect.free_digits, _MOST_DECIMALS)
 
     def word(self, line: int, letter: str) -> int | None:
         """Index of the first word with a letter in a line."""

@@ -130,6 +130,7 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
     job = Job(
         program=beside(path, file.program),
         machine=beside(path, file.machine),
+        dialect=file.dialect,
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),

@@ -66,6 +66,14 @@ def _controller(value: object) -> object:
     return value
 
 
+def _dialect(value: object) -> object:
+    if value not in CONTROLLERS:
+        raise refusal(
+            f"= {shown(value)} is not a dialect that olp knows; built are: {', '.join(CONTROLLERS)}"
+        )
+    return value
+
+
 def _sign(value: object) -> object:
     if value != SIGN:
         raise refusal(
@@ -148,5 +156,8 @@ OffsetName = Annotated[str, Field(min_length=1), AfterValidator(_offset_name)]
 Chain = Annotated[str, BeforeValidator(_chain), Field(json_schema_extra={"enum": sorted(CHAINS)})]
 Controller = Annotated[
     str, BeforeValidator(_controller), Field(json_schema_extra={"enum": list(CONTROLLERS)})
+]
+ProgramDialect = Annotated[
+    str, BeforeValidator(_dialect), Field(json_schema_extra={"enum": list(CONTROLLERS)})
 ]
 Sign = Annotated[str, BeforeValidator(_sign), Field(json_schema_extra={"const": SIGN})]

@@ -22,6 +22,7 @@ from olp.files.fields import (
     NotNegative,
     OffsetName,
     Positive,
+    ProgramDialect,
     Sign,
     Text,
     ToolNumber,
@@ -402,6 +403,11 @@ class JobFile(Table):
     program: Text | None = Field(default=None, description="the path of the program, relative to this file")
     machine: Text | None = Field(
         default=None, description="the path of the machine file, relative to this file"
+    )
+    dialect: ProgramDialect | None = Field(
+        default=None,
+        description="the dialect of the program, where its text and its ending do not say: "
+        + ", ".join(CONTROLLERS),
     )
     start_mm: Position = Field(
         default_factory=Position,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from olp.program.dialect import Dialect
 from olp.program.profiles import Profile
 from olp.program.state import Capture, PathMode
 from olp.toolpath import Toolpath
@@ -77,7 +78,7 @@ class Program:
     a decimal point are whole units."""
 
     data: bytes
-    profile: Profile
+    dialect: Dialect
     toolpath: Toolpath
     words: Words | None
     slot: Small
@@ -94,6 +95,12 @@ class Program:
     @property
     def lines(self) -> int:
         return len(self.line_start)
+
+    @property
+    def rs274(self) -> Profile:
+        """The dialect of a program of blocks of words."""
+        assert isinstance(self.dialect, Profile)
+        return self.dialect
 
     def text(self, line: int) -> str:
         """The text of a line, counted from 1, for people."""

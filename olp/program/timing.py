@@ -113,7 +113,7 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     dwell = np.zeros(len(line) + 1)
     word, at = scan.of_letter(b"M")
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
-    if program.profile.name == "linuxcnc":
+    if program.dialect.name == "linuxcnc":
         at, code = at[~np.isin(code, _ALONG)], code[~np.isin(code, _ALONG)]
     late = np.isin(code, _AFTER + _AFTER_ISO if scan.iso else _AFTER)
     rest[np.searchsorted(line, at[late], "right")] = True

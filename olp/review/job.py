@@ -19,8 +19,8 @@ from olp.files.measured import read_measured
 from olp.files.write import read_bytes, write_bytes
 from olp.loading import Loaded, PathLike, load, source_of, unrolled
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.progress import Progress, silent
 from olp.proof.matching import match as match_moves
 from olp.retiming import retime
@@ -93,11 +93,12 @@ def view(
     """
     tell = progress or silent
     data, name = source_of(program)
-    loaded = load(machine, job, "hold" if corrected is not None else outside_box)
+    with naming(name):
+        loaded = load(machine, job, "hold" if corrected is not None else outside_box).reading(data, name)
     setup, options = loaded.setup, Options(contour=contour)
     if flatten or expand_cycles:
         with naming(name):
-            data = unrolled(data, name, loaded.profile, expand_cycles, peck_clearance_mm)
+            data = unrolled(data, name, loaded.dialect, expand_cycles, peck_clearance_mm)
     if corrected is not None:
         other, corrected_name = source_of(corrected)
         report = api.verify(
@@ -112,9 +113,9 @@ def view(
                 )  # fmt: skip
         other, report = correction.data, correction.report
     with naming(name):
-        nominal = read(data, setup, loaded.profile, options)
+        nominal = read(data, setup, loaded.dialect, options)
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
-        second = read(other, setup, loaded.profile, options)
+        second = read(other, setup, loaded.dialect, options)
         groups = _groups(nominal, second, loaded, tolerance_um)
         tell("sample", 0.0)
         samples = sample(nominal, second, groups, loaded.model, step_mm)
