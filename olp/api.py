@@ -151,11 +151,11 @@ def simulate(
         return Simulation(np.zeros((0, 3)), np.zeros(0), "")
     actual, move = Tracer.trace(path, loaded.model, step_mm)
     home = path.frames[int(path.frame[0])]
-    origin = np.array(home.offset_mm) - np.array(home.length_mm)
     lengths = path.per_frame([f.length_mm for f in path.frames])
-    actual = actual - origin - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    tip = actual - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    actual = home.tip_mm(tip)
     known = np.isfinite(actual).all(axis=1)
-    return Simulation(actual[known], path.line[move[known]], home.work_offset)
+    return Simulation(actual[known], path.line[move[known]].astype(np.float64), home.work_offset)
 
 
 def inspect(

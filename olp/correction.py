@@ -15,7 +15,7 @@ from olp.checks import state
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
-from olp.compensation.writer import Writer
+from olp.compensation.writing import write
 from olp.errormodel.base import Array
 from olp.exceptions import AlreadyCorrected, OlpError, ProgramError
 from olp.findings import Finding
@@ -86,14 +86,13 @@ def correct_bytes(
     limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
-    writer = Writer(
+    written = write(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
         stamp=stamp_line(loaded.digest, loaded.dialect.comment),
     )  # fmt: skip
-    text = writer.text()
-    parts, tally, holes = writer.parts, writer.tally, writer.holes
-    del writer
+    text, parts, tally, holes = written.text, written.parts, written.tally, written.holes
+    del written
     tell("prove", 0.7)
     path = program.toolpath
     nominal = replace(program, words=None, slot=program.slot[:0])

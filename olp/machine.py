@@ -154,8 +154,8 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `dialect` is that of
-    the program, None: what its text and the ending of its file say."""
+    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `dialect` is that
+    of the program, None: what its text and the ending of its file say."""
 
     program: str | None = None
     machine: str | None = None

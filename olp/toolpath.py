@@ -45,7 +45,8 @@ class Frame:
     Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
     `length_mm`). `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the
     touch-off of the work offset on the raw machine, None where it was located by other means; `tool_touched`
-    likewise for the length of the active tool.
+    likewise for the length of the active tool. In a rotated frame the words are turned first, by the rows of
+    `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`.
     """
 
     unit_mm: float = 1.0
@@ -56,6 +57,17 @@ class Frame:
     work_offset: str = ""
     touched: tuple[Vector, Vector] | None = None
     tool_touched: tuple[Vector, Vector] | None = None
+    turn: tuple[Vector, Vector, Vector] | None = None
+
+    def origin_mm(self) -> Vector:
+        """The axis position of the program's origin, no tool length active."""
+        x, y, z = (o - n for o, n in zip(self.offset_mm, self.length_mm, strict=True))
+        return (x, y, z)
+
+    def tip_mm(self, point: Array) -> Array:
+        """Places of the tip (n, 3) in this frame, from axis positions less the length."""
+        away = point - np.array(self.origin_mm())
+        return away if self.turn is None else np.asarray(away @ np.array(self.turn), float)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,13 +26,10 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     """What the program's text alone tells."""
     out = []
     path = program.toolpath
-    for name, line, _ in program.remarks:
+    for name, line, text in program.remarks:
         if name == "unit":
-            out.append(
-                finding(
-                    "OLP301", "neither G20 nor G21 stands before the first move; millimetres assumed", [line]
-                )
-            )
+            which = "neither G20 nor G21 stands before the first move" if text == "mm" else text
+            out.append(finding("OLP301", f"{which}; millimetres assumed", [line]))
         elif name == "increments":
             out.append(
                 finding(

@@ -49,7 +49,7 @@ class Dialect:
     move to move where a program does not say; `inch_decimals` are the decimals of inch programs for a least
     increment of 0.001 mm, `free_digits` those that centres of arcs may have beyond those of positions.
     `comment` are the marks around a comment, and `first` the beginnings of lines, in capitals, that have to
-    stay in front of any other."""
+    stay in front of any other, in their order (`|` between such as stand for each other)."""
 
     name: str
     title: str

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 
 from olp.exceptions import ProgramError, UsageError
 from olp.machine import Setup
-from olp.program import reader
+from olp.program import apt, reader
+from olp.program.apt_table import APT
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
 from olp.program.profiles import PROFILES, Profile
@@ -25,13 +26,21 @@ def _rs274(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, wor
     return reader.read(data, setup, dialect, options, words=words)
 
 
-READERS: Mapping[str, Reader] = {"rs274": _rs274}
-DIALECTS: Mapping[str, Dialect] = {**PROFILES}
+READERS: Mapping[str, Reader] = {"rs274": _rs274, "apt": apt.read}
+DIALECTS: Mapping[str, Dialect] = {**PROFILES, APT.name: APT}
 
 #: Endings of files that only one family has. The ending of a version (`.ncl.3`) does not count.
-_ENDINGS: Mapping[str, str] = {}
+_ENDINGS: Mapping[str, str] = {
+    **dict.fromkeys(("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"), "apt"),
+}
 #: What only texts of a family say at the start of a line.
-_SIGNS: Mapping[str, re.Pattern[bytes]] = {}
+_SIGNS: Mapping[str, re.Pattern[bytes]] = {
+    "apt": re.compile(
+        rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
+        rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
+        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/)"
+    ),
+}
 #: What only texts of statements say, without saying of which family.
 _STATEMENTS = re.compile(rb"(?im)^[ \t]*(GOTO|RAPID|FROM)[ \t]*/")
 _VERSION = re.compile(r"\.\d+$")

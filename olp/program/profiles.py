@@ -35,6 +35,7 @@ class Profile(Dialect):
     """One control's reading of word-address text."""
 
     family: str = "rs274"
+    first: tuple[bytes, ...] = (b"%", b"O|:")
     codes: Mapping[int, Act]
     refusals: Mapping[int, str]
     harmless_m: frozenset[int]
