@@ -358,6 +358,8 @@ class StatementWriter:
             if rows.head[arc.row]:
                 for word, mantissa, decimals in changes:
                     self._replace(word, mantissa, decimals, edits)
+                if text.long is not None and abs(arc.sweep) <= np.pi:
+                    edits.add(*text.long, BARE, 0)
             else:
                 self._arc_again(rows, arc, text, changes, edits)
         return [edits.done()]
@@ -418,22 +420,27 @@ class StatementWriter:
         place = int(self.statements.end[arc.move])
         order = rows.serial(arc.row) * 64
         spans = [(text.begin, text.end, numbers | (end if text.whole else {}))]
+        long = text.long if abs(arc.sweep) <= np.pi else None
         if not text.whole:
             begin, stop = int(self.statements.begin[arc.move]), int(self.statements.end[arc.move])
             spans.append((begin, stop, end))
         for begin, stop, values in spans:
-            order = self._again(begin, stop, values, place, eol, order, edits)
+            order = self._again(begin, stop, values, long, place, eol, order, edits)
         self.tally.inserted_blocks += 1
 
     def _again(
-        self, begin: int, stop: int, values: dict[int, tuple[int, int]], place: int, eol: bytes, order: int,
-        edits: EditList,
+        self, begin: int, stop: int, values: dict[int, tuple[int, int]], long: tuple[int, int] | None,
+        place: int, eol: bytes, order: int, edits: EditList,
     ) -> int:  # fmt: skip
-        """Bytes once more, with other numbers in place of some words; a comment at the end is left out."""
+        """Bytes once more, with other numbers in place of some words; a comment at the end, and what is `long`
+        only, are left out."""
         at, lead = begin, eol
         for word in sorted(values, key=lambda w: int(self.words.number[w])):
             start = int(self.words.number[word])
-            lead += self.program.data[at:start]
+            if long is not None and at <= long[0] < start:
+                lead += self.program.data[at : long[0]] + self.program.data[long[1] : start]
+            else:
+                lead += self.program.data[at:start]
             edits.add(place, place, *values[word], lead, order)
             at, lead, order = int(self.words.end[word]), b"", order + 1
         trail = self.program.data[at:stop]

@@ -27,6 +27,7 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
 _GROUP = re.compile(rb"(?i)\(\s*(CIRCLE|CYLNDR|LINE)\s*/([^()]*)\)")
+_AGAIN = re.compile(rb"(?i)2\s*,\s*INTOF\s*,")
 _TOKEN = re.compile(rb"[^\s,]+")
 #: a normal is an axis of the machine where the sine between them is below this
 _SQUARE = 1e-6
@@ -126,13 +127,14 @@ def tlon(statement: Statement, out: StatementCollector) -> tuple[ArcForm, list[F
     if max(abs(p - q) for p, q in zip(values[:2], line[:2], strict=True)) > 1e-3:
         raise ProgramError("the LINE of TLON does not begin at the centre", line=statement.line)
     normal = (0.0, 0.0, 1.0) if kind == b"CIRCLE" else tuple(values[3:6])
-    rest = b"".join(_GROUP.sub(b"", statement.text).upper().split())
+    again = _AGAIN.search(statement.text)
+    long = None if again is None else (statement.place(again.start()), statement.place(again.end() - 1) + 1)
     centres = tuple(
         (a, b, c) for a, b, c in ([out.word(f) for f in fields[:3]] for fields in (round_, straight))
     )
-    text = ArcText(statement.begin, statement.end, centres, out.word(round_[size - 1]), whole=True)
+    text = ArcText(statement.begin, statement.end, centres, out.word(round_[size - 1]), whole=True, long=long)
     form = ArcForm(
-        text, statement.line, tuple(values[:3]), normal, values[size - 1], second=b"2,INTOF" in rest
+        text, statement.line, tuple(values[:3]), normal, values[size - 1], second=again is not None
     )
     return form, straight[3:6]
 

@@ -77,7 +77,8 @@ class ArcText:
     """How a program of statements says an arc: bytes `begin`..`end` of what says it beside its end point,
     indices of the words of its centre (two of them where it stands twice), of its `radius` and of its `angle`
     in degrees (-1 where not said) and of the direction in which it begins (empty where not said). `whole`:
-    its end point is said in there too."""
+    its end point is said in there too. `long` are the bytes that belong to arcs of more than half a circle
+    only."""
 
     begin: int
     end: int
@@ -86,6 +87,7 @@ class ArcText:
     angle: int = -1
     direction: tuple[int, ...] = ()
     whole: bool = False
+    long: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
