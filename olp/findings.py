@@ -210,6 +210,17 @@ _TABLE = (
         'compensated_by_controller = ["EXX"].',
     ),
     Rule(
+        "OLP412",
+        "thermal compensation in the program",
+        Severity.WARNING,
+        "The program switches on a compensation of the control's own for temperature (TECOMP, TEMPR). Where "
+        "the calibration was measured without it, or the job states temperatures too, expansion is "
+        "corrected twice.",
+        "State in active_during_measurement what was on while measuring, and leave temperatures_degC out of "
+        "the job, or switch the control's compensation off.",
+        "`TECOMP/ON,0.0000105` in a DMIS program.",
+    ),
+    Rule(
         "OLP601",
         "wrong pairing",
         Severity.ERROR,

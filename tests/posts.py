@@ -9,15 +9,15 @@ import numpy as np
 
 FLAVOURS = ("creo", "nx", "catia", "solidworks", "autodesk")
 HEAD = {
-    "creo": "$$*          Pro/CLfile  Version 8.0\n$$-> MFGNO / JOB\nPARTNO / JOB\nMACHIN / UNCX01, 1\nUNITS / MM\n"
-    "LOADTL / 1\n$$-> CUTTER / 10.000000\n"
+    "creo": "$$*          Pro/CLfile  Version 8.0\n$$-> MFGNO / JOB\nPARTNO / JOB\nMACHIN / UNCX01, 1\n"
+    "UNITS / MM\nLOADTL / 1\n$$-> CUTTER / 10.000000\n"
     "$$-> CSYS / 1.0000000000, 0.0000000000, 0.0000000000, 0.0000000000,  $\n"
     "            0.0000000000, 1.0000000000, 0.0000000000, 0.0000000000,  $\n"
     "            0.0000000000, 0.0000000000, 1.0000000000, 0.0000000000\nSPINDL / RPM, 9000.000000,  CLW\n",
-    "nx": "TOOL PATH/PLANAR_MILL,TOOL,MILL10\nMSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,"
-    "1.0000000,0.0000000\n$$ centerline data\nUNITS/MM\nLOADTL/1\nSPINDL/RPM,9000,CLW\nPAINT/PATH\n",
-    "catia": "$$ -----------------------------------------------------------------\n$$     GENERATED ON TODAY\n"
-    "PARTNO PART OPERATION.1\nUNITS/MM\nLOADTL/1\nSPINDL/  9000.0000,RPM,CLW\nPPRINT OPERATION NAME : Profile $ 1\n",
+    "nx": "TOOL PATH/PLANAR_MILL,TOOL,MILL10\nMSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,"
+    "0.0000000,1.0000000,0.0000000\n$$ centerline data\nUNITS/MM\nLOADTL/1\nSPINDL/RPM,9000,CLW\nPAINT/PATH\n",
+    "catia": "$$ -----------------------------------------------------------------\n$$  GENERATED TODAY\n"
+    "PARTNO PART OPERATION.1\nUNITS/MM\nLOADTL/1\nSPINDL/  9000.0000,RPM,CLW\nPPRINT NAME : Profile $ 1\n",
     "solidworks": "PARTNO/1\nUNIT/MM\nINSERT/10MM CRB 4FL 20 LOC\nCUTTER/10.,0,5.,0,0,0,64.\nLOAD/TOOL,1\n"
     "COOLNT/FLOOD\nSPINDL/9000,RPM,CLW\nTRNTYP/WORLD,0,0,0\nCSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0\n",
     "autodesk": "PARTNO/1001\nUNITS/MM\nLOADTL/1\nSPINDL/9000,CLW\nCOOLNT/ON\n",
@@ -56,7 +56,7 @@ def job(seed: int, count: int = 12, reach: float = 300.0, *, digits: int = 4) ->
         start = np.arctan2(here[1] - centre[1], here[0] - centre[0])
         rise = 0.0 if choice != 3 else round(float(rng.uniform(-3, 3)), digits)
         end = centre + radius * np.array([np.cos(start + sweep), np.sin(start + sweep), 0.0])
-        end = np.round(end + (0, 0, rise), digits) if choice != 4 else here
+        end = np.round(end + np.array([0, 0, rise]), digits) if choice != 4 else here
         steps.append(Step("arc", end, centre, sweep))
         here = end
     return steps
@@ -119,7 +119,8 @@ def _arc(step: Step, here: np.ndarray, flavour: str, say: object) -> str:
     if flavour == "solidworks":
         return str(say("CIRCLE", x, y, z, 0, 0, "1." if sign > 0 else "-1."))
     if flavour == "autodesk":
-        return str(say("MOVARC", x, y, z, 0, 0, int(sign), radius, "ANGLE", float(np.degrees(abs(step.sweep)))))
+        degrees = float(np.degrees(abs(step.sweep)))
+        return str(say("MOVARC", x, y, z, 0, 0, int(sign), radius, "ANGLE", degrees))
     way = sign * np.array([-(here[1] - y), here[0] - x]) / radius
     second = "2,INTOF," if abs(step.sweep) > np.pi else ""
     ex, ey, ez = (float(v) for v in step.end)

@@ -30,6 +30,8 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
         if name == "unit":
             which = "neither G20 nor G21 stands before the first move" if text == "mm" else text
             out.append(finding("OLP301", f"{which}; millimetres assumed", [line]))
+        elif name == "thermal":
+            out.append(finding("OLP412", text, [line]))
         elif name == "increments":
             out.append(
                 finding(
@@ -38,7 +40,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
                     [line],
                 )
             )
-    whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
+    whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
     if whole.any():
         lines = lines_of(path, whole)
         out.append(

@@ -432,8 +432,8 @@ class StatementWriter:
         self, begin: int, stop: int, values: dict[int, tuple[int, int]], long: tuple[int, int] | None,
         place: int, eol: bytes, order: int, edits: EditList,
     ) -> int:  # fmt: skip
-        """Bytes once more, with other numbers in place of some words; a comment at the end, and what is `long`
-        only, are left out."""
+        """Bytes once more, with other numbers in place of some words. A comment at the end is left out, and
+        what is `long`."""
         at, lead = begin, eol
         for word in sorted(values, key=lambda w: int(self.words.number[w])):
             start = int(self.words.number[word])

@@ -86,6 +86,7 @@ def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
         compensated_by_controller=file.compensated_by_controller,
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
+        styli={name: table.offset_mm for name, table in file.styli.items()},
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         length_active=file.job_defaults.length_active,
@@ -136,6 +137,7 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
         temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
+        styli={name: table.offset_mm for name, table in file.styli.items()},
         meshes=tuple(meshes),
     )
     return job, lines

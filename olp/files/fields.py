@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 from olp.machine import CHAINS, COMPONENTS, SQUARENESS
 
 #: Dialect profiles that can be read and written today.
-CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt")
+CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis")
 ISO_NAMES = COMPONENTS + SQUARENESS
 SIGN = "actual-minus-commanded"
 

@@ -222,6 +222,13 @@ class JobDefaultsTable(Table):
     length_active: bool = Field(default=False, description="whether the tool length is active at the start")
 
 
+class StylusTable(Table):
+    offset_mm: Triple = Field(
+        description="from the end of the ram to the centre of the tip, in mm; the lever of angular errors"
+    )
+
+
+Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]
 
@@ -257,6 +264,7 @@ class MachineFile(Table):
     )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
+    styli: Styli = Field(default={}, description="tables [styli.LABEL], for the sensors of DMIS programs")
     job_defaults: JobDefaultsTable = Field(
         default_factory=JobDefaultsTable, description="the state at the start of a program"
     )
@@ -421,6 +429,7 @@ class JobFile(Table):
         default={}, description="tables [work_offsets.NAME], which override the machine's"
     )
     tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
+    styli: Styli = Field(default={}, description="tables [styli.LABEL], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
 
 

@@ -11,10 +11,11 @@ from collections.abc import Callable, Mapping
 
 from olp.exceptions import ProgramError, UsageError
 from olp.machine import Setup
-from olp.program import apt, reader
+from olp.program import apt, dmis, reader
 from olp.program.apt_table import APT
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
+from olp.program.dmis_table import DMIS
 from olp.program.profiles import PROFILES, Profile
 from olp.program.program import Program
 
@@ -26,12 +27,13 @@ def _rs274(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, wor
     return reader.read(data, setup, dialect, options, words=words)
 
 
-READERS: Mapping[str, Reader] = {"rs274": _rs274, "apt": apt.read}
-DIALECTS: Mapping[str, Dialect] = {**PROFILES, APT.name: APT}
+READERS: Mapping[str, Reader] = {"rs274": _rs274, "apt": apt.read, "dmis": dmis.read}
+DIALECTS: Mapping[str, Dialect] = {**PROFILES, APT.name: APT, DMIS.name: DMIS}
 
 #: Endings of files that only one family has. The ending of a version (`.ncl.3`) does not count.
 _ENDINGS: Mapping[str, str] = {
     **dict.fromkeys(("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"), "apt"),
+    **dict.fromkeys(("dmi", "dms", "dmis"), "dmis"),
 }
 #: What only texts of a family say at the start of a line.
 _SIGNS: Mapping[str, re.Pattern[bytes]] = {
@@ -39,6 +41,11 @@ _SIGNS: Mapping[str, re.Pattern[bytes]] = {
         rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
         rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
         rb"CIRCLE[ \t]*/|CYCLE[ \t]*/)"
+    ),
+    "dmis": re.compile(
+        rb"(?im)^[ \t]*(DMISMN|FILNAM|SNSLCT|SNSET|PTMEAS|MEAS[ \t]*/|ENDMES|ENDFIL|WKPLAN|TECOMP|"
+        rb"GOTO[ \t]*/[ \t]*CART|MODE[ \t]*/[ \t]*(?:MAN|PROG|AUTO)|F\([^)]*\)[ \t]*=[ \t]*FEAT|"
+        rb"FEDRAT[ \t]*/[ \t]*\w+VEL)"
     ),
 }
 #: What only texts of statements say, without saying of which family.

@@ -57,7 +57,7 @@ class Profile(Dialect):
             Row(
                 f"G{code / 10:g}",
                 _SUPPORT.get(act, Support.READ),
-                self.refusals.get(code, "") if act is Act.REFUSE else "",
+                self.refusals.get(code, "is no code of this control") if act is Act.REFUSE else "",
             )
             for code, act in sorted(self.codes.items())
         ]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .linuxcnc import ARC, FEED, PROBE, RAPID, CanonMoves
+from .linuxcnc import ARC, FEED, RAPID, CanonMoves
 
 NUMBER = r"[-+]?(?:\d+\.\d*|\.\d+|\d+)(?:[eEdD][-+]?\d+)?"
 Frame = tuple[np.ndarray, np.ndarray]
@@ -41,7 +41,7 @@ def joined(data: bytes) -> list[tuple[int, str]]:
     for number, raw in enumerate(data.decode("latin-1").replace("\r", "").split("\n"), 1):
         text = raw
         if comment or text.lstrip().startswith("$$"):
-            comment = "$$->" in text[:8] and text.rstrip().endswith("$") or comment and text.rstrip().endswith("$")
+            comment = (comment or "$$->" in text[:8]) and text.rstrip().endswith("$")
             continue
         if not pending and text.strip().upper().startswith(TEXT):
             out.append((number, text.strip().upper()))
@@ -149,14 +149,16 @@ def read_apt(
             centre = at(frame, circle[:3], unit, length)
             sense = np.cross(here - centre, way)[k]
             here = at(frame, straight[3:], unit, length)
-            out.add(line, ARC, here, length, tool, -tall * aim, centre, 1 if sense > 0 else -1, AXIS_OF_PLANE[k])
+            turns = 1 if sense > 0 else -1
+            out.add(line, ARC, here, length, tool, -tall * aim, centre, turns, AXIS_OF_PLANE[k])
         elif major in ("LOADTL", "LOAD"):
             tool, size = int(value[0]), 1.0
             tall = tools[tool]
         elif major in ("UNITS", "UNIT"):
             unit = 25.4 if "INCH" in text else 1.0
         elif major in ("CSYS", "MSYS"):
-            key = "" if value in ([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], [0, 0, 0, 1, 0, 0, 0, 1, 0]) else repr(value)
+            same = ([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], [0, 0, 0, 1, 0, 0, 0, 1, 0])
+            key = "" if value in same else repr(value)
             if not out.line and key:
                 systems[0] = key
             system = key
