@@ -46,7 +46,8 @@ class Frame:
     `length_mm`). `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the
     touch-off of the work offset on the raw machine, None where it was located by other means; `tool_touched`
     likewise for the length of the active tool. In a rotated frame the words are turned first, by the rows of
-    `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`.
+    `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is
+    the part of the offset by which the tip stays off the point that is said, as over a hole.
     """
 
     unit_mm: float = 1.0
@@ -58,10 +59,12 @@ class Frame:
     touched: tuple[Vector, Vector] | None = None
     tool_touched: tuple[Vector, Vector] | None = None
     turn: tuple[Vector, Vector, Vector] | None = None
+    lift_mm: Vector = ZERO
 
     def origin_mm(self) -> Vector:
         """The axis position of the program's origin, no tool length active."""
-        x, y, z = (o - n for o, n in zip(self.offset_mm, self.length_mm, strict=True))
+        parts = zip(self.offset_mm, self.length_mm, self.lift_mm, strict=True)
+        x, y, z = (offset - length - lift for offset, length, lift in parts)
         return (x, y, z)
 
     def tip_mm(self, point: Array) -> Array:

@@ -38,6 +38,8 @@ _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL | Flag.PASS)
 _MOST_DECIMALS = 10
 #: digits of inserted numbers, where the program itself has as many
 _FINE_DECIMALS = 6
+#: pieces of one inserted statement at the most, for their order among insertions at one place
+_ROW = 64
 
 
 class StatementWriter:
@@ -289,7 +291,7 @@ class StatementWriter:
         out = []
         ahead = rows.before[tails]
         at = np.where(ahead, place[which, 1], place[which, 0])
-        order = (tails * 8 + 16).astype(np.int32)
+        order = (tails * _ROW).astype(np.int32)
         zero = np.zeros(len(tails), np.int8)
         bare = np.full(len(tails), BARE)
         lead = pieces[which, 0]
@@ -325,6 +327,9 @@ class StatementWriter:
         words = [s for s in slot.tolist() if s >= 0]
         start = [int(self.words.number[s]) for s in words]
         stop = [int(self.words.end[s]) for s in words]
+        arc = statements.arcs.get(move)
+        if arc is not None and arc.whole:
+            return b"GOTO/", b",", b",", b""
         lead = data[begin : start[0]]
         if len(words) == 3:
             between, last = data[stop[0] : start[1]], data[stop[1] : start[2]]
@@ -418,7 +423,7 @@ class StatementWriter:
         if text.direction:
             numbers |= self._direction(arc, text)
         place = int(self.statements.end[arc.move])
-        order = rows.serial(arc.row) * 64
+        order = arc.row * _ROW
         spans = [(text.begin, text.end, numbers | (end if text.whole else {}))]
         long = text.long if abs(arc.sweep) <= np.pi else None
         if not text.whole:

@@ -345,28 +345,23 @@ class _Reader:
         self, cycle: _Cycle, line: Index, frame: Index, end: Array, slot: Index, begin: Index,
         stop: Index, ups: Array,
     ) -> None:  # fmt: skip
-        """Places of holes: over the place, to it (the statement's own point), down, and up."""
+        """Places of holes: to the clearance above the place, which the statement says, down, and up."""
         out = self.out
         at = np.array(self.position)
         for i in range(len(line)):
-            point, where, own, up = end[i].copy(), int(line[i]), int(frame[i]), ups[i]
-            clear = point + up * (cycle.clear_mm or 0.0)
-            height = float((at - clear) @ up)
-            if cycle.clear_mm is not None and height > 1e-9:
-                out.put_lone(Kind.RAPID, Flag.CYCLE, where, own, clear + up * height)
-            if cycle.clear_mm is not None:
-                out.put_lone(Kind.RAPID, Flag.CYCLE, where, own, clear)
-            to = Kind.LINE if cycle.clear_mm is not None else Kind.RAPID
-            out.feeds.append((out.moves, cycle.feed_mm_s))
+            where, up = int(line[i]), ups[i]
+            x, y, z = (up * (cycle.clear_mm or 0.0)).tolist()
+            own = self.table.lifted(int(frame[i]), (x, y, z)) if cycle.clear_mm else int(frame[i])
+            at = end[i] + up * (cycle.clear_mm or 0.0)
             out.put_moves(
-                np.array([to], np.uint8), np.zeros(1, np.uint8), [where], [own], point[None], slot[i : i + 1],
-                begin[i : i + 1], stop[i : i + 1],
+                np.array([Kind.RAPID], np.uint8), np.zeros(1, np.uint8), [where], [own], at[None],
+                slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip
-            at = point
+            out.feeds.append((out.moves, cycle.feed_mm_s))
             if cycle.depth_mm is not None and cycle.clear_mm is not None:
                 out.strokes.append((out.moves - 1, out.moves))
-                out.put_lone(Kind.LINE, Flag.CYCLE, where, own, point - up * cycle.depth_mm)
-                at = point + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
+                out.put_lone(Kind.LINE, Flag.CYCLE, where, own, end[i] - up * cycle.depth_mm)
+                at = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
                 out.put_lone(Kind.RAPID, Flag.CYCLE, where, own, at)
         out.feeds.append((out.moves, self.feed_mm_s))
         end[-1] = at

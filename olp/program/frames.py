@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -121,6 +123,15 @@ class FrameTable:
             work_offset=work.name, touched=touch_of(self.setup, work, line), tool_touched=tool_touched,
             turn=turn_of(work.rotation_deg),
         )  # fmt: skip
+        return self._known(frame)
+
+    def lifted(self, number: int, lift: Vector) -> int:
+        """A frame in which the tip stays off the points that are said."""
+        frame = self.frames[number]
+        x, y, z = (o + v for o, v in zip(frame.offset_mm, lift, strict=True))
+        return self._known(replace(frame, offset_mm=(x, y, z), lift_mm=lift))
+
+    def _known(self, frame: Frame) -> int:
         known = self._index.get(frame)
         if known is None:
             known = self._index[frame] = len(self.frames)

@@ -87,9 +87,6 @@ def prove(
     exempt = np.zeros(len(path), bool)
     exempt[passed] = True
     loose = uncorrected_starts(path, exempt)
-    if nominal.statements is not None:
-        # the way down to a hole's place begins above it, by the same numbers
-        loose[nominal.statements.strokes[:, 0]] = False
     if parts is None:
         groups = match(nominal, target, corrected, model, tolerance_mm + digit_mm)
     else:

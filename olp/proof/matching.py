@@ -64,4 +64,8 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         groups[i] = j + skip
         extra -= skip
         i, j = i + 1, j + skip + 1
+    last = len(path) - 1
+    if count and groups[-1] < last and np.abs(actual[last] - target_mm[-1]).max() < near_mm:
+        # a whole circle at the end comes to its last point twice
+        groups[-1] = last
     return groups
