@@ -115,6 +115,7 @@ def correct_bytes(
         *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
         *checks.hole_findings(holes, limits.tolerance_mm),
+        *checks.stroke_findings(nominal, loaded.model, limits.tolerance_mm),
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),

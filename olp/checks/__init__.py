@@ -163,6 +163,24 @@ def hole_findings(holes: HolePlan, tolerance_mm: float) -> list[Finding]:
     ]
 
 
+def stroke_findings(program: Program, model: ErrorModel, tolerance_mm: float) -> list[Finding]:
+    """Holes whose stroke, which is the control's own, cannot follow the error."""
+    said = program.statements
+    if said is None or not len(said.strokes):
+        return []
+    path = program.toolpath
+    top, bottom = said.strokes[:, 0], said.strokes[:, 1]
+    tool = path.tool_mm()
+    levers = tool if tool.ndim == 1 else tool[top]
+    change = model.error(path.end_mm[bottom], levers) - model.error(path.end_mm[top], levers)
+    lean = np.nan_to_num(np.sqrt((change * change).sum(axis=1)))
+    wide = lean > tolerance_mm
+    if not wide.any():
+        return []
+    what = f"{int(wide.sum())} holes lean by up to {lean.max() * 1e3:.2f} um between clearance and bottom"
+    return [finding("OLP105", what, path.line[top[wide]].tolist())]
+
+
 def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
     """Size of each source of error over the nominal path, largest first, from up to 4096 of its moves."""
     known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))

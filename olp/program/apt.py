@@ -82,6 +82,7 @@ class _Reader:
         self.direction: Statement | None = None
         self.ended = 0
         self.feed_mm_s = NAN
+        self.feed_said = (0, -1)
         self.rapid: list[int] = []
         self.driven: dict[int, ArcForm] = {}
         self.arcs: list[tuple[int, ArcForm]] = []
@@ -357,13 +358,13 @@ class _Reader:
                 np.array([Kind.RAPID], np.uint8), np.zeros(1, np.uint8), [where], [own], at[None],
                 slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip
-            out.feeds.append((out.moves, cycle.feed_mm_s))
+            out.put_feed(out.moves, cycle.feed_mm_s, where)
             if cycle.depth_mm is not None and cycle.clear_mm is not None:
                 out.strokes.append((out.moves - 1, out.moves))
                 out.put_lone(Kind.LINE, Flag.CYCLE, where, own, end[i] - up * cycle.depth_mm)
                 at = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
                 out.put_lone(Kind.RAPID, Flag.CYCLE, where, own, at)
-        out.feeds.append((out.moves, self.feed_mm_s))
+        out.put_feed(out.moves, self.feed_mm_s, *self.feed_said)
         end[-1] = at
 
     def _unknown(self, statement: Statement, row: int) -> None:
@@ -391,7 +392,9 @@ class _Reader:
 
     def _feed(self, statement: Statement, row: int) -> None:
         self.feed_mm_s = feed_of(statement, self.unit_mm, self.turns_s)
-        self.out.feeds.append((self._move(row), self.feed_mm_s))
+        said = next((f for f in statement.fields() if f.number is not None), None)
+        self.feed_said = statement.line, -1 if said is None else self.out.word(said)
+        self.out.put_feed(self._move(row), self.feed_mm_s, *self.feed_said)
 
     def _units(self, statement: Statement, row: int) -> None:
         self._resolve(row)

@@ -352,7 +352,7 @@ class _Reader:
         if fields and fields[0].text in self.speed and numbers:
             self.speed[fields[0].text] = numbers[0][0] / 10.0 ** numbers[0][1] * unit
         if fields and fields[0].text == b"MESVEL":
-            self.out.feeds.append((self.out.moves + row - self.done, self.speed[b"MESVEL"]))
+            self.out.put_feed(self.out.moves + row - self.done, self.speed[b"MESVEL"], statement.line)
 
     def _meas(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is not None:

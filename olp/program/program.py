@@ -91,15 +91,25 @@ class ArcText:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class StatedFeeds:
+    """(k,) feeds as they are said: the first `move` of each, its `line`, and the `word` of its number, -1
+    where no word could be changed."""
+
+    move: Index
+    line: Index
+    word: Index
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Statements:
     """What a program of whole statements has beside its words.
 
     (n,) `begin`, `end`: the bytes that say the end of each move, -1 where no statement does. (n,)
     `feed_mm_s`, inf for rapids and NaN where it is not known; (n + 1,) `rest` and `dwell_s` of the places
-    before, between and after the moves. `arcs` by move. `broken`: the marks of continuation inside words,
-    by word. `rapid` is the line that makes the next statement a rapid; `mark` joins lines, none of which
-    becomes longer than `width` bytes (0: as long as they come). `strokes` (k, 2): the moves to the place and
-    to the bottom of each hole.
+    before, between and after the moves; `feeds` are where feeds are said. `arcs` by move. `broken`: the marks
+    of continuation inside words, by word. `rapid` is the line that makes the next statement a rapid; `mark`
+    joins lines, none of which becomes longer than `width` bytes (0: as long as they come). `strokes` (k, 2):
+    the moves to the place and to the bottom of each hole.
     """
 
     begin: Small
@@ -110,6 +120,7 @@ class Statements:
     arcs: Mapping[int, ArcText]
     broken: Mapping[int, bytes]
     strokes: npt.NDArray[np.int64]
+    feeds: StatedFeeds
     rapid: bytes = b""
     mark: bytes = b"$"
     width: int = 0

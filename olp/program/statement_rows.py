@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from olp.program.columns import Columns
 from olp.program.dialect import Dialect
-from olp.program.program import ArcSlots, ArcText, Program, Statements, Words
+from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
 from olp.program.statement_lexer import Chunk, Field, Statement
 from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 
@@ -68,7 +68,7 @@ class StatementCollector:
         self.broken: dict[int, bytes] = {}
         self.strokes: list[tuple[int, int]] = []
         self.remarks: dict[str, tuple[int, str]] = {}
-        self.feeds: list[tuple[int, float]] = [(0, float("nan"))]
+        self._feeds: list[tuple[int, float, int, int]] = [(0, float("nan"), 0, -1)]
         self.pauses: list[tuple[int, float]] = []
 
     # -- words and points of a chunk -----------------------------------------------------------------
@@ -186,6 +186,10 @@ class StatementCollector:
             np.array([list(end_mm)], float), [slot], [-1], [-1],
         )  # fmt: skip
 
+    def put_feed(self, move: int, mm_s: float, line: int, word: int = -1) -> None:
+        """A feed from a move on, and the word that says it."""
+        self._feeds.append((move, mm_s, line, word))
+
     def put_arcs(self, move: Index, centre: Array, plane: Index, sweep: Array) -> None:
         self.columns.put("arc_move", move, np.int64)
         self.columns.put("arc_centre", centre, np.float64)
@@ -215,10 +219,13 @@ class StatementCollector:
         for move, seconds in self.pauses:
             rest[move] = True
             dwell[move] += seconds
+        move, line, word = np.array([(m, n, w) for m, _, n, w in self._feeds], np.int64).T
+        feeds = StatedFeeds(move, line, word)
         statements = Statements(
             begin=take("begin_byte", np.int32), end=take("end_byte", np.int32),
             feed_mm_s=self._feed(kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
-            broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2), rapid=rapid,
+            broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
+            feeds=feeds, rapid=rapid,
             width=max(longest, _WIDTH),
         )  # fmt: skip
         count = len(arcs)
@@ -237,7 +244,7 @@ class StatementCollector:
         )
 
     def _feed(self, kind: npt.NDArray[np.uint8], flag: npt.NDArray[np.uint8]) -> Array:
-        move, value = (np.array(column) for column in zip(*self.feeds, strict=True))
+        move, value, *_ = (np.array(column) for column in zip(*self._feeds, strict=True))
         out = value[np.searchsorted(move, np.arange(len(kind)), "right") - 1]
         out[kind == Kind.RAPID] = np.inf
         out[(flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
