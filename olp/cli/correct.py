@@ -174,12 +174,13 @@ def _diff(nominal: str | bytes, result: Correction, machine: Machine, on_stderr:
     from olp.files.write import read_bytes
     from olp.program.profiles import PROFILES
 
-    profile = PROFILES.get(machine.controller)
+    profile = PROFILES.get(result.report["program"]["dialect"])
     largest_um = float(result.report.get("largest_correction_um", 0.0))
     return render(
         nominal if isinstance(nominal, bytes) else read_bytes(nominal),
         result.data,
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
         increments_mm=machine.least_increment_mm if profile and profile.increments_without_point else None,
+        statements=profile is None,
         colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
     )

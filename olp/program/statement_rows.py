@@ -21,8 +21,8 @@ Mask = npt.NDArray[np.bool_]
 
 _POW10 = 10.0 ** np.arange(19)
 _NONE = (-1, -1, -1)
-#: no line has to be shorter, and none becomes longer than the longest there is
-_WIDTH = 72
+#: columns of cards and of old terminals: a text that keeps to them goes on keeping to them
+_WIDTHS = (72, 80)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +226,7 @@ class StatementCollector:
             feed_mm_s=self._feed(kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
             broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
             feeds=feeds, rapid=rapid,
-            width=max(longest, _WIDTH),
+            width=next((w for w in _WIDTHS if longest <= w), 0),
         )  # fmt: skip
         count = len(arcs)
         return Program(
