@@ -40,11 +40,13 @@ _SIGNS: Mapping[str, re.Pattern[bytes]] = {
     "apt": re.compile(
         rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
         rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
-        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/)"
+        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/|UNITS?[ \t]*/[ \t]*(?:MM|INCH(?:ES)?)[ \t]*\r?$|"
+        rb"GOTO[ \t]*/[-+.\dED \t]+(?:,[-+.\dED \t]+){5})"
     ),
     "dmis": re.compile(
         rb"(?im)^[ \t]*(DMISMN|FILNAM|SNSLCT|SNSET|PTMEAS|MEAS[ \t]*/|ENDMES|ENDFIL|WKPLAN|TECOMP|"
-        rb"GOTO[ \t]*/[ \t]*CART|MODE[ \t]*/[ \t]*(?:MAN|PROG|AUTO)|F\([^)]*\)[ \t]*=[ \t]*FEAT|"
+        rb"UNITS[ \t]*/[ \t]*\w+[ \t]*,|GOTO[ \t]*/[ \t]*CART|"
+        rb"MODE[ \t]*/[ \t]*(?:MAN|PROG|AUTO)|F\([^)]*\)[ \t]*=[ \t]*FEAT|"
         rb"FEDRAT[ \t]*/[ \t]*\w+VEL)"
     ),
 }
