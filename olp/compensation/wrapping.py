@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import numpy as np
 
 
 def wrapped(text: bytes, width: int, mark: bytes) -> bytes:
@@ -10,16 +10,22 @@ def wrapped(text: bytes, width: int, mark: bytes) -> bytes:
     A line without a comma, or with a comment, stays as it is."""
     if not width:
         return text
-    long = re.compile(rb"[^\r\n]{%d,}" % (width + 1))
-    return long.sub(lambda found: _broken(found, text, width, mark), text)
+    ends = np.flatnonzero(np.frombuffer(text, np.uint8) == 10)
+    starts = np.concatenate(([0], ends + 1))
+    stops = np.append(ends, len(text))
+    long = np.flatnonzero(stops - starts > width)
+    parts, at = [], 0
+    for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
+        eol = b"\r\n" if text[stop - 1 : stop] == b"\r" else b"\n"
+        line = text[start:stop].rstrip(b"\r")
+        parts += [text[at:start], _broken(line, width, mark, eol)]
+        at = start + len(line)
+    return b"".join([*parts, text[at:]]) if parts else text
 
 
-def _broken(found: re.Match[bytes], text: bytes, width: int, mark: bytes) -> bytes:
-    line = found[0]
+def _broken(line: bytes, width: int, mark: bytes, eol: bytes) -> bytes:
     if b"$$" in line or b"'" in line:
         return line
-    after = text[found.end() : found.end() + 2]
-    eol = b"\r\n" if after == b"\r\n" else b"\n"
     pieces = []
     while len(line) > width:
         at = line.rfind(b",", 0, width - len(mark)) + 1
