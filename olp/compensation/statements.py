@@ -7,17 +7,16 @@ other numbers. Goes through the rows in chunks, as `writer` does for blocks of w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.arcwords import Arc, solve
 from olp.compensation.digits import AxisRows, incremental
 from olp.compensation.plan import Plan, targets
 from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
+from olp.compensation.statement_arcs import FINE_DECIMALS, MOST_DECIMALS, ROW, arc_edits
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
 from olp.compensation.wrapping import wrapped
@@ -25,7 +24,7 @@ from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.machine import Vector
 from olp.program.edits import BARE, EditList, Edits, Prefixes, splice
-from olp.program.program import ArcText, Program
+from olp.program.program import Program
 from olp.toolpath import Flag, Kind
 
 Index = npt.NDArray[np.int64]
@@ -34,12 +33,6 @@ CHUNK = 1 << 15
 _POW10 = 10.0 ** np.arange(19)
 _INT10 = 10 ** np.arange(19, dtype=np.int64)
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL | Flag.PASS)
-#: doubles of positions are good for so many digits behind the point
-_MOST_DECIMALS = 10
-#: digits of inserted numbers, where the program itself has as many
-_FINE_DECIMALS = 6
-#: pieces of one inserted statement at the most, for their order among insertions at one place
-_ROW = 64
 
 
 class StatementWriter:
@@ -75,7 +68,7 @@ class StatementWriter:
         if any(f.turn is not None for f in frames):
             self.turn = np.array([np.eye(3) if f.turn is None else f.turn for f in frames])
         used = self.words.decimals[program.slot[program.slot >= 0]]
-        self.finest = min(int(used.max(initial=0)), _FINE_DECIMALS)
+        self.finest = min(int(used.max(initial=0)), FINE_DECIMALS)
         self.broken = np.array(sorted(self.statements.broken), np.int64)
         self.changed = False
 
@@ -135,7 +128,7 @@ class StatementWriter:
         )
         self._mark_take_ups(rows)
         self._digits(rows)
-        edits = [*self._changes(rows), *self._insertions(rows), *self._arcs(rows)]
+        edits = [*self._changes(rows), *self._insertions(rows), *arc_edits(self, rows)]
         self.emitted = [float(v) for v in rows.emitted[-1]]
         self.parts[move[0] : move[-1] + 1] += np.bincount(move - move[0]).astype(np.int32)
         return [e for e in edits if len(e)]
@@ -163,8 +156,8 @@ class StatementWriter:
         given = slot >= 0
         own = np.where(given, self.words.decimals[slot], 0).astype(np.int64)
         word = np.where(given, self.words.mantissa[slot], 0)
-        fewest = self._fewest(unit)
-        decimals = np.minimum(np.maximum(own, fewest), _MOST_DECIMALS)
+        fewest = self.fewest(unit)
+        decimals = np.minimum(np.maximum(own, fewest), MOST_DECIMALS)
         with np.errstate(invalid="ignore"):
             wanted = np.rint(local * _POW10[decimals])
         unknown = np.isnan(wanted)
@@ -201,19 +194,19 @@ class StatementWriter:
         nominal = self.local(self.path.end_mm[rows.move[a:b]], frame)
         places = np.empty((b - a, 3))
         for axis in range(3):
-            grid = int(max(own[a:b, axis].max(initial=0), self._fewest(self.unit[frame[:1]])[0, axis]))
+            grid = int(max(own[a:b, axis].max(initial=0), self.fewest(self.unit[frame[:1]])[0, axis]))
             column = AxisRows(
                 command=local[a:b, axis], nominal=nominal[:, axis], given=given[a:b, axis],
                 raw=np.repeat(held[a:b, None], 3, axis=1)[:, axis], reset=np.zeros(b - a, bool),
                 word=word[a:b, axis], decimals=own[a:b, axis].astype(np.int8), offset=0.0, unit=1.0,
             )  # fmt: skip
-            digits = incremental(column, float(entry[axis]), min(grid, _MOST_DECIMALS))
+            digits = incremental(column, float(entry[axis]), min(grid, MOST_DECIMALS))
             places[:, axis] = digits.emitted
             rows.mantissa[a:b, axis], rows.decimals[a:b, axis] = digits.mantissa, digits.decimals
             rows.write[a:b, axis] = digits.write & ~held[a:b]
         rows.emitted[a:b] = self.placed(places, frame)
 
-    def _fewest(self, unit: Array) -> Index:
+    def fewest(self, unit: Array) -> Index:
         """(n, 3) the fewest decimals of numbers in units (n,)."""
         metric = np.array([max(self.style.least(axis, 1.0), self.finest) for axis in range(3)])
         if (unit == 1.0).all():
@@ -291,7 +284,7 @@ class StatementWriter:
         out = []
         ahead = rows.before[tails]
         at = np.where(ahead, place[which, 1], place[which, 0])
-        order = (tails * _ROW).astype(np.int32)
+        order = (tails * ROW).astype(np.int32)
         zero = np.zeros(len(tails), np.int8)
         bare = np.full(len(tails), BARE)
         lead = pieces[which, 0]
@@ -342,133 +335,3 @@ class StatementWriter:
         if self.path.kind[move] == Kind.RAPID:
             lead = statements.rapid + self.program.eol(int(self.path.line[move])) + lead
         return lead, between, last, trail
-
-    # -- arcs --------------------------------------------------------------------------------------
-
-    def _arcs(self, rows: Rows) -> list[Edits]:
-        """Centres, radii and angles of arcs, and the later parts of arcs."""
-        row = np.flatnonzero(
-            np.isin(self.path.kind[rows.move], (Kind.ARC_CW, Kind.ARC_CCW))
-            & ((rows.flag & np.uint8(Flag.PASS)) == 0)
-            & ~self.plan.take_up[rows.first : rows.first + len(rows.move)]
-        )
-        if not row.size:
-            return []
-        edits = EditList(self.prefixes)
-        arcs = solve(self, rows, row)
-        for i in range(len(arcs.row)):
-            arc = arcs.one(i)
-            text = self.statements.arcs[arc.move]
-            changes = self._arc_words(arc, text)
-            if rows.head[arc.row]:
-                for word, mantissa, decimals in changes:
-                    self._replace(word, mantissa, decimals, edits)
-                if text.long is not None and abs(arc.sweep) <= np.pi:
-                    edits.add(*text.long, BARE, 0)
-            else:
-                self._arc_again(rows, arc, text, changes, edits)
-        return [edits.done()]
-
-    def _arc_words(self, arc: Arc, text: ArcText) -> list[tuple[int, int, int]]:
-        """(word, mantissa, decimals) of all that says an arc beside its end."""
-        frame = self.path.frame[arc.move : arc.move + 1]
-        centre = arc.centre.copy()
-        unit = float(self.unit[frame[0]])
-        number = self.local(centre[None], frame)[0]
-        out = []
-        fewest = self._fewest(self.unit[frame])[0]
-        for words in text.centres:
-            for axis, word in enumerate(words):
-                out.append(self._rounded(word, float(number[axis]), int(fewest[axis]) + 1))
-        radius = float(np.hypot(*(np.delete(arc.start - centre, _NORMAL[arc.plane]))))
-        if text.radius >= 0:
-            out.append(self._rounded(text.radius, radius / unit, int(fewest.max()) + 1))
-        if text.angle >= 0:
-            out.append(self._rounded(text.angle, float(np.degrees(abs(self._sweep(arc)))), _FINE_DECIMALS))
-        return out
-
-    def _sweep(self, arc: Arc) -> float:
-        """The angle between the ends of an arc as they are written."""
-        a, b = (k for k in range(3) if k != _NORMAL[arc.plane])
-        first, last = arc.start - arc.centre, arc.end - arc.centre
-        angle = float(np.arctan2(last[b], last[a]) - np.arctan2(first[b], first[a]))
-        if arc.plane == 1:
-            angle = -angle
-        return angle + 2 * np.pi * round((arc.sweep - angle) / (2 * np.pi))
-
-    def _rounded(self, word: int, value: float, fewest: int) -> tuple[int, int, int]:
-        decimals = min(max(int(self.words.decimals[word]), fewest), _MOST_DECIMALS)
-        return word, round(value * 10**decimals), decimals
-
-    def _replace(self, word: int, mantissa: int, decimals: int, edits: EditList) -> None:
-        own = int(self.words.decimals[word])
-        said = int(self.words.mantissa[word])
-        same = said * 10 ** (decimals - own) if decimals >= own else round(said / 10 ** (own - decimals))
-        if same != mantissa:
-            prefix = self.statements.broken.get(word, b"")
-            edits.add(int(self.words.number[word]), int(self.words.end[word]), mantissa, decimals, prefix)
-            self.tally.changed_words += 1
-
-    def _arc_again(
-        self, rows: Rows, arc: Arc, text: ArcText, changes: Sequence[tuple[int, int, int]], edits: EditList
-    ) -> None:
-        """A later part: all that says the arc, and its end, once more with other numbers."""
-        eol = self.program.eol(arc.line)
-        numbers = {word: (mantissa, decimals) for word, mantissa, decimals in changes}
-        slot = self.program.slot[arc.move].tolist()
-        end = {
-            word: (int(rows.mantissa[arc.row, axis]), int(rows.decimals[arc.row, axis]))
-            for axis, word in enumerate(slot)
-        }
-        if text.direction:
-            numbers |= self._direction(arc, text)
-        place = int(self.statements.end[arc.move])
-        order = arc.row * _ROW
-        spans = [(text.begin, text.end, numbers | (end if text.whole else {}))]
-        long = text.long if abs(arc.sweep) <= np.pi else None
-        if not text.whole:
-            begin, stop = int(self.statements.begin[arc.move]), int(self.statements.end[arc.move])
-            spans.append((begin, stop, end))
-        for begin, stop, values in spans:
-            order = self._again(begin, stop, values, long, place, eol, order, edits)
-        self.tally.inserted_blocks += 1
-
-    def _again(
-        self, begin: int, stop: int, values: dict[int, tuple[int, int]], long: tuple[int, int] | None,
-        place: int, eol: bytes, order: int, edits: EditList,
-    ) -> int:  # fmt: skip
-        """Bytes once more, with other numbers in place of some words. A comment at the end is left out, and
-        what is `long`."""
-        at, lead = begin, eol
-        for word in sorted(values, key=lambda w: int(self.words.number[w])):
-            start = int(self.words.number[word])
-            if long is not None and at <= long[0] < start:
-                lead += self.program.data[at : long[0]] + self.program.data[long[1] : start]
-            else:
-                lead += self.program.data[at:start]
-            edits.add(place, place, *values[word], lead, order)
-            at, lead, order = int(self.words.end[word]), b"", order + 1
-        trail = self.program.data[at:stop]
-        comment = trail.rfind(b"$$")
-        if comment >= 0 and b"\n" not in trail[comment:]:
-            trail = trail[:comment].rstrip()
-        edits.add(place, place, BARE, 0, trail, order)
-        return order + 1
-
-    def _direction(self, arc: Arc, text: ArcText) -> dict[int, tuple[int, int]]:
-        """The way in which a part of an arc begins."""
-        first, second = ((0, 1), (2, 0), (1, 2))[arc.plane]
-        way = np.zeros(3)
-        away = arc.start - arc.centre
-        way[first], way[second] = -away[second] * np.sign(arc.sweep), away[first] * np.sign(arc.sweep)
-        way /= np.linalg.norm(way)
-        if self.turn is not None:
-            way = way @ self.turn[int(self.path.frame[arc.move])]
-        return {
-            word: (round(float(way[axis]) * 10**_FINE_DECIMALS), _FINE_DECIMALS)
-            for axis, word in enumerate(text.direction)
-        }
-
-
-#: the axis of the normal of each plane
-_NORMAL = (2, 1, 0)

@@ -28,6 +28,12 @@ _CONTINUED = re.compile(rb"\$[ \t]*\Z")
 _WIDEST = 6
 
 
+def shown(text: bytes) -> str:
+    """Words of a program, for a message."""
+    said = text.decode("ascii", "backslashreplace")
+    return "".join(c if c.isprintable() else "?" for c in said[:40])
+
+
 @dataclass(frozen=True, slots=True)
 class Field:
     """One minor word of a statement: its text without blanks around it, in capitals, and its bytes
