@@ -221,6 +221,15 @@ _TABLE = (
         "`TECOMP/ON,0.0000105` in a DMIS program.",
     ),
     Rule(
+        "OLP413",
+        "sense of arcs assumed",
+        Severity.WARNING,
+        "CIRCLE statements of this form (NX) are read as turning right-handed about their normal, and no "
+        "joint of the program tells whether they do: along the other part of the circle errors differ.",
+        "Compare one arc with the simulation of the CAM system (olp view), or have it write GOTOs for arcs.",
+        "`CIRCLE/0,0,0,0,0,-1,5,0.06,0.5,10,0` behind a corner.",
+    ),
+    Rule(
         "OLP601",
         "wrong pairing",
         Severity.ERROR,

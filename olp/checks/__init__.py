@@ -32,6 +32,8 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
             out.append(finding("OLP301", f"{which}; millimetres assumed", [line]))
         elif name == "thermal":
             out.append(finding("OLP412", text, [line]))
+        elif name == "arcs":
+            out.append(finding("OLP413", text, [line]))
         elif name == "increments":
             out.append(
                 finding(

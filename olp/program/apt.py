@@ -12,10 +12,11 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.exceptions import ProgramError
 from olp.machine import Setup
-from olp.program.apt_arcs import resolved, tlon
+from olp.program.apt_arcs import ArcForm, Resolved, joints, resolved, tlon
 from olp.program.apt_events import UNIT, Cycle, Events, axis_of
 from olp.program.apt_table import FREE, TABLE
 from olp.program.dialect import Dialect, Options, Support
@@ -43,6 +44,7 @@ class _Reader(Events):
     def run(self) -> Program:
         for chunk in chunks(self.data):
             self._chunk(chunk)
+        self._judge_turns()
         x, y, z = self.start
         end = self.ended or self.data.count(b"\n") + 1
         return self.out.program(self.table.frames, (x, y, z), end, b"RAPID")
@@ -51,9 +53,9 @@ class _Reader(Events):
 
     def _chunk(self, chunk: Chunk) -> None:
         out = self.out
-        out.open(chunk)
+        out.begin(chunk)
         if self.ended:
-            out.close()
+            out.finish()
             return
         events: list[Statement] = []
         alone: list[Point] = []
@@ -80,14 +82,14 @@ class _Reader(Events):
         for statement, row in zip(events, upto, strict=True):
             self._event(statement, row)
             if self.ended:
-                out.close()
+                out.finish()
                 return
         self._resolve(len(self.points))
         # what was said of the point behind the last one holds for the first of the next chunk
         count = len(self.points)
         self.rapid = [row - count for row in self.rapid]
         self.arcs = [(row - count, form) for row, form in self.arcs]
-        out.close()
+        out.finish()
 
     def _event(self, statement: Statement, row: int) -> None:
         text = statement.text.strip().upper()
@@ -197,12 +199,42 @@ class _Reader(Events):
                     [form for _, form in arcs], start, end[rows], line[rows], self.unit_mm,
                     offset if offset.ndim == 1 else offset[rows], turn,
                 )  # fmt: skip
+                self._check_turns(arcs, found, start, end, rows, kind)
                 kind[rows] = np.where(found.sweep > 0, Kind.ARC_CCW, Kind.ARC_CW)
                 self.out.put_arcs(rows + self.out.moves, found.centre, found.plane, found.sweep)
                 for row, form in arcs:
                     self.out.arcs[row + self.out.moves] = form.text
             self.out.put_moves(kind, flag, line, frame, end, slot, begin, stop)
         self.position = end[-1].tolist()
+
+    def _check_turns(
+        self, arcs: Sequence[tuple[int, ArcForm]], found: Resolved, start: Array, end: Array, rows: Index,
+        kind: npt.NDArray[np.uint8],
+    ) -> None:  # fmt: skip
+        """What the joints of arcs with straight moves before them tell of the sense of turning."""
+        before = np.where(rows[:, None] > 1, end[np.maximum(rows - 2, 0)], np.array(self.position))
+        straight = (rows > 0) & (kind[np.maximum(rows - 1, 0)] == Kind.LINE) & ~np.isin(rows - 1, rows)
+        told = np.where(straight, joints(found, start, before), 0)
+        for (_, form), way in zip(arcs, told.tolist(), strict=True):
+            if form.way is not None or form.angle_rad is not None:
+                continue
+            if not form.sure and self.unsure is None:
+                self.unsure = form.line
+            if way > 0:
+                self.onward += 1
+            elif way < 0:
+                self.back.append(form.line)
+
+    def _judge_turns(self) -> None:
+        """Refuse a program whose arcs turn back where they should go on; remark one that does not tell."""
+        if len(self.back) > self.onward:
+            raise ProgramError(
+                "the arc turns right back where the move before it should go on: its normal seems to be "
+                "left-handed, which is not read",
+                line=self.back[0],
+            )
+        if self.unsure is not None and not self.onward:
+            self.out.remarks["arcs"] = (self.unsure, "arcs are taken as right-handed about their normals")
 
     def _frames(self, points: Points, part: slice) -> tuple[Index, Mask, Array]:
         """Of each point: the number of its frame, whether the tool turns on the way to it, and the direction

@@ -31,6 +31,8 @@ _AGAIN = re.compile(rb"(?i)2\s*,\s*INTOF\s*,")
 _TOKEN = re.compile(rb"[^\s,]+")
 #: a normal is an axis of the machine where the sine between them is below this
 _SQUARE = 1e-6
+#: a joint is tangent where the cosine between both ways is above this
+_TANGENT = 0.9999
 #: an angle that is said may differ from the one that the points give by this, and by what 0.01 mm subtends
 _ANGLE_RAD = 2e-3
 #: number of the plane (G17, G18, G19) by the axis of its normal
@@ -40,7 +42,8 @@ _PLANE_OF = np.array([2, 1, 0])
 @dataclass(frozen=True, slots=True)
 class ArcForm:
     """One arc as read, in the unit of the program: `angle_rad` where it is said; `way` is the direction in
-    which CATIA begins, and `second` whether the line counts when it is met again."""
+    which CATIA begins, and `second` whether the line counts when it is met again. Not `sure`: that it
+    turns right-handed about its normal was not seen in a program of that form."""
 
     text: ArcText
     line: int
@@ -51,6 +54,7 @@ class ArcForm:
     turns: int = 1
     way: tuple[float, ...] | None = None
     second: bool = False
+    sure: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +91,7 @@ def circle(statement: Statement, out: StatementCollector) -> ArcForm:
     text = ArcText(statement.begin, statement.end, ((a, b, c),), out.word(fields[6]) if has_radius else -1)
     return ArcForm(
         text, statement.line, tuple(values[:3]), tuple(values[3:6]), values[6] if has_radius else None,
-        turns=turns,
+        turns=turns, sure=len(values) < 8,
     )  # fmt: skip
 
 
@@ -192,6 +196,22 @@ def resolved(
     for i, form in enumerate(forms):
         _check(form, start[i], found[i], axes[i], float(sweep[i]), unit_mm)
     return Resolved(found, plane, sweep)
+
+
+def joints(found: Resolved, start: Array, before: Array) -> Index:
+    """(m,) of each arc 1 where it goes on as the straight move from `before` to its start goes, -1 where it
+    turns right back, 0 where there is a corner, which tells nothing."""
+    rows = np.arange(len(start))
+    axes = np.array(PLANES)[found.plane]
+    arm = start - found.centre
+    way = np.zeros_like(start)
+    way[rows, axes[:, 0]] = -arm[rows, axes[:, 1]] * np.sign(found.sweep)
+    way[rows, axes[:, 1]] = arm[rows, axes[:, 0]] * np.sign(found.sweep)
+    come = start - before
+    size = np.sqrt((way * way).sum(axis=1) * (come * come).sum(axis=1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosine = np.nan_to_num((way * come).sum(axis=1) / size)
+    return np.where(np.abs(cosine) > _TANGENT, np.sign(cosine), 0.0).astype(np.int64)
 
 
 def _catia(form: ArcForm, start: Array, end: Array, centre: Array, axes: Array, turn: Array | None) -> bool:

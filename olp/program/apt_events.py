@@ -72,6 +72,9 @@ class Events:
         self.rapid: list[int] = []
         self.driven: dict[int, ArcForm] = {}
         self.arcs: list[tuple[int, ArcForm]] = []
+        self.onward = 0
+        self.back: list[int] = []
+        self.unsure: int | None = None
         self.points: Points
         self.done = 0
         self._handlers: dict[bytes, Callable[[Statement, int], None]] = {

@@ -44,7 +44,7 @@ class _Reader(Events):
 
     def _chunk(self, chunk: Chunk) -> None:
         out = self.out
-        out.open(chunk)
+        out.begin(chunk)
         events: list[Statement] = []
         alone: list[Point] = []
         for found in () if self.ended else chunk.statements(_NO_TEXT):
@@ -70,7 +70,7 @@ class _Reader(Events):
                 break
         if not self.ended:
             self._resolve(len(self.points))
-        out.close()
+        out.finish()
 
     def _in_header(self, statement: Statement) -> bool:
         """The block BEGIN/CHFILE … END/CHFILE of WinWerth holds keys and values, no statements."""

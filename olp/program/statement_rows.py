@@ -73,14 +73,14 @@ class StatementCollector:
 
     # -- words and points of a chunk -----------------------------------------------------------------
 
-    def open(self, chunk: Chunk) -> None:
+    def begin(self, chunk: Chunk) -> None:
         """Begin a chunk: its lines, and the words of its plain points."""
         self.columns.put("line_start", chunk.line_start, np.int32)
         self.columns.put("line_end", chunk.line_end, np.int32)
         self._base = self.words
         self._put_words(chunk.mantissa, chunk.decimals, chunk.pointed, chunk.start, chunk.end)
 
-    def close(self) -> None:
+    def finish(self) -> None:
         """End a chunk: the words that were read alone stand behind those of its plain points."""
         if self._lone:
             mantissa, decimals, pointed, start, end = zip(*self._lone, strict=True)

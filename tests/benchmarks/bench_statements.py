@@ -58,8 +58,8 @@ def main() -> None:
             number = program.read_bytes().count(b"\n")
             each = cpu / number * 1e6
             first = first or each
-            print(f"{program.suffix}: {number} lines, {cpu:.2f} s, {each:.2f} us a line, {each / first:.2f} x G-code, "
-                  f"peak {peak / 1024:.0f} MB")  # fmt: skip
+            share = f"{each:.2f} us a line, {each / first:.2f} x G-code"
+            print(f"{program.suffix}: {number} lines, {cpu:.2f} s, {share}, peak {peak / 1024:.0f} MB")
             stages(program, described)
 
 
