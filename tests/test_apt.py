@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from dataclasses import replace
 from pathlib import Path
 
@@ -161,6 +162,21 @@ def test_a_turned_frame_turns_the_points(tmp_path: Path) -> None:
     assert away.max() < 0.2
 
 
+SHIPPED = Path(__file__).resolve().parents[1] / "programs" / "apt-flavours"
+
+
+@pytest.mark.parametrize("flavour", posts.FLAVOURS)
+def test_the_shipped_programs_are_those_of_their_script_and_are_corrected(flavour: str) -> None:
+    (path,) = SHIPPED.glob(f"{flavour}.*")
+    script = runpy.run_path(str(SHIPPED.parents[0] / "make" / "statements.py"))
+    assert path.read_bytes() == script["posted"](flavour)
+    setup = load_setup(None, SHIPPED / "job.toml")
+    result = olp.correct(path, setup)
+    assert result.report["deviation"]["holds"]
+    assert olp.verify(path, result.data, setup).report["deviation"]["holds"]
+    assert {f.code for f in result.findings} <= {"OLP103", "OLP105", "OLP303", "OLP413"}
+
+
 # -- statements ----------------------------------------------------------------------------------------
 
 
@@ -214,7 +230,7 @@ def test_a_split_rapid_stays_a_rapid_and_a_line_none(bent: Path) -> None:
         assert len(moves.kind) > rapids + 1
 
 
-def test_holes_are_corrected_above_their_place(bent: Path) -> None:
+def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
     data = (
         b"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/10,20,30\nCYCLE/DRILL,FEDTO,40.,MMPM,250.,RAPTO,3.,RTRCTO,25.\n"
         b"GOTO/10,20,0\nGOTO/60,-20,0\nCYCLE/OFF\nRAPID\nGOTO/0,0,50\n"
@@ -223,14 +239,29 @@ def test_holes_are_corrected_above_their_place(bent: Path) -> None:
     path = found.toolpath
     heights = (path.end_mm - ORIGIN)[:, 2] - 120.0
     assert heights.tolist() == pytest.approx([30, 3, -40, 25, 3, -40, 25, 50])
-    assert ((path.flag & Flag.CYCLE) != 0).tolist() == [False, False, True, True, False, True, True, False]
+    assert ((path.flag & Flag.CYCLE) != 0).tolist() == [False, True, True, True, True, True, True, False]
     result = olp.correct(data, bent)
-    places = np.array([[10, 20, 3], [60, -20, 3.0]]) + ORIGIN + [0, 0, 120]
-    want = JudgeModel(bent).command_for(places, [0.0, 0.0, -120.0]) - [0, 0, 3]
+    model, lever = JudgeModel(bent), [0.0, 0.0, -120.0]
+    places = np.array([[10, 20, 0], [60, -20, 0.0]]) + ORIGIN + [0, 0, 120]
+    ends = [model.command_for(places + [0, 0, z], lever) - [0, 0, z] for z in (3.0, -40.0)]
+    want = (ends[0] + ends[1]) / 2
     own = np.array(read_apt(result.data, FRAMES, LENGTHS).axis)[1:3]
     assert np.abs(own - want).max() < 1e-4
     moves = result.report["moves"]
-    assert (moves["corrected"], moves["approximated"], moves["passed"]) == (4, 4, 0)
+    assert (moves["corrected"], moves["approximated"], moves["passed"]) == (2, 6, 0)
+
+
+def test_holes_stand_where_a_canned_cycle_puts_them(bent: Path) -> None:
+    cycle = b"G21 G90 G54 G98\nT1 M6\nG43 H1\nG0 X10 Y20 Z30\nG81 X10. Y20. R3. Z-40. F250\nX60. Y-20.\nM2\n"
+    data = (
+        b"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/10,20,30\nCYCLE/DRILL,DEPTH,40.,MMPM,250.,CLEAR,3.,RTRCTO,30.\n"
+        b"GOTO/10,20,0\nGOTO/60,-20,0\nCYCLE/OFF\nFINI\n"
+    )
+    blocks = re.findall(rb"X([-\d.]+) ?Y([-\d.]+)", olp.correct(cycle, bent).data)[1:]
+    points = re.findall(rb"GOTO/([-\d.]+),([-\d.]+)", olp.correct(data, bent).data)[1:]
+    said = [np.array([[float(n) for n in row] for row in rows]) for rows in (blocks, points)]
+    assert len(said[0]) == len(said[1]) == 2
+    assert np.abs(said[0] - said[1]).max() <= 2e-4
 
 
 def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:

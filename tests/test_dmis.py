@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import runpy
 from dataclasses import replace
 from pathlib import Path
 
@@ -92,6 +93,16 @@ def test_a_nominal_alignment_corrects_the_probe_path(bent: Path, zero: Path) -> 
     assert moves["inserted_blocks"] == 0
     assert result.report["deviation"]["holds"]
     assert not {"OLP101", "OLP104", "OLP306"} & {f.code for f in result.findings}
+
+
+def test_the_shipped_program_is_that_of_its_script_and_is_corrected() -> None:
+    folder = Path(__file__).resolve().parents[1] / "programs"
+    path = folder / "dmis-housing" / "housing.dmi"
+    script = runpy.run_path(str(folder / "make" / "statements.py"))
+    assert path.read_bytes() == script["housing"]()
+    result = olp.correct(path, load_setup(None, path.with_name("job.toml")))
+    assert result.report["deviation"]["holds"]
+    assert result.report["moves"]["passed"] == 1
 
 
 @pytest.mark.corpus

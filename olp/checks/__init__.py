@@ -175,11 +175,11 @@ def stroke_findings(program: Program, model: ErrorModel, tolerance_mm: float) ->
     tool = path.tool_mm()
     levers = tool if tool.ndim == 1 else tool[top]
     change = model.error(path.end_mm[bottom], levers) - model.error(path.end_mm[top], levers)
-    lean = np.nan_to_num(np.sqrt((change * change).sum(axis=1)))
+    lean = np.nan_to_num(np.sqrt((change * change).sum(axis=1))) / 2
     wide = lean > tolerance_mm
     if not wide.any():
         return []
-    what = f"{int(wide.sum())} holes lean by up to {lean.max() * 1e3:.2f} um between clearance and bottom"
+    what = f"{int(wide.sum())} holes lean by up to {lean.max() * 1e3:.2f} um at clearance and bottom"
     return [finding("OLP105", what, path.line[top[wide]].tolist())]
 
 

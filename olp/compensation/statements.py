@@ -32,7 +32,7 @@ Index = npt.NDArray[np.int64]
 CHUNK = 1 << 15
 _POW10 = 10.0 ** np.arange(19)
 _INT10 = 10 ** np.arange(19, dtype=np.int64)
-_BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL | Flag.PASS)
+_BYPASS = np.uint8(Flag.CONTROL | Flag.PASS)
 
 
 class StatementWriter:
@@ -149,7 +149,7 @@ class StatementWriter:
         """What is written at each row, and where that leads."""
         move, part = rows.move, slice(rows.first, rows.first + len(rows.move))
         frame = self.path.frame[move]
-        command, raw = self.plan.command_mm[part], self.plan.raw[part]
+        command, raw = self._middled(rows, self.plan.command_mm[part]), self.plan.raw[part]
         unit = self.unit[frame]
         local = self.local(command, frame)
         slot = np.where(rows.head[:, None], self.program.slot[move], -1)
@@ -183,6 +183,19 @@ class StatementWriter:
         for a, b in pairwise([0, *changes.tolist(), len(move)]):
             if counting[a]:
                 self._counted(rows, a, b, local, word, own, given, held)
+
+    def _middled(self, rows: Rows, command: Array) -> Array:
+        """Commands with the places of holes corrected as the middle of their strokes asks for."""
+        strokes = self.statements.strokes
+        low, high = np.searchsorted(strokes[:, 0], (rows.move[0], rows.move[-1] + 1))
+        if high == low:
+            return command
+        top, bottom = (np.searchsorted(rows.move, strokes[low:high, k]) for k in (0, 1))
+        end = self.path.end_mm
+        away = command - end[rows.move]
+        out = command.copy()
+        out[top] += np.nan_to_num(away[bottom] - away[top]) / 2
+        return out
 
     def _counted(
         self, rows: Rows, a: int, b: int, local: Array, word: Index, own: Index, given: Mask, held: Mask

@@ -299,8 +299,10 @@ class _Reader(Events):
             x, y, z = (up * (cycle.clear_mm or 0.0)).tolist()
             own = self.table.lifted(int(frame[i]), (x, y, z)) if cycle.clear_mm else int(frame[i])
             at = end[i] + up * (cycle.clear_mm or 0.0)
+            stroke = cycle.depth_mm is not None and cycle.clear_mm is not None
+            flag = np.array([Flag.CYCLE if stroke else 0], np.uint8)
             out.put_moves(
-                np.array([Kind.RAPID], np.uint8), np.zeros(1, np.uint8), [where], [own], at[None],
+                np.array([Kind.RAPID], np.uint8), flag, [where], [own], at[None],
                 slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip
             out.put_feed(out.moves, cycle.feed_mm_s, where)
