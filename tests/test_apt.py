@@ -243,7 +243,8 @@ def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
     result = olp.correct(data, bent)
     model, lever = JudgeModel(bent), [0.0, 0.0, -120.0]
     places = np.array([[10, 20, 0], [60, -20, 0.0]]) + ORIGIN + [0, 0, 120]
-    ends = [model.command_for(places + [0, 0, z], lever) - [0, 0, z] for z in (3.0, -40.0)]
+    levels = [np.array([0.0, 0.0, z]) for z in (3.0, -40.0)]
+    ends = [model.command_for(places + level, lever) - level for level in levels]
     want = (ends[0] + ends[1]) / 2
     own = np.array(read_apt(result.data, FRAMES, LENGTHS).axis)[1:3]
     assert np.abs(own - want).max() < 1e-4
