@@ -13,7 +13,7 @@ from typing import NoReturn, TypeVar
 import numpy as np
 
 from olp.exceptions import InputError
-from olp.program.dmis import MACHINE_FRAME
+from olp.program.dmis_events import MACHINE_FRAME
 from olp.program.numbertext import Number, number
 from olp.program.statement_lexer import Comment, Statement, chunks
 from olp.results.reported import Carried, Reported, Stated
