@@ -70,7 +70,7 @@ class LetteredWriter(StatementWriter):
         ends = self.program.line_end
         return int(ends[min(int(np.searchsorted(ends, at)), len(ends) - 1)])
 
-    def _fewest(self, unit: Array) -> Index:
+    def fewest(self, unit: Array) -> Index:
         """(n, 3) the fewest decimals of numbers in units (n,), which are any here."""
         finest = self.finest
         known = {u: [max(self.style.least(axis, u), finest) for axis in range(3)] for u in set(unit.tolist())}

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from olp.program.described import Rule, UserDialect
 from olp.program.forms import NUMBERS
 from olp.program.lexer import Bytes, Index, Mask, numbers, runs
+from olp.program.numbertext import LONGEST
 
 _DIGITS = b"0123456789."
 _POW10 = 10.0 ** np.arange(19)
@@ -170,6 +171,7 @@ def _tokens(text: Bytes) -> tuple[Index, Index, Index, npt.NDArray[np.int8], Mas
     said = digit[end] > digit[begin]
     begin, end = begin[said], end[said]
     good = (point[end] - point[begin] <= 1) & (signs[end] - signs[begin] <= sign[begin])
+    good &= end - begin <= LONGEST
     # one odd number, as in a comment, would have all of them read one by one
     step = np.zeros(len(text) + 1, np.int8)
     step[begin[good]] += 1

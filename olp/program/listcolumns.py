@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from olp.program.delimited import DELIMITERS, Layout
 from olp.program.lexer import Bytes, Index, Mask, blanked, numbers, runs
+from olp.program.numbertext import LONGEST
 
 #: Positions are smaller, and so many digits are exact.
 _MOST = 10**15
@@ -154,7 +155,8 @@ def plain_numbers(
     if len(begin) != len(first) or (begin != first).any() or (end != last).any():
         return None
     mantissa, decimals, _, malformed = numbers(compact, compact[8 : len(compact) - 8], begin, end)
-    if malformed.size or (np.abs(mantissa) >= _MOST).any():
+    long = (stop - start).max(initial=0) > LONGEST
+    if malformed.size or long or (np.abs(mantissa) >= _MOST).any():
         return None
     back = np.empty_like(order)
     back[order] = np.arange(len(order))

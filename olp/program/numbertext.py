@@ -13,6 +13,8 @@ Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
 #: Decimals beyond these say nothing that a double holds.
 MOST_DECIMALS = 10
+#: Longer texts are no numbers.
+LONGEST = 40
 #: No position is that large, whatever its unit.
 _MOST = 1e8
 _NUMBER = re.compile(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
@@ -48,7 +50,7 @@ def number(text: bytes, decimal: bytes = b".") -> Number | None:
         return None
     sign, whole, mark, fraction, letter, exponent = found.groups(b"")
     power = int(exponent or b"0")
-    if abs(power) > 99 or len(whole) + len(fraction) > 40:
+    if abs(power) > 99 or len(text) > LONGEST:
         return None
     value = float(sign + (whole or b"0") + b"." + (fraction or b"0") + b"e%d" % power)
     if abs(value) >= _MOST:
