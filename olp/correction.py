@@ -89,7 +89,11 @@ def correct_bytes(
         )
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
-    limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
+    lettered = program.statements is not None and bool(program.statements.decimal)
+    limits = Limits(
+        tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold,
+        insert=not lettered,
+    )  # fmt: skip
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
     written = write(

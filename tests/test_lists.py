@@ -156,6 +156,20 @@ def test_places_are_no_path_unless_the_profile_says_so(machine: Path) -> None:
         olp.correct(LONG, setup_of(machine), split_rapids=True)
 
 
+def test_no_row_takes_up_lost_motion_where_none_may_be_inserted(tmp_path: Path) -> None:
+    recipe = Recipe(work_offsets=FRAMES, backlash_um={"X": 8.0, "Y": 5.0, "Z": 6.0})
+    machine = random_machine(tmp_path / "m", 4, recipe)
+    places = [(0, 0, 0), (50, 0, 0), (20, 10, 0), (60, -10, 5), (10, 20, 5), (11, 20, 5), (10.5, 20, 6)]
+    rows = "".join(f"{x:.3f},{y:.3f},{z:.3f}\n" for x, y, z in places)
+    text = ("X_mm,Y_mm,Z_mm\n" + rows).encode()
+    for dialect in (None, layout(joined="lines")):
+        result = olp.correct(text, setup_of(machine, dialect))
+        assert result.data.count(b"\n") == text.count(b"\n") + 1
+    more = olp.correct(text, setup_of(machine, layout(joined="lines", insert=True)))
+    assert more.data.count(b"\n") > text.count(b"\n") + 1
+    assert more.report["deviation"]["holds"]
+
+
 def test_no_row_is_inserted_where_rows_have_a_time(machine: Path) -> None:
     text = LONG.replace(b"Z_mm\n", b"Z_mm,t_s\n").replace(b"100.0000\n", b"100.0000,0.5\n")
     dialect = layout(joined="lines", insert=True, columns={"t": "t_s"})
