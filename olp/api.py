@@ -17,9 +17,9 @@ from olp.errormodel.base import Array
 from olp.exceptions import ConfigError, OlpError, naming
 from olp.files.config import load_setup as load_setup
 from olp.findings import Finding
-from olp.loading import PathLike, lever_of, load, profile_of, setup_of, source_of, unrolled
+from olp.loading import PathLike, lever_of, load, reading, setup_of, source_of, unrolled
 from olp.machine import Setup
-from olp.program.reader import Options, read
+from olp.program.dialects import Options, read
 from olp.progress import Progress, silent
 from olp.toolpath import Kind, carried
 
@@ -112,11 +112,13 @@ def verify(
     tell = progress or silent
     options = Options(contour=contour)
     texts = [source_of(p) for p in (nominal, corrected)]
+    with naming(texts[0][1]):
+        loaded = loaded.reading(*texts[0])
     programs = []
     for data, name in texts:
         tell("read", 0.0)
         try:
-            programs.append((read(data, loaded.setup, loaded.profile, options), name))
+            programs.append((read(data, loaded.setup, loaded.dialect, options), name))
         except OlpError as error:
             raise error.in_file(name or "<program>") from None
     run = verify_programs(
@@ -139,9 +141,9 @@ def simulate(
     from olp.deviation import Tracer
 
     data, name = source_of(program)
-    loaded = load(machine, job, outside_box)
     try:
-        path = read(data, loaded.setup, loaded.profile, Options(contour=contour), words=False).toolpath
+        loaded = load(machine, job, outside_box).reading(data, name)
+        path = read(data, loaded.setup, loaded.dialect, Options(contour=contour), words=False).toolpath
         shift = zero_shifts(path.frames, loaded.model)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
@@ -149,11 +151,11 @@ def simulate(
         return Simulation(np.zeros((0, 3)), np.zeros(0), "")
     actual, move = Tracer.trace(path, loaded.model, step_mm)
     home = path.frames[int(path.frame[0])]
-    origin = np.array(home.offset_mm) - np.array(home.length_mm)
     lengths = path.per_frame([f.length_mm for f in path.frames])
-    actual = actual - origin - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    tip = actual - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    actual = home.tip_mm(tip)
     known = np.isfinite(actual).all(axis=1)
-    return Simulation(actual[known], path.line[move[known]], home.work_offset)
+    return Simulation(actual[known], path.line[move[known]].astype(np.float64), home.work_offset)
 
 
 def inspect(
@@ -162,10 +164,9 @@ def inspect(
     """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
     matrix."""
     data, name = source_of(program)
-    setup = setup_of(machine, job)
-    profile = profile_of(setup)
     try:
-        found = read(data, setup, profile)
+        setup, dialect = reading(setup_of(machine, job), data, name)
+        found = read(data, setup, dialect)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
     path = found.toolpath
@@ -178,8 +179,8 @@ def inspect(
     findings = checks.program_findings(found, setup, contour=False)
     return {
         "name": Path(name).name if name else "",
-        "dialect": profile.name,
-        "dialect_title": profile.title,
+        "dialect": dialect.name,
+        "dialect_title": dialect.title,
         "lines": found.lines,
         "moves": {kind.name.lower(): int((path.kind == kind).sum()) for kind in Kind},
         "cycles": len(found.holes),
@@ -192,7 +193,7 @@ def inspect(
         ],
         "stamped": find_stamp(data) is not None,
         "findings": [f.as_dict() for f in findings],
-        "support": profile.support(),
+        "support": dialect.support(),
     }
 
 
@@ -241,7 +242,8 @@ def flatten(
     """Unroll loops, subprograms, expressions and, if asked, canned cycles into plain blocks. Not lossless."""
     data, name = source_of(program)
     try:
-        return unrolled(data, name, setup_of(machine, job), expand_cycles)
+        setup = setup_of(machine, job)
+        return unrolled(data, name, setup, reading(setup, data, name)[1], expand_cycles)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
 

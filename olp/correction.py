@@ -17,14 +17,14 @@ from olp.compensation.invert import TOLERANCE_MM
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
-from olp.compensation.writer import Writer
+from olp.compensation.writing import write
 from olp.errormodel.base import Array
-from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, naming
+from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, UsageError, naming
 from olp.findings import Finding
 from olp.loading import Loaded, unrolled
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.progress import Progress
 from olp.proof import ROUNDING_SHARE, Proof, prove
 from olp.toolpath import Flag, Index, Toolpath
@@ -78,25 +78,34 @@ def correct_bytes(
             "model twice; correct the nominal program",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
+    loaded = loaded.reading(data, name)
     if unroll or expand:
-        data = unrolled(data, name, loaded.setup, expand, clearance)
+        data = unrolled(data, name, loaded.setup, loaded.dialect, expand, clearance)
     tell("read", 0.0)
-    program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
+    program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
+    if rapids and program.statements is not None and program.statements.decimal:
+        raise UsageError(
+            "--split-rapids does not go with this dialect: nothing says how the machine goes between its "
+            "places; "
+            'state joined = "lines" and insert = true in the profile'
+        )
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
-    limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
+    lettered = program.statements is not None and bool(program.statements.decimal)
+    limits = Limits(
+        tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold,
+        insert=not lettered,
+    )  # fmt: skip
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
-    writer = Writer(
+    written = write(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.profile.comment),
+        stamp=stamp_line(loaded.digest, loaded.dialect.comment) if loaded.dialect.marks else b"",
     )  # fmt: skip
-    text = writer.text()
-    if not writer.changed:
-        text = data
-    parts, tally, holes = writer.parts, writer.tally, writer.holes
-    del writer
+    text = written.text if written.changed else data
+    parts, tally, holes = written.parts, written.tally, written.holes
+    del written
     tell("prove", 0.7)
     path = program.toolpath
     nominal = replace(program, words=None, slot=program.slot[:0])
@@ -104,7 +113,7 @@ def correct_bytes(
     passed = rows.passed
     corrections = _largest_correction(path, _ends(rows, len(path)))
     del rows
-    corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    corrected = read(text, loaded.setup, loaded.dialect, Options(contour=contour), words=False)
     proof = prove(
         nominal,
         corrected,
@@ -118,7 +127,9 @@ def correct_bytes(
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
+        *checks.between_findings(nominal, proof, loaded.model),
         *checks.hole_findings(holes, limits.tolerance_mm),
+        *checks.stroke_findings(nominal, loaded.model, limits.tolerance_mm),
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
@@ -161,6 +172,7 @@ def verify_programs(
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
+        *checks.between_findings(first, proof, loaded.model),
         *checks.program_findings(first, loaded.setup, contour=contour),
         *_model(first.toolpath, loaded, limits.tolerance_mm),
     )
@@ -196,8 +208,8 @@ def _prove_without_deleted(
         return
     options = Options(block_delete=True, contour=contour)
     line = int(path.line[deleted][0])
-    nominal = read(program.data, loaded.setup, loaded.profile, options, words=False)
-    corrected = read(text, loaded.setup, loaded.profile, options, words=False)
+    nominal = read(program.data, loaded.setup, loaded.dialect, options, words=False)
+    corrected = read(text, loaded.setup, loaded.dialect, options, words=False)
     try:
         rows = plan(nominal.toolpath, loaded.model, replace(limits, refuse_outside=False))
         proof = prove(
@@ -240,7 +252,7 @@ def report_of(
             "name": Path(name).name if name else "",
             "sha256": hashlib.sha256(data).hexdigest(),
             "lines": program.lines,
-            "dialect": loaded.profile.name,
+            "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),
         },
         "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
@@ -277,7 +289,7 @@ def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> d
     halves = [
         0.5 * least
         if any(
-            not _multiple(10.0 ** -fewest_decimals(least, u, program.profile.inch_decimals) * u, least)
+            not _multiple(10.0 ** -fewest_decimals(least, u, loaded.dialect.inch_decimals) * u, least)
             for u in units
         )
         else 0.0
@@ -318,7 +330,7 @@ def _largest_correction(path: Toolpath, command_mm: Array) -> float:
 def last_digit_mm(program: Program, setup: Setup) -> float:
     """The coarsest last digit that the corrected program is written with."""
     units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
-    inch = program.profile.inch_decimals
+    inch = program.dialect.inch_decimals
     return max(
         10.0 ** -fewest_decimals(least, unit, inch) * unit
         for least in setup.machine.least_increment_mm

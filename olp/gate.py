@@ -24,8 +24,8 @@ from olp.findings import GATE_CODES, Finding
 from olp.geometry import PLANES
 from olp.loading import Loaded, PathLike, load, setup_of, source_of
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.progress import Progress, silent
 from olp.proof import Proof
 from olp.toolpath import Flag
@@ -69,7 +69,7 @@ class _Case:
         """A program with its words, which a correction drops early."""
         if program.words is not None:
             return program
-        return read(program.data, self.loaded.setup, self.loaded.profile, self.options)
+        return read(program.data, self.loaded.setup, self.loaded.dialect, self.options)
 
 
 def check(
@@ -105,6 +105,8 @@ def check(
         setup = replace(setup, machine=replace(setup.machine, compensated_by_controller=frozenset()))
     loaded = load(setup, None, "hold")
     data, name = source_of(program)
+    with naming(name):
+        loaded = loaded.reading(data, name)
     outside = "OLP405" if outside_box == "refuse" else "OLP403"
     options = Options(contour=contour)
     with naming(name):
@@ -150,13 +152,13 @@ def _case(
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
         return _Case(name, data, run.corrected, run, proof, loaded, options, what)
-    written = read(data, loaded.setup, loaded.profile, options)
+    written = read(data, loaded.setup, loaded.dialect, options)
     if nominal is None:
         what = "the corrected program as it is; what needs the nominal one is left out (--nominal)"
         return _Case(name, data, written, None, None, loaded, options, what)
     source, other = source_of(nominal)
     try:
-        first = read(source, loaded.setup, loaded.profile, options)
+        first = read(source, loaded.setup, loaded.dialect, options)
     except OlpError as error:
         raise error.in_file(other or "<nominal>") from None
     run = verify_programs(

@@ -8,26 +8,35 @@ from pathlib import Path
 from typing import Literal
 
 from olp.errormodel import Calibration, ErrorModel, build
-from olp.exceptions import ConfigError
+from olp.exceptions import ConfigError, UsageError
 from olp.files.calibration import files_beside, load_calibration
 from olp.files.config import load_setup
+from olp.files.described import described
 from olp.files.structure import read_drift_log, sensors_of
 from olp.files.write import read_bytes
 from olp.machine import Job, Setup
-from olp.program.profiles import PROFILES, Profile
+from olp.program.dialect import Dialect
+from olp.program.dialects import DIALECTS, dialect_of
 
 PathLike = str | Path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """Everything loaded that a run needs."""
+    """Everything loaded that a run needs. `dialect` is that of the control until a program is there
+    (`reading`)."""
 
     setup: Setup
-    profile: Profile
+    dialect: Dialect
     calibration: Calibration
     model: ErrorModel
     digest: str
+
+    def reading(self, data: bytes, name: str) -> Loaded:
+        """The same for a program: its dialect is settled here, also for what is made of it later. Raises
+        ProgramError where it cannot be told."""
+        setup, dialect = reading(self.setup, data, name)
+        return replace(self, setup=setup, dialect=dialect)
 
 
 def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refuse", "hold"]) -> Loaded:
@@ -47,7 +56,7 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
     calibration = at_temperatures(calibration, setup.job)
     skip = described.compensated_by_controller - calibration.active_during_measurement
     model = build(calibration, described.chain, outside=outside, skip_components=frozenset(skip))
-    return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
+    return Loaded(setup, control_of(setup), calibration, model, _digest(described.calibration, described))
 
 
 def at_temperatures(calibration: Calibration, job: Job) -> Calibration:
@@ -75,14 +84,25 @@ def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
     return machine if isinstance(machine, Setup) else load_setup(machine, job)
 
 
-def profile_of(setup: Setup) -> Profile:
+def control_of(setup: Setup) -> Dialect:
     """What the control of a machine reads and writes."""
-    profile = PROFILES.get(setup.machine.controller)
-    if profile is None:
+    dialect = DIALECTS.get(setup.machine.controller) or described(setup.machine.controller)
+    if dialect is None:
         raise ConfigError(
-            f"controller {setup.machine.controller!r} has no profile; expected one of {', '.join(PROFILES)}"
+            f"controller {setup.machine.controller!r} has no dialect; expected one of {', '.join(DIALECTS)}"
         )
-    return profile
+    return dialect
+
+
+def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
+    """The dialect of a program, and the setup with it named, so that what is made of the program later is
+    read alike. Raises ProgramError where it cannot be told, UsageError for a name that there is not."""
+    own = setup.job.described
+    if isinstance(own, Dialect):
+        return setup, own
+    dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
+    own = None if dialect.name in DIALECTS else dialect
+    return replace(setup, job=replace(setup.job, dialect=dialect.name, described=own)), dialect
 
 
 def _digest(calibration: str, machine: object) -> str:
@@ -101,14 +121,18 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: float | None = None) -> bytes:
+def unrolled(
+    data: bytes, name: str, setup: Setup, dialect: Dialect, expand: bool, clearance: float | None = None
+) -> bytes:
     """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
-    Payloads that the job gives by line become comments first, as lines are others afterwards."""
+    Payloads that the job gives by line become comments first, as lines are others afterwards. Raises
+    UsageError for a dialect that has none of them."""
     from olp.program.directives import with_payloads
     from olp.program.flatten import flatten as unroll
 
-    profile = profile_of(setup)
-    data = with_payloads(data, setup.job.payloads, profile.comment)
+    if dialect.family != "rs274":
+        raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
+    data = with_payloads(data, setup.job.payloads, dialect.comment)
     folder = Path(name).parent if name else None
 
     def beside(wanted: str) -> bytes | None:
@@ -121,7 +145,7 @@ def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: floa
         return None
 
     return unroll(
-        data, profile=profile.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
+        data, profile=dialect.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
     )
 
 

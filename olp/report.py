@@ -39,8 +39,8 @@ def to_text(report: Report) -> str:
         _sources(report),
         _worst(report),
         findings_text(report.get("findings") or ()),
-        _sentences("What this proves", report.get("proves") or ()),
-        _sentences("What it does not prove", report.get("does_not_prove") or ()),
+        sentences("What this proves", report.get("proves") or ()),
+        sentences("What it does not prove", report.get("does_not_prove") or ()),
     )
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
@@ -303,7 +303,7 @@ def _place(finding: Report) -> str:
     return place + (f" ({count} in all)" if count > 1 else "")
 
 
-def _sentences(title: str, sentences: Sequence[str]) -> Iterator[str]:
+def sentences(title: str, sentences: Sequence[str]) -> Iterator[str]:
     if sentences:
         yield title
     for sentence in sentences:

@@ -15,6 +15,12 @@ import olp
 DAY = datetime.date(2026, 11, 21)
 #: units, a path tolerance and known axes, so that nothing else is found
 HEAD = b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"
+DMIS = b"DMISMN/'CHECK',05.2\nUNITS/MM,ANGDEC\n"
+MCS = '[work_offsets.MCS]\nset_by = "true"\n'
+PROBED = b"GOTO/10,10,10\nMEAS/POINT,F(A),1\nPTMEAS/CART,10,10,0,0,0,1\nENDMES\nENDFIL\n"
+APT = b"UNITS/MM\nRAPID\nGOTO/-5,-10,0\nFEDRAT/600,MMPM\n"
+#: an arc of NX that begins upwards in Y
+TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
 TOUCH = "[work_offsets.G54]\n"
 
 
@@ -240,6 +246,14 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP411": (
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
+    ),
+    "OLP412": (
+        Call(b"TECOMP/ON,0.00001\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
+        Call(b"TECOMP/OFF\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
+    ),
+    "OLP413": (
+        Call(b"GOTO/5,1,0\n" + TURN, APT, controller="apt"),
+        Call(b"GOTO/10,-10,0\n" + TURN, APT, controller="apt"),
     ),
     "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
     "OLP421": (

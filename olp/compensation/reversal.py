@@ -52,9 +52,11 @@ class Reversal:
         return Reversal(axes, band_mm, lost.max(axis=0)) if axes.any() else None
 
 
-def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal) -> Plan:
+def carry_play(
+    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool = True
+) -> Plan:
     """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed
-    move, a row that only takes it up comes first.
+    move, a row that only takes it up comes first; without `insert` not before moves that are never split.
 
     Where one axis turns the straightness of another may jump with it, and that one turns too: the states are
     gone through until they agree.
@@ -80,14 +82,17 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
         if np.abs(play - before).max(initial=0.0) < 1e-3:
             break
     rows = replace(rows, command_mm=command, play=play)
-    turns &= _may_turn(path, rows)[:, None]
+    turns &= _may_turn(path, rows, insert=insert)[:, None]
     return _take_up(model, rows, tool, held, turns) if turns.any() else rows
 
 
-def _may_turn(path: Toolpath, rows: Plan) -> Mask:
-    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place."""
+def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:
+    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place.
+    Without `insert` not before those that are never split."""
     may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
+    if not insert:
+        may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0
     may[:1] = False
     may[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
     return np.asarray(may, bool)

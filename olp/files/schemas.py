@@ -23,6 +23,7 @@ from olp.files.fields import (
     NotNegative,
     OffsetName,
     Positive,
+    ProgramDialect,
     Sign,
     Text,
     ToolNumber,
@@ -203,6 +204,13 @@ class JobDefaultsTable(Table):
     length_active: bool = Field(default=False, description="whether the tool length is active at the start")
 
 
+class StylusTable(Table):
+    offset_mm: Triple = Field(
+        description="from the end of the ram to the centre of the tip, in mm; the lever of angular errors"
+    )
+
+
+Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]
 
@@ -238,6 +246,7 @@ class MachineFile(Table):
     )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
+    styli: Styli = Field(default={}, description="tables [styli.LABEL], for the sensors of DMIS programs")
     job_defaults: JobDefaultsTable = Field(
         default_factory=JobDefaultsTable, description="the state at the start of a program"
     )
@@ -439,6 +448,11 @@ class JobFile(Table):
     machine: Text | None = Field(
         default=None, description="the path of the machine file, relative to this file"
     )
+    dialect: ProgramDialect | None = Field(
+        default=None,
+        description="the dialect of the program, where its text and its ending do not say: "
+        + ", ".join(CONTROLLERS),
+    )
     start_mm: Position = Field(
         default_factory=Position,
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
@@ -459,6 +473,7 @@ class JobFile(Table):
         default={}, description="tables [work_offsets.NAME], which override the machine's"
     )
     tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
+    styli: Styli = Field(default={}, description="tables [styli.LABEL], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
 
     @field_validator("payloads")

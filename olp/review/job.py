@@ -19,8 +19,8 @@ from olp.files.points import read_points
 from olp.files.write import read_bytes, write_bytes
 from olp.loading import Loaded, PathLike, load, source_of, unrolled
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.progress import Progress, silent
 from olp.proof.matching import match as match_moves
 from olp.retiming import retime
@@ -94,11 +94,12 @@ def view(
     """
     tell = progress or silent
     data, name = source_of(program)
-    loaded = load(machine, job, "hold" if corrected is not None else outside_box)
+    with naming(name):
+        loaded = load(machine, job, "hold" if corrected is not None else outside_box).reading(data, name)
     setup, options = loaded.setup, Options(contour=contour)
     if flatten or expand_cycles:
         with naming(name):
-            data = unrolled(data, name, setup, expand_cycles, peck_clearance_mm)
+            data = unrolled(data, name, setup, loaded.dialect, expand_cycles, peck_clearance_mm)
     if corrected is not None:
         other, corrected_name = source_of(corrected)
     else:
@@ -111,9 +112,9 @@ def view(
         other = correction.data
     tell("read", 0.0)
     with naming(name):
-        nominal = read(data, setup, loaded.profile, options)
+        nominal = read(data, setup, loaded.dialect, options)
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
-        second = read(other, setup, loaded.profile, options)
+        second = read(other, setup, loaded.dialect, options)
         if correction is not None:
             report = correction.report
         else:

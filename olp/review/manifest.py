@@ -61,7 +61,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "program": scene.name,
         "corrected": scene.corrected_name,
         "machine": scene.machine.name,
-        "profile": scene.nominal.profile.name,
+        "profile": scene.nominal.dialect.name,
         "digest": scene.digest,
         "compression": "deflate",
         "origin_mm": origin.tolist(),

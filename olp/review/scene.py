@@ -35,7 +35,7 @@ class Frame:
     def of(path: Toolpath) -> Frame:
         """The work offset of a program that has one and the same all through, else the machine."""
         used = [path.frames[k] for k in np.unique(path.frame).tolist()]
-        places = {(f.work_offset, *np.round(np.subtract(f.offset_mm, f.length_mm), 9).tolist()) for f in used}
+        places = {(f.work_offset, *np.round(f.origin_mm(), 9).tolist()) for f in used}
         if len(places) == 1:
             name, x, y, z = places.pop()
             return Frame(f"{name}, as programmed", str(name), (x, y, z))
