@@ -6,16 +6,21 @@ import json
 from typing import Any
 
 from olp.exceptions import UsageError
-from olp.files.schemas import FILES
+from olp.files.described import DialectFile
+from olp.files.point_profile import PointProfile
+from olp.files.schemas import FILES, Table
+
+KINDS: dict[str, type[Table]] = {**FILES, "points": PointProfile, "dialect": DialectFile}
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(kind: str) -> dict[str, Any]:
-    """The JSON Schema of a "machine", "calibration" or "job" file; raises UsageError for any other kind."""
-    if kind not in FILES:
-        raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(FILES)}')
-    schema = _cleaned(FILES[kind].model_json_schema(by_alias=True, mode="validation"))
+    """The JSON Schema of a file: "machine", "calibration", "job", "points" or "dialect"; raises UsageError
+    for any other kind."""
+    if kind not in KINDS:
+        raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(KINDS)}')
+    schema = _cleaned(KINDS[kind].model_json_schema(by_alias=True, mode="validation"))
     return {"$schema": DIALECT, "title": f"olp {kind} file", **schema}
 
 
