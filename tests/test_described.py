@@ -22,6 +22,7 @@ from olp.exceptions import ConfigError, OlpError, ProgramError
 from olp.files.config import load_setup
 from olp.files.described import described, load_described
 from olp.files.fields import SHIPPED
+from olp.files.json_schema import json_schema
 from olp.machine import Setup
 from olp.program.dialect import Dialect, Support
 from olp.program.dialects import read
@@ -296,6 +297,11 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path: Path, change: tuple[str, st
     with pytest.raises(ConfigError, match=re.escape(words)) as caught:
         load_described(path)
     assert "line " in str(caught.value) or "missing" in words
+
+
+@pytest.mark.parametrize("kind", ["points", "dialect"])
+def test_files_have_a_schema(kind: str) -> None:
+    assert json_schema(kind)["properties"]["schema"]["const"] == f"olp-{kind}-1"
 
 
 # -- the files that come with olp --------------------------------------------------------------------

@@ -58,9 +58,13 @@ def write(
 
 def _plain(program: Program, rows: Plan) -> bool:
     """Whether numbers that keep their own form are all written as the writer of statements does: no column is
-    padded, no number has a sign or zeros that it need not have, none is shared, and no move is split."""
+    padded, no number has a sign or zeros that it need not have, none is shared, and nothing stands behind a
+    move that is split."""
     words, said = program.words, program.statements
-    if words is None or said is None or len(rows) != len(program.toolpath) or not len(words.start):
+    if words is None or said is None or not len(words.start):
+        return False
+    split = np.unique(rows.move[1:][rows.move[1:] == rows.move[:-1]])
+    if not np.isin(said.end[split], program.line_end).all():
         return False
     if said.decimal != b"." or any(f.unit_mm not in (1.0, MM_PER_INCH) for f in program.toolpath.frames):
         return False
@@ -72,7 +76,9 @@ def _plain(program: Program, rows: Plan) -> bool:
     whole = size // _POW10[words.decimals]
     length = 1 + (whole[:, None] >= _POW10[1:10]).sum(axis=1) + (words.mantissa < 0)
     length += np.where(words.decimals > 0, words.decimals + 1, 0)
-    # a zero behind a minus, a plus, zeros in front and exponents all show in the length
+    # zero behind a minus, which rounding leaves
+    length += (size == 0) & (text[words.number] == ord("-"))
+    # a plus, zeros in front and exponents all show in the length
     if (words.end - words.number != length).any() or (slot != np.arange(len(slot))).any():
         return False
     return (

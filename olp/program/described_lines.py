@@ -52,46 +52,42 @@ class Text:
 
     def __init__(self, data: bytes) -> None:
         self.data = data
-        head = 3 if data[:3] == b"\xef\xbb\xbf" else 0
-        rows = data[head:].splitlines(keepends=True)
-        size = np.array([len(r) for r in rows], np.int64)
-        bare = np.array([len(r.rstrip(b"\r\n")) for r in rows], np.int64)
-        self.start = head + np.cumsum(size) - size
-        self.end = self.start + bare
-        self.lines = list(zip(self.start.tolist(), self.end.tolist(), strict=True))
+        self.start, self.end = _lines(data)
         text = np.frombuffer(data, np.uint8)
-        found = _tokens(text)
-        self.first, self.last, self.mantissa, self.decimals, good = found
-        deleted = ((text >= 48) & (text <= 57)) | (text == 46)
-        kept = np.concatenate(([0], np.cumsum(~deleted)))
+        self.first, self.last, self.mantissa, self.decimals, good = _tokens(text)
         self.token = np.searchsorted(self.first, np.append(self.start, len(text)))
-        owner = np.maximum(np.searchsorted(self.start, self.first, "right") - 1, 0)
-        self.offset = kept[self.first] - kept[self.start[owner]] if len(self.start) else self.first
-        counts = np.diff(self.token)
-        bad = np.bincount(owner[~good], minlength=len(self.start)) if len(self.start) else counts
-        self.count = counts.tolist()
+        owner = np.repeat(np.arange(len(self.start)), np.diff(self.token))
+        deleted = ((text >= 48) & (text <= 57)) | (text == 46)
+        gone = np.concatenate((np.zeros(1, np.int32), np.cumsum(deleted, dtype=np.int32)))
+        self.offset = self.first - self.start[owner] - (gone[self.first] - gone[self.start[owner]])
+        bad = np.bincount(owner[~good], minlength=len(self.start))
+        self.count: list[int] = np.diff(self.token).tolist()
         self.plain: list[bool] = (bad == 0).tolist()
         # one number for the places of all numbers of a line
-        place = np.arange(len(owner)) - self.token[owner] if len(owner) else owner
+        place = np.arange(len(owner)) - self.token[owner]
         mixed = (self.offset.astype(np.uint64) + np.uint64(1)) * _PRIMES[place % len(_PRIMES)]
         total = np.concatenate((np.zeros(1, np.uint64), np.cumsum(mixed, dtype=np.uint64)))
         self.places: list[int] = (total[self.token[1:]] - total[self.token[:-1]]).tolist()
+        self.keys = self._keys()
+
+    def _keys(self) -> list[bytes]:
+        """Each line without the digits of its numbers."""
+        data = self.data
+        if b"\r" not in data and data[:3] != b"\xef\xbb\xbf":
+            return data.translate(None, _DIGITS).split(b"\n")[: len(self.start)]
+        bounds = zip(self.start.tolist(), self.end.tolist(), strict=True)
+        return [data[a:b].translate(None, _DIGITS) for a, b in bounds]
 
     @property
     def value(self) -> npt.NDArray[np.float64]:
         """(m,) the numbers."""
         return np.asarray(self.mantissa / _POW10[self.decimals], float)
 
-    def key(self, line: int) -> bytes:
-        """A line without the digits of its numbers."""
-        start, end = self.lines[line]
-        return self.data[start:end].translate(None, _DIGITS)
-
     def statement(self, line: int, dialect: UserDialect) -> tuple[Line | None, int]:
         """The statement that begins in a line, None for none, and the line behind it."""
         text, at, first = "", [], line
-        while line < len(self.lines):
-            start, end = self.lines[line]
+        while line < len(self.keys):
+            start, end = int(self.start[line]), int(self.end[line])
             code = _without_comment(self.data[start:end].decode("latin-1"), dialect)
             kept = code.rstrip()
             goes_on = bool(dialect.continuation) and kept.endswith(dialect.continuation)
@@ -100,7 +96,7 @@ class Text:
             line += 1
             if not goes_on:
                 break
-        begin, stop = self.lines[first][0], self.lines[line - 1][1]
+        begin, stop = int(self.start[first]), int(self.end[line - 1])
         return (Line(first + 1, text, tuple(at), begin, stop) if text.strip() else None), line
 
 
@@ -165,12 +161,10 @@ def _tokens(text: Bytes) -> tuple[Index, Index, Index, npt.NDArray[np.int8], Mas
     # of the characters of numbers that the lexer knows, these two part them here
     parted = np.where((text == 44) | (text == 47), np.uint8(32), text)
     compact, begin, end = runs(parted)
-    digit, point = _counted((text >= 48) & (text <= 57)), _counted(text == 46)
     sign = (text == 43) | (text == 45)
-    signs = _counted(sign)
-    said = digit[end] > digit[begin]
+    said = _within((text >= 48) & (text <= 57), begin, end) > 0
     begin, end = begin[said], end[said]
-    good = (point[end] - point[begin] <= 1) & (signs[end] - signs[begin] <= sign[begin])
+    good = (_within(text == 46, begin, end) <= 1) & (_within(sign, begin, end) <= sign[begin])
     good &= end - begin <= LONGEST
     # one odd number, as in a comment, would have all of them read one by one
     step = np.zeros(len(text) + 1, np.int8)
@@ -187,9 +181,28 @@ def _tokens(text: Bytes) -> tuple[Index, Index, Index, npt.NDArray[np.int8], Mas
     return begin, end, mantissa, decimals, good
 
 
-def _counted(what: Mask) -> Index:
-    """(n + 1,) how many of the bytes before each are so."""
-    return np.concatenate(([0], np.cumsum(what)))
+def _within(what: Mask, begin: Index, end: Index) -> Index:
+    """(n,) how many bytes from `begin` up to `end` are so; stretches are apart and none is empty."""
+    if not len(begin):
+        return np.zeros(0, np.int64)
+    edges = np.column_stack((begin, end)).ravel()
+    # a last stretch that ends with the text has no bytes behind it
+    padded = np.append(what.view(np.uint8), np.uint8(0))
+    return np.asarray(np.add.reduceat(padded, edges, dtype=np.int32)[::2], np.int64)
+
+
+def _lines(data: bytes) -> tuple[Index, Index]:
+    """(n,) where each line begins and where its text ends."""
+    head = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+    if b"\r" not in data:
+        newline = np.flatnonzero(np.frombuffer(data, np.uint8) == 10)
+        rest = not len(newline) or newline[-1] < len(data) - 1
+        end = np.append(newline, len(data)) if rest and len(data) > head else newline
+        return np.concatenate(([head], end[:-1] + 1))[: len(end)], end
+    rows = data[head:].splitlines(keepends=True)
+    size = np.array([len(r) for r in rows], np.int64)
+    start = head + np.cumsum(size) - size
+    return start, start + np.array([len(r.rstrip(b"\r\n")) for r in rows], np.int64)
 
 
 def _without_comment(body: str, dialect: UserDialect) -> str:

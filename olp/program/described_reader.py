@@ -119,13 +119,13 @@ class _Reader:
     def _matched(self, text: Text) -> list[_Item]:
         """Statements with their rules, and stretches of lines that are alike, in order."""
         found: list[_Item] = []
-        known: dict[tuple[str, bytes], Kin | None] = {}
+        known: dict[str, dict[bytes, Kin | None]] = {}
         open_: _Alike | None = None
-        plain, count, places = text.plain, text.count, text.places
+        plain, count, places, keys = text.plain, text.count, text.places, text.keys
+        here = known.setdefault(self.section, {})
         at = 0
-        while at < len(plain):
-            key = (self.section, text.key(at))
-            kin = known.get(key)
+        while at < len(keys):
+            kin = here.get(keys[at])
             if kin is not None and plain[at] and kin.count == count[at] and kin.places == places[at]:
                 if open_ is None:
                     open_ = _Alike([], [])
@@ -139,8 +139,9 @@ class _Reader:
                 open_ = None
                 bare, rule, match = self._rule(line)
                 found.append((bare, rule, match))
-                if key not in known and key[0] == self.section and self._varies(match):
-                    known[key] = kin_of(text, line, bare, rule, match)
+                if keys[at] not in here and rule.enters is None and self._varies(match):
+                    here[keys[at]] = kin_of(text, line, bare, rule, match)
+                here = known.setdefault(self.section, {})
             at = behind
         return found
 

@@ -1,4 +1,4 @@
-"""CPU time of `olp correct` on one path posted as G-code, as APT and as DMIS, in one run.
+"""CPU time of `olp correct` on one path as G-code, APT, DMIS, a list and Kawasaki AS, in one run.
 
     python tests/benchmarks/bench_statements.py [points]
 
@@ -24,6 +24,15 @@ from olp.toolpath import Kind
 
 def posted(points: np.ndarray, rapid: np.ndarray, dialect: str) -> bytes:
     """The points as whole statements."""
+    if dialect == "list":
+        rows = [f"{x:.4f},{y:.4f},{z:.4f},100" for x, y, z in points.tolist()]
+        return "\n".join(["X_mm,Y_mm,Z_mm,speed", *rows, ""]).encode()
+    if dialect == "kawasaki-as":
+        moves = [
+            f"{'JMOVE' if fast else 'LMOVE'} TRANS({x:.4f},{y:.4f},{z:.4f},0,180,0)"
+            for (x, y, z), fast in zip(points.tolist(), rapid.tolist(), strict=True)
+        ]
+        return "\n".join([".PROGRAM raster()", *moves, ".END", ""]).encode()
     said = [f"GOTO/{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()]
     if dialect == "dmis":
         return "\n".join(["DMISMN/'BENCH',05.2", "UNITS/MM,ANGDEC", *said, "ENDFIL", ""]).encode()
@@ -47,20 +56,22 @@ def main() -> None:
         tip = path.end_mm[whole] - np.array([f.length_mm for f in path.frames])[path.frame[whole]]
         rapid = path.kind[whole] == Kind.RAPID
         files = [gcode]
-        for dialect, ending in (("apt", "apt"), ("dmis", "dmi")):
+        for dialect, ending in (("apt", "apt"), ("dmis", "dmi"), ("list", "csv"), ("kawasaki-as", "as")):
             files.append(folder / f"raster.{ending}")
             files[-1].write_bytes(posted(tip, rapid, dialect))
         first = 0.0
         for program in files:
             out = folder / f"out{program.suffix}"
             correct = ["correct", str(program), "-m", str(described), "-o", str(out), "--force", "--quiet"]
+            correct += ["--dialect", "kawasaki-as"] if program.suffix == ".as" else []
             cpu, peak = user_seconds([sys.executable, "-m", "olp", *correct])
             number = program.read_bytes().count(b"\n")
             each = cpu / number * 1e6
             first = first or each
             share = f"{each:.2f} us a line, {each / first:.2f} x G-code"
             print(f"{program.suffix}: {number} lines, {cpu:.2f} s, {share}, peak {peak / 1024:.0f} MB")
-            stages(program, described)
+            if program.suffix != ".as":
+                stages(program, described)
 
 
 if __name__ == "__main__":
