@@ -419,6 +419,17 @@ def test_noise_and_drift_of_a_line() -> None:
     assert noise.sigma == pytest.approx(0.5 * UM, rel=0.2)
 
 
+def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    lines = []
+    for a in "XYZ":
+        targets = np.linspace(*machine.box["XYZ".index(a)], 40)
+        taken = simulated.take(machine, np.random.default_rng(1), f"E{a}{a}", targets=targets, runs=1)
+        lines.append(line_of(taken, 0.5 * UM))
+    calibration = calibration_of(fit(Measurements("m", tuple(lines)), "FXYZ"))
+    assert not any(curve.forward for curve in calibration.curves)
+
+
 def test_recordings_of_many_samples_are_read_in_reasonable_memory() -> None:
     """Sweeps of 2000 places there and back: no table of samples by places."""
     machine = simulated.machine(0, "smooth", "FXYZ")
