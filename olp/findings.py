@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from olp.calibration_rules import CALIBRATION
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
+from olp.model_rules import MODEL
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
+from olp.table_rules import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,7 +306,10 @@ _TABLE = (
 )
 
 RULES = {
-    rule.code: rule for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY), key=lambda rule: rule.code)
+    rule.code: rule
+    for rule in sorted(
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL), key=lambda rule: rule.code
+    )
 }
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine

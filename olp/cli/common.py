@@ -143,21 +143,15 @@ def given(program: str | None, machine: str | None, job: str | None) -> Given:
 
 def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
     """Machine and job, and the files that describe them. Raises UsageError, InputError."""
-    import tomllib
-
-    from olp.files.config import beside, load_setup
-    from olp.files.write import read_bytes
+    from olp.files.calibration import files_beside
+    from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
     meshes = (mesh.file for mesh in setup.job.meshes)
-    inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration, *meshes)
+    named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
+    inputs = files_of(*named, *meshes)
     if setup.machine.calibration is not None:
-        try:
-            curves = tomllib.loads(read_bytes(setup.machine.calibration).decode("utf-8-sig")).get("curves")
-            inputs += files_of(*(beside(setup.machine.calibration, curve["file"]) for curve in curves or ()))
-        except (ValueError, TypeError, KeyError, AttributeError):
-            # The loader of calibrations says what is wrong with it.
-            pass
+        inputs += [str(file) for file in files_beside(setup.machine.calibration)]
     return setup, tuple(inputs)
 
 
