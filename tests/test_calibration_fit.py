@@ -209,6 +209,17 @@ def test_what_lengths_leave() -> None:
     assert np.median(left_other) <= 1.2
 
 
+def test_a_length_that_slipped_is_left_out_and_named() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    all_rays = rays(machine, 0, 6, 120)
+    wrong = all_rays[2].length_mm.copy()
+    wrong[33] += 0.05
+    bad = (*all_rays[:2], dataclasses.replace(all_rays[2], length_mm=wrong), *all_rays[3:])
+    found = fit(Measurements("m", lengths=bad), "FXYZ")
+    assert [(outlier.source, outlier.row) for outlier in found.outliers] == [("station-2.csv", 34)]
+    assert not told(found, "OLP808")
+
+
 def test_lengths_of_points_in_a_plane_are_refused() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
     (one,) = rays(machine, 0, 1, 50, [(0.0, 0.0, 0.0)])

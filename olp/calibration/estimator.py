@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -45,8 +46,9 @@ HALF_CELLS = 5
 #: Cells where no lines but points or lengths tell of an axis, to begin with; they double as long as
 #: chi-square is off by more than MISFIT standard deviations and becomes BETTER by it.
 POINT_CELLS, MISFIT, BETTER = 12, 5.0, 0.8
-#: What stands for the component of a point.
-POINT = "point"
+#: What stands for the component of a point and of a length.
+POINT, LENGTH = "point", "length"
+T = TypeVar("T", Points, Lengths)
 #: The adjustment is made anew after cyclic terms or points were left out, so often at most.
 PASSES = 8
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
@@ -259,7 +261,8 @@ def _fit(
     scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
     waves, unseen = _waves(measurements, lines, scattered)
     shapes = _shapes(lines, noises, splines, waves, tell)
-    stations = [first_station(rays) for rays in measurements.lengths]
+    lengths = list(measurements.lengths)
+    stations = [first_station(rays) for rays in lengths]
     poses = [first_poses(pods) for pods in measurements.pods]
     theta = np.zeros(0)
     learnt: dict[str, tuple[float, float]] | None = None
@@ -273,7 +276,7 @@ def _fit(
         of_points = [points_block(cloud, parameters) for cloud in clouds]
         of_lengths = [
             lengths_block(rays, parameters, theta, station)
-            for rays, station in zip(measurements.lengths, stations, strict=True)
+            for rays, station in zip(lengths, stations, strict=True)
         ]
         of_pods = [
             pods_block(pods, parameters, theta, own)
@@ -292,10 +295,18 @@ def _fit(
         turns = [residuals_of(block, theta)[0].reshape(-1, 6) for block in of_pods]
         still = all(np.abs(step[:3]).max() < STILL_MM for step in steps)
         still = still and all(np.abs(turn[:, :3]).max() < POD_STILL_MM for turn in turns)
-        if seen == waves and not any(slips) and still:
+        # before the stations stand still, a residual may be theirs
+        pairs = zip(of_lengths if still else (), lengths, strict=False)
+        slips_of_lengths = [_slips(block, rays, solved) for block, rays in pairs]
+        if seen == waves and not any(slips) and not any(slips_of_lengths) and still:
             break
         waves = seen
-        outliers += [slip for some in slips for slip in some]
+        outliers += [slip for some in (*slips, *slips_of_lengths) for slip in some]
+        lengths = (
+            [_without(rays, some) for rays, some in zip(lengths, slips_of_lengths, strict=True)]
+            if still
+            else lengths
+        )
         clouds = [_without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
         stations = [station.moved(step) for station, step in zip(stations, steps, strict=True)]
         poses = [
@@ -311,7 +322,7 @@ def _fit(
     ]
     rays_left = [
         LengthsResult(rays, station, *_left(block, theta))
-        for rays, station, block in zip(measurements.lengths, stations, of_lengths, strict=True)
+        for rays, station, block in zip(lengths, stations, of_lengths, strict=True)
     ]
     pods_left = [
         PodsResult(pods, tuple(own), *_left(block, theta))
@@ -364,23 +375,25 @@ def _left(block: Block, theta: Array) -> tuple[Array, float]:
     return residual, float(np.sum((residual / sigma) ** 2))
 
 
-def _slips(block: Block, cloud: Points, solved: Solved) -> list[Outlier]:
-    """Points whose residual is no noise, the worst ones first."""
+def _slips(block: Block, cloud: Points | Lengths, solved: Solved) -> list[Outlier]:
+    """Points or lengths whose residual is no noise, the worst ones first."""
     _, residual, sigma = residuals_of(block, solved.theta)
-    rest = residual.reshape(-1, 3)
-    off = np.abs(residual / sigma).reshape(-1, 3).max(axis=1)
+    rest = residual.reshape(len(cloud.row), -1)
+    off = np.abs(residual / sigma).reshape(rest.shape).max(axis=1)
+    kind = POINT if isinstance(cloud, Points) else LENGTH
     worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
     return [
-        Outlier(cloud.source, int(cloud.row[k]), POINT, float(np.linalg.norm(rest[k])), float(off[k]))
+        Outlier(cloud.source, int(cloud.row[k]), kind, float(np.linalg.norm(rest[k])), float(off[k]))
         for k in worst.tolist()
         if off[k] > OUTLIER and off[k] > 0.3 * off.max()
     ]
 
 
-def _without(cloud: Points, slips: Sequence[Outlier]) -> Points:
+def _without(cloud: T, slips: Sequence[Outlier]) -> T:
     use = ~np.isin(cloud.row, [slip.row for slip in slips])
-    names = ("axis_mm", "tool_mm", "measured_mm", "row")
-    return dataclasses.replace(cloud, **{name: getattr(cloud, name)[use] for name in names})
+    names = {"axis_mm", "tool_mm", "measured_mm", "length_mm", "sigma_mm", "row"}
+    kept = {f.name: getattr(cloud, f.name)[use] for f in dataclasses.fields(cloud) if f.name in names}
+    return dataclasses.replace(cloud, **kept)
 
 
 def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:
