@@ -9,7 +9,7 @@ import numpy as np
 from judge import simulated
 
 from olp.calibration.estimator import Fit
-from olp.calibration.observations import Lengths, Line, Measurements, Points, Square
+from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points, Square
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
 #: tools of the judgement: the one measured with, and one that no line has seen
@@ -66,6 +66,17 @@ def rays(
         Lengths(*simulated.lengths(machine, seed, place, k, n, tools), source=f"station-{k}.csv")
         for k, place in enumerate(places)
     )
+
+
+def two_pods(
+    machine: simulated.Machine, seed: int, n: int, tools: Sequence[object] | None = None
+) -> Pods:
+    """Angles of 10 urad from two pods, whose distance is known within 10 um."""
+    tools = simulated.OFFSETS if tools is None else tools
+    places = np.array(simulated.PODS)
+    apart = float(np.linalg.norm(places[1] - places[0]))
+    taken = simulated.directions(machine, seed, n, places, 10e-6, tools)
+    return Pods(*taken, 10e-6, ((0, 1, apart, 0.01),), "pods.csv")
 
 
 @dataclass(frozen=True)

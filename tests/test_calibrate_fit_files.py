@@ -165,6 +165,23 @@ def test_lengths_from_a_station(tmp_path: Path) -> None:
     assert found.tool_mm[-1].tolist() == [50.0, 0.0, -90.0]
 
 
+def test_directions_from_pods(tmp_path: Path) -> None:
+    head = "X_mm,Y_mm,Z_mm,azimuth_1_deg,elevation_1_deg,azimuth_2_deg,elevation_2_deg\n"
+    places = [(x, y, z) for x in (0, 500) for y in (0, 300) for z in (-100, 0)]
+    rows = [f"{x},{y},{z},{10 + x / 100},1,{-20 + y / 100},2\n" for x, y, z in places]
+    (tmp_path / "p.csv").write_text(head + "".join(rows))
+    pods = '[[pods]]\nfile = "p.csv"\nsigma_urad = 10.0\n[[pods.baselines]]\nbetween = [1, {}]\n'
+    pods += "length_mm = 4000.0\n"
+    planned(tmp_path, pods.format(2) + "sigma_um = 10.0\n")
+    (found,) = load_measurements([tmp_path]).pods
+    assert np.degrees(found.azimuth_rad[-1]) == pytest.approx([15.0, -17.0])
+    assert np.degrees(found.elevation_rad[-1]) == pytest.approx([1.0, 2.0])
+    assert found.baselines == ((0, 1, 4000.0, 0.01),)
+    planned(tmp_path, pods.format(3) + "sigma_um = 10.0\n")
+    with pytest.raises(ConfigError, match="two of the pods 1 to 2"):
+        load_measurements([tmp_path])
+
+
 @pytest.mark.parametrize(
     ("change", "more", "words"),
     [

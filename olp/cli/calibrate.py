@@ -6,7 +6,7 @@ from olp.cli.late import LateGroup
 
 #: Verb to what it does; each is a module `olp.cli.calibrate_VERB`.
 VERBS: dict[str, str] = {
-    "fit": "Make a calibration from lines of lasers, levels and squares.",
+    "fit": "Make a calibration from lines, points, lengths and directions.",
     "read": "Show what is understood of the file of an instrument.",
     "import": "Read the compensation table of a control as a calibration.",
     "export": "Write a calibration as the table of a control, and say what it would leave.",

@@ -97,6 +97,8 @@ def command(
 def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
     """The report as people read it: lines by the names of their files."""
     shown = dict(report)
+    for key in ("sets_of_points", "stations", "sets_of_pods"):
+        shown[key] = [{**row, "name": Path(row["name"]).name} for row in report[key]]
     for key in ("lines_of_lengths", "lines_of_angles"):
         shown[key] = [
             {"name": f"{row['name']} {Path(row['file']).name}"}

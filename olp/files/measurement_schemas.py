@@ -168,6 +168,32 @@ class StationTable(Table):
     )
 
 
+class BaselineTable(Table):
+    between: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = Field(
+        strict=False, description="the numbers of two pods, such as [1, 2]"
+    )
+    length_mm: Positive = Field(description="the distance between their centres, in mm")
+    sigma_um: Positive = Field(description="its standard uncertainty, in um")
+
+
+class PodsTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
+        "azimuth_1_deg, elevation_1_deg, azimuth_2_deg ..., relative to this file"
+    )
+    pods: Annotated[int, Field(ge=1)] = Field(default=2, description="how many pods; 2 if left out")
+    sigma_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
+    baselines: list[BaselineTable] = Field(
+        default=[],
+        description="tables [[pods.baselines]]: known distances; without one nothing tells the scale",
+    )
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
+    )
+
+
 class PeriodsTable(Table):
     X: list[Positive] = Field(default=[], description="the periods of screw and scale of X, [..] in mm")
     Y: list[Positive] = Field(default=[], description="the periods of screw and scale of Y, [..] in mm")
@@ -210,4 +236,7 @@ class MeasurementsFile(Table):
     stations: list[StationTable] = Field(
         default=[],
         description="tables [[stations]]: lengths from places that nobody knows (multilateration)",
+    )
+    pods: list[PodsTable] = Field(
+        default=[], description="tables [[pods]]: directions from places that nobody knows"
     )

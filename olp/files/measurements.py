@@ -17,20 +17,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.calibration.observations import Lengths, Line, Measurements, Points, Square, SquarenessReading
+from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points, Square, SquarenessReading
 from olp.exceptions import ConfigError, InputError
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
     LineKeys,
     LineTable,
     MeasurementsFile,
+    PodsTable,
     PointsTable,
     SquarenessReadingTable,
     SquareTable,
     Stated,
     StationTable,
 )
-from olp.files.point_readings import LENGTH, PointReadings, read_point_readings
+from olp.files.point_readings import LENGTH, PointReadings, directions, read_point_readings
 from olp.files.problems import Problem, config_error, validate
 from olp.files.readings import Readings, check_component, decoded, parse_readings, stated_keys
 from olp.files.schema_base import Position
@@ -55,6 +56,7 @@ class _Gathered:
     lines: list[Line] = field(default_factory=list)
     points: list[Points] = field(default_factory=list)
     lengths: list[Lengths] = field(default_factory=list)
+    pods: list[Pods] = field(default_factory=list)
     squares: dict[str, Square] = field(default_factory=dict)
     squareness: list[SquarenessReading] = field(default_factory=list)
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
@@ -112,6 +114,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         chain=found.chain,
         points=tuple(found.points),
         lengths=tuple(found.lengths),
+        pods=tuple(found.pods),
     )
 
 
@@ -129,7 +132,9 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             continue
         try:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
-            for table in (t for kind in ("lines", "points", "stations") for t in stated.get(kind, ())):
+            for table in (
+                t for kind in ("lines", "points", "stations", "pods") for t in stated.get(kind, ())
+            ):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader says what is wrong with it.
@@ -167,10 +172,11 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    tables: list[tuple[Path, LineTable | PointsTable | StationTable]] = [
+    tables: list[tuple[Path, LineTable | PointsTable | StationTable | PodsTable]] = [
         *((("lines", k), table) for k, table in enumerate(plan.lines)),
         *((("points", k), table) for k, table in enumerate(plan.points)),
         *((("stations", k), table) for k, table in enumerate(plan.stations)),
+        *((("pods", k), table) for k, table in enumerate(plan.pods)),
     ]
     for key, item in tables:
         try:
@@ -178,8 +184,10 @@ def _plan(path: FilePath, found: _Gathered) -> None:
                 _line(path, item, plan.defaults, plan.vertical, found)
             elif isinstance(item, PointsTable):
                 found.points.append(_points(path, item, plan.defaults))
-            else:
+            elif isinstance(item, StationTable):
                 found.lengths.append(_lengths(path, item, plan.defaults))
+            else:
+                found.pods.append(_pods(path, item, plan.defaults))
         except ConfigError as error:
             if error.file not in (None, str(path)):
                 found.errors.append(error)
@@ -217,7 +225,7 @@ def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
     return Points(
         axis_mm=readings.axis_mm,
         tool_mm=_tools(readings, table, defaults),
-        measured_mm=readings.measured_mm,
+        measured_mm=readings.measured,
         sigma=table.sigma_um * MM_PER_UM,
         sigma_scale=table.sigma_scale_um_m * PER_UNIT,
         source=readings.file,
@@ -227,7 +235,7 @@ def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
 
 def _lengths(plan: FilePath, table: StationTable, defaults: LineKeys) -> Lengths:
     readings = read_point_readings(plan.parent / table.file, LENGTH)
-    length = readings.measured_mm[:, 0]
+    length = readings.measured[:, 0]
     return Lengths(
         axis_mm=readings.axis_mm,
         tool_mm=_tools(readings, table, defaults),
@@ -239,8 +247,27 @@ def _lengths(plan: FilePath, table: StationTable, defaults: LineKeys) -> Lengths
     )
 
 
+def _pods(plan: FilePath, table: PodsTable, defaults: LineKeys) -> Pods:
+    readings = read_point_readings(plan.parent / table.file, directions(table.pods))
+    angles = np.radians(readings.measured)
+    wrong = [b.between for b in table.baselines if max(b.between) > table.pods or len(set(b.between)) < 2]
+    if wrong:
+        raise ConfigError(f"baselines between {list(wrong[0])}; expected two of the pods 1 to {table.pods}")
+    return Pods(
+        axis_mm=readings.axis_mm,
+        tool_mm=_tools(readings, table, defaults),
+        azimuth_rad=angles[:, 0::2],
+        elevation_rad=angles[:, 1::2],
+        sigma=table.sigma_urad * RAD_PER_URAD,
+        baselines=tuple(
+            (b.between[0] - 1, b.between[1] - 1, b.length_mm, b.sigma_um * MM_PER_UM) for b in table.baselines
+        ),
+        source=readings.file,
+    )
+
+
 def _tools(
-    readings: PointReadings, table: PointsTable | StationTable, defaults: LineKeys
+    readings: PointReadings, table: PointsTable | StationTable | PodsTable, defaults: LineKeys
 ) -> npt.NDArray[np.float64]:
     """The vector of each point, from the file or from the plan."""
     tool = table.tool_mm or defaults.tool_mm

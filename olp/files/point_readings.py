@@ -6,7 +6,7 @@
 
 The instrument's frame is its own. Columns tool_X_mm, tool_Y_mm, tool_Z_mm hold the vector from the gauge
 point to the reflector where it differs from point to point. Lengths from a station have one column length_mm
-in place of the measured ones.
+in place of the measured ones, directions from pods azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
 """
 
 from __future__ import annotations
@@ -33,14 +33,20 @@ LENGTH = ("length_mm",)
 TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)
 
 
+def directions(pods: int) -> tuple[str, ...]:
+    """The columns of angles of so many pods."""
+    return tuple(f"{angle}_{k + 1}_deg" for k in range(pods) for angle in ("azimuth", "elevation"))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PointReadings:
-    """(n, 3) columns in mm, of lengths (n, 1); `tool_mm` is None where the file has no such columns. `row`
-    (n,) is the line of each point, `keys` what the file states in comments, each with its line."""
+    """(n, 3) columns in mm, `measured` (n, k) as in the file; `tool_mm` is None where the file has no such
+    columns. `row` (n,) is the line of each point, `keys` what the file states in comments, each with its
+    line."""
 
     file: str
     axis_mm: Array
-    measured_mm: Array
+    measured: Array
     tool_mm: Array | None
     row: npt.NDArray[np.int64]
     keys: Mapping[str, tuple[str, int]]
@@ -74,7 +80,7 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
         values = [_number(cell) for cell in cells]
         for name, cell, value in zip(header, cells, values, strict=True):
             if not math.isfinite(value):
-                found.append((number, f'{name} = "{cell}"; expected a number in mm'))
+                found.append((number, f'{name} = "{cell}"; expected a number in {name.rpartition("_")[2]}'))
         rows.append(values)
     if found:
         raise config_error(found, file)

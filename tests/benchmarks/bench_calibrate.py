@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from calibration_cases import FRESH, TOOLS, case, cloud, left, rays
+from calibration_cases import FRESH, TOOLS, case, cloud, left, rays, two_pods
 from judge.simulated import OFFSETS
 
 from olp.calibration.estimator import fit
@@ -35,8 +35,8 @@ def spread(values: np.ndarray) -> str:
 
 @dataclass(frozen=True)
 class Method:
-    """What is measured: the lines, so many points of this uncertainty, lengths from so many stations; judged
-    with these tools."""
+    """What is measured: the lines, so many points of this uncertainty, lengths from so many stations, so many
+    points seen by two pods; judged with these tools."""
 
     name: str
     lines: bool
@@ -44,6 +44,7 @@ class Method:
     sigma_um: float
     tools: tuple[tuple[float, float, float], ...]
     stations: int = 0
+    directions: int = 0
 
 
 METHODS = (
@@ -51,6 +52,8 @@ METHODS = (
     Method("120 points of 5 um", False, 120, 5.0, FRESH),
     Method("lines and 40 points of 8 um", True, 40, 8.0, FRESH),
     Method("6 stations, 250 lengths each", False, 0, 0.0, (OFFSETS[0], FRESH[1]), stations=6),
+    Method("two pods of 10 urad, 250 points", False, 0, 0.0, FRESH, directions=250),
+    Method("two pods of 10 urad, 1000 points", False, 0, 0.0, FRESH, directions=1000),
 )
 
 
@@ -63,8 +66,9 @@ def run(method: Method, family: str, seeds: int) -> None:
         lines = measurements.lines if method.lines else ()
         squares = measurements.squares if method.lines else ()
         lengths = rays(machine, seed, method.stations, 250) if method.stations else ()
+        pods = (two_pods(machine, seed, method.directions),) if method.directions else ()
         taken = dataclasses.replace(
-            measurements, lines=lines, squares=squares, points=points, lengths=lengths
+            measurements, lines=lines, squares=squares, points=points, lengths=lengths, pods=pods
         )
         begin = time.process_time()
         found = fit(taken, machine.chain)

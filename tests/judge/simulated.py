@@ -309,3 +309,39 @@ def lengths(
     true = np.linalg.norm(place - station, axis=1)
     noise = sigma[0] + sigma[1] * true
     return at, tool, true - 321.0 - 40.0 * number + rng.normal(0.0, noise), noise
+
+
+def directions(
+    m: Machine, seed: int, n: int, places: np.ndarray, sigma: float, tools: Any = OFFSETS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axis positions, tool vectors, azimuths and elevations (n, k) of pods at places (k, 3), each turned in
+    its own way."""
+    rng = np.random.default_rng([seed, n, 17])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    place = at + tool
+    for vector in np.array(tools):
+        own = (tool == vector).all(axis=1)
+        place[own] += m.error(at[own], vector)
+    angles = []
+    for pod in places:
+        # upright, turned about the vertical, a little out of level
+        heading, tilt = rng.uniform(-np.pi, np.pi), rng.normal(0.0, 0.01, 2)
+        c, s = np.cos(heading), np.sin(heading)
+        turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        lean = np.array([[1.0, 0.0, tilt[0]], [0.0, 1.0, tilt[1]], [-tilt[0], -tilt[1], 1.0]])
+        u, _, v = np.linalg.svd(lean @ turn)
+        x, y, z = ((place - pod) @ (u @ v).T).T
+        angles.append((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))))
+    azimuth, elevation = (np.stack([a[k] for a in angles], axis=1) for k in range(2))
+    return (
+        at,
+        tool,
+        azimuth + rng.normal(0.0, sigma, azimuth.shape),
+        elevation + rng.normal(0.0, sigma, elevation.shape),
+    )
+
+
+#: two pods in front of the machine, 4 m apart
+PODS = ((-500.0, -1500.0, -300.0), (3500.0, -1500.0, -100.0))
