@@ -323,6 +323,24 @@ def test_cards_keep_their_columns(tmp_path: Path) -> None:
     assert read_apt(out, FRAMES, LENGTHS).axis[0] - ORIGIN == pytest.approx([1234.4, 1234.4, -123.6])
 
 
+@pytest.mark.parametrize("eol", ["\n", "\r\n"])
+def test_cards_keep_their_numbers(tmp_path: Path, bent: Path, eol: str) -> None:
+    said = ["PARTNO CARDS", "UNITS/MM", "FEDRAT/600,MMPM", "GOTO/ -120.5,  -70.5,  3.5", "RAPID"]
+    said += ["GOTO/200.123,150.456,2.5", "CIRCLE/180,150.456,2.5,$", "0,0,1,20.123", "GOTO/180,170.579,2.5"]
+    said += ["GOTO/-120.5,-70.5,3.5", "FINI"]
+    data = "".join(f"{line:<72}{10 * k + 10:08d}{eol}" for k, line in enumerate(said)).encode()
+    zero = machines.zero_machine(tmp_path, RECIPE)
+    assert olp.correct(data, zero).data == data
+    out = olp.correct(data, bent).data
+    lines = unstamped(out).split(eol.encode())
+    assert {len(line) for line in lines} == {80, 0}
+    numbers = [line[72:] for line in lines if line[72:].strip()]
+    assert numbers == [f"{10 * k + 10:08d}".encode() for k in range(len(said))]
+    bare = [b"".join(line[:72].rstrip() + b"\n" for line in text.splitlines()) for text in (data, out)]
+    assert judged(*bare, bent).max_um <= ALLOWED_UM
+    assert olp.verify(data, out, bent).report["deviation"]["holds"]
+
+
 def test_the_dialect_is_told_by_name_text_and_ending() -> None:
     control, apt = DIALECTS["linuxcnc"], DIALECTS["apt"]
     assert dialect_of(None, control, b"G0 X1\n", "a.nc") is control

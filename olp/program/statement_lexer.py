@@ -23,6 +23,9 @@ Mask = npt.NDArray[np.bool_]
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EDed][+-]?\d+)?\Z")
 _QUOTED = re.compile(rb"'[^'\r\n]*'")
+#: the last eight columns of a card: a number, perhaps behind letters
+_SEQUENCE = re.compile(rb"[A-Z]{0,4} *\d{1,8} *\Z")
+_CARD = re.compile(rb"(?m)^([^\r\n]{72})[^\r\n]{8}(?=\r?$)")
 _CONTINUED = re.compile(rb"\$[ \t]*\Z")
 #: the most numbers that a plain point has: place and tool axis
 _WIDEST = 6
@@ -230,9 +233,21 @@ def _comment_at(raw: bytes) -> int:
     return at if at >= 0 else len(raw)
 
 
+def is_cards(data: bytes) -> bool:
+    """Whether a text is made of cards: lines of 80 columns, the last eight of which are their numbers."""
+    head = [line.rstrip(b"\r") for line in data[: 1 << 13].split(b"\n")[:40]]
+    lines = [line for line in head[:-1] if line.strip()]
+    if len(lines) < 3 or any(len(line) != 80 for line in lines):
+        return False
+    numbers = [line[72:] for line in lines if line[72:].strip()]
+    return len(numbers) > 1 and all(_SEQUENCE.match(number) for number in numbers)
+
+
 def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
-    """Lex a whole text, chunk by chunk, each ending at the end of a statement. Raises ProgramError for a text
-    of two bytes a character."""
+    """Lex a whole text, chunk by chunk, each ending at the end of a statement. The numbers of cards are blank
+    to it. Raises ProgramError for a text of two bytes a character."""
+    if is_cards(data):
+        data = _CARD.sub(rb"\1        ", data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ProgramError("the text is UTF-16; expected one byte a character; save it as plain text", line=1)
     if data[:3] == b"\xef\xbb\xbf":
