@@ -296,7 +296,11 @@ def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:
         ),
         ("UNITS/MM\nGOTO/1,2,3,0,0,2\n", 2, "length 2"),
         ("GOTO/1,2,3 $ 4\n", 1, "inside a statement"),
-        ("UNITS/MM\nGOTO/10,10,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n", 4, "left-handed"),
+        (
+            "UNITS/MM\n" + "GOTO/10,10,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n" * 3,
+            4,
+            "left-handed",
+        ),
         ("TRACUT/M1\n", 1, "TRACUT"),
         ("UNITS/FURLONG\n", 1, "UNITS"),
     ],

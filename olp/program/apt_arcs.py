@@ -32,7 +32,7 @@ _TOKEN = re.compile(rb"[^\s,]+")
 #: a normal is an axis of the machine where the sine between them is below this
 _SQUARE = 1e-6
 #: a joint is tangent where the cosine between both ways is above this
-_TANGENT = 0.9999
+_TANGENT = 1.0 - 1e-6
 #: an angle that is said may differ from the one that the points give by this, and by what 0.01 mm subtends
 _ANGLE_RAD = 2e-3
 #: number of the plane (G17, G18, G19) by the axis of its normal

@@ -120,6 +120,8 @@ class StatementCollector:
         """A word of its own for a number; returns its index."""
         found = field.number
         assert found is not None
+        if not self.keep_words:
+            return -1
         mantissa, decimals = found
         said = self.data[field.start : field.end]
         if b"$" in said:
