@@ -2,8 +2,9 @@
 
 Creo and NX say `CIRCLE/centre,normal,radius…`, SolidWorks CAM `CIRCLE/centre,normal`, Autodesk
 `MOVARC/centre,normal,radius,ANGLE,degrees`; the end is the next GOTO, and the turn is right-handed about the
-normal. CATIA says `INDIRV/direction` and `TLON,GOFWD/(CIRCLE/centre,radius),ON,(LINE/centre,end)`, or CYLNDR
-with a normal: forward along the circle until it meets the line, with `2,INTOF` for the second time.
+normal. One GOTO ends a CIRCLE: Creo says the same one again where a chord has come between two arcs of it.
+CATIA says `INDIRV/direction` and `TLON,GOFWD/(CIRCLE/centre,radius),ON,(LINE/centre,end)`, or CYLNDR with a
+normal: forward along the circle until it meets the line, with `2,INTOF` for the second time.
 """
 
 from __future__ import annotations
