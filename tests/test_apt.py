@@ -16,7 +16,7 @@ from judge.cldata import read_apt
 from judge.linuxcnc import CanonMoves
 from judge.machines import Recipe
 from judge.model import JudgeModel
-from judge.path import Deviation, deviation
+from judge.path import Deviation, actual, deviation
 
 import olp
 from olp.exceptions import ProgramError
@@ -250,6 +250,22 @@ def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
     assert np.abs(own - want).max() < 1e-4
     moves = result.report["moves"]
     assert (moves["corrected"], moves["approximated"], moves["passed"]) == (2, 6, 0)
+
+
+def test_strokes_of_holes_take_up_no_lost_motion(tmp_path: Path) -> None:
+    """The error asks for another place at the bottom than above, and yet no axis turns round there."""
+    path = machines.random_machine(tmp_path, 3, replace(RECIPE, backlash_um={"X": 8.0, "Y": 8.0}))
+    places = [(40.0, 40.0), (40.0, 120.0), (40.0, 200.0), (160.0, 200.0), (160.0, 40.0)]
+    said = "".join(f"GOTO/{x},{y},0\n" for x, y in places)
+    cycle = "CYCLE/DRILL,DEPTH,12,MMPM,200,CLEAR,2,RTRCTO,20\n"
+    data = f"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/-50,-60,20\n{cycle}{said}CYCLE/OFF\nFINI\n".encode()
+    model = JudgeModel(path)
+    real = actual(canon(olp.correct(data, path).data), model)
+    ends = real.points[real.dense.last][1:] - canon(data).axis[1:]
+    # half of what the holes lean is left at their upper ends, nearly the same for all
+    assert np.ptp(ends, axis=0).max() < 0.3e-3
+    raw = actual(canon(data), model)
+    assert np.ptp(raw.points[raw.dense.last][1:] - canon(data).axis[1:], axis=0).max() > 8e-3
 
 
 def test_holes_stand_where_a_canned_cycle_puts_them(bent: Path) -> None:
