@@ -16,7 +16,7 @@ from judge.cldata import read_apt
 from judge.linuxcnc import CanonMoves
 from judge.machines import Recipe
 from judge.model import JudgeModel
-from judge.path import Deviation, deviation
+from judge.path import Deviation, actual, deviation
 
 import olp
 from olp.exceptions import ProgramError
@@ -252,6 +252,22 @@ def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
     assert (moves["corrected"], moves["approximated"], moves["passed"]) == (2, 6, 0)
 
 
+def test_strokes_of_holes_take_up_no_lost_motion(tmp_path: Path) -> None:
+    """The error asks for another place at the bottom than above, and yet no axis turns round there."""
+    path = machines.random_machine(tmp_path, 3, replace(RECIPE, backlash_um={"X": 8.0, "Y": 8.0}))
+    places = [(40.0, 40.0), (40.0, 120.0), (40.0, 200.0), (160.0, 200.0), (160.0, 40.0)]
+    said = "".join(f"GOTO/{x},{y},0\n" for x, y in places)
+    cycle = "CYCLE/DRILL,DEPTH,12,MMPM,200,CLEAR,2,RTRCTO,20\n"
+    data = f"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/-50,-60,20\n{cycle}{said}CYCLE/OFF\nFINI\n".encode()
+    model = JudgeModel(path)
+    real = actual(canon(olp.correct(data, path).data), model)
+    ends = real.points[real.dense.last][1:] - canon(data).axis[1:]
+    # half of what the holes lean is left at their upper ends, nearly the same for all
+    assert np.ptp(ends, axis=0).max() < 0.3e-3
+    raw = actual(canon(data), model)
+    assert np.ptp(raw.points[raw.dense.last][1:] - canon(data).axis[1:], axis=0).max() > 8e-3
+
+
 def test_holes_stand_where_a_canned_cycle_puts_them(bent: Path) -> None:
     cycle = b"G21 G90 G54 G98\nT1 M6\nG43 H1\nG0 X10 Y20 Z30\nG81 X10. Y20. R3. Z-40. F250\nX60. Y-20.\nM2\n"
     data = (
@@ -296,7 +312,11 @@ def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:
         ),
         ("UNITS/MM\nGOTO/1,2,3,0,0,2\n", 2, "length 2"),
         ("GOTO/1,2,3 $ 4\n", 1, "inside a statement"),
-        ("UNITS/MM\nGOTO/10,10,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n", 4, "left-handed"),
+        (
+            "UNITS/MM\n" + "GOTO/10,10,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n" * 3,
+            4,
+            "left-handed",
+        ),
         ("TRACUT/M1\n", 1, "TRACUT"),
         ("UNITS/FURLONG\n", 1, "UNITS"),
     ],
@@ -321,6 +341,24 @@ def test_cards_keep_their_columns(tmp_path: Path) -> None:
     out = unstamped(olp.correct(data, path).data)
     assert max(len(line) for line in out.splitlines()) <= 80
     assert read_apt(out, FRAMES, LENGTHS).axis[0] - ORIGIN == pytest.approx([1234.4, 1234.4, -123.6])
+
+
+@pytest.mark.parametrize("eol", ["\n", "\r\n"])
+def test_cards_keep_their_numbers(tmp_path: Path, bent: Path, eol: str) -> None:
+    said = ["PARTNO CARDS", "UNITS/MM", "FEDRAT/600,MMPM", "GOTO/ -120.5,  -70.5,  3.5", "RAPID"]
+    said += ["GOTO/200.123,150.456,2.5", "CIRCLE/180,150.456,2.5,$", "0,0,1,20.123", "GOTO/180,170.579,2.5"]
+    said += ["GOTO/-120.5,-70.5,3.5", "FINI"]
+    data = "".join(f"{line:<72}{10 * k + 10:08d}{eol}" for k, line in enumerate(said)).encode()
+    zero = machines.zero_machine(tmp_path, RECIPE)
+    assert olp.correct(data, zero).data == data
+    out = olp.correct(data, bent).data
+    lines = unstamped(out).split(eol.encode())
+    assert {len(line) for line in lines} == {80, 0}
+    numbers = [line[72:] for line in lines if line[72:].strip()]
+    assert numbers == [f"{10 * k + 10:08d}".encode() for k in range(len(said))]
+    bare = [b"".join(line[:72].rstrip() + b"\n" for line in text.splitlines()) for text in (data, out)]
+    assert judged(*bare, bent).max_um <= ALLOWED_UM
+    assert olp.verify(data, out, bent).report["deviation"]["holds"]
 
 
 def test_the_dialect_is_told_by_name_text_and_ending() -> None:

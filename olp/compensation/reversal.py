@@ -21,6 +21,7 @@ from olp.toolpath import Flag, Kind, Toolpath
 if TYPE_CHECKING:
     from olp.compensation.plan import Plan
 
+Index = npt.NDArray[np.int64]
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 _NO_TOOL = np.zeros(3)
@@ -66,12 +67,14 @@ def carry_play(
     play = np.zeros((len(rows), 3))
     turns = np.zeros((len(rows), 3), bool)
     command, held = rows.command_mm, np.zeros((len(rows), 3))
+    still = _still(path, rows)
     for _ in range(_PASSES):
         lost = model.lost_motion_mm(command)
         assert lost is not None
         lost = np.maximum(np.nan_to_num(lost), 0.0)
         # where the load is: the command without its lead, and without the hold of the pass before
         wanted = np.where(rows.raw, rows.target_mm, command - lost / 2 * play - held)
+        wanted = np.take_along_axis(wanted, still, axis=0)
         before = play.copy()
         for axis in np.flatnonzero(reversal.axes).tolist():
             play[:, axis], load, turns[:, axis] = _follow(wanted[:, axis], lost[:, axis], reversal.band_mm)
@@ -84,6 +87,18 @@ def carry_play(
     rows = replace(rows, command_mm=command, play=play)
     turns &= _may_turn(path, rows, insert=insert)[:, None]
     return _take_up(model, rows, tool, held, turns) if turns.any() else rows
+
+
+def _still(path: Toolpath, rows: Plan) -> Index:
+    """(r, 3) the row where each axis came to where it is: the strokes of one hole move no axis across them,
+    though the error there would ask for it."""
+    end = path.end_mm[rows.move]
+    stays = np.zeros((len(rows), 3), bool)
+    cycle = (path.flag[rows.move] & np.uint8(Flag.CYCLE)) != 0
+    line = path.line[rows.move]
+    stays[1:] = (cycle[1:] & (line[1:] == line[:-1]))[:, None] & (end[1:] == end[:-1])
+    order = np.broadcast_to(np.arange(len(rows))[:, None], stays.shape)
+    return np.asarray(np.maximum.accumulate(np.where(stays, 0, order), axis=0), np.int64)
 
 
 def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:

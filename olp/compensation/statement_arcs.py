@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from olp.compensation.arcwords import Arc, solve
 from olp.compensation.rows import Rows
+from olp.geometry import PLANES
 from olp.program.edits import BARE, EditList, Edits
 from olp.program.program import ArcText
 from olp.toolpath import Flag, Kind
@@ -22,8 +24,6 @@ MOST_DECIMALS = 10
 FINE_DECIMALS = 6
 #: pieces of one inserted statement at the most, for their order among insertions at one place
 ROW = 64
-#: the axis of the normal of each plane
-_NORMAL = (2, 1, 0)
 
 
 def arc_edits(writer: StatementWriter, rows: Rows) -> list[Edits]:
@@ -37,10 +37,13 @@ def arc_edits(writer: StatementWriter, rows: Rows) -> list[Edits]:
         return []
     edits = EditList(writer.prefixes)
     arcs = solve(writer, rows, row)
+    frame = writer.path.frame[arcs.move]
+    centres = writer.local(arcs.centre, frame).tolist()
+    units, fewest = writer.unit[frame].tolist(), writer.fewest(writer.unit[frame]).tolist()
     for i in range(len(arcs.row)):
         arc = arcs.one(i)
         text = writer.statements.arcs[arc.move]
-        changes = _arc_words(writer, arc, text)
+        changes = _arc_words(writer, arc, text, centres[i], units[i], fewest[i])
         if rows.head[arc.row]:
             for word, mantissa, decimals in changes:
                 _replace(writer, word, mantissa, decimals, edits)
@@ -51,33 +54,30 @@ def arc_edits(writer: StatementWriter, rows: Rows) -> list[Edits]:
     return [edits.done()]
 
 
-def _arc_words(writer: StatementWriter, arc: Arc, text: ArcText) -> list[tuple[int, int, int]]:
-    """(word, mantissa, decimals) of all that says an arc beside its end."""
-    frame = writer.path.frame[arc.move : arc.move + 1]
-    centre = arc.centre.copy()
-    unit = float(writer.unit[frame[0]])
-    number = writer.local(centre[None], frame)[0]
-    out = []
-    fewest = writer.fewest(writer.unit[frame])[0]
-    for words in text.centres:
-        for axis, word in enumerate(words):
-            out.append(_rounded(writer, word, float(number[axis]), int(fewest[axis]) + 1))
-    radius = float(np.hypot(*(np.delete(arc.start - centre, _NORMAL[arc.plane]))))
+def _arc_words(
+    writer: StatementWriter, arc: Arc, text: ArcText, number: list[float], unit: float, fewest: list[int]
+) -> list[tuple[int, int, int]]:
+    """(word, mantissa, decimals) of all that says an arc beside its end; `number` is its centre as said."""
+    out = [
+        _rounded(writer, word, number[axis], fewest[axis] + 1)
+        for words in text.centres
+        for axis, word in enumerate(words)
+    ]
     if text.radius >= 0:
-        out.append(_rounded(writer, text.radius, radius / unit, int(fewest.max()) + 1))
+        a, b = PLANES[arc.plane][:2]
+        away = (arc.start - arc.centre).tolist()
+        out.append(_rounded(writer, text.radius, math.hypot(away[a], away[b]) / unit, max(fewest) + 1))
     if text.angle >= 0:
-        out.append(_rounded(writer, text.angle, float(np.degrees(abs(_sweep(arc)))), FINE_DECIMALS))
+        out.append(_rounded(writer, text.angle, math.degrees(abs(_sweep(arc))), FINE_DECIMALS))
     return out
 
 
 def _sweep(arc: Arc) -> float:
     """The angle between the ends of an arc as they are written."""
-    a, b = (k for k in range(3) if k != _NORMAL[arc.plane])
-    first, last = arc.start - arc.centre, arc.end - arc.centre
-    angle = float(np.arctan2(last[b], last[a]) - np.arctan2(first[b], first[a]))
-    if arc.plane == 1:
-        angle = -angle
-    return angle + 2 * np.pi * round((arc.sweep - angle) / (2 * np.pi))
+    a, b = PLANES[arc.plane][:2]
+    first, last = (arc.start - arc.centre).tolist(), (arc.end - arc.centre).tolist()
+    angle = math.atan2(last[b], last[a]) - math.atan2(first[b], first[a])
+    return angle + 2 * math.pi * round((arc.sweep - angle) / (2 * math.pi))
 
 
 def _rounded(writer: StatementWriter, word: int, value: float, fewest: int) -> tuple[int, int, int]:
@@ -150,7 +150,7 @@ def _again(
 
 def _direction(writer: StatementWriter, arc: Arc, text: ArcText) -> dict[int, tuple[int, int]]:
     """The way in which a part of an arc begins."""
-    first, second = ((0, 1), (2, 0), (1, 2))[arc.plane]
+    first, second = PLANES[arc.plane][:2]
     way = np.zeros(3)
     away = arc.start - arc.centre
     way[first], way[second] = -away[second] * np.sign(arc.sweep), away[first] * np.sign(arc.sweep)

@@ -19,7 +19,7 @@ from olp.compensation.stamp import stamped
 from olp.compensation.statement_arcs import FINE_DECIMALS, MOST_DECIMALS, ROW, arc_edits
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
-from olp.compensation.wrapping import wrapped
+from olp.compensation.wrapping import carded, wrapped
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array, Mask
 from olp.machine import Vector
@@ -83,14 +83,16 @@ class StatementWriter:
             if edits:
                 joined = Edits.join(edits)
                 text = splice(source[at:to], at, joined, self.prefixes, leading_zero=self.style.leading_zero)
-                out.append(wrapped(text.tobytes(), self.statements.width, self.statements.mark))
+                lines = carded if self.statements.cards else wrapped
+                out.append(lines(text.tobytes(), self.statements.width, self.statements.mark))
                 self.changed = True
             else:
                 out.append(self.program.data[at:to])
             at = to
         out.append(self.program.data[at:])
         if self.changed and self.stamp:
-            out[0] = stamped(out[0], self.stamp, self.program.eol(1), self.program.dialect.first)
+            stamp = self.stamp.ljust(self.statements.width + 8) if self.statements.cards else self.stamp
+            out[0] = stamped(out[0], stamp, self.program.eol(1), self.program.dialect.first)
         return b"".join(out)
 
     def _start_of(self, move: int) -> int:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+
+_CARD_NUMBER = re.compile(rb"[A-Z]{0,4} *\d{1,8} *\Z")
 
 
 def wrapped(text: bytes, width: int, mark: bytes) -> bytes:
@@ -21,6 +25,32 @@ def wrapped(text: bytes, width: int, mark: bytes) -> bytes:
         parts += [text[at:start], _broken(line, width, mark, eol)]
         at = start + len(line)
     return b"".join([*parts, text[at:]]) if parts else text
+
+
+def carded(text: bytes, width: int, mark: bytes) -> bytes:
+    """A text of cards whose lines have grown, shrunk or come new: their numbers stand in the eight columns
+    behind `width` again, each once, and a line that is too long goes on in a card without a number."""
+    out: list[bytes] = []
+    last = b""
+    for raw in text.split(b"\n"):
+        end = b"\r" if raw.endswith(b"\r") else b""
+        line = raw.removesuffix(b"\r")
+        number = line[-8:]
+        said = len(line) > 8 and (line[-9:-8] == b" " or len(line) > width)
+        if not line.strip():
+            out.append(raw)
+            continue
+        if not (said and _CARD_NUMBER.match(number)):
+            number, body = b" " * 8, line.rstrip()
+        else:
+            body = line[:-8].rstrip()
+        if number == last:
+            number = b" " * 8
+        last = number if number.strip() else last
+        first, *more = _broken(body, width, mark, b"\n").split(b"\n")
+        out.append(first.ljust(width) + number + end)
+        out += [card.ljust(width) + b" " * 8 + end for card in more]
+    return b"\n".join(out)
 
 
 def _broken(line: bytes, width: int, mark: bytes, eol: bytes) -> bytes:

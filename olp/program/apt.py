@@ -29,6 +29,8 @@ from olp.toolpath import Flag, Kind
 NAN = float("nan")
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
 _CREO = re.compile(rb"\$\$->\s*([A-Z_]+)\s*/?")
+#: so many joints that turn right back are no accident
+_SEVERAL = 3
 _RAPID = frozenset((b"RAPID", b"RAPID/"))
 
 
@@ -227,14 +229,15 @@ class _Reader(Events):
 
     def _judge_turns(self) -> None:
         """Refuse a program whose arcs turn back where they should go on; remark one that does not tell."""
-        if len(self.back) > self.onward:
+        if len(self.back) >= _SEVERAL and len(self.back) > 2 * self.onward:
             raise ProgramError(
                 "the arc turns right back where the move before it should go on: its normal seems to be "
                 "left-handed, which is not read",
                 line=self.back[0],
             )
-        if self.unsure is not None and not self.onward:
-            self.out.remarks["arcs"] = (self.unsure, "arcs are taken as right-handed about their normals")
+        doubt = self.unsure if self.unsure is not None else next(iter(self.back), None)
+        if doubt is not None and not self.onward:
+            self.out.remarks["arcs"] = (doubt, "arcs are taken as right-handed about their normals")
 
     def _frames(self, points: Points, part: slice) -> tuple[Index, Mask, Array]:
         """Of each point: the number of its frame, whether the tool turns on the way to it, and the direction

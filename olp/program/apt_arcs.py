@@ -2,8 +2,9 @@
 
 Creo and NX say `CIRCLE/centre,normal,radius…`, SolidWorks CAM `CIRCLE/centre,normal`, Autodesk
 `MOVARC/centre,normal,radius,ANGLE,degrees`; the end is the next GOTO, and the turn is right-handed about the
-normal. CATIA says `INDIRV/direction` and `TLON,GOFWD/(CIRCLE/centre,radius),ON,(LINE/centre,end)`, or CYLNDR
-with a normal: forward along the circle until it meets the line, with `2,INTOF` for the second time.
+normal. One GOTO ends a CIRCLE: Creo says the same one again where a chord has come between two arcs of it.
+CATIA says `INDIRV/direction` and `TLON,GOFWD/(CIRCLE/centre,radius),ON,(LINE/centre,end)`, or CYLNDR with a
+normal: forward along the circle until it meets the line, with `2,INTOF` for the second time.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _TOKEN = re.compile(rb"[^\s,]+")
 #: a normal is an axis of the machine where the sine between them is below this
 _SQUARE = 1e-6
 #: a joint is tangent where the cosine between both ways is above this
-_TANGENT = 0.9999
+_TANGENT = 1.0 - 1e-6
 #: an angle that is said may differ from the one that the points give by this, and by what 0.01 mm subtends
 _ANGLE_RAD = 2e-3
 #: number of the plane (G17, G18, G19) by the axis of its normal

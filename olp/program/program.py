@@ -108,7 +108,8 @@ class Statements:
     `feed_mm_s`, inf for rapids and NaN where it is not known; (n + 1,) `rest` and `dwell_s` of the places
     before, between and after the moves; `feeds` are where feeds are said. `arcs` by move. `broken`: the marks
     of continuation inside words, by word. `rapid` is the line that makes the next statement a rapid; `mark`
-    joins lines, none of which becomes longer than `width` bytes (0: as long as they come). `strokes` (k, 2):
+    joins lines, none of which becomes longer than `width` bytes (0: as long as they come); `cards` have
+    their numbers behind that width, in the last eight columns. `strokes` (k, 2):
     the moves to the place and to the bottom of each hole. `decimal` is the decimal mark of texts
     whose numbers keep their own form and column, empty for others.
     """
@@ -123,6 +124,7 @@ class Statements:
     strokes: npt.NDArray[np.int64]
     feeds: StatedFeeds
     rapid: bytes = b""
+    cards: bool = False
     mark: bytes = b"$"
     width: int = 0
     decimal: bytes = b""

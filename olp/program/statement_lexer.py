@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +25,13 @@ Mask = npt.NDArray[np.bool_]
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EDed][+-]?\d+)?\Z")
 _QUOTED = re.compile(rb"'[^'\r\n]*'")
+#: the last eight columns of a card: a number, perhaps behind letters
+_SEQUENCE = re.compile(rb"[A-Z]{0,4} *\d{1,8} *\Z")
+_CARD = re.compile(rb"(?m)^([^\r\n]{72})[^\r\n]{8}(?=\r?$)")
 _CONTINUED = re.compile(rb"\$[ \t]*\Z")
+_GROUPED = re.compile(rb"[()']")
+#: numbers of fewer digits are exact in any case
+_PLAIN_DIGITS = 13
 #: the most numbers that a plain point has: place and tool axis
 _WIDEST = 6
 
@@ -34,8 +42,7 @@ def shown(text: bytes) -> str:
     return "".join(c if c.isprintable() else "?" for c in said[:40])
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
+class Field(NamedTuple):
     """One minor word of a statement: its text without blanks around it, in capitals, and its bytes
     `start`..`end` of the program."""
 
@@ -49,9 +56,14 @@ class Field:
         return number_of(self.text)
 
 
+@lru_cache(1 << 12)
 def number_of(text: bytes) -> tuple[int, int] | None:
     """Mantissa and decimals of a number as APT and DMIS write it, with an exponent or not; None where it is
     none."""
+    whole, _, fraction = text.partition(b".")
+    digits = whole + fraction
+    if len(digits) < _PLAIN_DIGITS and (digits[1:] if digits[:1] in b"+-" else digits).isdigit():
+        return int(digits), len(fraction)
     if not _NUMBER.match(text):
         return None
     body, _, power = text.upper().replace(b"D", b"E").partition(b"E")
@@ -98,8 +110,10 @@ class Statement:
         at = self.text.find(b"/") + 1
         if not at:
             return []
-        out, start, depth, quoted = [], at, 0, False
         text = self.text
+        if not _GROUPED.search(text, at):
+            return self._simple(at)
+        out, start, depth, quoted = [], at, 0, False
         for i in range(at, len(text)):
             c = text[i]
             if c == 39:
@@ -115,6 +129,29 @@ class Statement:
                 start = i + 1
         if text[start:].strip():
             out += self._parted(start, len(text))
+        return out
+
+    def _simple(self, at: int) -> list[Field]:
+        """The minor words of a statement without brackets and quotes."""
+        out: list[Field] = []
+        begin, where = self.begin, self.where
+        pieces = self.text[at:].split(b",")
+        last = len(pieces) - 1
+        for k, piece in enumerate(pieces):
+            inner = piece.strip()
+            size = len(piece)
+            if not inner and k == last:
+                break
+            if not inner or b" " in inner or b"\t" in inner:
+                out += self._parted(at, at + size)
+            else:
+                start = at + piece.index(inner)
+                stop = start + len(inner) - 1
+                if where is None:
+                    out.append(Field(inner.upper(), begin + start, begin + stop + 1))
+                else:
+                    out.append(Field(inner.upper(), where[start], where[stop] + 1))
+            at += size + 1
         return out
 
     def _parted(self, a: int, b: int) -> list[Field]:
@@ -230,9 +267,21 @@ def _comment_at(raw: bytes) -> int:
     return at if at >= 0 else len(raw)
 
 
+def is_cards(data: bytes) -> bool:
+    """Whether a text is made of cards: lines of 80 columns, the last eight of which are their numbers."""
+    head = [line.rstrip(b"\r") for line in data[: 1 << 13].split(b"\n")[:40]]
+    lines = [line for line in head[:-1] if line.strip()]
+    if len(lines) < 3 or any(len(line) != 80 for line in lines):
+        return False
+    numbers = [line[72:] for line in lines if line[72:].strip()]
+    return len(numbers) > 1 and all(_SEQUENCE.match(number) for number in numbers)
+
+
 def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
-    """Lex a whole text, chunk by chunk, each ending at the end of a statement. Raises ProgramError for a text
-    of two bytes a character."""
+    """Lex a whole text, chunk by chunk, each ending at the end of a statement. The numbers of cards are blank
+    to it. Raises ProgramError for a text of two bytes a character."""
+    if is_cards(data):
+        data = _CARD.sub(rb"\1        ", data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ProgramError("the text is UTF-16; expected one byte a character; save it as plain text", line=1)
     if data[:3] == b"\xef\xbb\xbf":

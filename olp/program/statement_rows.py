@@ -12,7 +12,7 @@ import numpy.typing as npt
 from olp.program.columns import Columns
 from olp.program.dialect import Dialect
 from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
-from olp.program.statement_lexer import Chunk, Field, Statement
+from olp.program.statement_lexer import Chunk, Field, Statement, is_cards
 from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 
 Array = npt.NDArray[np.float64]
@@ -120,6 +120,8 @@ class StatementCollector:
         """A word of its own for a number; returns its index."""
         found = field.number
         assert found is not None
+        if not self.keep_words:
+            return -1
         mantissa, decimals = found
         said = self.data[field.start : field.end]
         if b"$" in said:
@@ -219,6 +221,7 @@ class StatementCollector:
         for move, seconds in self.pauses:
             rest[move] = True
             dwell[move] += seconds
+        cards = is_cards(self.data)
         move, line, word = np.array([(m, n, w) for m, _, n, w in self._feeds], np.int64).T
         feeds = StatedFeeds(move, line, word)
         statements = Statements(
@@ -226,7 +229,8 @@ class StatementCollector:
             feed_mm_s=self._feed(kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
             broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
             feeds=feeds, rapid=rapid,
-            width=next((w for w in _WIDTHS if longest <= w), 0),
+            cards=cards,
+            width=72 if cards else next((w for w in _WIDTHS if longest <= w), 0),
         )  # fmt: skip
         count = len(arcs)
         return Program(

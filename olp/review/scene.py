@@ -33,10 +33,10 @@ class Frame:
 
     @staticmethod
     def of(path: Toolpath) -> Frame:
-        """The work offset of a program that has one and the same all through, else the machine."""
+        """The work offset of a program that has one all through, and not turned, else the machine."""
         used = [path.frames[k] for k in np.unique(path.frame).tolist()]
         places = {(f.work_offset, *np.round(f.origin_mm(), 9).tolist()) for f in used}
-        if len(places) == 1:
+        if len(places) == 1 and all(f.turn is None for f in used):
             name, x, y, z = places.pop()
             return Frame(f"{name}, as programmed", str(name), (x, y, z))
         return Frame("machine, less tool lengths", "machine", (0.0, 0.0, 0.0))
