@@ -22,6 +22,13 @@ APT = b"UNITS/MM\nRAPID\nGOTO/-5,-10,0\nFEDRAT/600,MMPM\n"
 #: an arc of NX that begins upwards in Y
 TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
 TOUCH = "[work_offsets.G54]\n"
+LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
+TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
+LISTED = 'dialect = "layout.toml"\n'
+LAYOUT = {
+    "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\nunit = "mm"\n'
+    b'frame = "G54"\n[columns]\nX = "X_mm"\nY = "Y_mm"\nZ = "Z_mm"\n'
+}
 
 
 @dataclass(frozen=True)
@@ -103,6 +110,12 @@ def load(um_kg: float) -> dict[str, Any]:
     """A sag that does not depend on the place."""
     text = f"X_mm,EZX_um_kg\n-1000,{-um_kg}\n2000,{-um_kg}\n"
     return {"calibration": '[[compliance]]\nfile = "load.csv"\n', "curves": {"load.csv": text}}
+
+
+def sag(um: float) -> dict[str, Any]:
+    """Straightness that is zero at both ends of a metre and `um` in its middle."""
+    text = f"X_mm,EZX_um\n-1000,0\n0,0\n500,{um}\n1000,0\n2000,0\n"
+    return {"calibration": '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n', "curves": {"x.csv": text}}
 
 
 def structure() -> dict[str, Any]:
@@ -246,6 +259,18 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP411": (
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
+    ),
+    "OLP331": (
+        Call(b"10,20,30\n20,20,30\n", LIST, controller="list"),
+        Call(b"10,20,30\n20,20,30\n", LIST, job=LISTED, files=LAYOUT),
+    ),
+    "OLP332": (
+        Call(b"10,20,30,0\n20,20,30,0.002\n", TURNED, controller="list"),
+        Call(b"10,20,30,0\n20,20,30,0\n", TURNED, controller="list"),
+    ),
+    "OLP333": (
+        Call(b"0,0,0\n1000,0,0\n", LIST, controller="list", **sag(2.1)),
+        Call(b"0,0,0\n1000,0,0\n", LIST, controller="list", **sag(1.7)),
     ),
     "OLP412": (
         Call(b"TECOMP/ON,0.00001\n" + PROBED, DMIS, tables=MCS, controller="dmis"),

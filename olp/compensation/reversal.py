@@ -74,7 +74,8 @@ def carry_play(
         lost = np.maximum(np.nan_to_num(lost), 0.0)
         # where the load is: the command without its lead, and without the hold of the pass before
         wanted = np.where(rows.raw, rows.target_mm, command - lost / 2 * play - held)
-        wanted = np.take_along_axis(wanted, still, axis=0)
+        if still is not None:
+            wanted = np.take_along_axis(wanted, still, axis=0)
         before = play.copy()
         for axis in np.flatnonzero(reversal.axes).tolist():
             play[:, axis], load, turns[:, axis] = _follow(wanted[:, axis], lost[:, axis], reversal.band_mm)
@@ -89,12 +90,14 @@ def carry_play(
     return _take_up(model, rows, tool, held, turns) if turns.any() else rows
 
 
-def _still(path: Toolpath, rows: Plan) -> Index:
+def _still(path: Toolpath, rows: Plan) -> Index | None:
     """(r, 3) the row where each axis came to where it is: the strokes of one hole move no axis across them,
-    though the error there would ask for it."""
+    though the error there would ask for it. None without canned cycles."""
+    cycle = (path.flag[rows.move] & np.uint8(Flag.CYCLE)) != 0
+    if not cycle.any():
+        return None
     end = path.end_mm[rows.move]
     stays = np.zeros((len(rows), 3), bool)
-    cycle = (path.flag[rows.move] & np.uint8(Flag.CYCLE)) != 0
     line = path.line[rows.move]
     stays[1:] = (cycle[1:] & (line[1:] == line[:-1]))[:, None] & (end[1:] == end[:-1])
     order = np.broadcast_to(np.arange(len(rows))[:, None], stays.shape)

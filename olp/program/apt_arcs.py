@@ -32,6 +32,11 @@ _AGAIN = re.compile(rb"(?i)2\s*,\s*INTOF\s*,")
 _TOKEN = re.compile(rb"[^\s,]+")
 #: a normal is an axis of the machine where the sine between them is below this
 _SQUARE = 1e-6
+_N = rb"\s*([+-]?(?:\d{1,12}\.?\d{0,12}|\.\d{1,12}))\s*"
+#: CIRCLE of six numbers, seven, or more
+_PLAIN = re.compile(
+    rb"(?i)\s*CIRCLE\s*/" + rb",".join([_N] * 6) + rb"(?:," + _N + rb"((?:,[-+.\d\s]+)*))?,?\s*\Z"
+)
 #: a joint is tangent where the cosine between both ways is above this
 _TANGENT = 1.0 - 1e-6
 #: an angle that is said may differ from the one that the points give by this, and by what 0.01 mm subtends
@@ -80,6 +85,9 @@ def _numbers(fields: Sequence[Field], least: int, statement: Statement, what: st
 
 def circle(statement: Statement, out: StatementCollector) -> ArcForm:
     """CIRCLE of Creo, NX and SolidWorks CAM."""
+    plain = _PLAIN.match(statement.text)
+    if plain is not None:
+        return _plain_circle(statement, plain, out)
     fields = statement.fields()
     values = _numbers(fields, 6, statement, "CIRCLE")
     turns = 1
@@ -93,6 +101,24 @@ def circle(statement: Statement, out: StatementCollector) -> ArcForm:
     return ArcForm(
         text, statement.line, tuple(values[:3]), tuple(values[3:6]), values[6] if has_radius else None,
         turns=turns, sure=len(values) < 8,
+    )  # fmt: skip
+
+
+def _plain_circle(statement: Statement, found: re.Match[bytes], out: StatementCollector) -> ArcForm:
+    """A CIRCLE of numbers alone, parted by commas: nearly all there are."""
+    said = found.groups()
+    values = [float(n) for n in said[:6]]
+    radius = said[6]
+    spans = [found.span(k) for k in ((1, 2, 3) if radius is None else (1, 2, 3, 7))]
+    words = [
+        out.word(Field(statement.text[a:b], statement.place(a), statement.place(b - 1) + 1)) for a, b in spans
+    ]
+    text = ArcText(
+        statement.begin, statement.end, ((words[0], words[1], words[2]),), words[3] if radius else -1
+    )
+    return ArcForm(
+        text, statement.line, tuple(values[:3]), tuple(values[3:]), None if radius is None else float(radius),
+        sure=not said[7],
     )  # fmt: skip
 
 
