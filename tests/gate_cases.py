@@ -26,8 +26,8 @@ LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
 TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
 LISTED = 'dialect = "layout.toml"\n'
 LAYOUT = {
-    "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\nunit = "mm"\n'
-    b'frame = "G54"\n[columns]\nX = "X_mm"\nY = "Y_mm"\nZ = "Z_mm"\n'
+    "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\n'
+    b'unit = "mm"\nframe = "G54"\n[columns]\nX = "X_mm"\nY = "Y_mm"\nZ = "Z_mm"\n'
 }
 
 
@@ -115,7 +115,8 @@ def load(um_kg: float) -> dict[str, Any]:
 def sag(um: float) -> dict[str, Any]:
     """Straightness that is zero at both ends of a metre and `um` in its middle."""
     text = f"X_mm,EZX_um\n-1000,0\n0,0\n500,{um}\n1000,0\n2000,0\n"
-    return {"calibration": '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n', "curves": {"x.csv": text}}
+    table = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
+    return {"calibration": table, "curves": {"x.csv": text}}
 
 
 def structure() -> dict[str, Any]:
@@ -269,8 +270,8 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"10,20,30,0\n20,20,30,0\n", TURNED, controller="list"),
     ),
     "OLP333": (
-        Call(b"0,0,0\n1000,0,0\n", LIST, controller="list", **sag(2.1)),
-        Call(b"0,0,0\n1000,0,0\n", LIST, controller="list", **sag(1.7)),
+        Call(b"0.000,0.000,0.000\n1000.000,0.000,0.000\n", LIST, controller="list", **sag(2.1)),
+        Call(b"0.000,0.000,0.000\n1000.000,0.000,0.000\n", LIST, controller="list", **sag(1.7)),
     ),
     "OLP412": (
         Call(b"TECOMP/ON,0.00001\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
