@@ -103,8 +103,10 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
     inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
     if setup.machine.calibration is not None:
         try:
-            curves = tomllib.loads(read_bytes(setup.machine.calibration).decode("utf-8-sig")).get("curves")
-            inputs += files_of(*(beside(setup.machine.calibration, curve["file"]) for curve in curves or ()))
+            tables = tomllib.loads(read_bytes(setup.machine.calibration).decode("utf-8-sig"))
+            named = [curve["file"] for curve in tables.get("curves", ())]
+            named += [tables["covariance"]["file"]] if "file" in tables.get("covariance", ()) else []
+            inputs += files_of(*(beside(setup.machine.calibration, name) for name in named))
         except (ValueError, TypeError, KeyError, AttributeError):
             # The loader of calibrations says what is wrong with it.
             pass
