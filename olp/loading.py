@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from olp.confidence.components import unsure
 from olp.errormodel import Calibration, ErrorModel, build
+from olp.errormodel.uncertainty import Uncertainty
 from olp.exceptions import ConfigError
 from olp.files.calibration import load_calibration
 from olp.files.config import load_setup
+from olp.files.covariance import load_uncertainty
 from olp.files.write import read_bytes
 from olp.machine import Setup
 from olp.program.profiles import PROFILES, Profile
@@ -20,17 +23,35 @@ PathLike = str | Path
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """Everything loaded that a run needs."""
+    """Everything loaded that a run needs. `skip` are components that the control corrects, `left_out` those
+    that are not corrected because they are within their own uncertainty; `model` has neither."""
 
     setup: Setup
     profile: Profile
     calibration: Calibration
     model: ErrorModel
     digest: str
+    uncertainty: Uncertainty | None
+    skip: frozenset[str]
+    left_out: frozenset[str] = frozenset()
+
+    @property
+    def full(self) -> ErrorModel:
+        """The model with the components that were left out for being within their own uncertainty."""
+        if not self.left_out:
+            return self.model
+        return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
 
 
-def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refuse", "hold"]) -> Loaded:
-    """Machine, calibration and job of a run, and the error model that they make."""
+def load(
+    machine: PathLike | Setup,
+    job: PathLike | None,
+    outside: Literal["refuse", "hold"],
+    *,
+    only_sure: bool = False,
+) -> Loaded:
+    """Machine, calibration and job of a run, and the error model that they make; `only_sure` leaves out
+    components within their own uncertainty. Raises InputError, ConfigError."""
     setup = setup_of(machine, job)
     described = setup.machine
     if described.calibration is None:
@@ -43,9 +64,20 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
             "would be corrected twice; list the components that it corrects, or switch its tables off"
         )
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
-    skip = described.compensated_by_controller - calibration.active_during_measurement
-    model = build(calibration, described.chain, outside=outside, skip_components=frozenset(skip))
-    return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
+    skip = frozenset(described.compensated_by_controller - calibration.active_during_measurement)
+    uncertainty = load_uncertainty(described.calibration, calibration)
+    left_out: frozenset[str] = frozenset()
+    if only_sure:
+        if uncertainty is None:
+            raise ConfigError(
+                "the calibration states no uncertainty, so nobody knows which components are sure; give the "
+                "file of [covariance] or sigma columns, or correct without --only-sure-components",
+                file=described.calibration,
+            )
+        left_out = unsure(calibration, uncertainty) - skip
+    model = build(calibration, described.chain, outside=outside, skip_components=skip | left_out)
+    digest = _digest(described.calibration, described, left_out)
+    return Loaded(setup, profile_of(setup), calibration, model, digest, uncertainty, skip, left_out)
 
 
 def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
@@ -63,7 +95,7 @@ def profile_of(setup: Setup) -> Profile:
     return profile
 
 
-def _digest(calibration: str, machine: object) -> str:
+def _digest(calibration: str, machine: object, left_out: frozenset[str]) -> str:
     """Hash of the calibration file, its curve files and the machine values that decide the model."""
     import tomllib
 
@@ -72,6 +104,8 @@ def _digest(calibration: str, machine: object) -> str:
     for curve in tomllib.loads(raw.decode()).get("curves", []):
         digest.update(read_bytes(Path(calibration).parent / curve["file"]))
     digest.update(repr(getattr(machine, "chain", "")).encode())
+    if left_out:
+        digest.update(repr(sorted(left_out)).encode())
     return digest.hexdigest()
 
 

@@ -14,7 +14,7 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"calibration_rules", "gate_rules", "metrology_rules"},
+    {"calibration_rules", "confidence_rules", "gate_rules", "metrology_rules"},
     {"findings"},
     {"geometry", "tables"},
     {"machine"},
@@ -23,7 +23,7 @@ LAYERS = (
     {"errormodel"},
     {"deviation", "clearance", "measured"},
     {"compensation", "trajectory", "calibration"},
-    {"proof"},
+    {"proof", "confidence"},
     {"checks", "nominal", "testpaths"},
     {"scene"},
     {"report", "plots"},
@@ -31,7 +31,7 @@ LAYERS = (
     {"report_document"},
     {"files"},
     {"loading", "poses"},
-    {"replanning"},
+    {"replanning", "assessing"},
     {"comparing_parts"},
     {"calibrating", "correction", "retiming", "comparing"},
     {"gate"},

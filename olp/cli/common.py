@@ -61,6 +61,17 @@ def proof_options(function: F) -> F:
             metavar="YYYY-MM-DD",
             help="The day of the run, to be compared with valid_until of the calibration.",
         ),
+        click.option(
+            "--within-um",
+            type=Length(),
+            help="The tolerance of the part: how probable is it that the tip stays within? "
+            "Default: --tolerance-um.",
+        ),
+        click.option(
+            "--only-sure-components",
+            is_flag=True,
+            help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
+        ),
         click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."),
         click.option(
             "--tolerance-um",

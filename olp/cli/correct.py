@@ -71,6 +71,8 @@ def command(
     tolerance_um: float,
     outside_box: str,
     contour: bool,
+    within_um: float | None,
+    only_sure_components: bool,
     date: datetime.datetime | None,
     as_json: bool,
     fail_on: str,
@@ -121,6 +123,8 @@ def command(
                 peck_clearance_mm=peck_clearance_mm,
                 contour=contour,
                 split_rapids=split_rapids,
+                within_um=within_um,
+                only_sure_components=only_sure_components,
                 date=date.date() if date else None,
                 progress=show,
             )

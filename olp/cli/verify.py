@@ -30,6 +30,8 @@ def command(
     job: str | None,
     tolerance_um: float,
     contour: bool,
+    within_um: float | None,
+    only_sure_components: bool,
     date: datetime.datetime | None,
     as_json: bool,
     fail_on: str,
@@ -51,6 +53,8 @@ def command(
         call.setup,
         tolerance_um=tolerance_um,
         contour=contour,
+        within_um=within_um,
+        only_sure_components=only_sure_components,
         date=date.date() if date else None,
     )
     put(report.to_json(result.report) if as_json else report.to_text(result.report))
