@@ -41,7 +41,7 @@ CONFIDENCE = (
         Severity.WARNING,
         "The job states temperatures that differ from those of the calibration (20 degC for the workpiece), "
         "and the calibration has no expansion for them. What they do is not corrected; it counts as "
-        "uncertainty, with the expansion of steel (11.5 um/(m K)).",
+        "uncertainty, with the expansion of steel (11.5 um/(m K)), here more than half the tolerance.",
         "Give the table [thermal] of the calibration, or work at its temperature.",
         "`X_scale = 24.0` in the job, and no X_scale_um_m_K: 46 um over 1 m.",
     ),

@@ -309,6 +309,8 @@ RULES = {
     for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *CONFIDENCE), key=lambda rule: rule.code)
 }
 
+#: findings of uncertainty
+CONFIDENCE_CODES = tuple(rule.code for rule in CONFIDENCE)
 #: what a gate looks for: all but those of measured paths and of measurements of a machine
 GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))
 

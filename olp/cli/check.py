@@ -10,6 +10,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    confidence_options,
     exit_for,
     files_of,
     given,
@@ -73,6 +74,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     show_default=True,
     help="Outside the calibrated box: an error (OLP405), or a warning (OLP403) and the error at the face.",
 )
+@confidence_options
 @click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
@@ -89,6 +91,8 @@ def command(
     date: datetime.datetime | None,
     tolerance_um: float,
     outside_box: str,
+    within_um: float | None,
+    only_sure_components: bool,
     clearances: str | None,
     contour: bool,
     force: bool,
@@ -120,6 +124,8 @@ def command(
                 tolerance_um=tolerance_um,
                 outside_box="hold" if outside_box == "hold" else "refuse",
                 contour=contour,
+                within_um=within_um,
+                only_sure_components=only_sure_components,
                 date=date.date() if date else None,
                 select=select,
                 ignore=ignore,

@@ -61,6 +61,22 @@ def proof_options(function: F) -> F:
             metavar="YYYY-MM-DD",
             help="The day of the run, to be compared with valid_until of the calibration.",
         ),
+        click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."),
+        click.option(
+            "--tolerance-um",
+            type=Length(),
+            default=1.0,
+            show_default=True,
+            help="How far the corrected path may be from the nominal one, rounding apart.",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def confidence_options(function: F) -> F:
+    """What every verb that looks at uncertainties has in common."""
+    for option in (
         click.option(
             "--within-um",
             type=Length(),
@@ -71,14 +87,6 @@ def proof_options(function: F) -> F:
             "--only-sure-components",
             is_flag=True,
             help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
-        ),
-        click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."),
-        click.option(
-            "--tolerance-um",
-            type=Length(),
-            default=1.0,
-            show_default=True,
-            help="How far the corrected path may be from the nominal one, rounding apart.",
         ),
     ):
         function = option(function)

@@ -12,6 +12,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    confidence_options,
     exit_for,
     files_of,
     given,
@@ -41,6 +42,7 @@ LAST_DIGITS_UM = 10.0
 @setup_options
 @click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
+@confidence_options
 @click.option(
     "--outside-box",
     type=click.Choice(["refuse", "hold"]),

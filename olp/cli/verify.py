@@ -8,6 +8,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    confidence_options,
     exit_for,
     given,
     proof_options,
@@ -23,6 +24,7 @@ from olp.exceptions import UsageError
 @click.argument("corrected")
 @setup_options
 @proof_options
+@confidence_options
 def command(
     nominal: str,
     corrected: str,

@@ -89,7 +89,8 @@ class Confidence:
 
     `lines` (l,) of the program with the probabilities that all their way-points are within, `program_before`
     and `program_after` that all of the program's are, from so many `draws`; `gain` is the probability that
-    the corrected program is better than the nominal one, by the mean square of deviations.
+    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm`
+    is the largest standard uncertainty by temperatures.
     """
 
     points: Points
@@ -107,6 +108,7 @@ class Confidence:
     program_after: float
     gain: float
     draws: int
+    expansion_mm: float
 
     def __len__(self) -> int:
         return len(self.points)
@@ -194,6 +196,7 @@ def confidence(
     touch, count = unknowns.touches(path.frames)
     change = points.before_mm - points.after_mm
     share = np.zeros(unknowns.sensitivity.columns)
+    expands, expansion = unknowns.sensitivity.expansion is not None, 0.0
     joint = _Joint(unknowns, path, points, touch, count, within_mm, seed)
     order = np.argsort(line, kind="stable")
     for a in range(0, n, _BLOCK):
@@ -201,6 +204,8 @@ def confidence(
         tell("uncertainty", a / n)
         for part, rows in _blocks(unknowns.sensitivity, path, points, which, touch, joint):
             covariance[part] = _covariance(rows)
+            if expands:
+                expansion = max(expansion, float((rows[:, :, -4:] ** 2).sum(axis=(0, 2)).max(initial=0.0)))
             share += np.einsum("ink,ni->k", rows, change[part], optimize=True)
     joint.end()
     covariance += _scatter(unknowns, count, path, points)
@@ -224,6 +229,7 @@ def confidence(
         program_after=float((joint.worst[1] <= within_mm**2).mean()),
         gain=float(_positive(np.array([mean.sum()]), np.array([total]))[0]),
         draws=joint.draws,
+        expansion_mm=expansion**0.5,
     )
 
 

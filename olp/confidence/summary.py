@@ -113,14 +113,12 @@ def findings(
             f"{100 * found.program_after:.1f} %"
         )
         out.append(_finding("OLP423", what, _numbers(poor)))
-    if expansion is not None and expansion.unmodelled_K > 0.0 and len(found):
-        reach = _expansion_um(expansion, found.points.axis_mm)
-        if reach > 0.5 * found.within_mm * UM_PER_MM:
-            what = (
-                f"temperatures differ by up to {expansion.unmodelled_K:g} K without an expansion in the "
-                f"calibration: about {reach:.1f} um on this program"
-            )
-            out.append(_finding("OLP424", what))
+    if expansion is not None and expansion.unmodelled_K > 0.0 and found.expansion_mm > 0.5 * found.within_mm:
+        what = (
+            f"temperatures differ by up to {expansion.unmodelled_K:g} K without an expansion in the "
+            f"calibration: about {found.expansion_mm * UM_PER_MM:.1f} um on this program"
+        )
+        out.append(_finding("OLP424", what))
     doubtful = [part.name for part in parts if not part.sure and part.name not in left_out]
     if doubtful:
         out.append(_finding("OLP425", f"{', '.join(doubtful)}: smaller than 2 sigma"))
@@ -196,10 +194,3 @@ def _component(part: Component) -> dict[str, Any]:
         "probability_helps": part.helps,
         "sure": part.sure,
     }
-
-
-def _expansion_um(expansion: Expansion, axis_mm: Array) -> float:
-    """The largest expansion over the way-points, one standard uncertainty."""
-    scale = np.array(expansion.scale) * np.ptp(axis_mm, axis=0)
-    workpiece = expansion.workpiece * np.ptp(axis_mm, axis=0)
-    return float(np.sqrt(scale**2 + workpiece**2).max() * UM_PER_MM)
