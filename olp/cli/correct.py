@@ -138,7 +138,9 @@ def command(
                     nominal, call.setup, correction=result, corrected_name="" if output == STREAM else output,
                     tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
                     contour=contour, flatten=flatten, expand_cycles=expand_cycles,
-                    peck_clearance_mm=peck_clearance_mm, progress=show,
+                    peck_clearance_mm=peck_clearance_mm, within_um=within_um,
+                    only_sure_components=only_sure_components, date=date.date() if date else None,
+                    progress=show,
                 ).parts()  # fmt: skip
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None

@@ -11,6 +11,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    confidence_options,
     files_of,
     given,
     put,
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
 )
+@confidence_options
 @click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
 @click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
 @click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
@@ -83,6 +85,8 @@ def command(
     port: int,
     tolerance_um: float,
     outside_box: str,
+    within_um: float | None,
+    only_sure_components: bool,
     contour: bool,
     flatten: bool,
     expand_cycles: bool,
@@ -123,7 +127,8 @@ def command(
                     source(call.program), setup, corrected=corrected, measured=measured,
                     tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
                     contour=contour, flatten=flatten, expand_cycles=expand_cycles,
-                    peck_clearance_mm=peck_clearance_mm, time=not no_time, step_mm=step_mm, progress=show,
+                    peck_clearance_mm=peck_clearance_mm, time=not no_time, step_mm=step_mm,
+                    within_um=within_um, only_sure_components=only_sure_components, progress=show,
                 )  # fmt: skip
             except OlpError as error:
                 raise (error.in_file("<stdin>") if error.line is not None else error) from None
