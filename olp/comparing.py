@@ -14,8 +14,8 @@ import numpy as np
 from olp import comparing_parts as parts
 from olp.checks import state
 from olp.exceptions import InputError, OlpError, UsageError
-from olp.files.point_profile import PointProfile, looked_at
-from olp.files.points import Points, parse_points
+from olp.files.point_profile import PointProfile
+from olp.files.points import Points, layout_of, parse_points, read_points
 from olp.files.write import read_bytes
 from olp.findings import Finding
 from olp.loading import Loaded, PathLike, load, setup_of
@@ -24,7 +24,8 @@ from olp.measured import figures, runs
 from olp.measured.pairing import Order
 from olp.measured.path import Array, Index, Path
 from olp.nominal import Nominal, nominal_of
-from olp.poses import part_frame, poses_report
+from olp.poses import part_frame as poses_frame
+from olp.poses import poses_report
 from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.progress import Progress, silent
@@ -36,7 +37,7 @@ class Comparison:
     """What a comparison found: the report ("olp-comparison-1") as a mapping and the findings.
 
     `path` is the nominal path, `runs` and `before` are the measured runs on it, in the nominal frame; all of
-    them are None and empty for poses. `part_frame` is a table for the job file, of poses.
+    them are None and empty for poses. `part_frame` is a table for the job file, of poses, where asked for.
     """
 
     report: dict[str, Any]
@@ -52,6 +53,7 @@ class Comparison:
         yield b"run,s_mm,line,X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted\n"
         for run in (*self.before, *self.runs):
             assert self.path is not None
+            name = _quoted(run.name)
             d, foot = run.deviation, run.pairing.foot_mm
             columns = (
                 run.pairing.s_mm, self.path.line[run.pairing.segment], *foot.T,
@@ -60,9 +62,14 @@ class Comparison:
             for a in range(0, len(foot), 1 << 14):
                 rows = zip(*(c[a : a + (1 << 14)].tolist() for c in columns), strict=True)
                 yield "".join(
-                    f"{run.name},{s:.6f},{line},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good}\n"
+                    f"{name},{s:.6f},{line},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good}\n"
                     for s, line, x, y, z, t, n, b, good in rows
                 ).encode()
+
+
+def _quoted(cell: str) -> str:
+    """A cell of a CSV file (RFC 4180)."""
+    return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',"\r\n') else cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +97,7 @@ def compare(
     reach_mm: float = 1.0,
     tolerance_um: float | None = None,
     add_errors: bool = False,
-    frame_name: str = "G54",
+    part_frame: str | None = None,
     contour: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
@@ -101,14 +108,15 @@ def compare(
     `before` is one run (cycle); with `poses` each row is a pose, paired by name or by row. `align` and
     `order` are as in `olp.measured.runs.place`; points farther than `reach_mm` from their place are in no
     figure. With `add_errors` measured axis positions (a control's log) are moved to where the calibrated
-    machine's tip would go. Raises InputError, UsageError and CannotCompute.
+    machine's tip would go. `part_frame` names the work offset that poses, measured in axis positions, are
+    to give. Raises InputError, UsageError and CannotCompute.
     """
     tell = progress or silent
     options = {"align": align, "reach_mm": reach_mm, "tolerance_um": tolerance_um}
     tell("read", 0.0)
     if not measured:
         raise UsageError("no measured file is given; name at least one")
-    sets = [[_points(name, profile) for name in names] for names in (measured, before)]
+    sets = [[read_points(name, profile) for name in names] for names in (measured, before)]
     source = _source(nominal, machine, job, contour)
     layout = sets[0][0].profile
     if poses:
@@ -116,13 +124,13 @@ def compare(
             raise UsageError("poses come from a file of points; the nominal one is a program")
         report, found = poses_report(source.points, *sets, align=align, reach_mm=reach_mm)
         report = _head(source, sets, options) | report
-        table = part_frame(source.points, sets[0], frame_name) if len(source.points) >= 3 else None
+        table = None if part_frame is None else poses_frame(source.points, sets[0], part_frame)
         return Comparison(_with(report, found), tuple(found), layout, part_frame=table)
     axes = _positions(sets) == "axes"
-    if add_errors and not (axes and source.loaded):
+    if add_errors and not (axes and source.program):
         raise UsageError(
-            "--add-errors moves axis positions of a control's log by the machine's errors; give -m, and a "
-            'profile with positions = "axes"'
+            "--add-errors moves axis positions of a control's log by the machine's errors; give a program as "
+            'NOMINAL, -m, and a profile with positions = "axes"'
         )
     path, move = _nominal(source, axes)
     _same_frame(source, sets, axes)
@@ -134,7 +142,8 @@ def compare(
     placed = runs.place(path, names, points, align, order, reach_mm)
     tell("figures", 0.8)
     found = runs.findings(path, placed)
-    taken = _taken(source, path, move, placed, axes) if placed.fitted and all(placed.right) else None
+    judged = placed.fitted and all(placed.right) and bool(placed.runs[0].counted.any())
+    taken = _taken(source, path, move, placed, axes) if judged else None
     if taken is not None:
         found += runs.eaten_finding(*taken)
     count = len(measured)
@@ -170,18 +179,13 @@ def _with(report: dict[str, Any], found: Sequence[Finding]) -> dict[str, Any]:
     return report | {"findings": [f.as_dict() for f in found]}
 
 
-def _points(name: PathLike, profile: PointProfile | None) -> Points:
-    return parse_points(read_bytes(name), str(name), profile)
-
-
 def _source(
     nominal: PathLike | bytes, machine: PathLike | Setup | None, job: PathLike | None, contour: bool
 ) -> _Source:
     setup = None if machine is None and job is None else setup_of(machine, job)
     data = nominal if isinstance(nominal, bytes) else read_bytes(nominal)
     name = "" if isinstance(nominal, bytes) else str(nominal)
-    first = data[:8192].decode("utf-8", "replace").splitlines()[:40]
-    if looked_at(first) is not None:
+    if layout_of(data) is not None:
         loaded = None if setup is None else load(setup, None, "hold")
         return _Source(name, data, parse_points(data, name or "<stdin>"), None, loaded)
     if setup is None:

@@ -106,8 +106,12 @@ def _iso_9283(path: Path, members: Sequence[figures.Run]) -> dict[str, Any]:
 def verdict(report: dict[str, Any], tolerance_um: float | None) -> list[Finding]:
     """Whether the measured path is within tolerance; sets `holds` where that was asked for."""
     size = (report["after"].get("across_um") or {}).get("max")
-    if tolerance_um is None or size is None:
+    if tolerance_um is None:
         return []
+    if size is None:
+        report["holds"] = False
+        message = f"no measured point of a cutting move counts, so {tolerance_um:g} um are not shown to hold"
+        return [Finding("OLP609", message)]
     report["holds"] = size <= tolerance_um
     if report["holds"]:
         return []

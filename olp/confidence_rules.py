@@ -6,7 +6,7 @@ from olp.rule import Rule, Severity
 
 CONFIDENCE = (
     Rule(
-        "OLP421",
+        "OLP431",
         "gain within its uncertainty",
         Severity.INFO,
         "At these lines the deviation that the correction takes away is smaller than the expanded "
@@ -18,7 +18,7 @@ CONFIDENCE = (
         "3 um of correction, and a squareness that is known to 5 um there.",
     ),
     Rule(
-        "OLP422",
+        "OLP432",
         "correction not sure to help",
         Severity.WARNING,
         "Over the whole program the gain of the correction is smaller than its uncertainty: the probability "
@@ -27,7 +27,7 @@ CONFIDENCE = (
         "A calibration of 20 um of uncertainty for errors of 10 um.",
     ),
     Rule(
-        "OLP423",
+        "OLP433",
         "within tolerance by chance",
         Severity.WARNING,
         "The tolerance that --within-um asks for is smaller than what the calibration is sure of: the "
@@ -36,7 +36,7 @@ CONFIDENCE = (
         "--within-um 5 with a band of 8 um.",
     ),
     Rule(
-        "OLP424",
+        "OLP434",
         "temperature not corrected",
         Severity.WARNING,
         "The job states temperatures that differ from those of the calibration (20 degC for the workpiece), "
@@ -46,7 +46,7 @@ CONFIDENCE = (
         "`X_scale = 24.0` in the job, and no X_scale_um_m_K: 46 um over 1 m.",
     ),
     Rule(
-        "OLP425",
+        "OLP435",
         "components within their own uncertainty",
         Severity.INFO,
         "What the calibration says of these components is smaller than its expanded uncertainty (2 sigma), "
@@ -55,7 +55,7 @@ CONFIDENCE = (
         "A squareness of 4 urad with a standard uncertainty of 5 urad.",
     ),
     Rule(
-        "OLP426",
+        "OLP436",
         "components left out",
         Severity.INFO,
         "--only-sure-components: these components are within their own uncertainty and were not corrected. "
@@ -64,7 +64,7 @@ CONFIDENCE = (
         "--only-sure-components, and a squareness of 4 urad known to 5 urad.",
     ),
     Rule(
-        "OLP427",
+        "OLP437",
         "calibration has aged",
         Severity.WARNING,
         "By growth_per_year the standard uncertainties are at least twice those of the day of measuring.",

@@ -12,8 +12,10 @@ from olp.calibration_rules import CALIBRATION
 from olp.confidence_rules import CONFIDENCE
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
+from olp.model_rules import MODEL
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
+from olp.table_rules import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +194,7 @@ _TABLE = (
         "OLP402",
         "outside travel",
         Severity.ERROR,
-        "A corrected command leaves the travel of an axis, so the control will stop with a limit alarm.",
+        "A command leaves the travel of an axis, so the control will stop with a limit alarm.",
         "Move the part, or leave the section out with (olp off).",
         "Travel of X up to 2000 mm, and the corrected program writes X2000.012.",
     ),
@@ -306,7 +308,9 @@ _TABLE = (
 
 RULES = {
     rule.code: rule
-    for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *CONFIDENCE), key=lambda rule: rule.code)
+    for rule in sorted(
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *CONFIDENCE), key=lambda rule: rule.code
+    )
 }
 
 #: findings of uncertainty

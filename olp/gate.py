@@ -14,6 +14,7 @@ from olp import checks
 from olp.checks import motion, state
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
+from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp
 from olp.correction import Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
@@ -46,25 +47,23 @@ class Check:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
-    """The program as it would run, `run` where a nominal one is known; findings carry the lines of `named`:
-    the nominal program where that was given alone, else the corrected one."""
+    """The program as it would run; `run` and `proof` where a nominal one is known. Lines of the proof are
+    those of `data`, the text that was given: the nominal program where that was given alone, else the
+    corrected one."""
 
     name: str
     data: bytes
     written: Program
     run: Run | None
+    proof: Proof | None
     loaded: Loaded
     options: Options
     checked: str
 
-    def proof(self) -> Proof:
-        """The proof, with the lines of the text that findings name."""
-        assert self.run is not None
-        proof = self.run.proof
-        if self.data is self.run.text:
-            path = replace(proof.nominal, line=proof.written.line[proof.groups])
-            return replace(proof, nominal=path)
-        return replace(proof, written=replace(proof.written, line=proof.nominal.line[proof.owner()]))
+    @property
+    def corrected_here(self) -> bool:
+        """The text that was given is the nominal program, and the run has found what it can."""
+        return self.run is not None and self.data is not self.run.text
 
     def worded(self, program: Program) -> Program:
         """A program with its words, which a correction drops early."""
@@ -152,11 +151,13 @@ def _case(
             within_um=within_um,
         )  # fmt: skip
         what = "what olp correct makes of the program"
-        return _Case(name, data, run.corrected, run, loaded, options, what)
+        path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
+        proof = replace(run.proof, written=path)
+        return _Case(name, data, run.corrected, run, proof, loaded, options, what)
     written = read(data, loaded.setup, loaded.profile, options)
     if nominal is None:
         what = "the corrected program as it is; what needs the nominal one is left out (--nominal)"
-        return _Case(name, data, written, None, loaded, options, what)
+        return _Case(name, data, written, None, None, loaded, options, what)
     source, other = source_of(nominal)
     try:
         first = read(source, loaded.setup, loaded.profile, options)
@@ -167,14 +168,17 @@ def _case(
         date=date, within_um=within_um,
     )  # fmt: skip
     what = f"the corrected program against the nominal one ({Path(other).name if other else 'stdin'})"
-    return _Case(name, data, written, run, loaded, options, what)
+    proof = replace(
+        run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
+    )
+    return _Case(name, data, written, run, proof, loaded, options, what)
 
 
 def _findings(
     case: _Case, tolerance_mm: float, outside: str, date: datetime.date | None, contour: bool
 ) -> list[Finding]:
     """All findings. What the run that made the case has found stands; the rest is looked for here."""
-    loaded, run = case.loaded, case.run
+    loaded, run, proof = case.loaded, case.run, case.proof
     machine, sanity = loaded.setup.machine, loaded.setup.machine.sanity
     found = [
         *_stamps(case),
@@ -183,19 +187,17 @@ def _findings(
     ]
     if date is None:
         found.append(finding("OLP408", "no date is given"))
-    if run is not None and case.data is not run.text:
-        # corrected here, with all its findings
-        proof = case.proof()
+    path = case.written.toolpath
+    if run is not None and proof is not None and case.corrected_here:
         found += run.findings
-        program, path = case.worded(run.nominal), proof.written
+        path = proof.written
     else:
-        program, path = case.written, case.written.toolpath
         found += state.travel_findings(path, machine)
         found += state.box_findings(path, loaded.model.box_mm, outside)
         found += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
-        found += checks.program_findings(program, loaded.setup, contour=contour)
-        if run is not None:
-            proof = case.proof()
+        found += checks.program_findings(case.written, loaded.setup, contour=contour)
+        found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
+        if run is not None and proof is not None:
             found += checks.proof_findings(proof, run.passed)
             found += _confidence(run)
     found += state.tool_findings(path, loaded.calibration, sanity)
@@ -203,19 +205,17 @@ def _findings(
     found += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
     found += motion.reversal_findings(path, loaded.model)
     speeds = motion.Feeds.of(case.worded(case.written))
-    found += (
-        speeds.findings() if run is None or case.data is run.text else motion.Feeds.of(program).findings()
-    )
+    before = None if run is None else motion.Feeds.of(case.worded(run.nominal))
+    found += (before if before is not None and case.corrected_here else speeds).findings()
     if speeds.mm_s is not None:
         found += motion.demand_findings(path, speeds.mm_s, machine)
-    if run is not None:
+    if run is not None and proof is not None and before is not None:
         correction = _corrections(run.nominal, case.written, proof)
         found += state.sanity_findings(proof.nominal, correction, sanity)
         found += motion.low_findings(proof, loaded.model)
-        before = motion.Feeds.of(case.worded(run.nominal))
         if speeds.mm_s is not None and before.mm_s is not None:
             found += motion.changed_findings(proof, before.mm_s, speeds.mm_s)
-        if case.data is run.text:
+        if not case.corrected_here:
             largest = float(np.sqrt((correction * correction).sum(axis=1)).max(initial=0.0))
             found += checks.path_mode_findings(case.written, largest)
     return found
@@ -246,7 +246,7 @@ def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | N
     solids = [
         Solid(mesh, Path(mesh.file).name, vertices[faces] * mesh.unit_mm) for mesh, vertices, faces in read
     ]
-    path = case.written.toolpath if case.run is None else case.proof().written
+    path = case.written.toolpath if case.proof is None else case.proof.written
     return clearances(path, case.loaded.model, setup, solids)
 
 
@@ -271,7 +271,7 @@ def _stamps(case: _Case) -> list[Finding]:
                 "OLP311", "the program carries two stamps of a correction", [_line(case.data, first.start())]
             )
         )
-    if case.run is not None and case.data is case.run.text and find_stamp(case.run.nominal.data) is not None:
+    if case.run is not None and not case.corrected_here and find_stamp(case.run.nominal.data) is not None:
         out.append(finding("OLP311", "the program given as nominal carries the stamp of a correction"))
     own = case.loaded.digest[:12]
     if first is not None and not first.group().endswith(own.encode()):

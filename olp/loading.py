@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,11 +11,12 @@ from olp.confidence.components import unsure
 from olp.errormodel import Calibration, ErrorModel, build
 from olp.errormodel.uncertainty import Uncertainty
 from olp.exceptions import ConfigError
-from olp.files.calibration import load_calibration
+from olp.files.calibration import files_beside, load_calibration
 from olp.files.config import load_setup
 from olp.files.covariance import load_uncertainty
+from olp.files.structure import read_drift_log, sensors_of
 from olp.files.write import read_bytes
-from olp.machine import Setup
+from olp.machine import Job, Setup
 from olp.program.profiles import PROFILES, Profile
 
 PathLike = str | Path
@@ -64,6 +65,7 @@ def load(
             "would be corrected twice; list the components that it corrects, or switch its tables off"
         )
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
+    calibration = at_temperatures(calibration, setup.job)
     skip = frozenset(described.compensated_by_controller - calibration.active_during_measurement)
     uncertainty = load_uncertainty(described.calibration, calibration)
     left_out: frozenset[str] = frozenset()
@@ -78,6 +80,26 @@ def load(
     model = build(calibration, described.chain, outside=outside, skip_components=skip | left_out)
     digest = _digest(described.calibration, described, left_out)
     return Loaded(setup, profile_of(setup), calibration, model, digest, uncertainty, skip, left_out)
+
+
+def at_temperatures(calibration: Calibration, job: Job) -> Calibration:
+    """The calibration with its thermal structure at the temperatures of the job. Raises ConfigError where the
+    job names sensors that it does not have, or leaves some out."""
+    structure = calibration.structure
+    if structure is None:
+        if job.sensors_degC or job.sensor_log:
+            raise ConfigError(
+                "the job states temperatures of sensors, and the calibration has no thermal structure; give "
+                "[thermal] structure in the calibration file, or leave the sensors out"
+            )
+        return calibration
+    if job.sensors_degC is not None:
+        structure = structure.at(job.sensors_degC)
+    elif job.sensor_log is not None:
+        log = read_drift_log(job.sensor_log)
+        sensors = sensors_of(log, dict.fromkeys(s.name for s in structure.sensors))
+        structure = structure.settled(log.time_s, sensors, job.sensor_log_at_s)
+    return replace(calibration, structure=structure)
 
 
 def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
@@ -96,13 +118,10 @@ def profile_of(setup: Setup) -> Profile:
 
 
 def _digest(calibration: str, machine: object, left_out: frozenset[str]) -> str:
-    """Hash of the calibration file, its curve files and the machine values that decide the model."""
-    import tomllib
-
-    raw = read_bytes(calibration)
-    digest = hashlib.sha256(raw)
-    for curve in tomllib.loads(raw.decode()).get("curves", []):
-        digest.update(read_bytes(Path(calibration).parent / curve["file"]))
+    """Hash of the calibration file, the files that it names and the machine values that decide the model."""
+    digest = hashlib.sha256(read_bytes(calibration))
+    for file in files_beside(calibration):
+        digest.update(read_bytes(file))
     digest.update(repr(getattr(machine, "chain", "")).encode())
     if left_out:
         digest.update(repr(sorted(left_out)).encode())
@@ -116,10 +135,14 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it."""
+def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: float | None = None) -> bytes:
+    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
+    Payloads that the job gives by line become comments first, as lines are others afterwards."""
+    from olp.program.directives import with_payloads
     from olp.program.flatten import flatten as unroll
 
+    profile = profile_of(setup)
+    data = with_payloads(data, setup.job.payloads, profile.comment)
     folder = Path(name).parent if name else None
 
     def beside(wanted: str) -> bytes | None:

@@ -79,7 +79,8 @@ def motion_plot(
             plot.legend(frameon=False, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 0.98))
         plots[3].set_xlabel("time in s")
         plots[3].set_xlim(from_s, end)
-        figure.suptitle(title)
+        # a name may hold a $
+        figure.suptitle(title, parse_math=False)
         out = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         figure.savefig(out, format=kind, dpi=130, metadata=metadata)

@@ -12,7 +12,7 @@ from olp.files.points import Points
 from olp.files.toml_text import comment, toml_key, toml_lines
 from olp.findings import Finding
 from olp.measured import iso9283
-from olp.measured.path import Array
+from olp.measured.path import Array, Mask
 from olp.measured.rigid import Rigid, fit_frame
 from olp.measured.runs import Align, eaten_finding
 from olp.units import UM_PER_MM
@@ -27,7 +27,7 @@ def cycles(nominal: Points, files: Sequence[Points]) -> Array:
     found: list[Array] = []
     for points in files:
         if nominal.names is not None and points.names is not None:
-            found += _by_name(nominal.names, points)
+            found += _by_name(nominal.names, nominal.file, points)
             continue
         if len(points) % len(nominal):
             raise InputError(
@@ -39,10 +39,11 @@ def cycles(nominal: Points, files: Sequence[Points]) -> Array:
     return np.stack(found)
 
 
-def _by_name(names: Sequence[str], points: Points) -> list[Array]:
+def _by_name(names: Sequence[str], nominal: str, points: Points) -> list[Array]:
     place = {name: i for i, name in enumerate(names)}
     if len(place) < len(names):
-        raise InputError("the names of the nominal poses repeat; expected each name once", file=points.file)
+        twice = next(name for i, name in enumerate(names) if place[name] != i)
+        raise InputError(f'the nominal pose "{twice}" is there twice; expected each name once', file=nominal)
     out: list[Array] = []
     seen: dict[str, int] = {}
     assert points.names is not None
@@ -74,8 +75,7 @@ def poses_report(
     rigid = Rigid.identity()
     found: list[Finding] = []
     if fitted:
-        mean = np.nanmean(groups["after"], axis=0)
-        there = np.isfinite(mean).all(axis=1)
+        mean, there = _means(groups["after"])
         rigid = fit_frame(mean[there], command[there])
         groups = {
             name: rigid(attained.reshape(-1, 3)).reshape(attained.shape) for name, attained in groups.items()
@@ -146,6 +146,14 @@ def _group(
     }, found  # fmt: skip
 
 
+def _means(attained: Array) -> tuple[Array, Mask]:
+    """(m, 3) means of cycles (n, m, 3), and which of them (m,) are of something."""
+    there = np.asarray(np.isfinite(attained).all(axis=2), bool)
+    count = there.sum(axis=0)
+    total = np.where(there[:, :, None], attained, 0.0).sum(axis=0)
+    return np.asarray(total / np.maximum(count, 1)[:, None], float), np.asarray(count > 0, bool)
+
+
 def _distance(command: Array, attained: Array) -> Array:
     size = np.sqrt(((attained - command) ** 2).sum(axis=2)).ravel()
     return np.asarray(size[np.isfinite(size)], float)
@@ -162,8 +170,7 @@ def part_frame(nominal: Points, measured: Sequence[Points], name: str) -> str:
     tool length; position = Rz(C) Ry(B) Rx(A) point + offset. Raises CannotCompute for fewer points, or
     points on a line.
     """
-    mean = np.nanmean(cycles(nominal, measured), axis=0)
-    there = np.isfinite(mean).all(axis=1)
+    mean, there = _means(cycles(nominal, measured))
     rigid = fit_frame(nominal.points_mm[there], mean[there])
     away = np.sqrt(((rigid(nominal.points_mm[there]) - mean[there]) ** 2).sum(axis=1)) * UM_PER_MM
     angles = {f"{axis}_deg": round(v, 9) for axis, v in zip("ABC", rigid.angles_deg, strict=True)}

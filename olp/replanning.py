@@ -19,7 +19,7 @@ from olp.program.feeds import lengths_mm
 from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.program.state import PathMode
-from olp.program.timing import BLEND_MM
+from olp.program.timing import BLEND_MM, PathControl, path_modes
 from olp.progress import Progress
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
 from olp.trajectory.inertia import Inertial, capped, sure
@@ -58,7 +58,7 @@ class Case:
         stated = setup.machine.blend_mm
         with naming(name):
             profile = profile_of(setup)
-            text = unrolled(data, name, profile, False) if flatten else data
+            text = unrolled(data, name, setup, False) if flatten else data
             program = read(text, setup, profile, Options(block_delete=block_delete, contour=contour))
             if setup.machine.path_mode == "exact-stop" and blend_mm is None:
                 # a mode of line 0 holds from the start
@@ -101,14 +101,14 @@ class Case:
 
     def tolerances(self) -> dict[str, Any]:
         """Which path tolerances are in use, and where they come from."""
-        modes = self.program.path_modes
+        modes = path_modes(self.program, block_delete=self.block_delete)
         path = self.program.toolpath
-        blends = [m for m in modes if m.name.startswith("G64")]
-        stated = sorted({m.tolerance_mm * 1e3 for m in blends if m.tolerance_mm})
+        blends = [m for m in modes if m.control == PathControl.BLEND]
+        stated = {m.stated_mm * 1e3 for m in blends if m.stated_mm is not None}
         first = int(path.line[0]) if len(path) else 0
-        bare = not modes or modes[0].line > first or any(not m.tolerance_mm for m in blends)
+        bare = not modes or modes[0].line > first or any(m.stated_mm is None for m in blends)
         return {
-            "stated_um": stated,
+            "stated_um": sorted(stated),
             "default_um": self.blend_mm * 1e3 if bare else None,
             "default_from": self.blend_from if bare else None,
             "exact_stop_at_start": bool(modes) and modes[0].line == 0,
@@ -228,6 +228,8 @@ def with_feeds(found: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict
 def blend_study(case: Case, found: Plan, factors: Sequence[float], tell: Progress) -> list[dict[str, Any]]:
     """Time and path deviation at multiples of the tolerances in use; `found` is the plan at 1."""
     rows = []
+    path = case.tolerances()
+    used_um = [v for v in (*path["stated_um"], path["default_um"]) if v]
     for factor in factors:
         other = (
             found if factor == 1.0 else planned(case.scaled(factor), found.limits, tell, f"blend x{factor:g}")
@@ -235,11 +237,7 @@ def blend_study(case: Case, found: Plan, factors: Sequence[float], tell: Progres
         rows.append(
             {
                 "factor": factor,
-                "tolerance_um": [
-                    v * factor
-                    for v in (*case.tolerances()["stated_um"], case.tolerances()["default_um"])
-                    if v
-                ],
+                "tolerance_um": [v * factor for v in used_um],
                 "duration_s": other.duration_s,
                 "deviation_um": other.blending_mm * 1e3,
             }

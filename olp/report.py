@@ -197,6 +197,9 @@ def _budget(report: Report) -> Iterator[str]:
     titles = {
         "model_and_chords": "model and chords, under the tolerance",
         "rounding": "rounding to the last digit",
+        "increment": "least increment of the control",
+        "random_2_sigma": "random: repeatability, two standard deviations",
+        "inversion": "inversion of the model",
         "lost_motion_unknown": "lost motion not yet taken up",
     }
     # What a later version adds shows under its own key.
@@ -319,13 +322,18 @@ def findings_text(findings: Sequence[Report]) -> Iterator[str]:
     if not findings:
         return
     yield f"Findings ({len(findings)}), explained by olp explain CODE"
-    order = {"error": 0, "warning": 1, "info": 2}
-    for finding in sorted(findings, key=lambda f: order.get(str(f.get("severity")), 3)):
+    for finding in by_severity(findings):
         code = str(finding.get("code", ""))
         title = RULES[code].title if code in RULES else ""
         yield f"  {code}  {finding.get('severity', '')}: {title}{_place(finding)}"
         message = printable(str(finding.get("message", "")))
         yield from textwrap.wrap(message, WIDTH, initial_indent=" " * 10, subsequent_indent=" " * 10)
+
+
+def by_severity(findings: Iterable[Report]) -> list[Report]:
+    """Findings in the form of `Finding.as_dict`, the most severe first."""
+    order = {"error": 0, "warning": 1, "info": 2}
+    return sorted(findings, key=lambda f: order.get(str(f.get("severity")), 3))
 
 
 def _place(finding: Report) -> str:

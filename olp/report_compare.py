@@ -100,6 +100,9 @@ def _verdict(report: Report) -> Iterator[str]:
     if "holds" not in report:
         return
     size = figure(report.get("after"), ("across_um", "max"))
+    if size is None:
+        yield "NOT SHOWN TO BE WITHIN TOLERANCE: no measured point of a cutting move counts."
+        return
     verdict = "Within tolerance" if report["holds"] else "ABOVE TOLERANCE"
     yield from textwrap.wrap(
         f"{verdict}: the measured path is at most {number(size)} um from the nominal one; "

@@ -10,12 +10,18 @@ from typing import Any
 
 from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
 from olp.findings import RULES
-from olp.report import Report, number, percent
+from olp.report import Report, by_severity, number, percent
 from olp.report_compare import change, figure, table_rows, taken_by_fit
 
 Plots = Mapping[str, bytes]
 _MOST_SOURCES, _MOST_POSES = 24, 60
-_PART = {"model_and_chords": "model and chords", "rounding": "rounding to the last digit"}
+_PART = {
+    "model_and_chords": "model and chords",
+    "inversion": "inversion of the model",
+    "rounding": "rounding to the last digit",
+    "increment": "least increment of the control",
+    "random_2_sigma": "random: repeatability, two standard deviations",
+}
 
 
 def correction(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:
@@ -309,8 +315,7 @@ def _tests(report: Report, plots: Plots) -> Iterator[Section]:
 
 
 def _notices(report: Report) -> Iterator[Block]:
-    order = {"error": 0, "warning": 1, "info": 2}
-    found = sorted(report.get("findings") or (), key=lambda f: order.get(str(f["severity"]), 3))
+    found = by_severity(report.get("findings") or ())
     for f in found:
         rule = RULES[f["code"]]
         lines = f["lines"][:8]

@@ -6,10 +6,12 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from olp.report import WIDTH, Report, pairs, printable, table
+from olp.report import WIDTH, Report, findings_text, number, pairs, printable, shortened, table
 
 #: rows of a table that are shown
 _ROWS = 8
+#: of the name of another program
+_NAME = 50
 
 
 def to_text(report: Report) -> str:
@@ -17,6 +19,7 @@ def to_text(report: Report) -> str:
     sections = (
         _head(report), _nominal(report), _blend_study(report), _budget(report), _use(report), _slow(report),
         _lines(report), _feeds_written(report), _notes(report),
+        findings_text(report["findings"]),
     )  # fmt: skip
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
@@ -63,7 +66,7 @@ def _nominal(report: Report) -> Iterator[str]:
         return
     here, other = float(report["duration_s"]), float(nominal["duration_s"])
     change = f" ({100.0 * (here - other) / other:+.3f} %)" if other else ""
-    name = printable(nominal["program"]) or "<stdin>"
+    name = shortened(printable(nominal["program"]), _NAME) or "<stdin>"
     yield f"Against {name}: {other:.3f} s there, {here:.3f} s here{change}"
     if not nominal["lines_correspond"]:
         yield "  The lines of the two programs do not correspond, so they are not compared one by one."
@@ -104,12 +107,11 @@ def _budget(report: Report) -> Iterator[str]:
     }
     proof = report.get("proof")
     yield "Off the programmed path, largest in um"
-    rows = [(titles.get(k, k), f"{v:.2f}") for k, v in budget.items() if v]
+    rows = [(titles.get(k, k), number(v)) for k, v in budget.items() if v]
     if proof:
-        rows.insert(
-            0, (f"the axes, by the proof of {printable(proof['program'])}", f"{proof['path_max_um']:.2f}")
-        )
-        rows.append(("all of it in one place, at most", f"{proof['at_most_um']:.2f}"))
+        axes = f"the axes, by the proof of {shortened(printable(proof['program']), _NAME)}"
+        rows.insert(0, (axes, number(proof["path_max_um"])))
+        rows.append(("all of it in one place, at most", number(proof["at_most_um"])))
     yield from table(("", "max"), rows)
     path = report["path"]
     stated = ", ".join(f"{v:g}" for v in path["stated_um"][:6])
@@ -119,7 +121,8 @@ def _budget(report: Report) -> Iterator[str]:
     if path["exact_stop_at_start"]:
         parts.append("exact stop from the start, by the machine file")
     found = "; ".join(filter(None, parts)) or "none, the program asks for the exact path all through"
-    yield f"  Path tolerance: {found}"
+    text = f"Path tolerance: {found}"
+    yield from textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")
     inertial = report.get("inertial")
     if inertial:
         allowed = inertial["allowed_um"]
@@ -239,8 +242,8 @@ def clock(seconds: float) -> str:
     return f"{seconds:.2f} s" + (f" ({hours}:{minutes:02d}:{rest:04.1f})" if whole >= 60.0 else "")
 
 
-def _count(number: int, one: str, several: str) -> str:
-    return f"{number} {one if number == 1 else several}"
+def _count(amount: int, one: str, several: str) -> str:
+    return f"{amount} {one if amount == 1 else several}"
 
 
 def _percent(share: Any, digits: int) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from olp.checks.state import travel_findings
 from olp.exceptions import CannotCompute, UsageError
 from olp.files import trajectory as files
 from olp.files.write import write_files
+from olp.findings import Finding
 from olp.loading import PathLike, profile_of, setup_of, source_of
 from olp.machine import Setup
 from olp.plots import Format as Picture
@@ -36,11 +39,12 @@ FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retiming:
-    """A trajectory for each stretch of the program between places that the control alone knows, as `plan`,
-    and the report ("olp-retime-1")."""
+    """A trajectory for each stretch of the program between places that the control alone knows, as `plan`;
+    the report ("olp-retime-1"), and the findings: axes commanded beyond their travel."""
 
     plan: Plan
     report: dict[str, Any]
+    findings: tuple[Finding, ...] = ()
 
     @property
     def trajectories(self) -> tuple[Trajectory, ...]:
@@ -92,7 +96,9 @@ class Retiming:
         Raises CannotCompute as `trajectory` does, UsageError for a stretch or a cycle that cannot be, and
         ConfigError for Parquet without pyarrow.
         """
-        return _WRITERS[kind](self._stretch(stretch), cycle_s)
+        trajectory = self._stretch(stretch)
+        files.check_cycle(trajectory, cycle_s)
+        return _WRITERS[kind](trajectory, cycle_s)
 
     def files(
         self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
@@ -112,8 +118,9 @@ class Retiming:
     def _counted(
         self, kind: Format, cycle_s: float, stretch: int | None, progress: Progress | None
     ) -> Iterator[bytes]:
+        parts = self.parts(kind, cycle_s, stretch)
         whole = max(self._stretch(stretch).duration_s / cycle_s / files.ROWS, 1.0)
-        for done, part in enumerate(self.parts(kind, cycle_s, stretch)):
+        for done, part in enumerate(parts):
             yield part
             if progress is not None:
                 progress("write", min(done / whole, 1.0))
@@ -203,11 +210,13 @@ def retime(
     path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
     times the tolerances in use. `max_inertial_um` bounds the deviation that accelerations make on the
     machine's compliance. `block_delete` leaves `/` blocks out, `flatten` unrolls loops, subprograms and
-    expressions first: lines then count in the unrolled text. Raises InputError (ProgramError with its line,
+    expressions first: lines then count in the unrolled text. Axes commanded beyond their travel are findings
+    (OLP402), and planned all the same. Raises InputError (ProgramError with its line,
     ConfigError), UsageError and CannotCompute.
     """
     setup = setup_of(machine, job)
     profile_of(setup)
+    proved = None if proof is None else _proved(proof, setup)
     tell = progress or silent
 
     def case_of(source: PathLike | bytes) -> Case:
@@ -228,11 +237,15 @@ def retime(
     report = _report(case, found, compliance, max_inertial_um)
     if other is not None:
         report["nominal"] = _against(found, planned(other, found.limits, tell, "nominal"), other)
-    if proof is not None:
-        report["proof"] = _static(proof, report)
+    if proved is not None:
+        moving = sum(report["budget_um"].values())
+        report["proof"] = proved | {"at_most_um": proved["path_max_um"] + moving}
     if study_blend:
         report["blend_study"] = blend_study(case, found, FACTORS, tell)
-    return Retiming(found, report)
+    # the motion keeps to the box of its way-points, so commands within travel are motion within travel
+    findings = tuple(travel_findings(case.program.toolpath, setup.machine))
+    report["findings"] = [f.as_dict() for f in findings]
+    return Retiming(found, report, findings)
 
 
 def _against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
@@ -248,28 +261,25 @@ def _against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
     }
 
 
-def _static(proof: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
-    """What the proof of a correction leaves, and the sum with what the motion adds, in um. Raises UsageError
-    for what is no such report, or is of another machine."""
+def _proved(proof: Mapping[str, Any], setup: Setup) -> dict[str, Any]:
+    """What the proof of a correction leaves, in um. Raises UsageError for what is no such report, or is of
+    another machine."""
     try:
         if proof["schema"] != "olp-report-1":
             raise KeyError(proof["schema"])
         machine, left = str(proof["machine"]["name"]), float(proof["deviation"]["path_max_um"])
         budget = {str(key): float(value) for key, value in proof["budget_um"].items()}
         program = str(proof["program"]["name"])
-    except (KeyError, TypeError, ValueError):
+        if not all(map(math.isfinite, (left, *budget.values()))):
+            raise ValueError(left)
+    except (KeyError, TypeError, ValueError, AttributeError):
         raise UsageError(
             'the proof is no report of a correction; expected one of schema "olp-report-1", as olp correct '
             "and olp verify write"
         ) from None
-    if machine != report["machine"]:
-        raise UsageError(f"the proof is for machine {machine!r}, and this one is {report['machine']!r}")
-    return {
-        "program": program,
-        "budget_um": budget,
-        "path_max_um": left,
-        "at_most_um": left + sum(report["budget_um"].values()),
-    }
+    if machine != setup.machine.name:
+        raise UsageError(f"the proof is for machine {machine!r}, and this one is {setup.machine.name!r}")
+    return {"program": program, "budget_um": budget, "path_max_um": left}
 
 
 def _report(case: Case, found: Plan, compliance: Any, max_inertial_um: float | None) -> dict[str, Any]:

@@ -97,6 +97,32 @@ def growing(share: float) -> dict[str, Any]:
     return known(0.01, f"[covariance]\ngrowth_per_year = {share}\n")
 
 
+def total_map() -> dict[str, Any]:
+    nodes = [f"{x},{y},{z},0,0,0" for x in (-1000, 2000) for y in (-1000, 2000) for z in (-1000, 2000)]
+    text = "\n".join(["X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um", *nodes])
+    table = '[[maps]]\nfile = "map.csv"\nkind = "total"\ntool_mm = [0.0, 0.0, -150.0]\n'
+    return {"calibration": table, "curves": {"map.csv": text}}
+
+
+def load(um_kg: float) -> dict[str, Any]:
+    """A sag that does not depend on the place."""
+    text = f"X_mm,EZX_um_kg\n-1000,{-um_kg}\n2000,{-um_kg}\n"
+    return {"calibration": '[[compliance]]\nfile = "load.csv"\n', "curves": {"load.csv": text}}
+
+
+def structure() -> dict[str, Any]:
+    text = (
+        'schema = "olp-thermal-1"\nmachine = "m"\n[[sensors]]\nname = "beam"\nreference_degC = 20.0\n'
+        'range_degC = [15.0, 30.0]\n[[distortions]]\ncomponent = "EXX"\nsensor = "beam"\n'
+        "span_mm = [-1000.0, 2000.0]\noffset_um_K = 1.0\n"
+    )
+    return {"calibration": '[thermal]\nstructure = "t.toml"\n', "curves": {"t.toml": text}}
+
+
+def sensor(degC: float) -> str:
+    return f"[temperatures_degC.sensors]\nbeam = {degC}\n"
+
+
 def roll(urad: float) -> dict[str, Any]:
     table = '[[curves]]\nfile = "x.csv"\n'
     return {"calibration": table, "curves": {"x.csv": f"X_mm,EAX_urad\n-1000,{urad}\n2000,{urad}\n"}}
@@ -226,27 +252,38 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
     ),
+    "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
+    "OLP421": (
+        Call(b"G1 X100\n(olp payload 30)\nG1 X90\n", **load(0.11)),
+        Call(b"G1 X100\n(olp payload 30)\nG0 X90\nG1 X80\n", **load(0.11)),
+    ),
+    "OLP422": (Call(job="payload_kg = 1.0\n"), Call(job="payload_kg = 1.0\n", **load(0.01))),
+    "OLP423": (Call(**structure()), Call(job=sensor(20.0), **structure())),
+    "OLP424": (
+        Call(job=sensor(30.1), options={"outside_box": "hold"}, **structure()),
+        Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
+    ),
     # one way-point: the gain of 10 um is sure up to a sigma of 5 um
-    "OLP421": (Call(**known(5.1)), Call(**known(4.9))),
-    "OLP422": (Call(**known(5.1)), Call(**known(4.9))),
+    "OLP431": (Call(**known(5.1)), Call(**known(4.9))),
+    "OLP432": (Call(**known(5.1)), Call(**known(4.9))),
     # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer
-    "OLP423": (
+    "OLP433": (
         Call(**known(11.2), options={"within_um": 20.0}),
         Call(**known(9.2), options={"within_um": 20.0}),
     ),
     # 11.5 um/(m K) at 100 mm, half a um
-    "OLP424": (
+    "OLP434": (
         Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n"),
         Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n"),
     ),
     # the mean of a curve of two independent halves is known to sigma / sqrt(2)
-    "OLP425": (Call(**known(7.2)), Call(**known(6.9))),
-    "OLP426": (
+    "OLP435": (Call(**known(7.2)), Call(**known(6.9))),
+    "OLP436": (
         Call(**known(7.2), options={"only_sure_components": True}),
         Call(**known(6.9), options={"only_sure_components": True}),
     ),
     # 310 days after measuring
-    "OLP427": (Call(**growing(1.19)), Call(**growing(1.16))),
+    "OLP437": (Call(**growing(1.19)), Call(**growing(1.16))),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),
         Call(OVER, tables=tool(50.0), **clamp(9.999)),

@@ -82,7 +82,7 @@ def test_help_imports_no_verb() -> None:
         cwd=Path(olp.__file__).parents[1],
         check=True,
     )
-    assert done.stdout == "['olp.cli.common']\n"
+    assert done.stdout == "['olp.cli.common', 'olp.cli.late']\n"
 
 
 def test_the_module_runs_as_the_command_does() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from pathlib import Path
@@ -350,3 +351,97 @@ def test_text_of_a_program_is_no_markup(tmp_path: Path) -> None:
             == 0
         )
         assert "<script>" not in report.read_text()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("align", ["auto", "fit", "each"])
+def test_so_few_points_always_fit(nominal: Path, count: int, align: str) -> None:
+    few = bent(4)[:count] + np.array((500.0, 0.0, 0.0))
+    measured = nominal.with_name("measured.csv")
+    measured.write_text(table(few))
+    result = run("compare", nominal, measured, "--align", align, "--tolerance-um", "5")
+    assert (result.exit_code, result.stdout) == (4, "")
+    assert f"measured.csv: {count} points make no best fit" in result.stderr
+    assert "--align none" in result.stderr
+
+
+def test_few_points_in_the_nominal_frame_are_as_they_are(nominal: Path) -> None:
+    code, report = compared(nominal, bent(3000)[[700]] + np.array((0, 0, 0.01)), "--tolerance-um", 12)
+    assert (code, codes(report), report["holds"]) == (0, {"OLP603"}, True)
+    assert report["after"]["across_um"]["max"] == pytest.approx(10, abs=0.3)
+
+
+def test_nothing_that_counts_is_no_pass(tmp_path: Path) -> None:
+    """A run along a rapid alone, fitted or not, shows no tolerance to hold, and no nan."""
+    program, measured = tmp_path / "p.ngc", tmp_path / "m.csv"
+    program.write_text("G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG0 X100 Y80\nX0 Y90 Z0\nG1 X-10 F600\nM2\n")
+    points = np.array(((0, 0, 20), (50, 40, 20), (100, 80, 20), (80, 82, 16), (50, 85, 10.0), (20, 88, 4)))
+    measured.write_text(table(points))
+    for align in ("none", "fit"):
+        words = ["compare", program, measured, "-m", MACHINE, "--align", align]
+        result = run(*words, "--tolerance-um", "5")
+        assert result.exit_code == 1
+        assert "NOT SHOWN TO BE WITHIN TOLERANCE" in result.stdout
+        report = json.loads(run(*words, "--tolerance-um", "5", "--json").stdout)
+        assert report["holds"] is False
+        assert "OLP609" in codes(report)
+        for said in (result.stdout, json.dumps(report)):
+            assert not re.search(r"\bnan\b", said, re.IGNORECASE)
+        assert "holds" not in json.loads(run(*words, "--json").stdout)
+
+
+def test_poses_that_make_no_frame_keep_their_report(tmp_path: Path) -> None:
+    nominal, measured = tmp_path / "n.csv", tmp_path / "m.csv"
+    line = np.array(((0, 0, 0), (100, 0, 0), (200, 0, 0), (300, 0, 0.0)))
+    nominal.write_text(named(line))
+    # the second pose is measured in no cycle, the third in one only
+    rows = named(line + np.array((0, 0, 0.02))).splitlines()
+    measured.write_text("\n".join([rows[0], rows[1], rows[3], rows[4], rows[1], rows[4]]) + "\n")
+    result = run("compare", nominal, measured, "--poses", "--json")
+    report = json.loads(result.stdout)
+    assert (result.exit_code, codes(report)) == (0, {"OLP603", "OLP607"})
+    assert report["after"]["iso_9283"]["AP_um"] == pytest.approx(20)
+    frame = tmp_path / "f.toml"
+    refused = run("compare", nominal, measured, "--poses", "--part-frame", frame)
+    assert (refused.exit_code, frame.exists()) == (4, False)
+    assert "lie on one line" in refused.stderr
+
+
+def test_a_pose_named_twice_is_of_the_nominal_file(tmp_path: Path) -> None:
+    nominal, measured = tmp_path / "n.csv", tmp_path / "m.csv"
+    nominal.write_text(named(POSES).replace("P2", "P1"))
+    measured.write_text(named(POSES))
+    result = run("compare", nominal, measured, "--poses")
+    assert result.exit_code == 3
+    assert f'{nominal}: the nominal pose "P1" is there twice' in result.stderr
+
+
+def test_a_nominal_table_may_begin_with_a_mark_of_its_encoding(nominal: Path, tmp_path: Path) -> None:
+    measured = tmp_path / "measured.csv"
+    measured.write_text(table(bent(400)))
+    plain = json.loads(run("compare", nominal, measured, "--json").stdout)
+    nominal.write_bytes(b"\xef\xbb\xbf" + nominal.read_bytes())
+    result = run("compare", nominal, measured, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["after"] == plain["after"]
+
+
+def test_errors_are_added_to_a_program_only(nominal: Path) -> None:
+    measured = nominal.with_name("measured.csv")
+    measured.write_text(table(bent(400)))
+    words = ["--add-errors", "--positions", "axes", "-m", MACHINE]
+    result = run("compare", nominal, measured, *words)
+    assert result.exit_code == 2
+    assert "give a program as NOMINAL" in result.stderr
+
+
+def test_names_of_runs_are_cells(nominal: Path, tmp_path: Path) -> None:
+    out = tmp_path / "d.csv"
+    for name in ('a,b "c".csv', "plain.csv"):
+        measured = tmp_path / name
+        measured.write_text(table(bent(10)))
+        assert run("compare", nominal, measured, "-o", out, "--force", "-q").exit_code == 0
+        with out.open(newline="") as stream:
+            rows = list(csv.reader(stream))
+        assert {len(row) for row in rows} == {10}
+        assert {row[0] for row in rows[1:]} == {name}

@@ -18,7 +18,9 @@ from click.testing import CliRunner, Result
 
 import olp
 from olp.cli import main
+from olp.exceptions import UsageError
 from olp.files.trajectory import COLUMNS, LINE_COLUMNS, SLOW_COLUMNS
+from olp.retiming import Format, Retiming
 from olp.trajectory.usage import LIMITS
 
 PROGRAMS = Path(__file__).resolve().parents[1] / "programs"
@@ -474,3 +476,124 @@ def test_no_network_is_touched(job: Path, tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr("socket.socket.connect", refuse)
     assert olp.retime(program(tmp_path), job.with_name("machine.toml"), job).duration_s > 0.0
+
+
+# -- mistakes that a call or a file may hold --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz", "ros", "pvt"])
+@pytest.mark.parametrize("cycle_s", [1e-12, 0.0, -1e-3, float("nan"), float("inf")])
+def test_every_format_refuses_a_cycle_that_cannot_be(
+    job: Path, tmp_path: Path, kind: Format, cycle_s: float
+) -> None:
+    found = timed(job, tmp_path)
+    with pytest.raises(UsageError, match="cycle"):
+        found.parts(kind, cycle_s)
+    with pytest.raises(UsageError, match="cycle"):
+        found.write(tmp_path / "out", kind, cycle_s)
+    assert not (tmp_path / "out").exists()
+
+
+_TIMED: dict[str, Retiming] = {}
+
+
+def timed(job: Path, folder: Path) -> Retiming:
+    """One plan for all that ask for no other."""
+    if "square" not in _TIMED:
+        _TIMED["square"] = olp.retime(program(folder), job.with_name("machine.toml"), job)
+    return _TIMED["square"]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"budget_um": [1.0]},
+        {"budget_um": {"rounding": None}},
+        {"budget_um": {"rounding": float("nan")}},
+        {"deviation": []},
+        {"deviation": {"path_max_um": float("inf")}},
+        {"machine": "m"},
+        {"program": None},
+    ],
+)
+def test_a_report_that_is_none_is_refused_before_the_work(
+    job: Path, tmp_path: Path, change: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def planned(*_: object) -> None:
+        raise AssertionError("planned before the proof was looked at")
+
+    monkeypatch.setattr("olp.retiming.planned", planned)
+    good = {
+        "schema": "olp-report-1", "machine": {"name": "m"}, "program": {"name": "part.ngc"},
+        "deviation": {"path_max_um": 0.5}, "budget_um": {"rounding": 0.9},
+    }  # fmt: skip
+    proof = tmp_path / "proof.json"
+    proof.write_text(json.dumps(good | change))
+    result = run("retime", program(tmp_path), "-j", job, "--proof", proof)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "the proof is no report of a correction" in result.stderr
+
+
+def test_names_are_no_mathematics_of_a_picture(tmp_path: Path) -> None:
+    where = machine(tmp_path / "m", tables=TRUE_ZERO, job=START)
+    where.write_text(where.read_text().replace('name = "m"', 'name = "cost $5 and $x_$"'))
+    (where.with_name("calibration.toml")).write_text(
+        where.with_name("calibration.toml")
+        .read_text()
+        .replace('machine = "m"', 'machine = "cost $5 and $x_$"')
+    )
+    job = where.with_name("job.toml")
+    for words in (
+        ["retime", program(tmp_path, name="a$b^$.ngc"), "-j", job, "--plot", tmp_path / "motion.svg"],
+        ["inspect", "-j", job, "--plot", tmp_path / "curves.svg"],
+    ):
+        result = run(*words)
+        assert result.exit_code == 0, result.stderr
+        assert "cost $5 and $x_$" in words[-1].read_text()
+
+
+def test_beyond_travel_is_a_finding(tmp_path: Path) -> None:
+    job = machine(tmp_path / "m", tables=TRUE_ZERO, job=START).with_name("job.toml")
+    near = "G1 X1999.5 Y0 Z0 F30000\nG3 X1999.5 Y10 I0 J5\nG1 X0\n"
+    out = tmp_path / "out.csv"
+    for text, lines in ((near, [2]), (near.replace("1999.5", "1994.9"), [])):
+        part = program(tmp_path, text)
+        result = run("retime", part, "-j", job, "-o", out, "--force", "--report", tmp_path / "r.json")
+        found = json.loads((tmp_path / "r.json").read_text())["findings"]
+        assert (result.exit_code, out.exists()) == (1 if lines else 0, True)
+        assert [f["lines"] for f in found] == ([lines] if lines else [])
+        checked = json.loads(run("check", part, "-j", job, "--format", "json").stdout)["findings"]
+        assert [f["message"] for f in found] == [f["message"] for f in checked if f["code"] == "OLP402"]
+        assert ("OLP402" in result.stdout) == bool(lines)
+    part = program(tmp_path, near)
+    assert run("retime", part, "-j", job, "--fail-on", "never").exit_code == 0
+
+
+def test_what_ends_exact_stop_is_told_as_it_is_planned(tmp_path: Path) -> None:
+    """G62 and G63 of ISO controls blend as G64 does, and a P of nothing or less is no tolerance."""
+    job = machine(tmp_path / "m", controller="fanuc", tables=TRUE_ZERO, job=START).with_name("job.toml")
+    path = report_of(program(tmp_path, "G61 G1 X40. F3000.\nG62 Y40.\nX0.\n"), "-j", job)["path"]
+    assert (path["stated_um"], path["default_um"]) == ([], 10.0)
+    path = report_of(program(tmp_path, "G61 G1 X40. F3000.\nY40.\nX0.\n"), "-j", job)["path"]
+    assert (path["stated_um"], path["default_um"]) == ([], None)
+    linux = machine(tmp_path / "l", tables=TRUE_ZERO, job=START).with_name("job.toml")
+    for text, stated, default in (
+        ("G64 P-0.02\n", [], 10.0), ("G64 P0\n", [], 10.0), ("G64 P0.02\n", [20.0], None),
+    ):  # fmt: skip
+        path = report_of(program(tmp_path, text + "G1 X40 F3000\nY40\n"), "-j", linux)["path"]
+        assert (path["stated_um"], path["default_um"]) == (stated, default), text
+
+
+def test_the_report_keeps_to_its_width_and_shows_no_small_value_as_none(job: Path, tmp_path: Path) -> None:
+    modes = "".join(f"G64 P0.0{k}{k}{k}3\nX{k}\n" for k in range(1, 9))
+    part = program(tmp_path, "G21 G90 G54 G1 F3000 X0\n" + modes + "Y5\n")
+    proof = tmp_path / "proof.json"
+    proof.write_text(json.dumps({
+        "schema": "olp-report-1", "machine": {"name": "m"}, "program": {"name": "n" * 120 + ".ngc"},
+        "deviation": {"path_max_um": 0.001}, "budget_um": {"rounding": 0.9},
+    }))  # fmt: skip
+    long = program(tmp_path, SQUARE, "l" * 100 + ".ngc")
+    result = run("retime", part, "-j", job, "--proof", proof, "--nominal", long)
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 100
+    assert next(row for row in result.stdout.splitlines() if "by the proof of" in row).split()[-1] == "<0.01"

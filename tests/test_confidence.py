@@ -398,7 +398,7 @@ def shop(folder: Path, *, sigma: float = 1.0, square: float = 5.0, more: str = "
 
 
 def codes(findings: tuple[olp.Finding, ...]) -> set[str]:
-    return {f.code for f in findings if f.code.startswith("OLP42")}
+    return {f.code for f in findings if f.code.startswith("OLP43")}
 
 
 def test_a_correction_tells_how_sure_it_is(tmp_path: Path) -> None:
@@ -413,7 +413,7 @@ def test_a_correction_tells_how_sure_it_is(tmp_path: Path) -> None:
     assert np.abs(found.points.after_mm).max() < 0.1e-3
     assert said["within"]["before"]["program"] == 0.0
     assert said["within"]["after"]["program"] > 0.95 and said["expected"]["probability_better"] > 0.999
-    assert codes(result.findings) == {"OLP425"}
+    assert codes(result.findings) == {"OLP435"}
     assert "better with probability >99.9 %" in to_text(result.report)
 
 
@@ -429,7 +429,7 @@ def test_only_sure_components_leaves_the_unsure_squareness(tmp_path: Path) -> No
     machine = shop(tmp_path)
     whole, sure = olp.correct(PROGRAM, machine), olp.correct(PROGRAM, machine, only_sure_components=True)
     assert b"X199.9808" in whole.data and b"X199.9808" not in sure.data
-    assert codes(sure.findings) >= {"OLP426"}
+    assert codes(sure.findings) >= {"OLP436"}
     assert sure.confidence is not None and whole.confidence is not None
     # what is left out stays as expected deviation: 5 urad over 150 mm
     left = sure.confidence.points.after_mm
@@ -441,18 +441,18 @@ def test_only_sure_components_leaves_the_unsure_squareness(tmp_path: Path) -> No
 
 def test_where_nothing_is_known_well_correction_is_not_advised(tmp_path: Path) -> None:
     result = olp.correct(PROGRAM, shop(tmp_path, sigma=30.0), within_um=5.0)
-    assert codes(result.findings) == {"OLP421", "OLP422", "OLP423", "OLP425"}
-    gain = next(f for f in result.findings if f.code == "OLP421")
+    assert codes(result.findings) == {"OLP431", "OLP432", "OLP433", "OLP435"}
+    gain = next(f for f in result.findings if f.code == "OLP431")
     assert gain.lines == (4, 5)
     good = olp.correct(PROGRAM, shop(tmp_path, sigma=0.001, square=0.001), within_um=5.0)
     assert codes(good.findings) == set()
 
 
 def test_age_and_temperature_count(tmp_path: Path) -> None:
-    machine = shop(tmp_path, more="[covariance]\ngrowth_per_year = 1.0\nX_repeatability_um = 2.0\n")
+    machine = shop(tmp_path, more="[covariance]\ngrowth_per_year = 1.0\n[repeatability]\nX_um = 2.0\n")
     new = olp.correct(PROGRAM, machine, date=datetime.date(2026, 5, 14))
     old = olp.correct(PROGRAM, machine, date=datetime.date(2028, 5, 13))
-    assert "OLP427" in codes(old.findings) and "OLP427" not in codes(new.findings)
+    assert "OLP437" in codes(old.findings) and "OLP437" not in codes(new.findings)
     assert new.confidence is not None and old.confidence is not None
     # scatter of the machine, at the place and at the touch, does not grow
     assert new.confidence.sigma_mm[1, 0] == pytest.approx(1e-3 * np.sqrt(2.0 + 8.0), rel=1e-4)
@@ -461,7 +461,7 @@ def test_age_and_temperature_count(tmp_path: Path) -> None:
         'schema = "olp-job-1"\nmachine = "machine.toml"\n[temperatures_degC]\nX_scale = 23.0\n'
     )
     warm = olp.correct(PROGRAM, machine, tmp_path / "job.toml")
-    assert "OLP424" in codes(warm.findings)
+    assert "OLP434" in codes(warm.findings)
     assert warm.confidence is not None
     assert warm.confidence.sigma_mm[1, 0] == pytest.approx(
         1e-3 * np.sqrt(10.0 + (11.5e-3 * 3.0 * 200.0) ** 2), rel=1e-4

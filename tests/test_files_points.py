@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from olp.exceptions import ConfigError, InputError, UsageError
 from olp.files.point_profile import BUILT_IN, ColumnsTable, PointProfile, load_profile, with_options
-from olp.files.points import parse_points, read_points
+from olp.files.points import layout_of, parse_points, read_points
 
 NUMBERS = st.floats(-1e5, 1e5).map(lambda v: round(v, 6))
 
@@ -111,3 +111,45 @@ def test_an_unknown_key_of_a_profile_names_the_nearest(tmp_path: Path) -> None:
     path.write_text('schema = "olp-points-1"\ndelimitter = "comma"\n')
     with pytest.raises(ConfigError, match="did you mean delimiter"):
         load_profile(path)
+
+
+def test_the_line_of_a_row_without_its_name_is_said() -> None:
+    profile = PointProfile(header=False, columns=ColumnsTable(X=1, Y=2, Z=3, name=4))
+    with pytest.raises(InputError, match="3 columns; expected at least 4") as caught:
+        parse_points(b"1,2,3,A\n# aside\n1,2,3\n", "f.csv", profile)
+    assert caught.value.line == 3
+
+
+@pytest.mark.parametrize("item", ["X=0", "X=00", "X= ", "X=", "=3", "Q=3"])
+def test_a_column_that_cannot_be_is_no_traceback(item: str) -> None:
+    with pytest.raises(UsageError, match="--column"):
+        with_options(PointProfile(), [item])
+
+
+def test_digits_that_are_no_number_are_a_name() -> None:
+    assert with_options(PointProfile(), ["X=\u00b2"]).columns.X == "\u00b2"
+
+
+@pytest.mark.parametrize("text", [
+    "name,X_mm,Y_mm,Z_mm\nP#1,1,2,3\nP#2,4,5,6\n",
+    "# all of it\n name,X_mm,Y_mm,Z_mm\n   # aside, 1, 2, 3\nP#1,1,2,3\n\n \t\nP#2,4,5,6\n",
+    "name,X_mm,Y_mm,Z_mm\r\nP#1,1,2,3\r\n\r\nP#2,4,5,6\r\n",
+    "name,X_mm,Y_mm,Z_mm\rP#1,1,2,3\rP#2,4,5,6\r",
+])  # fmt: skip
+def test_a_hash_in_a_name_is_no_comment(text: str) -> None:
+    found = parse_points(text.encode(), "f.csv")
+    assert found.names == ("P#1", "P#2")
+    assert found.points_mm.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_a_mark_behind_a_number_is_refused_with_its_line() -> None:
+    with pytest.raises(InputError, match='column 3 is "3 # so"') as caught:
+        parse_points(b"X_mm,Y_mm,Z_mm\n1,2,3\n1,2,3 # so\n", "f.csv")
+    assert caught.value.line == 3
+
+
+def test_a_layout_is_told_from_the_head_of_a_long_file() -> None:
+    row = b"1.000000, 2.000000,3.000000\n"
+    assert layout_of(b"X;Y;Z\n" + b"1;2;3\n" * 50_000) == layout_of(b"X;Y;Z\n1;2;3\n")
+    assert layout_of(b"\xef\xbb\xbfX_mm,Y_mm,Z_mm\n" + row) is not None
+    assert layout_of(b"G21 G90\nG1 X1 Y2 Z3 F4\n") is None

@@ -8,6 +8,8 @@ import pytest
 from gate_cases import ARC, CASES, Call, box, scaled
 
 import olp
+from olp import gate
+from olp.checks import motion
 from olp.exceptions import ProgramError, UsageError
 from olp.findings import GATE_CODES, RULES
 
@@ -89,6 +91,30 @@ def test_of_a_corrected_program_alone_its_own_text_is_checked(tmp_path: Path) ->
     assert codes(olp.check(text, path)) == {"OLP408"}
     path.with_name("x.csv").write_text("X_mm,EXX_um\n-1000,0\n2000,1\n")
     assert codes(olp.check(text, path)) == {"OLP408", "OLP312"}
+
+
+@pytest.mark.parametrize("pair", [False, True])
+def test_each_text_is_read_and_timed_once(
+    tmp_path: Path, pair: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside what a correction reads, which drops the words early."""
+    call = Call(**scaled(10.0))
+    path = call.machine(tmp_path)
+    nominal = call.program()
+    program = olp.correct(nominal, path).data if pair else nominal
+    reads: list[bytes] = []
+    timed: list[object] = []
+    read, of = gate.read, motion.Feeds.of
+
+    def counted(data: bytes, *more: object, **words: object) -> object:
+        reads.append(data)
+        return read(data, *more, **words)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(gate, "read", counted)
+    monkeypatch.setattr(motion.Feeds, "of", lambda found: timed.append(found) or of(found))
+    olp.check(program, path, nominal=nominal if pair else None)
+    assert len(reads) == len(set(reads)) == 2
+    assert len(timed) == 2
 
 
 def test_what_cannot_be_read_is_refused_with_its_line(tmp_path: Path) -> None:

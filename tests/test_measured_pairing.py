@@ -239,3 +239,17 @@ def test_rigid_transforms_invert_and_their_angles_make_them(turn: list[float], s
     assert np.allclose(z @ y @ x, rigid.rotation, atol=1e-9)
     angle = np.linalg.norm(turn) % (2 * np.pi)
     assert np.isclose(rigid.angle_rad, min(angle, 2 * np.pi - angle), atol=1e-7)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 9, 17])
+@pytest.mark.parametrize("curve", [eight, square])
+def test_a_few_points_far_apart_find_their_places(curve: object, count: int) -> None:
+    """Each way between them leaves thousands of nodes without a point; the first point too keeps its own."""
+    rng = np.random.default_rng(count)
+    u = np.linspace(0.0, 2 * np.pi * 0.999, 4000)
+    path = Path.through(curve(u))  # type: ignore[operator]
+    for _ in range(4):
+        s = np.sort(rng.uniform(0.0, path.length_mm, count))
+        points, _ = path.at(s)
+        found = pair(path, points + np.array((0.0, 0.0, 0.01)), "forward")
+        assert np.abs(found.s_mm - s).max() < 0.05

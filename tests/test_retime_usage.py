@@ -36,7 +36,7 @@ def test_one_straight_move_in_closed_form() -> None:
     duration = 100.0 / FEED + 2.0 * HALF_RAMP_S
     assert lines.seconds == pytest.approx([duration], rel=1e-7)
     assert lines.lost_s() == pytest.approx([2.0 * HALF_RAMP_S], rel=1e-6)
-    assert lines.achieved() == pytest.approx([100.0 / FEED / duration], rel=1e-7)
+    assert lines.achieved_mm_s() == pytest.approx([100.0 / duration], rel=1e-7)
     assert lines.fastest_mm_s == pytest.approx([FEED], rel=1e-7)
     assert NAMES[lines.limit()[0]] == "feed"
     # jerk is at its limit in all four half ramps

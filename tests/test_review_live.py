@@ -116,6 +116,25 @@ def test_a_port_that_is_taken_is_refused(served: Served) -> None:
         Server(lambda: olp.view(served.program, served.machine, time=False), [], print, port)
 
 
+def test_a_port_is_bound_before_the_work_and_left_where_that_fails(served: Served) -> None:
+    def work() -> None:
+        raise AssertionError("worked before the port was bound")
+
+    port = served.server._http.server_address[1]
+    with pytest.raises(OlpError, match="cannot be served"):
+        Server(work, [], print, port)  # type: ignore[arg-type]
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        other = free.getsockname()[1]
+
+    def fails() -> None:
+        raise OlpError("no page")
+
+    for _ in range(2):
+        with pytest.raises(OlpError, match="no page"):
+            Server(fails, [], print, other)  # type: ignore[arg-type]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C reaches a whole console there")
 def test_ctrl_c_ends_it(tmp_path: Path) -> None:
     machine = zero_machine(tmp_path / "m")

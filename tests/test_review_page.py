@@ -15,6 +15,7 @@ from judge.unpacker import Page
 import olp
 from olp.exceptions import CannotCompute, InputError, OutsideBox, ProgramError, UsageError
 from olp.findings import RULES
+from olp.review import job
 from olp.review import page as pages
 from olp.review.manifest import manifest_of
 
@@ -261,6 +262,30 @@ def test_a_corrected_program_is_shown_as_it_is(machine: Path) -> None:
     ends = raw.samples.share == 1.0
     np.testing.assert_allclose(raw.samples.result[ends], raw.samples.uncorrected[ends], atol=1e-12)
     assert raw.report["deviation"]["holds"] is False
+
+
+def test_a_correction_of_an_unrolled_program_is_shown_beside_it(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (
+        HEAD + b"#1 = 0\no1 while [#1 lt 3]\nG1 X[40 + #1] Y[2 * #1] F600\n#1 = [#1 + 1]\no1 endwhile\nM2\n"
+    )
+    corrected = olp.correct(text, machine, flatten=True)
+    ours = olp.view(text, machine, correction=corrected, flatten=True, time=False).scene
+    calls: list[str] = []
+    for name, what in (("read", job.read), ("load", job.load)):
+
+        def counted(*args: Any, _what: Any = what, _name: str = name, **more: Any) -> Any:
+            calls.append(_name)
+            return _what(*args, **more)
+
+        monkeypatch.setattr(job, name, counted)
+    monkeypatch.setattr("olp.api.read", None)
+    theirs = olp.view(text, machine, corrected=corrected.data, flatten=True, time=False).scene
+    np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
+    assert theirs.report["deviation"] == ours.report["deviation"]
+    # each text is read once
+    assert sorted(calls) == ["load", "read", "read"]
 
 
 def test_a_page_is_written_whole_and_over_nothing(machine: Path, tmp_path: Path) -> None:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trajectory_cases import far_from
+from trajectory_cases import far_from, path_deviation
 
 from olp.exceptions import UsageError
 from olp.trajectory.audit import audit, slowing
 from olp.trajectory.critical import critical
-from olp.trajectory.deviation import deviation_bound, path_deviation
+from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.extremes import largest, nodes
 from olp.trajectory.motion import Motion
 from olp.trajectory.overlap import overlap_parts

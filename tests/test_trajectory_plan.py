@@ -86,13 +86,11 @@ def test_any_polyline_is_driven_within_all_limits(
         assert np.abs(state).max() <= 1e-6
 
 
-def test_lines_come_in_order_and_their_times_add_up() -> None:
+def test_lines_come_in_order() -> None:
     rng = np.random.default_rng(4)
     found = plan(route_of(np.cumsum(rng.normal(size=(30, 3)), axis=0)), LIMITS)
-    lines, seconds = found.seconds_by_line()
     assert (np.diff(found.motion.line) >= 0).all()
-    assert seconds.sum() == pytest.approx(found.duration_s)
-    assert set(lines.tolist()) <= set(range(1, 30))
+    assert set(found.motion.line.tolist()) <= set(range(1, 30))
 
 
 def test_dwells_are_waited_at_rest() -> None:

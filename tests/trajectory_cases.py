@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from olp.trajectory.motion import Array, Motion
 from olp.trajectory.route import AxisLimits, Index, Route
+from olp.trajectory.same import groups_of_same
+
+#: samples in one block, and segments that a search looks ahead
+_BLOCK, _AHEAD = 1 << 14, 64
+#: (mm) distances below are none
+_EVEN_MM = 1e-8
+_TINY = float(np.finfo(np.float64).tiny)
 
 LIMITS = AxisLimits(np.array([500.0, 500, 300]), np.array([5e3, 5e3, 3e3]), np.array([1e5, 1e5, 6e4]))
 
@@ -149,3 +156,73 @@ def excess(motion: Motion, limits: AxisLimits, feed: Array) -> float:
         steps = np.abs(np.diff(q, n=order, axis=0)) - 2.0**order * rounding
         worst = max(worst, float((steps / (most * 1e-3**order)).max(initial=0.0)))
     return worst
+
+
+def path_deviation(motion: Motion, route: Route, places: int = 5) -> Array:
+    """(k,) largest distance mm of each piece, at `places` times, from the polyline: samples are matched to
+    segments that never go back, nearest in the sense of least squares. A wrong match can make the distance
+    too large, never too small."""
+    polyline = _polyline(route)
+    largest = np.zeros(len(motion))
+    known = 0
+    for part, point in _samples(motion, places):
+        flat, known = _in_order(point.reshape(-1, 3), polyline, known)
+        largest[part] = flat.reshape(point.shape[:2]).max(axis=1)
+    return largest
+
+
+def _samples(motion: Motion, places: int) -> Iterator[tuple[Index, Array]]:
+    """Blocks of pieces (n,) and their positions (n, places, 3) in order of time."""
+    block = max(_BLOCK // places, 1)
+    share = np.linspace(0.0, 1.0, places)
+    for a in range(0, len(motion), block):
+        piece = np.arange(a, min(a + block, len(motion)))
+        seconds = np.diff(motion.start_s[a : a + len(piece) + 1])
+        u = (seconds[:, None] * share).ravel()
+        yield piece, motion.of(np.repeat(piece, places), u)[0].reshape(len(piece), places, 3)
+
+
+def _to_segments(point: Array, begin: Array, end: Array) -> Array:
+    """(n, m) distances of points (n, 3) from segments (m, 3) to (m, 3)."""
+    delta = (end - begin)[None]
+    offset = point[:, None, :] - begin[None]
+    size = np.maximum((delta * delta).sum(axis=2), _TINY)
+    share = np.clip((offset * delta).sum(axis=2) / size, 0.0, 1.0)
+    result: Array = np.sqrt(((offset - share[:, :, None] * delta) ** 2).sum(axis=2))
+    return result
+
+
+def _in_order(point: Array, polyline: Array, first: int) -> tuple[Array, int]:
+    """(n,) distances of points in order from segments that never go back, the first not before `first`;
+    and the segment reached. Dynamic programming over a window that slides along."""
+    away = np.zeros(len(point))
+    at = 0
+    while at < len(point):
+        take = point[at : at + _AHEAD]
+        last = min(first + 2 * _AHEAD, len(polyline) - 1)
+        begin, end = polyline[first:last], polyline[first + 1 : last + 1]
+        table = _to_segments(take, begin, end)
+        # rounding decides nothing: of segments that are as near the earliest is the one
+        cost = np.where(table > _EVEN_MM, table, 0.0) ** 2
+        for i in range(1, len(cost)):
+            cost[i] += np.minimum.accumulate(cost[i - 1])
+        # back from the best end; of equals the earliest, so that a path driven back later is not skipped
+        column = int(np.argmin(cost[-1]))
+        picks = [column]
+        for i in range(len(cost) - 2, -1, -1):
+            column = int(np.argmin(cost[i, : column + 1]))
+            picks.append(column)
+        picks.reverse()
+        # the later half of a block is decided with what comes after it
+        keep = len(take) if at + len(take) >= len(point) else max(len(take) // 2, 1)
+        away[at : at + keep] = table[np.arange(keep), picks[:keep]]
+        first += picks[keep - 1]
+        at += keep
+    return away, first
+
+
+def _polyline(route: Route) -> Array:
+    """(m, 3) way-points, those that are the same as the one before left out."""
+    group = groups_of_same(route.point_mm)
+    polyline = route.point_mm[np.flatnonzero(np.diff(group, prepend=-1))]
+    return np.repeat(polyline, 2, axis=0) if len(polyline) == 1 else polyline

@@ -22,8 +22,6 @@ from olp.units import AXES
 GRID_MM, GRID_RAD = 2e-5, 2e-8
 #: Cells over an axis: the fewest that reach that, between these.
 CELLS = (40, 80, 160, 320, 640, 1280, 2560)
-#: A cyclic term below so many standard deviations is noise.
-CYCLIC_SEEN = 3.0
 #: What is written ends here: 0.1 nm, 0.1 nrad.
 DIGITS = 7, 10
 
@@ -167,18 +165,12 @@ def _grid(values: Callable[[Array], Array], breaks: list[float], *, linear: bool
 
 
 def _cyclic(fit: Fit) -> list[Cyclic]:
-    """Cyclic terms that stand out of their noise."""
     found = []
     for name, waves in fit.parameters.waves.items():
-        start = fit.parameters.slices[f"wave {name}"].start
-        for k, wave in enumerate(waves):
-            at = slice(start + 2 * k, start + 2 * k + 2)
-            sine, cosine = fit.theta[at]
-            amplitude = math.hypot(sine, cosine)
-            sigma = math.sqrt(float(np.trace(fit.covariance[at, at])) / 2.0)
-            if amplitude > CYCLIC_SEEN * sigma:
-                size = round(amplitude, DIGITS[name[1] in "ABC"])
-                found.append(Cyclic(name, wave.period_mm, size, round(math.atan2(cosine, sine), 6)))
+        pairs = fit.theta[fit.parameters.slices[f"wave {name}"]].reshape(-1, 2)
+        for wave, (sine, cosine) in zip(waves, pairs, strict=True):
+            size = round(math.hypot(sine, cosine), DIGITS[name[1] in "ABC"])
+            found.append(Cyclic(name, wave.period_mm, size, round(math.atan2(cosine, sine), 6)))
     return found
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from olp.calibration.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
+from olp.calibration.lengths import STILL_MM, Station, first_station, lengths_block
 from olp.calibration.lines import (
     Noise,
     group_of,
@@ -23,9 +25,12 @@ from olp.calibration.lines import (
     squareness_block,
     targets_of,
 )
-from olp.calibration.normal import Block, Normal, locals_of, solve
-from olp.calibration.observations import Line, Measurements
+from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
+from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points
 from olp.calibration.parameters import CROSS, Parameters, Place
+from olp.calibration.pods import STILL_MM as POD_STILL_MM
+from olp.calibration.pods import Pose, first_poses, pods_block
+from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
 from olp.calibration.separation import aliased
 from olp.calibration.smoothing import Shape, shape_of
@@ -38,8 +43,18 @@ from olp.units import AXES
 #: Cells of the spline of a curve: as many as a line has targets between these.
 FEWEST, MOST = 6, 48
 HALF_CELLS = 5
+#: Cells where no lines but points or lengths tell of an axis, to begin with; they double as long as
+#: chi-square is off by more than MISFIT standard deviations and becomes BETTER by it.
+POINT_CELLS, MISFIT, BETTER = 12, 5.0, 0.8
+#: What stands for the component of a point and of a length.
+POINT, LENGTH = "point", "length"
+T = TypeVar("T", Points, Lengths)
+#: The adjustment is made anew after cyclic terms or points were left out, so often at most.
+PASSES = 8
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
 OUTLIER, SHARE = 6.0, 0.05
+#: A cyclic term below so many standard deviations is noise.
+CYCLIC_SEEN = 4.0
 #: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
 SWEEP = 0.3
 
@@ -66,6 +81,38 @@ class LineResult:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PointsResult:
+    """Points after the fit: residuals in mm in the machine's frame, x, y, z of each point by turns, and the
+    sum of squares of standardised residuals."""
+
+    points: Points
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LengthsResult:
+    """Lengths after the fit: where their station is, residuals (n,) in mm, sum of squares of standardised
+    residuals."""
+
+    lengths: Lengths
+    station: Station
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PodsResult:
+    """Directions after the fit: the poses of their pods, residuals in rad (and mm of baselines, last), sum of
+    squares of standardised residuals."""
+
+    pods: Pods
+    poses: tuple[Pose, ...]
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """theta with its covariance and layout; see `error`, `sigma`, `design`.
 
@@ -80,6 +127,9 @@ class Fit:
     covariance: Array
     prior: Prior
     lines: tuple[LineResult, ...]
+    points: tuple[PointsResult, ...]
+    lengths: tuple[LengthsResult, ...]
+    pods: tuple[PodsResult, ...]
     outliers: tuple[Outlier, ...]
     box_mm: Array
     slopes: Mapping[str, Array]
@@ -170,51 +220,180 @@ def fit(
 ) -> Fit:
     """Estimate the errors of a machine from all its readings.
 
-    `travel_mm` bounds the box; the datum is the place in the box nearest to zero if left out. Raises
-    ConfigError where a line cannot be used, CannotCompute where an axis has no line.
+    `travel_mm` bounds the box; the datum is the place in the box nearest to zero if left out. Where points or
+    lengths alone tell of an axis and do not fit, its curves are given more freedom. Raises ConfigError where
+    a line cannot be used, CannotCompute where nothing tells of an axis.
     """
-    tell = progress or silent
+    cells = POINT_CELLS
+    found = _fit(measurements, chain, travel_mm, datum_mm, progress or silent, cells)
+    alone = {line.component[2] for line in measurements.lines} != set(AXES)
+    while alone and misfit(found) > MISFIT and cells < MOST:
+        cells *= 2
+        finer = _fit(measurements, chain, travel_mm, datum_mm, progress or silent, cells)
+        if finer.chi_square / finer.freedom > BETTER * found.chi_square / found.freedom:
+            break
+        found = finer
+    return found
+
+
+def misfit(found: Fit) -> float:
+    """By how many standard deviations chi-square is above what noise gives: by its cube root, which is nearly
+    normal (E. B. Wilson and M. M. Hilferty, 1931)."""
+    part = 2.0 / (9.0 * found.freedom)
+    ratio = found.chi_square / found.freedom
+    return float((ratio ** (1.0 / 3.0) - (1.0 - part)) / np.sqrt(part))
+
+
+def _fit(
+    measurements: Measurements,
+    chain: str,
+    travel_mm: Sequence[tuple[float, float]] | None,
+    datum_mm: Vector | None,
+    tell: Progress,
+    cells: int,
+) -> Fit:
     tell("noise", 0.0)
     lines, noises, outliers = _screened(measurements.lines)
-    ranges, box = _ranges(lines, travel_mm)
+    clouds = list(measurements.points)
+    ranges, box = _ranges(lines, [*clouds, *measurements.lengths, *measurements.pods], travel_mm)
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
-    splines = [_spline(lines, axis, ranges[axis]) for axis in range(3)]
-    waves, unseen = _waves(measurements, lines)
+    splines = [_spline(lines, axis, ranges[axis], cells) for axis in range(3)]
+    scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
+    waves, unseen = _waves(measurements, lines, scattered)
     shapes = _shapes(lines, noises, splines, waves, tell)
-    parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
-    prior = Prior(parameters, shapes, _squares(measurements, parameters))
-    tell("adjustment", 0.0)
-
-    def blocks() -> list[Block]:
-        found = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
-        return found + [squareness_block(reading, parameters) for reading in measurements.squareness]
-
-    normal = _gathered(blocks(), prior)
-    prior.learn(normal)
-    solved = solve(normal, *prior.precision())
-    if prior.size_from(solved.theta):
-        solved = solve(normal, *prior.precision())
-    results, chi_square = [], 0.0
-    for k, block in enumerate(blocks()):
-        _, residual = locals_of(block, solved.theta, np.ones(len(block), bool))
-        part = float(np.sum((residual / block.sigma) ** 2))
-        chi_square += part
-        if k < len(lines):
-            results.append(LineResult(lines[k], noises[k], residual, part))
+    lengths = list(measurements.lengths)
+    stations = [first_station(rays) for rays in lengths]
+    poses = [first_poses(pods) for pods in measurements.pods]
+    theta = np.zeros(0)
+    learnt: dict[str, tuple[float, float]] | None = None
+    for _ in range(PASSES):
+        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
+        prior = Prior(parameters, shapes, _squares(measurements, parameters))
+        if learnt is not None:
+            prior.classes = learnt
+        theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
+        of_lines = [line_block(line, parameters, noise) for line, noise in zip(lines, noises, strict=True)]
+        of_points = [points_block(cloud, parameters) for cloud in clouds]
+        of_lengths = [
+            lengths_block(rays, parameters, theta, station)
+            for rays, station in zip(lengths, stations, strict=True)
+        ]
+        of_pods = [
+            pods_block(pods, parameters, theta, own)
+            for pods, own in zip(measurements.pods, poses, strict=True)
+        ]
+        others = [squareness_block(reading, parameters) for reading in measurements.squareness]
+        tell("adjustment", 0.5)
+        normal, solved = _adjusted(
+            [*of_lines, *of_points, *of_lengths, *of_pods, *others], prior, learnt is None
+        )
+        learnt = prior.classes
+        theta = solved.theta
+        seen = _waves_seen(parameters, solved)
+        slips = [_slips(block, cloud, solved) for block, cloud in zip(of_points, clouds, strict=True)]
+        steps = [residuals_of(block, theta)[0] for block in of_lengths]
+        turns = [residuals_of(block, theta)[0].reshape(-1, 6) for block in of_pods]
+        still = all(np.abs(step[:3]).max() < STILL_MM for step in steps)
+        still = still and all(np.abs(turn[:, :3]).max() < POD_STILL_MM for turn in turns)
+        # before the stations stand still, a residual may be theirs
+        pairs = zip(of_lengths if still else (), lengths, strict=False)
+        slips_of_lengths = [_slips(block, rays, solved) for block, rays in pairs]
+        if seen == waves and not any(slips) and not any(slips_of_lengths) and still:
+            break
+        waves = seen
+        outliers += [slip for some in (*slips, *slips_of_lengths) for slip in some]
+        lengths = (
+            [_without(rays, some) for rays, some in zip(lengths, slips_of_lengths, strict=True)]
+            if still
+            else lengths
+        )
+        clouds = [_without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
+        stations = [station.moved(step) for station, step in zip(stations, steps, strict=True)]
+        poses = [
+            [pose.moved(step) for pose, step in zip(own, turn, strict=True)]
+            for own, turn in zip(poses, turns, strict=True)
+        ]
+    results = [
+        LineResult(line, noise, *_left(block, theta))
+        for line, noise, block in zip(lines, noises, of_lines, strict=True)
+    ]
+    points = [
+        PointsResult(cloud, *_left(block, theta)) for cloud, block in zip(clouds, of_points, strict=True)
+    ]
+    rays_left = [
+        LengthsResult(rays, station, *_left(block, theta))
+        for rays, station, block in zip(lengths, stations, of_lengths, strict=True)
+    ]
+    pods_left = [
+        PodsResult(pods, tuple(own), *_left(block, theta))
+        for pods, own, block in zip(measurements.pods, poses, of_pods, strict=True)
+    ]
+    chi_square = sum(
+        (_left(block, theta)[1] for block in (*of_lines, *of_points, *of_lengths, *of_pods, *others)), 0.0
+    )
     # readings less what the fit used up of their freedom
-    used = float(np.trace(solved.covariance @ normal.H)) + normal.local
+    freedom = max(normal.count - float(np.trace(solved.covariance @ normal.H)) - normal.free, 1.0)
+    # readings that fit worse than their noise say that the model is not all there is
+    covariance = solved.covariance * max(1.0, chi_square / freedom)
     return Fit(
-        measurements, parameters, solved.theta, solved.covariance, prior, tuple(results), tuple(outliers),
-        box, _slopes(parameters), chi_square, max(normal.count - used, 1.0), unseen,
+        measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
+        tuple(rays_left), tuple(pods_left), tuple(outliers), box, _slopes(parameters), chi_square, freedom,
+        unseen,
     )  # fmt: skip
 
 
-def _gathered(blocks: Iterable[Block], prior: Prior) -> Normal:
+def _adjusted(blocks: Iterable[Block], prior: Prior, learn: bool) -> tuple[Normal, Solved]:
+    """The readings' normal equations and their solution, with what the prior is to learn from them."""
     normal = Normal.of(prior.parameters.size)
     for block in blocks:
         normal.add(block)
     prior.push(normal)
-    return normal
+    if learn:
+        prior.learn(normal)
+    solved = solve(normal, *prior.precision())
+    if learn and prior.size_from(solved.theta):
+        solved = solve(normal, *prior.precision())
+    return normal, solved
+
+
+def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave, ...]]:
+    """Cyclic terms that stand out of their noise."""
+    seen: dict[str, tuple[Wave, ...]] = {}
+    for name, waves in parameters.waves.items():
+        start = parameters.slices[f"wave {name}"].start
+        for k, wave in enumerate(waves):
+            at = slice(start + 2 * k, start + 2 * k + 2)
+            sigma = float(np.sqrt(np.trace(solved.covariance[at, at]) / 2.0))
+            if float(np.hypot(*solved.theta[at])) > CYCLIC_SEEN * sigma:
+                seen[name] = (*seen.get(name, ()), wave)
+    return seen
+
+
+def _left(block: Block, theta: Array) -> tuple[Array, float]:
+    """Residuals of a block and the sum of squares of the standardised ones."""
+    _, residual, sigma = residuals_of(block, theta)
+    return residual, float(np.sum((residual / sigma) ** 2))
+
+
+def _slips(block: Block, cloud: Points | Lengths, solved: Solved) -> list[Outlier]:
+    """Points or lengths whose residual is no noise, the worst ones first."""
+    _, residual, sigma = residuals_of(block, solved.theta)
+    rest = residual.reshape(len(cloud.row), -1)
+    off = np.abs(residual / sigma).reshape(rest.shape).max(axis=1)
+    kind = POINT if isinstance(cloud, Points) else LENGTH
+    worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
+    return [
+        Outlier(cloud.source, int(cloud.row[k]), kind, float(np.linalg.norm(rest[k])), float(off[k]))
+        for k in worst.tolist()
+        if off[k] > OUTLIER and off[k] > 0.3 * off.max()
+    ]
+
+
+def _without(cloud: T, slips: Sequence[Outlier]) -> T:
+    use = ~np.isin(cloud.row, [slip.row for slip in slips])
+    names = {"axis_mm", "tool_mm", "measured_mm", "length_mm", "sigma_mm", "row"}
+    kept = {f.name: getattr(cloud, f.name)[use] for f in dataclasses.fields(cloud) if f.name in names}
+    return dataclasses.replace(cloud, **kept)
 
 
 def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:
@@ -263,28 +442,36 @@ def _about_group(line: Line) -> Array:
 
 
 def _medians(values: Array, labels: np.ndarray) -> Array:
-    out = np.zeros(int(labels.max()) + 1)
-    for label in np.unique(labels):
-        out[label] = np.median(values[labels == label])
-    return out
+    """Median of the values of each label from 0."""
+    ordered = values[np.lexsort((values, labels))]
+    counts = np.bincount(labels)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    last = len(ordered) - 1
+    below, above = starts + np.maximum(counts - 1, 0) // 2, starts + counts // 2
+    middle = 0.5 * (ordered[np.minimum(below, last)] + ordered[np.minimum(above, last)])
+    return np.asarray(np.where(counts > 0, middle, 0.0))
 
 
 def _ranges(
-    lines: Sequence[Line], travel_mm: Sequence[tuple[float, float]] | None
+    lines: Sequence[Line],
+    clouds: Sequence[Points | Lengths | Pods],
+    travel_mm: Sequence[tuple[float, float]] | None,
 ) -> tuple[list[tuple[float, float]], Array]:
-    """What the lines of each axis reach together, and the box that every one of its components covers."""
+    """What the readings of each axis reach together, and the box: what every component with lines covers, or
+    the points where an axis has no lines."""
     ranges, box = [], np.zeros((3, 2))
     for axis in range(3):
         own = [line for line in lines if line.axis == axis]
-        if not own:
+        reached = [line.target_mm for line in own] + [cloud.axis_mm[:, axis] for cloud in clouds]
+        if not reached:
             raise CannotCompute(
                 f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
-                "every axis"
+                "every axis, or points"
             )
-        low = min(float(line.target_mm.min()) for line in own)
-        high = max(float(line.target_mm.max()) for line in own)
+        low = min(float(q.min()) for q in reached)
+        high = max(float(q.max()) for q in reached)
         ranges.append((low, high))
-        sides = []
+        sides = [] if own else [(low, high)]
         for name in {line.component for line in own}:
             same = [line for line in own if line.component == name]
             side = (
@@ -297,19 +484,21 @@ def _ranges(
         box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
         if box[axis, 0] >= box[axis, 1]:
             raise CannotCompute(
-                f"the lines along {AXES[axis]} have no length in common in the travel; expected them over "
+                f"the readings along {AXES[axis]} have no length in common in the travel; expected them over "
                 "the same length"
             )
     return ranges, box
 
 
-def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float]) -> Spline:
+def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float], cells: int) -> Spline:
     own = [len(targets_of(line)) for line in lines if line.axis == axis]
     long = [
         len(targets_of(line))
         for line in lines
         if line.axis == axis and np.ptp(line.target_mm) > SWEEP * (span[1] - span[0])
     ]
+    if not own:
+        return Spline(*span, cells)
     return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
 
 
@@ -344,13 +533,15 @@ def _shapes(
 
 
 def _waves(
-    measurements: Measurements, lines: Sequence[Line]
+    measurements: Measurements, lines: Sequence[Line], scattered: Sequence[Points | Lengths | Pods]
 ) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
     """Cyclic terms that the targets can see, and why others cannot be seen."""
     waves: dict[str, tuple[Wave, ...]] = {}
     unseen: dict[tuple[str, float], str] = {}
     for name in COMPONENTS:
         own = [targets_of(line) for line in lines if line.component == name]
+        if name[1] == name[2]:
+            own += [np.unique(part.axis_mm[:, AXES.index(name[2])]) for part in scattered]
         for period in measurements.periods_mm[AXES.index(name[2])] if own else ():
             reasons = [aliased(targets, period) for targets in own]
             if None in reasons:

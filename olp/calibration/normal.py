@@ -6,6 +6,7 @@ the Schur complement; so a hundred thousand readings cost one matrix of the size
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,79 +15,83 @@ import numpy.typing as npt
 from olp.errormodel.base import Array
 
 Index = npt.NDArray[np.intp]
-#: rows taken at once
-_CHUNK = 4096
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunk:
+    """Some readings of a block: y (n,) = rows (n, k) @ theta[columns] + local (n, l) @ nu + noise of standard
+    deviation sigma (n,)."""
+
+    rows: Array
+    y: Array
+    sigma: Array
+    local: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Readings of one file: y = rows @ theta[columns] + local @ nu + noise of standard deviation sigma.
+    """Readings that share local unknowns nu, in as many chunks as memory likes; `chunks` makes them anew.
 
-    `rows` (n, k), `columns` (k,), `local` (n, l), `precision` (l,) the prior precision of nu, whose mean is
-    zero; `y` and `sigma` (n,).
+    `columns` (k,) of theta that they depend on, `precision` (l,) the prior precision of nu, whose mean is
+    zero; a precision of 0 leaves it free.
     """
 
-    rows: Array
     columns: Index
-    y: Array
-    sigma: Array
-    local: Array
     precision: Array
+    chunks: Callable[[], Iterable[Chunk]]
     label: str = ""
 
-    def __len__(self) -> int:
-        return len(self.y)
+    @classmethod
+    def of(cls, chunk: Chunk, columns: Index, precision: Array, label: str = "") -> Block:
+        """A block of one chunk."""
+        return cls(columns, precision, lambda: (chunk,), label)
 
 
 @dataclass(slots=True, eq=False)
 class Normal:
-    """H theta = g over n parameters; `square` is the weighted sum of y^2 that is not explained by locals, and
-    `count` the readings."""
+    """H theta = g over n parameters; `square` is the weighted sum of y^2 that locals do not explain, `count`
+    the readings, and `free` the local unknowns without a prior."""
 
     H: Array
     g: Array
     square: float = 0.0
     count: int = 0
-    local: int = 0
+    free: int = 0
 
     @classmethod
     def of(cls, n: int) -> Normal:
         return cls(np.zeros((n, n)), np.zeros(n))
 
-    def add(self, block: Block, use: npt.NDArray[np.bool_] | None = None) -> None:
-        """Add the readings of a block, those that `use` (n,) marks."""
-        k, m = len(block.columns), block.local.shape[1]
+    def add(self, block: Block) -> None:
+        """Add the readings of a block."""
+        k, m = len(block.columns), len(block.precision)
         gram = np.zeros((k + m + 1, k + m + 1))
-        keep = np.arange(len(block)) if use is None else np.flatnonzero(use)
-        for start in range(0, len(keep), _CHUNK):
-            part = keep[start : start + _CHUNK]
-            table = np.concatenate(
-                [block.rows[part], block.local[part], block.y[part, None]], axis=1
-            ) / block.sigma[part, None]  # fmt: skip
+        for chunk in block.chunks():
+            table = np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1)
+            table /= chunk.sigma[:, None]
             gram += table.T @ table
+            self.count += len(chunk.y)
+        kept = [*range(k), k + m]
         inner = gram[k : k + m, k : k + m] + np.diag(block.precision)
-        outer = np.concatenate([gram[:k, k : k + m], gram[k + m :, k : k + m]])
-        solved = np.linalg.solve(inner, outer.T) if m else np.zeros((0, k + 1))
-        reduced = np.block([[gram[:k, :k], gram[:k, k + m :]], [gram[k + m :, :k], gram[k + m :, k + m :]]])
-        reduced -= outer @ solved
-        grid = np.ix_(block.columns, block.columns)
-        self.H[grid] += reduced[:k, :k]
+        outer = gram[np.ix_(kept, range(k, k + m))]
+        reduced = gram[np.ix_(kept, kept)] - outer @ np.linalg.solve(inner, outer.T)
+        self.H[np.ix_(block.columns, block.columns)] += reduced[:k, :k]
         self.g[block.columns] += reduced[:k, k]
         self.square += float(reduced[k, k])
-        self.count += len(keep)
-        self.local += int(np.sum(block.precision == 0.0)) if m else 0
+        self.free += int(np.sum(block.precision == 0.0))
 
 
-def locals_of(block: Block, theta: Array, use: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
-    """(nu, residual (n,) of all readings) of a block at the solution."""
-    rest = block.y - block.rows @ theta[block.columns]
-    m = block.local.shape[1]
-    if not m:
-        return np.zeros(0), rest
-    weighted = block.local[use] / block.sigma[use, None]
-    inner = weighted.T @ weighted + np.diag(block.precision)
-    nu = np.asarray(np.linalg.solve(inner, weighted.T @ (rest[use] / block.sigma[use])))
-    return nu, np.asarray(rest - block.local @ nu)
+def residuals_of(block: Block, theta: Array) -> tuple[Array, Array, Array]:
+    """(nu, residuals, their standard deviations) of all readings of a block at the solution."""
+    own = theta[block.columns]
+    inner, right = np.diag(block.precision), np.zeros(len(block.precision))
+    for chunk in block.chunks():
+        weighted = chunk.local / chunk.sigma[:, None]
+        inner = inner + weighted.T @ weighted
+        right = right + weighted.T @ ((chunk.y - chunk.rows @ own) / chunk.sigma)
+    nu = np.asarray(np.linalg.solve(inner, right))
+    rest = [chunk.y - chunk.rows @ own - chunk.local @ nu for chunk in block.chunks()]
+    return nu, np.concatenate(rest), np.concatenate([chunk.sigma for chunk in block.chunks()])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -92,6 +92,143 @@ class Line:
         return "positioning" if self.component[1] == self.component[2] else "straightness"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Places of the reflector as one set-up of a tracker (or any instrument of coordinates) saw them.
+
+    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
+    point to the reflector, `measured_mm` (n, 3) its places in the instrument's frame, which nobody knows, but
+    which is the same for all of these points. `sigma` is the standard uncertainty of a coordinate in mm,
+    `sigma_scale` that of the instrument's scale (mm/mm). Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    measured_mm: Array
+    sigma: float
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "measured_mm": np.atleast_2d(np.array(self.measured_mm, float)),
+            "row": np.array(self.row, np.int64) if len(self.row) else np.arange(1, len(axis) + 1),
+        }
+        if columns["measured_mm"].shape != axis.shape or axis.shape[1:] != (3,) or len(axis) < 4:
+            raise ConfigError(
+                f"{len(axis)} points; expected at least 4, each with three axis positions and three "
+                "coordinates",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()):
+            raise ConfigError("a point is not finite; leave the row out", file=self.source or None)
+        if not self.sigma > 0.0:
+            raise ConfigError(
+                "the uncertainty of the points is not stated; expected sigma_um", file=self.source or None
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lengths:
+    """Lengths that a tracking interferometer read from one station, whose place and dead length nobody knows.
+
+    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
+    point to the reflector, `length_mm` (n,) the readings, `sigma_mm` (n,) or one number their standard
+    uncertainty, `sigma_scale` that of their common scale (mm/mm). Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    length_mm: Array
+    sigma_mm: Array
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        length = np.array(self.length_mm, float)
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "length_mm": length,
+            "sigma_mm": np.array(np.broadcast_to(self.sigma_mm, length.shape), float),
+            "row": np.array(self.row, np.int64) if len(self.row) else np.arange(1, len(axis) + 1),
+        }
+        if length.shape != (len(axis),) or axis.shape[1:] != (3,) or len(axis) < 5:
+            raise ConfigError(
+                f"{length.size} lengths; expected at least 5 from a station, each with three axis positions",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()):
+            raise ConfigError("a length is not finite; leave the row out", file=self.source or None)
+        if not np.all(columns["sigma_mm"] > 0.0):
+            raise ConfigError(
+                "the uncertainty of the lengths is not stated; expected sigma_um", file=self.source or None
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pods:
+    """Directions in which pods or theodolites saw the reflector, each in its own frame that nobody knows.
+
+    `axis_mm` (n, 3) and `tool_mm` (n, 3) or (3,) as for Points; `azimuth_rad` and `elevation_rad` (n, k) of k
+    pods, `sigma` the standard uncertainty of an angle in rad. `baselines` are known distances: (pod, pod from
+    0, mm, standard uncertainty in mm); without one nobody knows the scale. Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    azimuth_rad: Array
+    elevation_rad: Array
+    sigma: float
+    baselines: tuple[tuple[int, int, float, float], ...] = ()
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "azimuth_rad": np.array(self.azimuth_rad, float),
+            "elevation_rad": np.array(self.elevation_rad, float),
+        }
+        shape = columns["azimuth_rad"].shape
+        if (
+            len(shape) != 2
+            or shape[0] != len(axis)
+            or shape != columns["elevation_rad"].shape
+            or len(axis) < 6
+        ):
+            raise ConfigError(
+                f"{len(axis)} points of pods; expected at least 6, each with both angles of every pod",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()) or not self.sigma > 0.0:
+            raise ConfigError(
+                "an angle is not finite, or sigma is not above 0; leave such rows out",
+                file=self.source or None,
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+    @property
+    def count(self) -> int:
+        """How many pods."""
+        return int(self.azimuth_rad.shape[1])
+
+
 @dataclass(frozen=True, slots=True)
 class Square:
     """An optical or mechanical square that two straightness lines share.
@@ -140,7 +277,7 @@ class Measurements:
     """
 
     machine: str
-    lines: tuple[Line, ...]
+    lines: tuple[Line, ...] = ()
     squares: tuple[Square, ...] = ()
     squareness: tuple[SquarenessReading, ...] = ()
     periods_mm: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]] = ((), (), ())
@@ -148,3 +285,6 @@ class Measurements:
     active_during_measurement: frozenset[str] = frozenset()
     measured: datetime.date | None = None
     chain: str | None = None
+    points: tuple[Points, ...] = ()
+    lengths: tuple[Lengths, ...] = ()
+    pods: tuple[Pods, ...] = ()

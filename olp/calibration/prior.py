@@ -33,6 +33,11 @@ def class_of(name: str) -> str:
     return "positioning" if name[1] == name[2] else "straightness"
 
 
+def known_to(shapes: Mapping[str, Shape], kind: str) -> bool:
+    """Whether some curve of a class has lines of its own."""
+    return any(class_of(name) == kind for name in shapes)
+
+
 @dataclass(slots=True)
 class Prior:
     """Roughness and amplitude of every curve. `shapes` are those that lines gave; `squares` the prior mean
@@ -51,7 +56,9 @@ class Prior:
         classes = self.classes if classes is None else classes
         for name in COMPONENTS:
             shape = self.shapes.get(name)
-            amplitude, roughness = classes[class_of(name)]
+            size, roughness = classes[class_of(name)]
+            # coefficients that move together share one size
+            amplitude = size * np.sqrt(p.spaces[name].size)
             if shape is not None:
                 amplitude, roughness = AMPLITUDE[name[1] in "ABC"], shape.roughness
             block = p.spaces[name].prior(roughness, amplitude)
@@ -93,7 +100,12 @@ class Prior:
                 and normal.H[p.slices[name], p.slices[name]].any()
             ]
             if seen:
-                self.classes[kind] = self._best(kind, normal)
+                self._choose(kind, normal, 1)
+                if not known_to(self.shapes, kind):
+                    # nothing but these readings tells the size of such curves
+                    for _ in range(2):
+                        self._choose(kind, normal, 0)
+                        self._choose(kind, normal, 1)
 
     def size_from(self, theta: Array) -> bool:
         """Take the size of curves without lines of their own to be that of the largest of their class with
@@ -113,17 +125,22 @@ class Prior:
         values = space.values(q) @ theta[self.parameters.slices[name]]
         return max(float(np.sqrt(np.mean(values**2))), LEAST_SIZE[class_of(name) == "angle"])
 
-    def _best(self, kind: str, normal: Normal) -> tuple[float, float]:
-        amplitude, start = self.classes[kind]
+    def _choose(self, kind: str, normal: Normal, which: int) -> None:
+        """Take the size (0) or roughness (1) of a class that the evidence prefers."""
+        start = self.classes[kind]
         steps = np.linspace(-3.0, 3.0, 7)
-        values = []
-        for step in steps:
-            trial = {**self.classes, kind: (amplitude, start * float(np.exp(step)))}
-            matrix, logdet = self.precision(trial)
-            values.append(evidence(normal, matrix, logdet) - 0.5 * (step / LOOSE) ** 2)
+
+        def moved(step: float) -> dict[str, tuple[float, float]]:
+            pair = [*start]
+            pair[which] *= float(np.exp(step))
+            return {**self.classes, kind: (pair[0], pair[1])}
+
+        values = [
+            evidence(normal, *self.precision(moved(step))) - 0.5 * (step / LOOSE) ** 2
+            for step in steps.tolist()
+        ]
         k = int(np.clip(np.argmax(values), 1, len(steps) - 2))
         a, b, c = values[k - 1 : k + 2]
         bend = a - 2.0 * b + c
         shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
-        step = float(steps[k] + np.clip(shift, -1.0, 1.0) * (steps[1] - steps[0]))
-        return amplitude, start * float(np.exp(step))
+        self.classes = moved(float(steps[k] + np.clip(shift, -1.0, 1.0) * (steps[1] - steps[0])))

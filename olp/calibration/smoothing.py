@@ -15,7 +15,7 @@ import numpy as np
 
 from olp.calibration.basis import Feature, Kink, Spline, Step, Wave
 from olp.calibration.lines import Noise, drift_ramps, targets_of
-from olp.calibration.normal import Block, Normal
+from olp.calibration.normal import Block, Chunk, Normal
 from olp.calibration.observations import Line
 from olp.errormodel.base import Array
 
@@ -28,6 +28,8 @@ HALF = 0.02, 20e-6
 #: What one more feature must gain beyond its own cost, in nats; the same of a step where another error of the
 #: axis has one; and the most features of a curve.
 GAIN, SHARED_GAIN, MOST = 2.0, 0.0, 8
+#: Steps and kinks are looked for between so many targets at most.
+FINEST = 80
 
 Half = Literal["none", "constant", "curve"]
 
@@ -55,6 +57,8 @@ def shape_of(
     angle = lines[0][0].quantity == "angle"
     inside = [line for line, _ in lines if np.ptp(line.target_mm) > 0.2 * (spline.high_mm - spline.low_mm)]
     targets = np.unique(np.concatenate([targets_of(line) for line in inside] or [np.zeros(0)]))
+    if len(targets) > FINEST:
+        targets = targets[np.unique(np.linspace(0, len(targets) - 1, FINEST).round().astype(int))]
     candidates: list[Feature] = [
         Step(float(a), float(b)) for a, b in itertools.pairwise(targets) if b - a > 1.0
     ]
@@ -111,10 +115,8 @@ def _block(rows: Array, line: Line, noise: Noise, waves: Sequence[Wave], amplitu
         ramps = drift_ramps(line)
         local += list(ramps.T)
         precision += [1.0 / noise.drift**2] * ramps.shape[1]
-    return Block(
-        rows, np.arange(rows.shape[1]), line.value, np.full(n, noise.sigma),
-        np.stack(local, axis=1), np.array(precision),
-    )  # fmt: skip
+    chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
+    return Block.of(chunk, np.arange(rows.shape[1]), np.array(precision))
 
 
 class _Choice:

@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import Fit, LineResult
+from olp.calibration.estimator import (
+    LENGTH,
+    MISFIT,
+    POINT,
+    Fit,
+    LengthsResult,
+    LineResult,
+    PointsResult,
+    misfit,
+)
 from olp.calibration.parameters import SHEAR
 from olp.calibration.prior import class_of
 from olp.errormodel.base import Array
@@ -25,8 +34,8 @@ UNSEEN = 0.7
 STRONG, MOST_PAIRS = 0.9, 8
 #: The runs may spread by so much more than stated.
 SCATTER = 1.5
-#: Chi-square beyond so many standard deviations of its distribution says that the model does not fit.
-MISFIT = 5.0
+#: Offsets of the reflector that differ by less than this are one.
+ONE_OFFSET_MM = 1.0
 _POINTS = 41
 _LISTED = 10
 
@@ -57,6 +66,17 @@ def unseen(fit: Fit) -> dict[str, float]:
         if after.mean() > UNSEEN**2 * before.mean():
             found[name] = math.sqrt(float(after.mean()))
     return found
+
+
+def scale_unseen(fit: Fit) -> float | None:
+    """Standard deviation of the common scale of all axes, where no reading tells of it."""
+    prior = np.linalg.inv(fit.prior.precision()[0])
+    row = np.zeros(fit.parameters.size)
+    for axis, letter in enumerate(AXES):
+        ends = fit.curve(f"E{letter}{letter}", fit.box_mm[axis])
+        row += (ends[1] - ends[0]) / float(np.ptp(fit.box_mm, axis=1).sum())
+    before, after = float(row @ prior @ row), float(row @ fit.covariance @ row)
+    return math.sqrt(after) if after > UNSEEN**2 * before else None
 
 
 def squareness_unseen(fit: Fit) -> dict[str, float]:
@@ -102,6 +122,8 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         "datum_mm": list(fit.parameters.datum_mm),
         "box_mm": {axis: fit.box_mm[k].tolist() for k, axis in enumerate(AXES)},
         "readings": sum(len(result.line.value) for result in fit.lines) + len(fit.measurements.squareness),
+        "points": sum(len(result.points.axis_mm) for result in fit.points),
+        "lengths": sum(len(result.residual) for result in fit.lengths),
         "left_out": len(fit.outliers),
         "chi_square_per_freedom": fit.chi_square / fit.freedom,
         "degrees_of_freedom": fit.freedom,
@@ -121,6 +143,17 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         ],
         "lines_of_lengths": [_line_row(r) for r in fit.lines if r.line.quantity != "angle"],
         "lines_of_angles": [_line_row(r) for r in fit.lines if r.line.quantity == "angle"],
+        "sets_of_points": [_points_row(result) for result in fit.points],
+        "stations": [_station_row(result) for result in fit.lengths],
+        "sets_of_pods": [
+            {
+                "name": result.pods.source or "pods",
+                "directions": 2 * result.pods.azimuth_rad.size,
+                "sigma_urad": result.pods.sigma / RAD_PER_URAD,
+                "chi_square_per_reading": result.chi_square / len(result.residual),
+            }
+            for result in fit.pods
+        ],
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
             for name, sigma in {**hidden, **squareness_unseen(fit)}.items()
@@ -136,7 +169,8 @@ def _row(fit: Fit, name: str, hidden: dict[str, float]) -> dict[str, Any]:
     shape = fit.prior.shapes.get(name)
     residuals = [result.residual for result in fit.lines if result.line.component == name]
     half = np.abs(half_of(fit, name, q))
-    words = "not observed" if name in hidden else "other lines" if shape is None else "smooth"
+    through = "points" if fit.points or fit.lengths or fit.pods else "other lines"
+    words = "not observed" if name in hidden else through if shape is None else "smooth"
     if shape is not None and shape.features:
         steps = len(joints_of(fit, name))
         kinks = len(shape.features) - steps
@@ -173,6 +207,27 @@ def _line_row(result: LineResult) -> dict[str, Any]:
     }
 
 
+def _points_row(result: PointsResult) -> dict[str, Any]:
+    n = len(result.points.axis_mm)
+    return {
+        "name": result.points.source or "points",
+        "points": n,
+        "sigma_coordinate_um": result.points.sigma * UM_PER_MM,
+        "residual_um": float(np.sqrt(np.mean(result.residual**2))) * UM_PER_MM,
+        "chi_square_per_coordinate": result.chi_square / (3 * n),
+    }
+
+
+def _station_row(result: LengthsResult) -> dict[str, Any]:
+    return {
+        "name": result.lengths.source or "station",
+        "lengths": len(result.residual),
+        "place_mm": result.station.place_mm.tolist(),
+        "residual_um": _rms([result.residual]) * UM_PER_MM,
+        "chi_square_per_length": result.chi_square / len(result.residual),
+    }
+
+
 def _rms(parts: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
@@ -186,6 +241,7 @@ def findings_of(
     """What a person should know about an adjustment."""
     return (
         *_unseen_findings(fit, tools),
+        *_scale_findings(fit),
         *_outlier_findings(fit),
         *_scatter_findings(fit),
         *_step_findings(fit),
@@ -209,7 +265,8 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
         yield Finding(
             "OLP801",
             f"{name} stands as zero: as large as other {like} of this machine ({sigma * scale:.2g} {unit}) "
-            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}",
+            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}"
+            + _why(fit, name),
         )
     for name in squareness_unseen(fit):
         yield Finding(
@@ -218,11 +275,32 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
         )
 
 
+def _scale_findings(fit: Fit) -> Iterator[Finding]:
+    scale = scale_unseen(fit)
+    if scale is not None:
+        yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
+
+
+def _why(fit: Fit, name: str) -> str:
+    """What points with too few offsets of the reflector have to do with an angle that they do not see."""
+    seen = [*(r.points.tool_mm for r in fit.points), *(r.lengths.tool_mm for r in fit.lengths)]
+    seen += [r.pods.tool_mm for r in fit.pods]
+    if not seen or name[1] in AXES:
+        return ""
+    tools = np.concatenate(seen)
+    size = np.linalg.svd(tools - tools.mean(axis=0), compute_uv=False)
+    if size[0] < ONE_OFFSET_MM * math.sqrt(len(tools)):
+        return "; the points have one offset of the reflector"
+    if size[1] < ONE_OFFSET_MM * math.sqrt(len(tools)):
+        return "; the offsets of the reflector lie on one line, and the turn about that line moves no point"
+    return ""
+
+
 def _outlier_findings(fit: Fit) -> Iterator[Finding]:
     files = dict.fromkeys((o.source, o.component) for o in fit.outliers)
     for source, component in files:
         own = [o for o in fit.outliers if (o.source, o.component) == (source, component)]
-        unit, scale = unit_of(component)
+        unit, scale = ("um", UM_PER_MM) if component in (POINT, LENGTH) else unit_of(component)
         rows = ", ".join(f"row {o.row} ({o.value * scale:.2f} {unit})" for o in own[:_LISTED])
         more = f" and {len(own) - _LISTED} more" if len(own) > _LISTED else ""
         yield Finding(
@@ -289,13 +367,13 @@ def _box_findings(fit: Fit, travel_mm: Sequence[tuple[float, float]] | None) -> 
 
 
 def _misfit_findings(fit: Fit) -> Iterator[Finding]:
-    """By the cube root of chi-square, which is nearly normal (Wilson and Hilferty, 1931)."""
-    part = 2.0 / (9.0 * fit.freedom)
-    z = ((fit.chi_square / fit.freedom) ** (1.0 / 3.0) - (1.0 - part)) / math.sqrt(part)
-    if z > MISFIT:
-        worst = max(fit.lines, key=lambda result: result.chi_square / len(result.line.value))
+    if misfit(fit) > MISFIT:
+        parts = [(r.chi_square / len(r.line.value), r.line.source or r.line.component) for r in fit.lines]
+        parts += [(r.chi_square / r.residual.size, r.points.source or "points") for r in fit.points]
+        parts += [(r.chi_square / len(r.residual), r.lengths.source or "lengths") for r in fit.lengths]
+        parts += [(r.chi_square / len(r.residual), r.pods.source or "pods") for r in fit.pods]
+        value, source = max(parts)
         yield Finding(
             "OLP808",
-            f"chi-square is {fit.chi_square / fit.freedom:.2f} a degree of freedom, and "
-            f"{worst.chi_square / len(worst.line.value):.2f} in {worst.line.source or worst.line.component}",
+            f"chi-square is {fit.chi_square / fit.freedom:.2f} a degree of freedom, {value:.2f} in {source}",
         )

@@ -105,17 +105,30 @@ def _demands(path: Toolpath, feed_mm_s: Array) -> tuple[Array, Array]:
     acceleration = np.zeros((count, 3))
     arcs, rows = path.arcs, path.arcs.move
     if len(arcs):
-        begin, end, most, radius, climb = _arc_ways(path, length)
+        quarters = _quarters(path)
+        begin, end, most, radius, climb = _arc_ways(path, length, quarters)
         first[rows], last[rows] = begin, end
         velocity[rows] = np.where(usable[rows, None], most * speed[rows, None], 0.0)
         # towards the centre: at most what the way to it has of an axis
-        normal = _normals(path) * (speed[rows] * climb)[:, None] ** 2 / radius[:, None]
+        normal = _normals(path, quarters) * (speed[rows] * climb)[:, None] ** 2 / radius[:, None]
         acceleration[rows] = np.where(usable[rows, None], normal, 0.0)
     joint = _joints(first, last, speed, length, usable & cutting_moves(path))
     return velocity, np.fmax(acceleration, joint)
 
 
-def _arc_ways(path: Toolpath, length: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _quarters(path: Toolpath) -> list[Mask]:
+    """For each quarter of a circle, which arcs (m,) pass the place at its end."""
+    arcs = path.arcs
+    start = path.starts_mm()[arcs.move]
+    return [
+        np.asarray(np.isfinite(quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter)))
+        for quarter in range(4)
+    ]
+
+
+def _arc_ways(
+    path: Toolpath, length: Array, quarters: list[Mask]
+) -> tuple[Array, Array, Array, Array, Array]:
     """Of each arc: unit ways at its start and end (m, 3), the largest share of each axis (m, 3), its radius
     and the share of the speed that goes round."""
     arcs, at = path.arcs, path.arcs.move
@@ -134,14 +147,13 @@ def _arc_ways(path: Toolpath, length: Array) -> tuple[Array, Array, Array, Array
         way[rows, three] = (end[rows, three] - start[rows, three]) / length[at]
         ways.append(way)
     most = np.maximum(np.abs(ways[0]), np.abs(ways[1]))
-    for quarter in range(4):
-        passed = np.isfinite(quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter))
+    for quarter, passed in enumerate(quarters):
         across = two if quarter % 2 == 0 else one
         most[rows[passed], across[passed]] = around[passed]
     return ways[0], ways[1], most, radius, around
 
 
-def _normals(path: Toolpath) -> Array:
+def _normals(path: Toolpath, quarters: list[Mask]) -> Array:
     """(m, 3) the largest share of each axis that the way to the centre of an arc has."""
     arcs, at = path.arcs, path.arcs.move
     start, end = path.starts_mm()[at], path.end_mm[at]
@@ -152,8 +164,7 @@ def _normals(path: Toolpath) -> Array:
         away[rows, axes[:, 2]] = 0.0
         with np.errstate(invalid="ignore", divide="ignore"):
             out = np.fmax(out, np.abs(away) / np.sqrt((away * away).sum(axis=1))[:, None])
-    for quarter in range(4):
-        passed = np.isfinite(quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter))
+    for quarter, passed in enumerate(quarters):
         along = axes[:, quarter % 2]
         out[rows[passed], along[passed]] = 1.0
     return out

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import datetime
 from pathlib import Path
+from typing import Literal
 
 import click
 
 from olp.cli.common import (
     STREAM,
-    Length,
     confidence_options,
+    contour_option,
+    date_option,
     exit_for,
+    fail_on_option,
     files_of,
     given,
+    outside_box_option,
     put,
     refuse_early,
+    refuse_twice,
     setup_options,
     source,
     talk,
+    tolerance_option,
 )
 from olp.cli.progress import progress
-from olp.exceptions import OlpError, UsageError
+from olp.exceptions import UsageError, naming
 
 
 def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
@@ -38,13 +44,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     "--select", multiple=True, callback=_codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
 )
 @click.option("--ignore", multiple=True, callback=_codes, metavar="CODES", help="All codes but these.")
-@click.option(
-    "--fail-on",
-    type=click.Choice(["info", "warning", "error", "never"]),
-    default="error",
-    show_default=True,
-    help="Exit with 1 where a finding is at least this severe.",
-)
+@fail_on_option
 @click.option(
     "--format",
     "form",
@@ -54,29 +54,12 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     help="SARIF 2.1.0 and JUnit XML are for pipelines.",
 )
 @click.option("-o", "--output", metavar="OUT", default=STREAM, help="Default: stdout.")
-@click.option(
-    "--date",
-    type=click.DateTime(["%Y-%m-%d"]),
-    metavar="YYYY-MM-DD",
-    help="The day of the run, to be compared with valid_until of the calibration.",
-)
-@click.option(
-    "--tolerance-um",
-    type=Length(),
-    default=1.0,
-    show_default=True,
-    help="How far the corrected path may be from the nominal one, rounding apart.",
-)
-@click.option(
-    "--outside-box",
-    type=click.Choice(["refuse", "hold"]),
-    default="refuse",
-    show_default=True,
-    help="Outside the calibrated box: an error (OLP405), or a warning (OLP403) and the error at the face.",
-)
+@date_option()
+@tolerance_option
+@outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options
 @click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
-@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
+@contour_option
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 def command(
     program: str | None,
@@ -88,9 +71,9 @@ def command(
     fail_on: str,
     form: str,
     output: str,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     tolerance_um: float,
-    outside_box: str,
+    outside_box: Literal["refuse", "hold"],
     within_um: float | None,
     only_sure_components: bool,
     clearances: str | None,
@@ -104,35 +87,33 @@ def command(
     call = given(program, machine, job)
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")
-    inputs = (*call.inputs, *files_of(nominal), *(mesh.file for mesh in call.setup.job.meshes))
+    inputs = (*call.inputs, *files_of(nominal))
     if clearances is not None and not call.setup.job.meshes:
         raise UsageError("--clearances needs meshes; name them in the job file, a table [[meshes]] each")
     if clearances == output == STREAM:
         raise UsageError("findings and --clearances cannot both go to stdout; name a file for one of them")
     refuse_early(files_of(output, clearances), inputs, force=force)
+    refuse_twice(files_of(output, clearances))
 
     from olp.files.write import write_files
     from olp.gate import check
     from olp.report_check import FORMATS, to_csv
 
-    with progress(form != "text") as show:
-        try:
-            result = check(
-                source(call.program),
-                call.setup,
-                nominal=None if nominal is None else source(nominal),
-                tolerance_um=tolerance_um,
-                outside_box="hold" if outside_box == "hold" else "refuse",
-                contour=contour,
-                within_um=within_um,
-                only_sure_components=only_sure_components,
-                date=date.date() if date else None,
-                select=select,
-                ignore=ignore,
-                progress=show,
-            )
-        except OlpError as error:
-            raise (error.in_file("<stdin>") if error.line is not None else error) from None
+    with progress(form != "text") as show, naming("<stdin>" if call.program == STREAM else ""):
+        result = check(
+            source(call.program),
+            call.setup,
+            nominal=None if nominal is None else source(nominal),
+            tolerance_um=tolerance_um,
+            outside_box=outside_box,
+            contour=contour,
+            within_um=within_um,
+            only_sure_components=only_sure_components,
+            date=date,
+            select=select,
+            ignore=ignore,
+            progress=show,
+        )
     parts = {output: FORMATS[form](result.report, fail_on).encode()}
     if clearances is not None and result.clearances is not None:
         parts[clearances] = to_csv(result.clearances.rows())

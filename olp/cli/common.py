@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import os
 import sys
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 STREAM = "-"
 FINDINGS_EXIT = 1
 REPORT_ENDINGS = (".html", ".json", ".md")
+PLOT_ENDINGS = (".svg", ".png")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,31 +46,71 @@ def setup_options(function: F) -> F:
     return click.option("-m", "--machine", metavar="machine.toml", help="The machine file.")(function)
 
 
-def proof_options(function: F) -> F:
-    """What `correct` and `verify` have in common."""
+def _day(
+    ctx: click.Context, parameter: click.Parameter, value: datetime.datetime | None
+) -> datetime.date | None:
+    return None if value is None else value.date()
+
+
+def date_option(of: str = "run") -> Callable[[F], F]:
+    """--date, as a day."""
+    return click.option(
+        "--date",
+        type=click.DateTime(["%Y-%m-%d"]),
+        callback=_day,
+        metavar="YYYY-MM-DD",
+        help=f"The day of the {of}, to be compared with valid_until of the calibration.",
+    )
+
+
+def outside_box_option(refused: str, held: str) -> Callable[[F], F]:
+    """--outside-box; its help says what becomes of what is outside."""
+    return click.option(
+        "--outside-box",
+        type=click.Choice(["refuse", "hold"]),
+        default="refuse",
+        show_default=True,
+        help=f"Outside the calibrated box: {refused}, or {held}.",
+    )
+
+
+fail_on_option = click.option(
+    "--fail-on",
+    type=click.Choice(["info", "warning", "error", "never"]),
+    default="error",
+    show_default=True,
+    help="Exit with 1 where a finding is at least this severe.",
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+contour_option = click.option(
+    "--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."
+)
+tolerance_option = click.option(
+    "--tolerance-um",
+    type=Length(),
+    default=1.0,
+    show_default=True,
+    help="How far the corrected path may be from the nominal one, rounding apart.",
+)
+flatten_option = click.option(
+    "--flatten", is_flag=True, help="Write out loops, subprograms and expressions first."
+)
+report_option = click.option(
+    "--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md."
+)
+
+
+def unroll_options(function: F) -> F:
+    """--flatten, --expand-cycles and what that needs."""
     for option in (
         click.option(
-            "--fail-on",
-            type=click.Choice(["info", "warning", "error", "never"]),
-            default="error",
-            show_default=True,
-            help="Exit with 1 where a finding is at least this severe.",
-        ),
-        click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
-        click.option(
-            "--date",
-            type=click.DateTime(["%Y-%m-%d"]),
-            metavar="YYYY-MM-DD",
-            help="The day of the run, to be compared with valid_until of the calibration.",
-        ),
-        click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."),
-        click.option(
-            "--tolerance-um",
+            "--peck-clearance-mm",
             type=Length(),
-            default=1.0,
-            show_default=True,
-            help="How far the corrected path may be from the nominal one, rounding apart.",
+            help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; "
+            "for --expand-cycles.",
         ),
+        click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves."),
+        flatten_option,
     ):
         function = option(function)
     return function
@@ -93,6 +135,13 @@ def confidence_options(function: F) -> F:
     return function
 
 
+def proof_options(function: F) -> F:
+    """What `correct` and `verify` have in common."""
+    for option in (fail_on_option, json_option, date_option(), contour_option, tolerance_option):
+        function = option(function)
+    return function
+
+
 @dataclass(frozen=True, slots=True)
 class Given:
     """What a call is about: the program (a path or `-`), machine and job, and every file that it reads."""
@@ -113,22 +162,15 @@ def given(program: str | None, machine: str | None, job: str | None) -> Given:
 
 def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
     """Machine and job, and the files that describe them. Raises UsageError, InputError."""
-    import tomllib
-
-    from olp.files.config import beside, load_setup
-    from olp.files.write import read_bytes
+    from olp.files.calibration import files_beside
+    from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
-    inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration)
+    meshes = (mesh.file for mesh in setup.job.meshes)
+    named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
+    inputs = files_of(*named, *meshes)
     if setup.machine.calibration is not None:
-        try:
-            tables = tomllib.loads(read_bytes(setup.machine.calibration).decode("utf-8-sig"))
-            named = [curve["file"] for curve in tables.get("curves", ())]
-            named += [tables["covariance"]["file"]] if "file" in tables.get("covariance", ()) else []
-            inputs += files_of(*(beside(setup.machine.calibration, name) for name in named))
-        except (ValueError, TypeError, KeyError, AttributeError):
-            # The loader of calibrations says what is wrong with it.
-            pass
+        inputs += [str(file) for file in files_beside(setup.machine.calibration)]
     return setup, tuple(inputs)
 
 
@@ -164,6 +206,20 @@ def refuse_twice(names: Iterable[str]) -> None:
         if path in seen:
             raise UsageError("is named as output twice; name two files", file=name)
         seen.add(path)
+
+
+def refuse_stream(**outputs: str | None) -> None:
+    """Raise where an output that goes to a file only is named `-`; keys are options, as in `save_profile`."""
+    for key, name in outputs.items():
+        if name == STREAM:
+            option = f"--{key.replace('_', '-')}"
+            raise UsageError(f"{option} writes a file, and - is stdout; name a file")
+
+
+def plot_ending(name: str) -> None:
+    """Raise UsageError for a picture whose ending names no format."""
+    if Path(name).suffix.lower() not in PLOT_ENDINGS:
+        raise UsageError(f"the plot {name!r} ends in no known format; expected .svg or .png")
 
 
 def report_ending(name: str) -> str:

@@ -11,12 +11,19 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    contour_option,
+    date_option,
     exit_for,
+    fail_on_option,
     files_of,
+    json_option,
     machine_given,
     put,
     refuse_early,
+    refuse_stream,
+    refuse_twice,
     report_ending,
+    report_option,
     setup_options,
     source,
     talk,
@@ -66,17 +73,11 @@ if TYPE_CHECKING:
     "--part-frame", metavar="FILE.toml", help="Work offset from three or more poses, for the job file."
 )
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
-@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
-@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
-@click.option(
-    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
-    help="The day of the measurement, to be compared with valid_until of the calibration.",
-)  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-@click.option(
-    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
-    help="Exit with 1 where a finding is at least this severe.",
-)  # fmt: skip
+@report_option
+@contour_option
+@date_option("measurement")
+@json_option
+@fail_on_option
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
 def command(
@@ -102,7 +103,7 @@ def command(
     frame_name: str,
     report_file: str | None,
     contour: bool,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -115,8 +116,10 @@ def command(
     """
     setup, described = machine_given(machine, job) if machine or job else (None, ())
     inputs = (*files_of(nominal, *measured, *before), *described)
+    refuse_stream(output=output, part_frame=part_frame, save_profile=save_profile)
     targets = files_of(output, part_frame, save_profile, report_file)
     refuse_early(targets, inputs, force=force)
+    refuse_twice(targets)
     if part_frame and not poses:
         raise UsageError("--part-frame takes points of a part, a row each; add --poses")
     for name in files_of(report_file):
@@ -134,18 +137,15 @@ def command(
         result = compare(
             source(nominal), measured, setup, before=before, poses=poses, profile=layout,
             align=align, order=order, reach_mm=reach_mm, tolerance_um=tolerance_um, add_errors=add_errors,
-            frame_name=frame_name, contour=contour, date=date.date() if date else None, progress=show,
+            part_frame=frame_name if part_frame else None, contour=contour, date=date, progress=show,
         )  # fmt: skip
         written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(output)}
-        if part_frame and result.part_frame is None:
-            raise UsageError("a part frame takes at least three nominal points")
         if part_frame and result.part_frame:
             written[Path(part_frame)] = result.part_frame.encode()
         if save_profile:
             written[Path(save_profile)] = result.profile.to_toml().encode()
         if report_file and report_file != STREAM:
-            day = date.date() if date else None
-            written[Path(report_file)] = report_files.comparison(result, setup, report_file, day)
+            written[Path(report_file)] = report_files.comparison(result, setup, report_file, date)
         write_files(written, force=force, inputs=inputs)
     if as_json or report_file == STREAM:
         put(to_json(result.report))
@@ -162,11 +162,12 @@ def _layout(
 ) -> PointProfile | None:
     """The profile that the call asks for, None where files tell their own."""
     from olp.files.point_profile import BUILT_IN, load_profile, with_options
-    from olp.files.points import suggested
+    from olp.files.points import layout_of
+    from olp.files.write import read_bytes
 
     if profile is None and not columns and not any(values.values()):
         return None
-    start = load_profile(profile) if profile else suggested(first) or BUILT_IN["olp"]
+    start = load_profile(profile) if profile else layout_of(read_bytes(first)) or BUILT_IN["olp"]
     if profile is None and columns and all(item.partition("=")[2].isdigit() for item in columns):
         start = start.model_copy(update={"header": False})
     return with_options(start, columns, **values)

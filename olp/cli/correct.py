@@ -5,25 +5,27 @@ from __future__ import annotations
 import datetime
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from olp.cli.common import (
     STREAM,
-    Length,
     confidence_options,
     exit_for,
     files_of,
     given,
+    outside_box_option,
     proof_options,
     put,
     refuse_early,
     refuse_twice,
     report_ending,
+    report_option,
     setup_options,
     source,
     talk,
+    unroll_options,
 )
 from olp.cli.progress import progress
 from olp.exceptions import ProgramError, UsageError
@@ -43,22 +45,10 @@ LAST_DIGITS_UM = 10.0
 @click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
 @confidence_options
-@click.option(
-    "--outside-box",
-    type=click.Choice(["refuse", "hold"]),
-    default="refuse",
-    show_default=True,
-    help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
-)
-@click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
-@click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
-@click.option(
-    "--peck-clearance-mm",
-    type=Length(),
-    help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; for --expand-cycles.",
-)
+@outside_box_option("refuse the program", "take the error at the box's face")
+@unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
-@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
+@report_option
 @click.option(
     "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
 )
@@ -71,11 +61,11 @@ def command(
     job: str | None,
     output: str | None,
     tolerance_um: float,
-    outside_box: str,
+    outside_box: Literal["refuse", "hold"],
     contour: bool,
     within_um: float | None,
     only_sure_components: bool,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     flatten: bool,
@@ -104,9 +94,8 @@ def command(
         )
     for name in files_of(report_file):
         report_ending(name)
-    inputs = (*call.inputs, *(mesh.file for mesh in call.setup.job.meshes))
     outputs = files_of(output, report_file, review_file)
-    refuse_early(outputs, inputs, force=force)
+    refuse_early(outputs, call.inputs, force=force)
     refuse_twice(outputs)
 
     from olp import api, report
@@ -119,7 +108,7 @@ def command(
                 nominal,
                 call.setup,
                 tolerance_um=tolerance_um,
-                outside_box="hold" if outside_box == "hold" else "refuse",
+                outside_box=outside_box,
                 flatten=flatten,
                 expand_cycles=expand_cycles,
                 peck_clearance_mm=peck_clearance_mm,
@@ -127,7 +116,7 @@ def command(
                 split_rapids=split_rapids,
                 within_um=within_um,
                 only_sure_components=only_sure_components,
-                date=date.date() if date else None,
+                date=date,
                 progress=show,
             )
             written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
@@ -136,27 +125,23 @@ def command(
 
                 written[Path(review_file)] = view(
                     nominal, call.setup, correction=result, corrected_name="" if output == STREAM else output,
-                    tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
-                    contour=contour, flatten=flatten, expand_cycles=expand_cycles,
-                    peck_clearance_mm=peck_clearance_mm, within_um=within_um,
-                    only_sure_components=only_sure_components, date=date.date() if date else None,
-                    progress=show,
+                    tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, within_um=within_um,
+                    only_sure_components=only_sure_components, date=date, progress=show,
                 ).parts()  # fmt: skip
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
     for name in files_of(report_file):
         from olp import report_files
-        from olp.loading import profile_of, source_of, unrolled
+        from olp.loading import source_of, unrolled
 
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
-            profile = profile_of(call.setup)
-            text = unrolled(text, origin, profile, expand_cycles, peck_clearance_mm)
-        day = date.date() if date else None
-        filed = report_files.correction(result, text, call.setup, name, day, contour=contour)
+            text = unrolled(text, origin, call.setup, expand_cycles, peck_clearance_mm)
+        filed = report_files.correction(result, text, call.setup, name, date, contour=contour)
         written[Path(name)] = filed
-    write_files(written, force=force, inputs=inputs)
+    write_files(written, force=force, inputs=call.inputs)
     on_stderr = output == STREAM
     if on_stderr:
         put(result.data)

@@ -11,6 +11,7 @@ import click
 from olp.cli.common import (
     files_of,
     machine_given,
+    plot_ending,
     put,
     refuse_early,
     setup_options,
@@ -22,8 +23,6 @@ from olp.exceptions import UsageError
 if TYPE_CHECKING:
     from olp.errormodel import Calibration
     from olp.machine import Setup
-
-_FORMATS = (".svg", ".png")
 
 
 @click.command("inspect")
@@ -62,8 +61,8 @@ def command(
         file = setup.job.program
     if tool is not None and at is None:
         raise UsageError("--tool belongs to --at; give the axis position with --at X Y Z")
-    if plot is not None and Path(plot).suffix.lower() not in _FORMATS:
-        raise UsageError(f"the plot {plot!r} ends in no known format; expected .svg or .png")
+    if plot is not None:
+        plot_ending(plot)
     refuse_early(files_of(plot), (*inputs, *files_of(file)), force=force)
 
     if plot is not None:
@@ -115,6 +114,7 @@ def _calibration(setup: Setup) -> Calibration:
 
 def machine_summary(setup: Setup) -> dict[str, Any]:
     """Axes, chain, calibration and the size of each of the 21 errors, with units in the keys."""
+    from olp.cli.inspect_parts import grid_summary
     from olp.machine import COMPONENTS, SQUARENESS
     from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 
@@ -163,7 +163,7 @@ def machine_summary(setup: Setup) -> dict[str, Any]:
         },
         "cyclic_position_errors": cyclic_position,
         "cyclic_angular_errors": cyclic_angular,
-    }
+    } | grid_summary(calibration, described.chain)
 
 
 def _size(calibration: Calibration, name: str, unit: str, scale: float) -> dict[str, Any]:

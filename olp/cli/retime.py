@@ -11,10 +11,17 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    contour_option,
+    exit_for,
+    fail_on_option,
     files_of,
+    flatten_option,
     given,
+    json_option,
+    plot_ending,
     put,
     refuse_early,
+    refuse_stream,
     refuse_twice,
     setup_options,
     silence_stdout,
@@ -22,7 +29,7 @@ from olp.cli.common import (
     talk,
 )
 from olp.cli.progress import progress
-from olp.exceptions import InputError, OlpError, UsageError
+from olp.exceptions import InputError, OlpError, UsageError, naming
 
 if TYPE_CHECKING:
     from olp.files.write import Content
@@ -70,11 +77,12 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     help="What an F word takes that holds for several blocks: the feed that takes as long in all, or "
     "the least planned feed.",
 )
-@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
+@contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
-@click.option("--flatten", is_flag=True, help="Unroll loops, subprograms and expressions first.")
+@flatten_option
 @click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+@json_option
+@fail_on_option
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
 def command(
@@ -101,6 +109,7 @@ def command(
     flatten: bool,
     report_file: str | None,
     as_json: bool,
+    fail_on: str,
     quiet: bool,
     force: bool,
 ) -> None:
@@ -117,8 +126,9 @@ def command(
         raise UsageError("stdout takes one result; write the others to files (-o, --write-feed, --report)")
     if stretch is not None and output is None and plot is None:
         raise UsageError("--stretch chooses what OUT and the plot take; name one with -o or --plot")
-    if plot is not None and Path(plot).suffix.lower() not in (".svg", ".png"):
-        raise UsageError(f"the plot {plot!r} ends in no known format; expected .svg or .png")
+    refuse_stream(lines=lines, slow=slow, report=report_file, plot=plot)
+    if plot is not None:
+        plot_ending(plot)
     if plot_span is not None and plot is None:
         raise UsageError("--plot-span says what --plot draws; name a file with --plot")
     inputs = (*call.inputs, *files_of(nominal, proof))
@@ -131,18 +141,15 @@ def command(
     from olp.files.write import write_files
     from olp.retiming import retime
 
-    with progress(quiet) as show:
-        try:
-            result = retime(
-                source(call.program), call.setup, nominal=None if nominal is None else source(nominal),
-                proof=None if proof is None else _json(proof),
-                blend_mm=blend_mm, study_blend=blend_study,
-                max_inertial_um=max_inertial_um, contour=contour, block_delete=block_delete,
-                flatten=flatten, progress=show,
-            )  # fmt: skip
-            feeds = None if write_feed is None else result.with_feeds(shared_feed, show)
-        except OlpError as error:
-            raise (error.in_file("<stdin>") if error.line is not None else error) from None
+    with progress(quiet) as show, naming("<stdin>" if STREAM in (call.program, nominal) else ""):
+        result = retime(
+            source(call.program), call.setup, nominal=None if nominal is None else source(nominal),
+            proof=None if proof is None else _json(proof),
+            blend_mm=blend_mm, study_blend=blend_study,
+            max_inertial_um=max_inertial_um, contour=contour, block_delete=block_delete,
+            flatten=flatten, progress=show,
+        )  # fmt: skip
+        feeds = None if write_feed is None else result.with_feeds(shared_feed, show)
         written: dict[Path, Content] = {}
         if output is not None and output != STREAM:
             written |= result.files(output, kind, cycle_ms * 1e-3, stretch, show)
@@ -154,11 +161,12 @@ def command(
             start, end = plot_span or (0.0, None)
             written |= result.plots(plot, stretch, from_s=start, to_s=end)
         written |= {Path(name): report.to_json(result.report) for name in files_of(report_file)}
+        streamed = _of_one(result, kind, cycle_ms * 1e-3, stretch) if output == STREAM else ()
         write_files(written, force=force, inputs=inputs)
     if feeds is not None and write_feed == STREAM:
         put(feeds)
     if output == STREAM:
-        _stream(_of_one(result, kind, cycle_ms * 1e-3, stretch))
+        _stream(streamed)
     if not quiet:
         for path in written:
             talk(f"wrote {path}")
@@ -166,6 +174,7 @@ def command(
         put(report.to_json(result.report))
     elif not quiet:
         put(report_time.to_text(result.report), err=bool(on_stdout))
+    exit_for(result.findings, fail_on)
 
 
 def _json(name: str) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from olp.cli.common import put
 
 
 @click.command("schema")
-@click.argument("kind", type=click.Choice(["machine", "calibration", "job"]))
+@click.argument("kind", type=click.Choice(["machine", "calibration", "job", "measurements"]))
 def command(kind: str) -> None:
-    """Print the JSON Schema of a machine, calibration or job file.
+    """Print the JSON Schema of a machine, calibration, job or measurements file.
 
     Editors complete and check TOML with it.
     """

@@ -7,6 +7,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    contour_option,
     files_of,
     given,
     put,
@@ -24,7 +25,7 @@ from olp.cli.common import (
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
-@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
+@contour_option
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 def command(
     program: str | None,

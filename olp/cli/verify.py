@@ -34,7 +34,7 @@ def command(
     contour: bool,
     within_um: float | None,
     only_sure_components: bool,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
 ) -> None:
@@ -57,7 +57,7 @@ def command(
         contour=contour,
         within_um=within_um,
         only_sure_components=only_sure_components,
-        date=date.date() if date else None,
+        date=date,
     )
     put(report.to_json(result.report) if as_json else report.to_text(result.report))
     exit_for(result.findings, fail_on)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -12,16 +12,20 @@ from olp.cli.common import (
     STREAM,
     Length,
     confidence_options,
+    contour_option,
     files_of,
     given,
+    outside_box_option,
     put,
     refuse_early,
     setup_options,
     source,
     talk,
+    tolerance_option,
+    unroll_options,
 )
 from olp.cli.progress import progress
-from olp.exceptions import OlpError, UsageError
+from olp.exceptions import UsageError, naming
 
 if TYPE_CHECKING:
     from olp.review.job import Review
@@ -43,27 +47,11 @@ if TYPE_CHECKING:
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: one that is free."
 )
-@click.option(
-    "--tolerance-um",
-    type=Length(),
-    default=1.0,
-    show_default=True,
-    help="How far the corrected path may be from the nominal one, rounding apart.",
-)
-@click.option(
-    "--outside-box",
-    type=click.Choice(["refuse", "hold"]),
-    default="refuse",
-    show_default=True,
-    help="Outside the calibrated box: refuse the program, or take the error at the box's face.",
-)
+@tolerance_option
+@outside_box_option("refuse the program", "take the error at the box's face")
+@contour_option
+@unroll_options
 @confidence_options
-@click.option("--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool.")
-@click.option("--flatten", is_flag=True, help="Write out loops, subprograms and expressions first.")
-@click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")
-@click.option(
-    "--peck-clearance-mm", type=Length(), help="Clearance above the last peck, for --expand-cycles."
-)
 @click.option(
     "--no-time", is_flag=True, help="Do not plan the motion; times are those of the programmed feed."
 )
@@ -84,7 +72,7 @@ def command(
     live: bool,
     port: int,
     tolerance_um: float,
-    outside_box: str,
+    outside_box: Literal["refuse", "hold"],
     within_um: float | None,
     only_sure_components: bool,
     contour: bool,
@@ -111,7 +99,7 @@ def command(
         )
     if STREAM in (corrected, *measured):
         raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
-    inputs = (*call.inputs, *files_of(corrected, *measured), *(mesh.file for mesh in call.setup.job.meshes))
+    inputs = (*call.inputs, *files_of(corrected, *measured))
     output = output or _default_output(call.program)
     if not live:
         refuse_early(files_of(output), inputs, force=force)
@@ -121,17 +109,14 @@ def command(
     def make() -> Review:
         # files may have changed since
         setup = given(program, machine, job).setup if live else call.setup
-        with progress(quiet) as show:
-            try:
-                return view(
-                    source(call.program), setup, corrected=corrected, measured=measured,
-                    tolerance_um=tolerance_um, outside_box="hold" if outside_box == "hold" else "refuse",
-                    contour=contour, flatten=flatten, expand_cycles=expand_cycles,
-                    peck_clearance_mm=peck_clearance_mm, time=not no_time, step_mm=step_mm,
-                    within_um=within_um, only_sure_components=only_sure_components, progress=show,
-                )  # fmt: skip
-            except OlpError as error:
-                raise (error.in_file("<stdin>") if error.line is not None else error) from None
+        with progress(quiet) as show, naming("<stdin>" if call.program == STREAM else ""):
+            return view(
+                source(call.program), setup, corrected=corrected, measured=measured,
+                tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+                expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, time=not no_time,
+                step_mm=step_mm, within_um=within_um, only_sure_components=only_sure_components,
+                progress=show,
+            )  # fmt: skip
 
     if live:
         _serve(make, inputs, port, quiet)

@@ -335,8 +335,9 @@ class _Joint:
         # the last one may go on in what comes next
         self.last = (numbers[-1], worst[:, -1].copy())
         self.lines += numbers[:-1]
-        for side, inside in zip(self.good, (worst[:, :-1] <= self.limit).mean(axis=2), strict=True):
-            side += inside.tolist()
+        shares = (worst[:, :-1] <= self.limit).mean(axis=2).tolist()
+        for good, share in zip(self.good, shares, strict=True):
+            good.extend(share)
 
     def end(self) -> None:
         """The line that came last is complete."""

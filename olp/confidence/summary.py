@@ -13,7 +13,7 @@ from olp.errormodel.base import Array
 from olp.errormodel.sensitivity import Expansion
 from olp.errormodel.uncertainty import Uncertainty
 from olp.findings import Finding
-from olp.toolpath import Toolpath
+from olp.toolpath import Index, Toolpath
 from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 
 #: Probabilities from here on are good enough: 2 sigma on both sides.
@@ -95,7 +95,7 @@ def findings(
     if weak.any():
         lines = _numbers(found.line[weak])
         what = f"{int(weak.sum())} of {len(found)} way-points: what is taken away is within its uncertainty"
-        out.append(_finding("OLP421", what, lines))
+        out.append(_finding("OLP431", what, lines))
     if len(found) and found.gain < SURE:
         before, after = (
             _expected(side, (found.sigma_mm**2).sum(axis=1))
@@ -105,28 +105,28 @@ def findings(
             f"the corrected program is better with a probability of {100 * found.gain:.0f} %: rms deviation "
             f"expected {before:.2f} um before, {after:.2f} um after"
         )
-        out.append(_finding("OLP422", what))
+        out.append(_finding("OLP432", what))
     if asked and found.program_after < GOOD:
         poor = found.lines[found.line_after < GOOD]
         what = (
             f"all way-points are within {found.within_mm * UM_PER_MM:g} um with a probability of "
             f"{100 * found.program_after:.1f} %"
         )
-        out.append(_finding("OLP423", what, _numbers(poor)))
+        out.append(_finding("OLP433", what, _numbers(poor)))
     if expansion is not None and expansion.unmodelled_K > 0.0 and found.expansion_mm > 0.5 * found.within_mm:
         what = (
             f"temperatures differ by up to {expansion.unmodelled_K:g} K without an expansion in the "
             f"calibration: about {found.expansion_mm * UM_PER_MM:.1f} um on this program"
         )
-        out.append(_finding("OLP424", what))
+        out.append(_finding("OLP434", what))
     doubtful = [part.name for part in parts if not part.sure and part.name not in left_out]
     if doubtful:
-        out.append(_finding("OLP425", f"{', '.join(doubtful)}: smaller than 2 sigma"))
+        out.append(_finding("OLP435", f"{', '.join(doubtful)}: smaller than 2 sigma"))
     if left_out:
-        out.append(_finding("OLP426", f"{', '.join(sorted(left_out))}: not corrected"))
+        out.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
     if growth >= AGED:
         what = f"standard uncertainties are {growth:.2g} times those on the day of measuring"
-        out.append(_finding("OLP427", what))
+        out.append(_finding("OLP437", what))
     return out
 
 
@@ -135,7 +135,7 @@ def _finding(code: str, message: str, lines: Sequence[int] = ()) -> Finding:
     return Finding(code, message, first, tuple(lines[:_LISTED]), max(len(lines), 1))
 
 
-def _numbers(lines: Array) -> list[int]:
+def _numbers(lines: Index) -> list[int]:
     return [int(line) for line in np.unique(lines).tolist()]
 
 

@@ -23,7 +23,7 @@ from olp.files.schemas import CalibrationFile, CovarianceTable
 from olp.files.tables import read_curves
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.machine import SQUARENESS
+from olp.machine import SQUARENESS, ZERO
 from olp.units import AXES, shifted
 
 SCHEMA = "olp-covariance-1"
@@ -54,15 +54,14 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
             )
     else:
         found = _of_sigmas(file, FilePath(path).parent, calibration)
-    repeatability = [shifted(getattr(stated, f"{axis}_repeatability_um"), -3) for axis in AXES]
+    repeatability = calibration.repeatability_mm or ZERO
     if found is None and (any(repeatability) or stated.temperature_K):
         found = Uncertainty((), fingerprint(calibration), "nothing is known of the calibration itself")
     if found is None:
         return None
-    x, y, z = repeatability
     return replace(
         found,
-        repeatability_mm=(x, y, z),
+        repeatability_mm=repeatability,
         growth_per_year=stated.growth_per_year,
         temperature_K=stated.temperature_K,
     )

@@ -1,4 +1,4 @@
-"""JSON Schemas of machine, calibration and job files, for editors that complete and check TOML."""
+"""JSON Schemas of the TOML files that people write, for editors that complete and check them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,20 @@ import json
 from typing import Any
 
 from olp.exceptions import UsageError
+from olp.files.measurement_schemas import MeasurementsFile
+from olp.files.schema_base import Table
 from olp.files.schemas import FILES
 
+#: kind of file to its model
+KINDS: dict[str, type[Table]] = {**FILES, "measurements": MeasurementsFile}
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(kind: str) -> dict[str, Any]:
-    """The JSON Schema of a "machine", "calibration" or "job" file; raises UsageError for any other kind."""
-    if kind not in FILES:
-        raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(FILES)}')
-    schema = _cleaned(FILES[kind].model_json_schema(by_alias=True, mode="validation"))
+    """The JSON Schema of a kind of file, one of KINDS; raises UsageError for any other kind."""
+    if kind not in KINDS:
+        raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(KINDS)}')
+    schema = _cleaned(KINDS[kind].model_json_schema(by_alias=True, mode="validation"))
     return {"$schema": DIALECT, "title": f"olp {kind} file", **schema}
 
 

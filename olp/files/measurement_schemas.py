@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from olp.files.fields import Chain, Interval, IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
 from olp.files.readings import SENSES
-from olp.files.schemas import Position, Table
+from olp.files.schema_base import Position, Table
 from olp.machine import COMPONENTS
 
 
@@ -135,6 +135,65 @@ class SquarenessReadingTable(Table):
     )
 
 
+class PointsTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
+        "measured_X_mm, measured_Y_mm, measured_Z_mm (in the instrument's frame), relative to this file"
+    )
+    sigma_um: Positive = Field(description="the standard uncertainty of a coordinate, in um")
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
+    )
+    sigma_scale_um_m: NotNegative = Field(
+        default=0.0, description="the standard uncertainty of the instrument's scale, in um/m"
+    )
+
+
+class StationTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and length_mm, "
+        "relative to this file"
+    )
+    sigma_um: Positive = Field(description="the standard uncertainty of a length, in um")
+    sigma_um_m: NotNegative = Field(default=0.0, description="what it grows by with the length, in um/m")
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
+    )
+    sigma_scale_um_m: NotNegative = Field(
+        default=0.0, description="the standard uncertainty of the scale of all lengths, in um/m"
+    )
+
+
+class BaselineTable(Table):
+    between: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = Field(
+        strict=False, description="the numbers of two pods, such as [1, 2]"
+    )
+    length_mm: Positive = Field(description="the distance between their centres, in mm")
+    sigma_um: Positive = Field(description="its standard uncertainty, in um")
+
+
+class PodsTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
+        "azimuth_1_deg, elevation_1_deg, azimuth_2_deg ..., relative to this file"
+    )
+    pods: Annotated[int, Field(ge=1)] = Field(default=2, description="how many pods; 2 if left out")
+    sigma_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
+    baselines: list[BaselineTable] = Field(
+        default=[],
+        description="tables [[pods.baselines]]: known distances; without one nothing tells the scale",
+    )
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
+    )
+
+
 class PeriodsTable(Table):
     X: list[Positive] = Field(default=[], description="the periods of screw and scale of X, [..] in mm")
     Y: list[Positive] = Field(default=[], description="the periods of screw and scale of Y, [..] in mm")
@@ -170,4 +229,14 @@ class MeasurementsFile(Table):
     )
     squares: list[SquareTable] = Field(default=[], description="tables [[squares]]")
     squareness: list[SquarenessReadingTable] = Field(default=[], description="tables [[squareness]]")
-    lines: Annotated[list[LineTable], Field(min_length=1)] = Field(description="tables [[lines]]")
+    lines: list[LineTable] = Field(default=[], description="tables [[lines]]")
+    points: list[PointsTable] = Field(
+        default=[], description="tables [[points]]: each one set-up of a tracker"
+    )
+    stations: list[StationTable] = Field(
+        default=[],
+        description="tables [[stations]]: lengths from places that nobody knows (multilateration)",
+    )
+    pods: list[PodsTable] = Field(
+        default=[], description="tables [[pods]]: directions from places that nobody knows"
+    )

@@ -14,20 +14,27 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-from olp.calibration.observations import Line, Measurements, Square, SquarenessReading
+import numpy as np
+import numpy.typing as npt
+
+from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points, Square, SquarenessReading
 from olp.exceptions import ConfigError, InputError
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
     LineKeys,
     LineTable,
     MeasurementsFile,
+    PodsTable,
+    PointsTable,
     SquarenessReadingTable,
     SquareTable,
     Stated,
+    StationTable,
 )
+from olp.files.point_readings import LENGTH, PointReadings, directions, read_point_readings
 from olp.files.problems import Problem, config_error, validate
 from olp.files.readings import Readings, check_component, decoded, parse_readings, stated_keys
-from olp.files.schemas import Position
+from olp.files.schema_base import Position
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 from olp.machine import Vector
@@ -47,6 +54,9 @@ class _Gathered:
 
     chain: str | None
     lines: list[Line] = field(default_factory=list)
+    points: list[Points] = field(default_factory=list)
+    lengths: list[Lengths] = field(default_factory=list)
+    pods: list[Pods] = field(default_factory=list)
     squares: dict[str, Square] = field(default_factory=dict)
     squareness: list[SquarenessReading] = field(default_factory=list)
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
@@ -102,6 +112,9 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         active_during_measurement=found.whole.get("active_during_measurement", (frozenset(), ""))[0],
         measured=found.whole["measured"][0],
         chain=found.chain,
+        points=tuple(found.points),
+        lengths=tuple(found.lengths),
+        pods=tuple(found.pods),
     )
 
 
@@ -118,8 +131,10 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
         if plan.suffix.lower() != ".toml":
             continue
         try:
-            tables = tomllib.loads(read_bytes(plan).decode("utf-8-sig")).get("lines")
-            for table in tables or ():
+            stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
+            for table in (
+                t for kind in ("lines", "points", "stations", "pods") for t in stated.get(kind, ())
+            ):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader says what is wrong with it.
@@ -157,20 +172,31 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    for index, line in enumerate(plan.lines):
-        key = ("lines", index)
-        at = line_of(key, places)
+    tables: list[tuple[Path, LineTable | PointsTable | StationTable | PodsTable]] = [
+        *((("lines", k), table) for k, table in enumerate(plan.lines)),
+        *((("points", k), table) for k, table in enumerate(plan.points)),
+        *((("stations", k), table) for k, table in enumerate(plan.stations)),
+        *((("pods", k), table) for k, table in enumerate(plan.pods)),
+    ]
+    for key, item in tables:
         try:
-            _line(path, line, plan.defaults, plan.vertical, found)
+            if isinstance(item, LineTable):
+                _line(path, item, plan.defaults, plan.vertical, found)
+            elif isinstance(item, PointsTable):
+                found.points.append(_points(path, item, plan.defaults))
+            elif isinstance(item, StationTable):
+                found.lengths.append(_lengths(path, item, plan.defaults))
+            else:
+                found.pods.append(_pods(path, item, plan.defaults))
         except ConfigError as error:
             if error.file not in (None, str(path)):
                 found.errors.append(error)
             else:
-                problems += [(at, f"{dotted(key)} ({line.file}): {text}") for text in error.problems]
+                at = line_of(key, places)
+                problems += [(at, f"{dotted(key)} ({item.file}): {text}") for text in error.problems]
         except InputError as error:
-            problems.append(
-                (line_of((*key, "file"), places), f'{dotted(key)}.file = "{line.file}": {error.message}')
-            )
+            sentence = f'{dotted(key)}.file = "{item.file}": {error.message}'
+            problems.append((line_of((*key, "file"), places), sentence))
     if problems:
         found.errors.append(config_error(problems, str(path)))
 
@@ -192,6 +218,66 @@ def _line(plan: FilePath, table: LineTable, defaults: LineKeys, vertical: str, f
 
 def _read(path: FilePath, profile: FilePath | None) -> Readings:
     return read_line(path, None if profile is None else load_line_profile(profile))
+
+
+def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
+    readings = read_point_readings(plan.parent / table.file)
+    return Points(
+        axis_mm=readings.axis_mm,
+        tool_mm=_tools(readings, table, defaults),
+        measured_mm=readings.measured,
+        sigma=table.sigma_um * MM_PER_UM,
+        sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+        source=readings.file,
+        row=readings.row,
+    )
+
+
+def _lengths(plan: FilePath, table: StationTable, defaults: LineKeys) -> Lengths:
+    readings = read_point_readings(plan.parent / table.file, LENGTH)
+    length = readings.measured[:, 0]
+    return Lengths(
+        axis_mm=readings.axis_mm,
+        tool_mm=_tools(readings, table, defaults),
+        length_mm=length,
+        sigma_mm=table.sigma_um * MM_PER_UM + table.sigma_um_m * PER_UNIT * np.abs(length),
+        sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+        source=readings.file,
+        row=readings.row,
+    )
+
+
+def _pods(plan: FilePath, table: PodsTable, defaults: LineKeys) -> Pods:
+    readings = read_point_readings(plan.parent / table.file, directions(table.pods))
+    angles = np.radians(readings.measured)
+    wrong = [b.between for b in table.baselines if max(b.between) > table.pods or len(set(b.between)) < 2]
+    if wrong:
+        raise ConfigError(f"baselines between {list(wrong[0])}; expected two of the pods 1 to {table.pods}")
+    return Pods(
+        axis_mm=readings.axis_mm,
+        tool_mm=_tools(readings, table, defaults),
+        azimuth_rad=angles[:, 0::2],
+        elevation_rad=angles[:, 1::2],
+        sigma=table.sigma_urad * RAD_PER_URAD,
+        baselines=tuple(
+            (b.between[0] - 1, b.between[1] - 1, b.length_mm, b.sigma_um * MM_PER_UM) for b in table.baselines
+        ),
+        source=readings.file,
+    )
+
+
+def _tools(
+    readings: PointReadings, table: PointsTable | StationTable | PodsTable, defaults: LineKeys
+) -> npt.NDArray[np.float64]:
+    """The vector of each point, from the file or from the plan."""
+    tool = table.tool_mm or defaults.tool_mm
+    if readings.tool_mm is not None:
+        if table.tool_mm is not None:
+            raise ConfigError("tool_mm is stated here and in columns of the file; expected it once")
+        return readings.tool_mm
+    if tool is None:
+        raise ConfigError("tool_mm is missing; expected it here, or the columns tool_X_mm ... in the file")
+    return np.array(tool)
 
 
 # -- files that describe themselves ----------------------------------------------------------------------

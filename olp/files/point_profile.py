@@ -11,7 +11,7 @@ from pydantic import Field
 from olp.exceptions import UsageError
 from olp.files.fields import Positive, Text
 from olp.files.problems import nearest, validate
-from olp.files.schemas import Table
+from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, read_bytes
 
@@ -111,7 +111,12 @@ def with_options(profile: PointProfile, columns: Sequence[str], **values: str | 
             near = nearest(key, COLUMNS)
             hint = f"did you mean {near}?" if near else f"expected one of {', '.join(COLUMNS)}"
             raise UsageError(f"--column {item} is not understood; {hint}, as in --column X=East")
-        table[key] = int(column) if column.isdigit() else column
+        number = int(column) if column.isdecimal() else None
+        if number == 0:
+            raise UsageError(f"--column {item}: columns count from 1")
+        if not column.strip():
+            raise UsageError(f"--column {item} names no column; give its name, or its number from 1")
+        table[key] = column if number is None else number
     changed: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
     changed["columns"] = ColumnsTable(**table)
     return profile.model_copy(update=changed)

@@ -20,7 +20,11 @@ from olp.files.write import PathLike, read_bytes
 
 Array = npt.NDArray[np.float64]
 
-_LOOK = 40
+#: lines, and bytes, from which a layout is told
+_LOOK, _HEAD = 40, 1 << 16
+
+
+_FRAME = re.compile(r"[#/;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,15 +56,27 @@ def read_points(path: PathLike, profile: PointProfile | None = None) -> Points:
     return parse_points(read_bytes(path), str(path), profile)
 
 
-def suggested(path: PathLike) -> PointProfile | None:
-    """The layout that the first rows of a file tell, None where they leave a choice. Raises InputError."""
-    return looked_at(read_bytes(path)[: 1 << 14].decode("utf-8-sig", "replace").splitlines()[:_LOOK])
+def row_line(points: Points, row: int) -> int:
+    """The line of the file, counted from 1, in which a point stands."""
+    text = _lines(read_bytes(points.file).decode("utf-8-sig"))
+    profile = points.profile
+    skip, _ = _header(list(itertools.islice(io.StringIO(text), _LOOK)), profile)
+    return next(itertools.islice(_rows(text, profile, skip), row, None))[0]
+
+
+def layout_of(data: bytes) -> PointProfile | None:
+    """The layout that the first rows of a file tell, None where they leave a choice."""
+    head = _lines(data[:_HEAD].decode("utf-8-sig", "replace"))
+    if len(data) > _HEAD:
+        # the last line may be cut
+        head = head[: head.rfind("\n") + 1] or head
+    return looked_at(head.split("\n")[:_LOOK])
 
 
 def parse_points(data: bytes, file: str, profile: PointProfile | None = None) -> Points:
     """As `read_points`, from the bytes of the file."""
     try:
-        text = data.decode("utf-8-sig")
+        text = _lines(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise InputError(
@@ -68,7 +84,7 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             file=file, line=line,
         ) from None  # fmt: skip
     first = list(itertools.islice(io.StringIO(text), _LOOK))
-    found = profile or looked_at(first)
+    found = profile or layout_of(data)
     if not text.strip():
         raise InputError("holds no points; expected a row a point", file=file)
     if found is None:
@@ -77,8 +93,8 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
-    stated = re.search(r"^[#/;\s]*frame\s*=\s*(\S+)", "".join(first), re.MULTILINE)
-    skip, header = _header(first, found, file)
+    stated = _frame(first, file)
+    skip, header = _header(first, found)
     if next(_rows(text, found, skip), None) is None:
         raise InputError("holds no points; expected a row a point", file=file)
     columns = {key: _place(column, header, file) for key, column in found.columns.given.items()}
@@ -90,20 +106,39 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         time = np.arange(len(table)) * found.sample_period_s
     names = None
     if "name" in columns:
-        names = tuple(cells[columns["name"]] for _, cells in _rows(text, found, skip))
+        names = _texts(text, file, found, skip, columns["name"])
     return Points(
         file,
         np.column_stack([column[axis] for axis in "XYZ"]) * MM[found.unit],
         time,
         names,
         column["line"].astype(np.int64) if "line" in column else None,
-        stated[1] if stated else found.frame,
+        stated or found.frame,
         found,
         hashlib.sha256(data).hexdigest(),
     )
 
 
-def _header(first: Sequence[str], profile: PointProfile, file: str) -> tuple[int, list[str]]:
+def _lines(text: str) -> str:
+    """A text with one kind of line ends."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _frame(first: Sequence[str], file: str) -> str | None:
+    """The frame that the head of a file states."""
+    stated = None
+    for number, line in enumerate(first, 1):
+        match = _FRAME.match(line)
+        if match and stated not in (None, match[1]):
+            raise InputError(
+                f"the frame is {match[1]} here and {stated} before; expected one frame a file",
+                file=file, line=number,
+            )  # fmt: skip
+        stated = match[1] if match else stated
+    return stated
+
+
+def _header(first: Sequence[str], profile: PointProfile) -> tuple[int, list[str]]:
     """How many lines stand before the first row of data, and the names of columns."""
     for number, line in enumerate(first):
         if _holds(line, profile):
@@ -141,18 +176,36 @@ def _rows(text: str, profile: PointProfile, skip: int) -> Iterator[tuple[int, li
             yield number, _cells(line, profile)
 
 
+def _texts(text: str, file: str, profile: PointProfile, skip: int, column: int) -> tuple[str, ...]:
+    """The cells of a column."""
+    out = []
+    for number, cells in _rows(text, profile, skip):
+        if column >= len(cells):
+            raise _too_short(cells, column, file, number, profile)
+        out.append(cells[column])
+    return tuple(out)
+
+
+def _too_short(
+    cells: Sequence[str], column: int, file: str, number: int, profile: PointProfile
+) -> InputError:
+    return InputError(
+        f'{len(cells)} columns; expected at least {column + 1}; is the delimiter "{profile.delimiter}"?',
+        file=file, line=number,
+    )  # fmt: skip
+
+
 def _table(text: str, file: str, profile: PointProfile, skip: int, columns: Sequence[int]) -> Array:
     """(n, k) numbers of the columns."""
     body = text.replace(",", ".") if profile.decimal == "comma" else text
     if profile.decimal == "comma" and profile.delimiter == "comma":
         raise InputError("has commas both between columns and in numbers; name another delimiter", file=file)
-    if profile.comment != "#":
-        # the reader takes one kind of comment only; an empty line keeps the numbers of the others
-        body = re.sub(rf"(?m)^[ \t]*{re.escape(profile.comment)}.*$", "", body)
+    # whole lines are comments, not what is behind a mark in a cell; empty lines keep the numbers of others
+    body = re.sub(rf"(?m)^[ \t]*((#|{re.escape(profile.comment)}).*)?$", "", body)
     try:
         table = np.loadtxt(
             io.StringIO(body), delimiter=DELIMITERS[profile.delimiter], skiprows=skip, usecols=columns,
-            comments="#", ndmin=2, quotechar='"',
+            comments=None, ndmin=2, quotechar='"',
         )  # fmt: skip
     except (ValueError, IndexError):
         raise _wrong_row(body, file, profile, skip, columns) from None
@@ -167,11 +220,7 @@ def _wrong_row(text: str, file: str, profile: PointProfile, skip: int, columns: 
     for number, cells in _rows(text, profile, skip):
         for column in columns:
             if column >= len(cells):
-                return InputError(
-                    f"{len(cells)} columns; expected at least {column + 1}; is the delimiter "
-                    f'"{profile.delimiter}"?',
-                    file=file, line=number,
-                )  # fmt: skip
+                return _too_short(cells, column, file, number, profile)
             try:
                 float(cells[column])
             except ValueError:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 
@@ -17,8 +18,8 @@ import numpy.typing as npt
 from olp.exceptions import ConfigError, UsageError
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
+from olp.units import AXES
 
-AXES = "XYZ"
 COLUMNS = (
     "t_s",
     *(f"{a}_mm" for a in AXES),
@@ -41,17 +42,26 @@ MOST_SAMPLES = 200_000_000
 _NANO = 1_000_000_000
 
 
-def rows(trajectory: Trajectory, cycle_s: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """(numbers (n, 10), lines (n,)) of the samples at the control's cycle, a block at a time.
-
-    Raises UsageError for a cycle that is not above 0, or so short that the samples would be too many.
-    """
-    if not cycle_s > 0.0 or trajectory.duration_s / cycle_s > MOST_SAMPLES:
+def check_cycle(trajectory: Trajectory, cycle_s: float) -> None:
+    """Raises UsageError for a cycle that is not above 0, or so short that samples would be too many."""
+    if not 0.0 < cycle_s < math.inf:
+        raise UsageError(f"the cycle is {cycle_s:g} s; expected a time above 0")
+    if trajectory.duration_s / cycle_s > MOST_SAMPLES:
         raise UsageError(
             f"a cycle of {cycle_s:g} s cuts {trajectory.duration_s:.1f} s into too many samples; expected at "
             f"most {MOST_SAMPLES}"
         )
-    times = trajectory.sample_times(cycle_s)
+
+
+def _times(trajectory: Trajectory, cycle_s: float) -> np.ndarray:
+    check_cycle(trajectory, cycle_s)
+    return trajectory.sample_times(cycle_s)
+
+
+def rows(trajectory: Trajectory, cycle_s: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """(numbers (n, 10), lines (n,)) of the samples at the control's cycle, a block at a time. Raises as
+    `check_cycle`."""
+    times = _times(trajectory, cycle_s)
     for a in range(0, len(times), ROWS):
         t = times[a : a + ROWS]
         position, velocity, acceleration, _, line = trajectory.at(t)
@@ -92,7 +102,7 @@ class _Parts(io.RawIOBase):
 def npz(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
     """The samples, and the pieces that they are taken from (see `olp.trajectory.motion.Motion`)."""
     motion = trajectory.motion
-    count = len(trajectory.sample_times(cycle_s))
+    count = len(_times(trajectory, cycle_s))
 
     def columns(a: int, b: int | None) -> Iterator[np.ndarray]:
         return (n[:, a] if b is None else n[:, a:b] for n, _ in rows(trajectory, cycle_s))

@@ -33,13 +33,12 @@ def whole(points_mm: Array, nodes_mm: Array, far_mm: float = np.inf) -> tuple[In
     count, width = len(points_mm), len(nodes_mm)
     step = np.diff(nodes_mm, axis=0)
     most = float((step * step).sum(axis=1).mean())
-    idle = _UNVISITED * most * np.arange(width)
+    idle = _UNVISITED * most * np.arange(width, dtype=float)
     moves = np.empty((count, 1, width), np.uint8)
-    total = np.full((1, width), np.inf)
+    total = np.zeros((1, width))
     for i in range(count):
         cost = np.minimum(_square(nodes_mm - points_mm[i]), far_mm * far_mm)[None]
-        start = np.asarray(idle[None] + cost, float) if i == 0 else None
-        total, moves[i] = _row(total, cost, most, start)
+        total, moves[i] = _row(total, cost, most, idle[None] if i == 0 else None)
     end = total[0] + idle[::-1]
     last = int(end.argmin())
     first = np.zeros((count, 1), np.int64)
@@ -85,7 +84,7 @@ def _side_by_side(points: Array, nodes: Array, low: Index, width: int, most: flo
             padded[:, :width] = total
             shift = (low[i] - low[i - 1])[:, None]
             total = np.take_along_axis(padded, np.minimum(column + shift, width), axis=1)
-        total, moves[i] = _row(total, cost, most, cost if i == 0 else None)
+        total, moves[i] = _row(total, cost, most, np.zeros_like(cost) if i == 0 else None)
         best[i] = total.argmin(axis=1)
     return _back(moves, low, best[-1], best, points, nodes)
 
@@ -96,21 +95,21 @@ def _square(away: Array) -> Array:
 
 
 def _row(before: Array, cost: Array, most: float, start: Array | None) -> tuple[Array, Moves]:
-    """Least costs (B, K) up to a row and the moves there, from those of the row before. `most` is what a node
-    without a place costs at most."""
-    if start is not None:
-        return start, np.full(cost.shape, _ANEW)
-    entered = before.copy()
-    np.minimum(entered[:, 1:], before[:, :-1], out=entered[:, 1:])
-    lost = ~np.isfinite(entered).any(axis=1)
-    entered[lost] = 0.0
+    """Least costs (B, K) up to a row and the moves there, from those of the row before, or from what it costs
+    to `start` at a node. `most` is what a node without a place costs at most."""
+    entered = before.copy() if start is None else start.copy()
+    lost = np.ones(len(entered), bool)
+    if start is None:
+        np.minimum(entered[:, 1:], before[:, :-1], out=entered[:, 1:])
+        lost[:] = ~np.isfinite(entered).any(axis=1)
+        entered[lost] = 0.0
     # total_j = min(entered_j + cost_j, total_{j-1} + passed_j): with sums of passed it is a running minimum
     summed = np.cumsum(np.minimum(cost, most), axis=1)
     head = entered + cost - summed
     least = np.minimum.accumulate(head, axis=1)
     moves = np.where(before <= entered, _DOWN, _BOTH)
-    moves[head > least] = _RIGHT
     moves[lost] = _ANEW
+    moves[head > least] = _RIGHT
     return least + summed, moves
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from olp.exceptions import CannotCompute
 from olp.findings import Finding
 from olp.measured.aligning import Alignment, align, paired, refit
 from olp.measured.figures import Run
@@ -18,6 +19,8 @@ from olp.units import UM_PER_MM
 
 Align = Literal["auto", "none", "fit", "each"]
 
+#: Fewer points than that always fit: a rigid motion has six numbers, and each point says two across its path.
+FEWEST = 4
 #: More points off their place than this share, and the pairing is wrong.
 MOST_OFF = 0.02
 #: places looked at for nearer passes; how much nearer, and above what everyday distance, counts
@@ -53,7 +56,8 @@ def place(
     """Place runs of points (m, 3) on a path.
 
     "none": they are in the nominal frame; "fit": one transform for all of them; "each": one for each; "auto":
-    none where most points lie within reach as they are, else fit. `order` None finds it.
+    none where most points lie within reach as they are, else fit. `order` None finds it. Raises CannotCompute
+    for a fit of fewer points than FEWEST.
     """
     found = None
     if how in ("auto", "none"):
@@ -65,6 +69,12 @@ def place(
     rival = False
     fitted = found is None
     if found is None:
+        for name, some in list(zip(names, points, strict=True))[: None if how == "each" else 1]:
+            if len(some) < FEWEST:
+                raise CannotCompute(
+                    f"{name}: {len(some)} points make no best fit, which would leave nothing of any error; "
+                    f"measure at least {FEWEST}, or state them in the nominal frame (--align none)"
+                )
         fits = [align(path, p, reach_mm, order) for p in (points if how == "each" else points[:1])]
         if how != "each":
             fits = [_together(path, points, fits[0], order, reach_mm)] * len(points)
@@ -150,11 +160,9 @@ def _frame_findings(placed: Placed) -> list[Finding]:
     run, rigid = placed.runs[0], placed.rigid[0]
     residual = rms_um(run)
     x, y, z = rigid.shift_mm.tolist()
-    out = [Finding(
-        "OLP611",
-        f"shift {x:.4f}, {y:.4f}, {z:.4f} mm, turn {np.degrees(rigid.angle_rad):.6f} deg; rms residual "
-        f"across the path {residual:.3g} um",
-    )]  # fmt: skip
+    left = f"; rms residual across the path {residual:.3g} um" if run.counted.any() else ""
+    turn = float(np.degrees(rigid.angle_rad))
+    out = [Finding("OLP611", f"shift {x:.4f}, {y:.4f}, {z:.4f} mm, turn {turn:.6f} deg{left}")]
     if placed.loose:
         out.append(Finding("OLP605", f"the path does not determine: {', '.join(placed.loose)}"))
     if placed.rival:

@@ -39,6 +39,16 @@ class PathControl(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Mode:
+    """A path mode from its line on; `stated_mm` is the tolerance that the program gives for it, None where
+    it gives none."""
+
+    line: int
+    control: PathControl
+    stated_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Timing:
     """Of n moves: (n,) `feed_mm_s`, inf for rapids and NaN where the control moves by itself or a time has no
     length; (n,) `control`, values of `PathControl`, and `blend_mm`, the tolerance of G64 where it is in force
@@ -66,7 +76,7 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
     scan = Scan.of(program, program.words, block_delete=block_delete)
     path = program.toolpath
     feed = feeds(scan)
-    control, blend = _path_control(program, scan, blend_mm)
+    control, blend = _path_control(program, _modes(program, scan), blend_mm)
     rest, dwell = _rests(program, scan)
     probes = np.flatnonzero(path.kind == Kind.PROBE)
     rest[probes + 1] = True
@@ -85,24 +95,40 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
     return Timing(feed, control, blend, rest, dwell)
 
 
-def _path_control(program: Program, scan: Scan, blend_mm: float) -> tuple[npt.NDArray[np.uint8], Array]:
-    """Per move its path mode and tolerance; a mode holds from its own block on."""
-    events: list[tuple[int, PathControl, float]] = []
+def path_modes(program: Program, *, block_delete: bool = False) -> tuple[Mode, ...]:
+    """The path modes of a program that was read with its words, in the order of lines; before the first one
+    the control blends, with a tolerance of its own."""
+    assert program.words is not None
+    return _modes(program, Scan.of(program, program.words, block_delete=block_delete))
+
+
+def _modes(program: Program, scan: Scan) -> tuple[Mode, ...]:
+    found = []
     for mode in program.path_modes:
         code = mode.name.split()[0]
         if code == "G64":
-            # P0 is no tolerance, as LinuxCNC's trajectory planner takes it
-            events.append((mode.line, PathControl.BLEND, mode.tolerance_mm or blend_mm))
+            # P0 and less is no tolerance, as LinuxCNC's trajectory planner takes it
+            stated = mode.tolerance_mm if mode.tolerance_mm is not None and mode.tolerance_mm > 0 else None
+            found.append(Mode(mode.line, PathControl.BLEND, stated))
         else:
             stop = code == "G61.1" or scan.iso
-            events.append((mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH, 0.0))
+            found.append(Mode(mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH))
     if scan.iso:
         # G62 and G63 end exact stop as G64 does
         lines = scan.code_line[np.isin(scan.code, (620, 630))].tolist()
-        events = sorted(events + [(line, PathControl.BLEND, blend_mm) for line in lines])
-    at = np.searchsorted(np.array([e[0] for e in events], np.int64), program.toolpath.line, "right")
-    control = np.array([PathControl.BLEND] + [e[1] for e in events], np.uint8)[at]
-    blend = np.array([blend_mm] + [e[2] if e[2] >= 0 else blend_mm for e in events], float)[at]
+        found += [Mode(line, PathControl.BLEND) for line in lines]
+    return tuple(sorted(found, key=lambda mode: mode.line))
+
+
+def _path_control(
+    program: Program, modes: tuple[Mode, ...], blend_mm: float
+) -> tuple[npt.NDArray[np.uint8], Array]:
+    """Per move its path mode and tolerance; a mode holds from its own block on."""
+    at = np.searchsorted(np.array([m.line for m in modes], np.int64), program.toolpath.line, "right")
+    control = np.array([PathControl.BLEND] + [m.control for m in modes], np.uint8)[at]
+    stated = [blend_mm if m.stated_mm is None else m.stated_mm for m in modes]
+    blend = np.array([blend_mm, *stated], float)[at]
+    blend[control != PathControl.BLEND] = 0.0
     return control, blend
 
 

@@ -16,10 +16,10 @@ from olp.assessing import unknowns_of
 from olp.compensation.plan import targets, zero_shifts
 from olp.confidence.probability import within
 from olp.confidence.spread import Points, bands, covariances
-from olp.correction import last_digit_mm
+from olp.correction import last_digit_mm, verify_programs
 from olp.errormodel.base import Array
-from olp.exceptions import ConfigError, naming
-from olp.files.measured import read_measured
+from olp.exceptions import naming
+from olp.files.points import read_points
 from olp.files.write import read_bytes, write_bytes
 from olp.loading import Loaded, PathLike, load, source_of, unrolled
 from olp.machine import Setup
@@ -30,11 +30,11 @@ from olp.proof.matching import match as match_moves
 from olp.retiming import retime
 from olp.review.listing import aligned
 from olp.review.manifest import manifest_of
-from olp.review.measured import Matched, match
+from olp.review.measured import Matched, Matcher
 from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, retimed, table
 from olp.review.page import page
-from olp.review.parts import Ends, Index
+from olp.review.parts import Index
 from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene, Sureness
 from olp.units import MM_PER_UM
@@ -94,9 +94,10 @@ def view(
 
     `corrected` is the corrected program, which is proved as `verify` does; without it the program is
     corrected as `correct` does, or `correction` is what that gave, to be called `corrected_name`. `measured`
-    are CSV files of positions of the tip. Without `time` the motion is not planned: times are those of the
-    programmed feed. `step_mm` is the distance between samples. `within_um`, `only_sure_components`
-    and `date` are those of `correct`. Raises InputError (ProgramError with its line,
+    are files of positions of the tip, read and placed on the path as `olp.compare` does; what that finds
+    stands beside the other findings. Without `time` the motion is not planned: times are those of the
+    programmed feed. `step_mm` is the distance between samples. `within_um`,
+    `only_sure_components` and `date` are those of `correct`. Raises InputError (ProgramError with its line,
     ConfigError) and CannotCompute.
     """
     tell = progress or silent
@@ -107,13 +108,9 @@ def view(
     setup, options = loaded.setup, Options(contour=contour)
     if flatten or expand_cycles:
         with naming(name):
-            data = unrolled(data, name, loaded.profile, expand_cycles, peck_clearance_mm)
+            data = unrolled(data, name, setup, expand_cycles, peck_clearance_mm)
     if corrected is not None:
         other, corrected_name = source_of(corrected)
-        report = api.verify(
-            program, corrected, setup, tolerance_um=tolerance_um, contour=contour, progress=progress,
-            within_um=within_um, only_sure_components=only_sure_components, date=date,
-        ).report  # fmt: skip
     else:
         if correction is None:
             with naming(name):
@@ -122,11 +119,19 @@ def view(
                     progress=progress, within_um=within_um, only_sure_components=only_sure_components,
                     date=date,
                 )  # fmt: skip
-        other, report = correction.data, correction.report
+        other = correction.data
+    tell("read", 0.0)
     with naming(name):
         nominal = read(data, setup, loaded.profile, options)
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
         second = read(other, setup, loaded.profile, options)
+        if correction is not None:
+            report = correction.report
+        else:
+            report = verify_programs(
+                (nominal, name), (second, corrected_name), loaded, tolerance_um=tolerance_um,
+                contour=contour, date=date, within_um=within_um,
+            ).report  # fmt: skip
         groups = _groups(nominal, second, loaded, tolerance_um)
         tell("sample", 0.0)
         samples = sample(nominal, second, groups, loaded.model, step_mm)
@@ -138,6 +143,12 @@ def view(
         samples, moment = _resting(samples, *retimed(second.toolpath, samples, plan.trajectories))
     frame = Frame.of(nominal.toolpath)
     position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
+    seen: tuple[Matched, ...] = ()
+    if measured:
+        matcher = Matcher(nominal.toolpath, samples, loaded.model, setup, np.array(frame.origin_mm))
+        seen = tuple(matcher.match(read_points(path)) for path in measured)
+        more = [finding.as_dict() for found in seen for finding in found.findings]
+        report = report | {"findings": [*report["findings"], *more]}
     scene = Scene(
         name=Path(name).name or "program",
         corrected_name=Path(corrected_name).name,
@@ -153,7 +164,7 @@ def view(
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
         listing=aligned(nominal, second, groups),
         bodies=tuple(_bodies(setup, nominal, samples, frame, position)),
-        measured=tuple(_matched(path, frame, position, samples, nominal, setup) for path in measured),
+        measured=seen,
         report=report,
         tolerance_um=tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
@@ -202,26 +213,6 @@ def _groups(nominal: Program, second: Program, loaded: Loaded, tolerance_um: flo
     target = targets(path, zero_shifts(path.frames, loaded.model))
     near = tolerance_um * MM_PER_UM + last_digit_mm(second, loaded.setup)
     return match_moves(nominal, target, second, loaded.model, near)
-
-
-def _matched(
-    path: PathLike, frame: Frame, position: Array, samples: Samples, nominal: Program, setup: Setup
-) -> Matched:
-    measured = read_measured(path)
-    origin = np.zeros(3)
-    if measured.frame == frame.offset:
-        origin = np.array(frame.origin_mm)
-    elif measured.frame != "machine":
-        offset = setup.work_offset(measured.frame)
-        if offset is None or any(offset.rotation_deg):
-            raise ConfigError(
-                f"frame {measured.frame!r} is no work offset without rotation of machine or job; expected "
-                f"{frame.offset!r} or \"machine\"",
-                file=measured.file,
-            )  # fmt: skip
-        origin = np.array(offset.offset_mm)
-    ends = Ends.of(nominal.toolpath)
-    return match(measured, samples, ends, position, origin - np.array(frame.origin_mm))
 
 
 def _bodies(

@@ -85,12 +85,6 @@ def aligned(nominal: Program, corrected: Program, groups: Index) -> Listing:
     return Listing(first, second, *rows)
 
 
-def alone(program: Program) -> Listing:
-    """The text of one program."""
-    row = np.arange(1, program.lines + 1, dtype=np.int32)
-    return Listing(shown(program.data), "", row, np.zeros_like(row))
-
-
 def largest(rows: Index, values: Array, count: int) -> Single:
     """(count,) the largest of the values of each row, NaN where it has none."""
     out = np.full(count, np.nan, np.float32)

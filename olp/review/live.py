@@ -31,12 +31,16 @@ class Server:
 
     def __init__(self, make: Make, inputs: Iterable[str], tell: Tell, port: int = 0) -> None:
         self._make, self._inputs, self._tell = make, tuple(inputs), tell
-        self._stamp = self._look()
-        self._set(make())
         try:
             self._http = ThreadingHTTPServer((LOOPBACK, port), self._handler())
         except OSError as error:
             raise OlpError(f"port {port} of {LOOPBACK} cannot be served ({error.strerror})") from None
+        self._stamp = self._look()
+        try:
+            self._set(make())
+        except BaseException:
+            self._http.server_close()
+            raise
         self._ended = threading.Event()
 
     @property

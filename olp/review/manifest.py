@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays.raw("rapid", _rapid(scene), "u1")
     arrays.quantised("t", scene.time_s, TIME_S)
     arrays.quantised("s", scene.samples.way_mm, WAY_MM)
+    deviations = list(_deviations(scene))
     manifest = {
         "schema": "olp-review-1",
         "title": f"{scene.name} on {scene.machine.name}",
@@ -79,14 +80,14 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "metrics": _metrics(scene, arrays),
         "sources": [f"source:{name}" for name, _ in scene.sources],
         "motion": _motion(scene, arrays),
-        "listing": _listing(scene, arrays, row),
+        "listing": _listing(scene, arrays, row, deviations),
         "meshes": list(_meshes(scene, arrays, origin)),
         "nodes": [{"path": list(path), "axis": axis} for path, axis in nodes(scene.machine)],
         "axes": "Q",
         "axes_origin_mm": axes_origin.tolist(),
-        "statistics": list(_statistics(scene)),
+        "statistics": list(_statistics(scene, deviations)),
         "findings": _findings(scene),
-        "callouts": list(_callouts(scene)),
+        "callouts": list(_callouts(scene, deviations)),
         "verdict": _verdict(scene),
         "frame": scene.frame.label,
         "tool_radius_mm": scene.tool_radius_mm,
@@ -115,14 +116,19 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
     out = [
         _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in LAYERS
     ]
-    for k, measured in enumerate(scene.measured):
-        name = "measured" if len(scene.measured) == 1 else f"measured-{k + 1}"
+    for k, (name, measured) in enumerate(zip(_measured(scene), scene.measured, strict=True)):
         base = arrays.quantised(f"P_{name}", measured.base_mm - origin, POSITION_MM)
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
         label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
         out.append(_layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0))
     return out
+
+
+def _measured(scene: Scene) -> list[str]:
+    """Names of the layers of measured runs."""
+    count = len(scene.measured)
+    return ["measured"] if count == 1 else [f"measured-{k + 1}" for k in range(count)]
 
 
 def _layer(
@@ -135,9 +141,7 @@ def _layer(
 
 
 def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
-    names = ["uncorrected", "corrected", "result"]
-    count = len(scene.measured)
-    names += ["measured"] if count == 1 else [f"measured-{k + 1}" for k in range(count)]
+    names = ["uncorrected", "corrected", "result", *_measured(scene)]
     out: list[dict[str, Any]] = [
         {
             "name": part, "label": label, "unit": "um", "kind": kind, "of": part,
@@ -214,15 +218,17 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
     }
 
 
-def _listing(scene: Scene, arrays: Arrays, row: npt.NDArray[np.int64]) -> dict[str, Any]:
-    listing, samples = scene.listing, scene.samples
+def _listing(
+    scene: Scene, arrays: Arrays, row: npt.NDArray[np.int64], deviations: Sequence[_Deviation]
+) -> dict[str, Any]:
+    listing = scene.listing
     rows = len(listing.row_nominal)
     arrays.text("text_nominal", listing.nominal)
     lines = listing.row_corrected > 0
     like = np.full(int(listing.row_corrected.max(initial=0)), -1, np.int64)
     like[listing.row_corrected[lines] - 1] = listing.row_nominal[lines].astype(np.int64) - 1
     arrays.patch("text_corrected", listing.corrected, "text_nominal", listing.nominal, _resembled(like))
-    before, after = (_size(delta) * UM_PER_MM for delta in (samples.uncorrected, samples.result))
+    before, after = (value for _, value, _ in deviations[:2])
     return {
         "nominal": "text_nominal",
         "corrected": "text_corrected",
@@ -265,19 +271,21 @@ def _size(delta: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", delta, delta)), float)
 
 
-def _deviations(scene: Scene) -> Iterator[tuple[str, Array, npt.NDArray[np.bool_]]]:
+_Deviation = tuple[str, Array, npt.NDArray[np.bool_]]
+
+
+def _deviations(scene: Scene) -> Iterator[_Deviation]:
     """(layer, (n,) um, (n,) whether the sample is on a move whose path counts) of what the tip does."""
     samples = scene.samples
     feed = cutting_moves(scene.nominal.toolpath)[samples.move]
     yield "uncorrected", _size(samples.uncorrected) * UM_PER_MM, feed
     yield "result", _size(samples.result) * UM_PER_MM, feed
-    for k, measured in enumerate(scene.measured):
-        name = "measured" if len(scene.measured) == 1 else f"measured-{k + 1}"
+    for name, measured in zip(_measured(scene), scene.measured, strict=True):
         yield name, _size(measured.delta_mm) * UM_PER_MM, feed[measured.index]
 
 
-def _statistics(scene: Scene) -> Iterator[dict[str, Any]]:
-    for layer, value, feed in _deviations(scene):
+def _statistics(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict[str, Any]]:
+    for layer, value, feed in deviations:
         cut = value[feed]
         if not len(cut):
             continue
@@ -320,10 +328,10 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
     ]
 
 
-def _callouts(scene: Scene) -> Iterator[dict[str, Any]]:
+def _callouts(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict[str, Any]]:
     """The worst point before and after, on moves whose path counts."""
     lines = scene.nominal.toolpath.line[scene.samples.move]
-    for layer, value, feed in _deviations(scene):
+    for layer, value, feed in deviations:
         if layer not in ("uncorrected", "result") or not feed.any():
             continue
         worst = int(np.where(feed, value, -1.0).argmax())

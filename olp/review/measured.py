@@ -1,4 +1,4 @@
-"""Measured points on the nominal path: each to the place where it was taken, in the order of the path."""
+"""Measured runs on the page: each point beside its place on the nominal path, as `olp compare` pairs them."""
 
 from __future__ import annotations
 
@@ -7,175 +7,120 @@ from pathlib import Path
 
 import numpy as np
 
+from olp.compensation.plan import zero_shifts
+from olp.errormodel import ErrorModel
 from olp.errormodel.base import Array
-from olp.exceptions import InputError
-from olp.files.measured import Measured
-from olp.review.parts import Ends, Index
+from olp.exceptions import ConfigError, InputError
+from olp.files.points import Points, row_line
+from olp.findings import Finding
+from olp.machine import Setup
+from olp.measured import runs
+from olp.measured.figures import Run
+from olp.nominal import Nominal, nominal_of
+from olp.review.parts import Index
 from olp.review.samples import Samples
+from olp.toolpath import Toolpath
 
-#: a measured point is taken as one of the path within this
-GATE_MM = 1.0
-_BLOCK = 128
-#: places tried around where the way says that a point lies, as shares of its reach
-_TRIES = np.linspace(-1.0, 1.0, 49)
-_FINER = np.linspace(-1.0, 1.0, 17)
-_REFINED = 3
-#: how far, at least and as a share of the way of a block, the way measured may differ from the nominal one
-_REACH_MM, _REACH_SHARE = 2.0, 0.1
-#: a millimetre of that difference weighs as much as this distance from the path: passes of one place are told
-#: apart by the way
-_LATE = 0.05
+#: points farther from their place are left out
+REACH_MM = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matched:
-    """Of n measured points: (n, 3) `base_mm`, the nearest place of the path, `delta_mm` from there, and (n,)
-    the `index` of the sample next to it."""
+    """Of n measured points in the order of the path: (n, 3) `base_mm`, the nearest place of the path,
+    `delta_mm` from there, and (n,) the `index` of the sample next to it. `findings` are those of
+    `olp compare` on how the run was placed."""
 
     label: str
     base_mm: Array
     delta_mm: Array
     index: Index
+    findings: tuple[Finding, ...]
 
 
-def match(measured: Measured, samples: Samples, ends: Ends, position_mm: Array, shift_mm: Array) -> Matched:
-    """Match points, moved by `shift_mm` into the frame of the path, to the path whose samples are at
-    `position_mm` (n, 3); `ends` are its moves.
+class Matcher:
+    """Places measured points on the path of a program whose samples are shown about `origin_mm`, where the
+    machine is when the tip, tool lengths apart, is at the zero of the page."""
 
-    The points have to follow the path in order; they may leave out parts of it. Raises InputError with the
-    line of the first point that is nowhere near what is still ahead.
-    """
-    points = measured.position_mm + shift_mm
-    path = _Path.of(position_mm, samples)
-    step = np.diff(points, axis=0, prepend=points[:1])
-    travelled = np.cumsum(np.sqrt((step * step).sum(axis=1)))
-    place = np.empty(len(points))
-    at = path.nearest(points[0], 0.0)
-    a = 0
-    while a < len(points):
-        b = min(a + _BLOCK, len(points))
-        ahead = travelled[a:b] - travelled[max(a - 1, 0)]
-        found, away = path.near(points[a:b], at + ahead, _REACH_MM + _REACH_SHARE * ahead)
-        far = np.flatnonzero(away > GATE_MM)
-        good = int(far[0]) if far.size else b - a
-        place[a : a + good] = np.maximum.accumulate(np.maximum(found[:good], at))
-        at = float(place[a + good - 1]) if good else at
-        a += good
-        if far.size:
-            # parts of the path were not measured: look for the point in all that is ahead
-            at = path.nearest(points[a], at)
-            gap = float(path.distance(points[a : a + 1], np.array([at]))[0])
-            if gap > GATE_MM:
-                raise InputError(
-                    f"the point is {gap:.3g} mm from all of the path that is still ahead; expected points "
-                    f"within {GATE_MM:g} mm of it and in its order, in frame {measured.frame}",
-                    file=measured.file, line=int(measured.line[a]),
-                )  # fmt: skip
-            place[a] = at
-            a += 1
-    base = path.exact(place, points, samples, ends)
-    return Matched(Path(measured.file).name, base, points - base, path.sample(place))
+    def __init__(
+        self, path: Toolpath, samples: Samples, model: ErrorModel, setup: Setup, origin_mm: Array
+    ) -> None:
+        self._path, self._setup = path, setup
+        self._nominal = nominal_of(path, model, "tip")
+        self._shift = zero_shifts(path.frames, model)
+        self._home = self._zero(int(path.frame[0]))
+        self._origin = origin_mm
+        self._samples, self._way = samples, _ways(self._nominal, samples)
+
+    def match(self, points: Points) -> Matched:
+        """Raises InputError with the line of the first point that is off, where points are not of this path,
+        and ConfigError for a frame that is none of the machine's."""
+        at = points.points_mm + self._from_frame(points)
+        nominal = self._nominal.path
+        placed = runs.place(nominal, [Path(points.file).name], [at], "auto", None, REACH_MM)
+        run = placed.runs[0]
+        if not placed.right[0]:
+            raise _refusal(points, run)
+        rows = np.flatnonzero(run.good)
+        if placed.orders[0] == "backward":
+            rows = rows[::-1]
+        elif placed.orders[0] == "free":
+            rows = rows[np.argsort(run.pairing.s_mm[rows], kind="stable")]
+        foot = run.pairing.foot_mm[rows]
+        # the page shows the program's own positions, without where touched zeros really lie
+        move = self._nominal.move[run.pairing.segment[rows]]
+        base = foot + self._home - self._shift[self._path.frame[move]] - self._origin
+        index = np.maximum.accumulate(self._nearest(run.pairing.s_mm[rows], move))
+        found = tuple(runs.findings(nominal, placed))
+        return Matched(run.name, base, run.points_mm[rows] - foot, index, found)
+
+    def _nearest(self, s_mm: Array, move: Index) -> Index:
+        """(n,) the sample next to each arc length; not the last one of the move before."""
+        way = self._way
+        after = np.clip(np.searchsorted(way, s_mm), 0, len(way) - 1)
+        before = np.maximum(after - 1, 0)
+        nearer = (s_mm - way[before] < way[after] - s_mm) & (self._samples.move[before] >= move)
+        return np.where(nearer, before, after).astype(np.int64)
+
+    def _zero(self, frame: int) -> Array:
+        """Where the zero of a frame of the program is on the machine, tool lengths apart."""
+        known = self._path.frames[frame]
+        return np.asarray(np.subtract(known.offset_mm, known.length_mm) + self._shift[frame], float)
+
+    def _from_frame(self, points: Points) -> Array:
+        """What brings positions in the frame that a file states into the first frame of the program."""
+        first = self._path.frames[int(self._path.frame[0])]
+        if points.frame in (None, first.work_offset):
+            return np.zeros(3)
+        if points.frame == "machine":
+            return np.asarray(-self._home, float)
+        assert points.frame is not None
+        for frame in np.unique(self._path.frame).tolist():
+            if self._path.frames[frame].work_offset == points.frame:
+                return np.asarray(self._zero(frame) - self._home, float)
+        offset = self._setup.work_offset(points.frame)
+        if offset is None or any(offset.rotation_deg):
+            raise ConfigError(
+                f"frame {points.frame!r} is no work offset without rotation of machine or job; expected "
+                f'{first.work_offset!r} or "machine"',
+                file=points.file,
+            )
+        return np.asarray(np.array(offset.offset_mm) - self._home, float)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Path:
-    """Samples (n, 3) by the way along them; across a gap the way does not grow, and nothing is between."""
+def _refusal(points: Points, run: Run) -> InputError:
+    off = np.flatnonzero(~run.good & ~run.pairing.beyond)
+    worst = int(off[0]) if len(off) else int(run.pairing.distance_mm.argmax())
+    return InputError(
+        f"the point is {run.pairing.distance_mm[worst]:.3g} mm from its place on the path, or the points are "
+        f"not in its order; expected points within {REACH_MM:g} mm of it; olp compare says more",
+        file=points.file, line=row_line(points, worst),
+    )  # fmt: skip
 
-    point: Array
-    way: Array
 
-    @staticmethod
-    def of(position: Array, samples: Samples) -> _Path:
-        step = np.diff(position, axis=0, prepend=position[:1])
-        length = np.sqrt((step * step).sum(axis=1))
-        length[~samples.joined] = 0.0
-        return _Path(position, np.cumsum(length))
-
-    def segment(self, way: Array) -> tuple[Index, Array]:
-        """The sample that ends the segment at each way, and the share of the segment before it."""
-        end = np.minimum(np.maximum(np.searchsorted(self.way, way, "left"), 1), len(self.way) - 1)
-        begin = np.maximum(end - 1, 0)
-        length = self.way[end] - self.way[begin]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.where(length > 0.0, (way - self.way[begin]) / length, 1.0)
-        return end, np.clip(share, 0.0, 1.0)
-
-    def at(self, way: Array) -> Array:
-        """(n, 3) places at ways (n,)."""
-        end, share = self.segment(way)
-        first = self.point[np.maximum(end - 1, 0)]
-        return np.asarray(first + share[:, None] * (self.point[end] - first))
-
-    def sample(self, way: Array) -> Index:
-        """(n,) samples next to ways."""
-        end, share = self.segment(way)
-        return np.asarray(np.where(share < 0.5, np.maximum(end - 1, 0), end))
-
-    def distance(self, point: Array, way: Array) -> Array:
-        away = point - self.at(way)
-        return np.asarray(np.sqrt((away * away).sum(axis=1)))
-
-    def exact(self, way: Array, points: Array, samples: Samples, ends: Ends) -> Array:
-        """(n, 3) places of the path itself, of which the samples of an arc are chords, beside points."""
-        chord = self.at(way)
-        end, share = self.segment(way)
-        rows = np.flatnonzero(ends.arc[samples.move[end]] >= 0)
-        end, move = end[rows], samples.move[end[rows]]
-        before = np.where(samples.move[end - 1] == move, samples.share[end - 1], 0.0)
-        share = before + share[rows] * (samples.share[end] - before)
-        shown = self.point[end] - samples.axis_mm[end]
-        for _ in range(2):
-            base = ends.at(move, share) + shown
-            ahead = np.einsum("ij,ij->i", points[rows] - base, ends.directions(move, share))
-            share = np.clip(share + ahead / np.maximum(ends.length[move], 1e-9), 0.0, 1.0)
-        chord[rows] = ends.at(move, share) + shown
-        return chord
-
-    def nearest(self, point: Array, least: float) -> float:
-        """The first way, no less than `least`, at which the path is about as near to a point as anywhere."""
-        first = max(int(np.searchsorted(self.way, least, "left")) - 1, 0)
-        begin, end = self.point[first:-1], self.point[first + 1 :]
-        if not len(begin):
-            return float(self.way[-1])
-        length = np.diff(self.way[first:])
-        along = np.where((length > 0.0)[:, None], end - begin, 0.0)
-        begin = np.where((length > 0.0)[:, None], begin, end)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.einsum("ij,ij->i", point - begin, along) / np.einsum("ij,ij->i", along, along)
-        way = self.way[first:-1] + np.clip(np.nan_to_num(share, nan=1.0), 0.0, 1.0) * length
-        way = np.maximum(way, least)
-        away = self.distance(np.broadcast_to(point, (len(way), 3)), way)
-        close = np.flatnonzero(away <= away.min() + 0.1 * GATE_MM)
-        # of several passes the first, so that what follows is still ahead
-        run = close[: int(np.flatnonzero(np.diff(close, append=close[-1] + 2) > 1)[0]) + 1]
-        return float(way[run[away[run].argmin()]])
-
-    def near(self, points: Array, guess: Array, reach: Array) -> tuple[Array, Array]:
-        """(n,) ways nearest to points within `reach` of a guess, and the distances there."""
-        rows = np.arange(len(points))
-        square = self._squares(points, guess[:, None] + reach[:, None] * _TRIES)
-        best = (square + (_LATE * reach[:, None] * _TRIES) ** 2).argmin(axis=1)
-        step = reach * (_TRIES[1] - _TRIES[0])
-        way = guess + reach * _TRIES[best]
-        for _ in range(_REFINED):
-            tries = way[:, None] + step[:, None] * _FINER
-            way = tries[rows, self._squares(points, tries).argmin(axis=1)]
-            step = step * (_FINER[1] - _FINER[0])
-        way = np.clip(way, 0.0, self.way[-1])
-        # on a straight stretch the foot of the perpendicular is exact
-        end, _ = self.segment(way)
-        begin = np.maximum(end - 1, 0)
-        along = self.point[end] - self.point[begin]
-        length = self.way[end] - self.way[begin]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.einsum("ij,ij->i", points - self.point[begin], along)
-            share = np.clip(np.nan_to_num(share / np.einsum("ij,ij->i", along, along), nan=1.0), 0.0, 1.0)
-        foot = np.where(length > 0.0, self.way[begin] + share * length, way)
-        way = np.where(self.distance(points, foot) <= self.distance(points, way), foot, way)
-        return way, self.distance(points, way)
-
-    def _squares(self, points: Array, tries: Array) -> Array:
-        """(n, k) squared distances of points (n, 3) from the path at ways (n, k)."""
-        there = self.at(np.clip(tries, 0.0, self.way[-1]).ravel()).reshape(*tries.shape, 3)
-        away = points[:, None, :] - there
-        return np.asarray(np.einsum("ijk,ijk->ij", away, away))
+def _ways(nominal: Nominal, samples: Samples) -> Array:
+    """(n,) arc length on the nominal path at each sample; a move that is none of it has the place before."""
+    s, of = nominal.path.s_mm, nominal.move
+    begin = s[np.searchsorted(of, samples.move, "left")]
+    end = s[np.searchsorted(of, samples.move, "right")]
+    return np.maximum.accumulate(begin + samples.share * (end - begin))

@@ -22,7 +22,7 @@ from olp.exceptions import CannotCompute
 POSITION_MM, DEVIATION_MM, TIME_S, WAY_MM = 1e-4, 1e-6, 1e-6, 1e-3
 
 _ALIGN = 8
-_TYPES = {"f4": "<f4", "f8": "<f8", "i4": "<i4", "u4": "<u4", "u1": "u1"}
+_TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
 #: what one thread deflates at a time; matches do not reach back across
 _CHUNK = 1 << 22
 #: half the time of zlib's default, and 7 % more bytes

@@ -16,7 +16,7 @@ from olp.exceptions import UsageError
 from olp.trajectory.extremes import largest as extreme
 from olp.trajectory.extremes import nodes
 from olp.trajectory.motion import Array, Motion
-from olp.trajectory.pieces import Mask, Pieces, bernstein, blocks
+from olp.trajectory.pieces import Mask, Pieces, bernstein, blocks, dot
 from olp.trajectory.route import AxisLimits
 
 #: places looked at for the speed along the path, ends included
@@ -213,9 +213,7 @@ def _rates(pieces: Pieces) -> tuple[Array, Mask]:
 
 def _square(vector: Array) -> Array:
     """(n,) squared norms of (3, n)."""
-    x, y, z = vector
-    result: Array = x * x + y * y + z * z
-    return result
+    return dot(vector, vector)
 
 
 def _fastest(pieces: Pieces) -> Array:
@@ -232,7 +230,7 @@ def _fastest(pieces: Pieces) -> Array:
     for _ in range(4):
         s = start + at * step
         slope, bend = pieces.slopes(s), pieces.bends(s)
-        climb, curve = _dot(slope, bend), _square(bend) + _dot(slope, third)
+        climb, curve = dot(slope, bend), _square(bend) + dot(slope, third)
         with np.errstate(all="ignore"):
             trial = np.where(curve < 0.0, at - climb / (curve * step), at)
         trial = np.clip(np.nan_to_num(trial), 0.0, seconds)
@@ -240,9 +238,3 @@ def _fastest(pieces: Pieces) -> Array:
         at = np.where(value > best, trial, at)
         best = np.maximum(value, best)
     return np.asarray(np.sqrt(best) * rate)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """(n,) scalar products of (3, n) and (3, n)."""
-    result: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return result

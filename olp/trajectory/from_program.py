@@ -121,7 +121,8 @@ def _smooth(path: Toolpath, steps: _Steps, before: Index) -> Mask:
 def _directions(path: Toolpath, steps: _Steps, way: Index, share: float) -> Array:
     """(k, 3) unit tangents of ways at their start (share 0) or end (1)."""
     move, arc = steps.move[way], steps.arc[way]
-    out = path.end_mm[move] - _starts(path, move)
+    start = path.starts_mm()[move]
+    out = path.end_mm[move] - start
     curved = np.flatnonzero(arc >= 0)
     if len(curved):
         arcs, picked = path.arcs, arc[curved]
@@ -129,7 +130,7 @@ def _directions(path: Toolpath, steps: _Steps, way: Index, share: float) -> Arra
         axes = np.array(PLANES)[arcs.plane[picked]]
         first, second, third = axes[:, 0], axes[:, 1], axes[:, 2]
         centre, sweep = arcs.centre_mm[picked], arcs.sweep_rad[picked]
-        at = path.end_mm[move[curved]] if share else _starts(path, move[curved])
+        at = path.end_mm[move[curved]] if share else start[curved]
         r0, r1 = at[rows, first] - centre[rows, first], at[rows, second] - centre[rows, second]
         rise = out[curved, third]
         tangent = np.zeros((len(curved), 3))
@@ -138,10 +139,6 @@ def _directions(path: Toolpath, steps: _Steps, way: Index, share: float) -> Arra
         out[curved] = tangent
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(out / np.sqrt((out * out).sum(axis=1))[:, None], float)
-
-
-def _starts(path: Toolpath, move: Index) -> Array:
-    return np.where(move[:, None] > 0, path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm))
 
 
 def _chords(path: Toolpath, clock: Timing, steps: _Steps) -> Index:
@@ -153,8 +150,9 @@ def _chords(path: Toolpath, clock: Timing, steps: _Steps) -> Index:
     arcs, picked, move = path.arcs, steps.arc[way], steps.move[way]
     rows = np.arange(len(way))
     axes = np.array(PLANES)[arcs.plane[picked]]
+    start = path.starts_mm()[move]
     away = [path.end_mm[move][rows, axes[:, i]] - arcs.centre_mm[picked][rows, axes[:, i]] for i in (0, 1)]
-    begin = [_starts(path, move)[rows, axes[:, i]] - arcs.centre_mm[picked][rows, axes[:, i]] for i in (0, 1)]
+    begin = [start[rows, axes[:, i]] - arcs.centre_mm[picked][rows, axes[:, i]] for i in (0, 1)]
     radius = np.maximum(np.hypot(*away), np.hypot(*begin))
     sagitta = CHORD_SHARE * _inside(clock, move)
     turn = np.minimum(4.0 * np.arcsin(np.sqrt(np.minimum(0.5 * sagitta / radius, 0.5))), _LARGEST_TURN)
@@ -187,7 +185,7 @@ def _cut(path: Toolpath, clock: Timing, steps: _Steps, tolerance: Array) -> tupl
         move, arc = steps.move[mine], steps.arc[mine]
         margin[at] = (1.0 - CHORD_SHARE) * _inside(clock, move)
         point[at] = arc_points(
-            _starts(path, move),
+            path.starts_mm()[move],
             path.end_mm[move],
             path.arcs.centre_mm[arc],
             path.arcs.plane[arc],

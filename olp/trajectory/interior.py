@@ -285,13 +285,12 @@ def _newton(
         gradient[i] += along * powers[i]
     for k, (i, j) in enumerate(_PAIRS):
         hessian[k] += square * powers[i] * powers[j]
-    return _banded(rows, spline, gradient, hessian, here, dual, beta, mu)
+    return _banded(rows, spline, gradient, hessian, dual, beta, mu)
 
 
 def _banded(
-    rows: Rows, spline: Spline, gradient: Array, hessian: Array, here: _State, dual: _Dual, beta: Array,
-    mu: float,
-) -> tuple[Array, Array]:  # fmt: skip
+    rows: Rows, spline: Spline, gradient: Array, hessian: Array, dual: _Dual, beta: Array, mu: float
+) -> tuple[Array, Array]:
     """Rows gathered by cell, then by coefficient, with the objective and the rows beta > 0."""
     m = len(spline.h)
     of_cell = np.add.reduceat(gradient, rows.first, axis=1)

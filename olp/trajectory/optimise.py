@@ -255,9 +255,7 @@ class _Rows:
         place = (self.low[:, None] + (self.high - self.low)[:, None] * part).ravel()
         piece, cell = np.repeat(self.piece, places), np.repeat(self.cell, places)
         share = np.repeat(self.share, places)
-        s = (place - self.path.break_mm[piece])[:, None]
-        _, c1, c2, c3 = (self.path.shape[piece, i] for i in range(4))
-        derivatives = (c1 + s * (2.0 * c2 + 3.0 * s * c3), 2.0 * c2 + 6.0 * s * c3, 6.0 * c3)
+        derivatives = self.path.derivatives(piece, place)
         return Rows.of(self.knot, cell, place, derivatives, self.cap[piece], self.limits, share)
 
     def rows(self) -> Rows:

@@ -41,12 +41,11 @@ _BLOCK = 8192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlapped:
-    """`motion`, the segment of the route that each piece drives (k,), and how many moves the closed form
-    had to solve in Ruckig's place. Where two moves overlap the segment is the later."""
+    """`motion`, and the segment of the route that each piece drives (k,). Where two moves overlap the segment
+    is the later."""
 
     motion: Motion
     segment: Index
-    replaced: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +64,7 @@ class _Moves:
 
 
 def overlap(route: Route, limits: AxisLimits) -> Motion:
-    """The motion along `route`, resting at way-points with no tolerance or with a dwell.
+    """The motion along `route`, resting at way-points with no tolerance; whoever plans adds dwells there.
 
     Raises UsageError where route or limits hold what is no number, or no limit above 0.
     """
@@ -78,7 +77,7 @@ def least_s(route: Route, limits: AxisLimits) -> Array:
     _check(route, limits)
     result = np.zeros(max(len(route) - 1, 0))
     if len(route) > 1:
-        first, _, moves = _merged(route, limits)
+        first, moves = _merged(route, limits)
         rest = rest_to_rest_s(moves.length, moves.speed, moves.acceleration, moves.jerk)
         result[first[1:] - 1] = rest - moves.overlap_s[1 : len(first)]
     return result
@@ -89,17 +88,16 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
     _check(route, limits)
     count = len(route)
     if count == 0:
-        return Overlapped(_nothing(), np.zeros(0, np.int64), 0)
-    first, dwell, moves = _merged(route, limits)
+        return Overlapped(_nothing(), np.zeros(0, np.int64))
+    first, moves = _merged(route, limits)
     segment = first[1:] - 1
     if segment.size == 0:
         line = int(route.line[0]) if len(route.line) else 0
-        return Overlapped(Motion.rest(route.point_mm[0], float(dwell[0]), line), np.zeros(1, np.int64), 0)
+        return Overlapped(Motion.rest(route.point_mm[0], 0.0, line), np.zeros(1, np.int64))
     points = route.point_mm[first]
     none = np.zeros(0, np.int64)
     all_seconds, all_time, all_path = (Growing(np.zeros(e)) for e in ((0,), (0, 4), (0, 4, 3)))
     all_shape, all_owner = Growing(none), Growing(none)
-    replaced = 0
     for a in range(0, len(segment), _BLOCK):
         part = _block(moves, points, a, min(a + _BLOCK, len(segment)))
         all_shape.append(part.shape + len(all_path))
@@ -107,34 +105,20 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
         all_seconds.append(part.seconds)
         all_time.append(part.time)
         all_path.append(part.path)
-        replaced += part.replaced
     seconds, time, path = all_seconds.whole(), all_time.whole(), all_path.whole()
     shape, owner = all_shape.whole(), all_owner.whole()
-    waits = np.flatnonzero(dwell > 0.0)
-    if waits.size:
-        # a dwell belongs to the segment that ends there; the one before the first move, to the first
-        at = np.searchsorted(owner, waits, side="left")
-        still = np.zeros((len(waits), 4, 3))
-        still[:, 0] = points[waits]
-        seconds = np.insert(seconds, at, dwell[waits])
-        time = np.insert(time, at, 0.0, axis=0)
-        shape = np.insert(shape, at, len(path) + np.arange(len(waits)))
-        owner = np.insert(owner, at, np.maximum(waits - 1, 0))
-        path = np.concatenate([path, still])
     origin = segment[owner]
     start = np.concatenate(([0.0], np.cumsum(seconds)))
-    return Overlapped(Motion(start, time, path, shape, route.line[origin]), origin, replaced)
+    return Overlapped(Motion(start, time, path, shape, route.line[origin]), origin)
 
 
-def _merged(route: Route, limits: AxisLimits) -> tuple[Index, Array, _Moves]:
-    """The first way-points of those that are the same (m,), the dwells there (m,), and the m - 1 moves."""
+def _merged(route: Route, limits: AxisLimits) -> tuple[Index, _Moves]:
+    """The first way-points of those that are the same (m,), and the m - 1 moves."""
     group = groups_of_same(route.point_mm)
     first = np.flatnonzero(np.diff(group, prepend=-1))
     tolerance = np.minimum.reduceat(route.tolerance_mm, first)
-    dwell = np.add.reduceat(route.dwell_s, first)
-    stops = (tolerance <= 0.0) | (dwell > 0.0)
     feed = route.feed_mm_s[first[1:] - 1]
-    return first, dwell, _moves(route.point_mm[first], feed, np.where(stops, 0.0, tolerance), limits)
+    return first, _moves(route.point_mm[first], feed, tolerance, limits)
 
 
 def _check(route: Route, limits: AxisLimits) -> None:
@@ -149,9 +133,8 @@ def _check(route: Route, limits: AxisLimits) -> None:
         raise UsageError("a way-point is not finite")
     if not bool(np.all(route.feed_mm_s > 0.0)):
         raise UsageError("a feed is not above 0")
-    for name, values in (("tolerance", route.tolerance_mm), ("dwell", route.dwell_s)):
-        if not bool(np.all(np.isfinite(values) & (values >= 0.0))):
-            raise UsageError(f"a {name} is not a number from 0 up")
+    if not bool(np.all(np.isfinite(route.tolerance_mm) & (route.tolerance_mm >= 0.0))):
+        raise UsageError("a tolerance is not a number from 0 up")
 
 
 def _moves(point: Array, feed: Array, tolerance: Array, limits: AxisLimits) -> _Moves:
@@ -191,7 +174,6 @@ class _Pieces:
     path: Array
     shape: Index
     owner: Index
-    replaced: int
 
 
 def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
@@ -224,9 +206,7 @@ def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
     shape[corners, 0] = count + np.arange(len(corners))
     owner = np.broadcast_to(np.arange(a, b)[:, None], seconds.shape)
     used = seconds > 0.0
-    return _Pieces(
-        seconds[used], time[used], path, shape[used], owner[used], int(np.count_nonzero(solved.replaced))
-    )
+    return _Pieces(seconds[used], time[used], path, shape[used], owner[used])
 
 
 def _corner(moves: _Moves, point: Array, at: Index) -> Array:

@@ -75,6 +75,12 @@ def blocks(motion: Motion) -> Iterator[tuple[slice, Pieces]]:
         )
 
 
+def dot(a: Array, b: Array) -> Array:
+    """(n,) scalar products of (3, n) and (3, n)."""
+    result: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return result
+
+
 def bernstein(coefficient: Array, width: Array) -> Array:
     """(d + 1, n) control points on [0, width] of polynomials `coefficient` (d + 1, n)."""
     degree = len(coefficient) - 1

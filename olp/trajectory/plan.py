@@ -62,12 +62,6 @@ class Trajectory:
         times: Array = np.arange(count + 1, dtype=float) * cycle_s
         return times if self.duration_s - times[-1] < 1e-12 else np.append(times, self.duration_s)
 
-    def seconds_by_line(self) -> tuple[Index, Array]:
-        """Lines that move, in order, and the time spent on each."""
-        lines, which = np.unique(self.motion.line, return_inverse=True)
-        seconds: Array = np.bincount(which, np.diff(self.motion.start_s), minlength=len(lines)).astype(float)
-        return lines.astype(np.int64), seconds
-
 
 def plan(
     route: Route, limits: AxisLimits, tell: Progress | None = None, *, optimise: bool | None = None

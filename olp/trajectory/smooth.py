@@ -66,12 +66,13 @@ class SmoothPath:
         k = np.clip(np.searchsorted(self.break_mm, way_mm, side="right") - 1, 0, len(self) - 1)
         s = (way_mm - self.break_mm[k])[:, None]
         c0, c1, c2, c3 = (self.shape[k, i] for i in range(4))
-        return (
-            c0 + s * (c1 + s * (c2 + s * c3)),
-            c1 + s * (2.0 * c2 + 3.0 * s * c3),
-            2.0 * c2 + 6.0 * s * c3,
-            6.0 * c3,
-        )
+        return (c0 + s * (c1 + s * (c2 + s * c3)), *self.derivatives(k, way_mm))
+
+    def derivatives(self, piece: Index, way_mm: Array) -> tuple[Array, Array, Array]:
+        """The first three derivatives of pieces (n,) by the way, (n, 3) each, at ways (n,) on them."""
+        s = (way_mm - self.break_mm[piece])[:, None]
+        c1, c2, c3 = (self.shape[piece, i] for i in range(1, 4))
+        return c1 + s * (2.0 * c2 + 3.0 * s * c3), 2.0 * c2 + 6.0 * s * c3, 6.0 * c3
 
 
 def needs_stop(point_mm: Array) -> Mask:

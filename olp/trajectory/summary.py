@@ -31,8 +31,10 @@ def summary(trajectories: Sequence[Trajectory], use: LineUse, slow: Sequence[Slo
         name: max((float(getattr(t.audit, name).max()) for t in trajectories), default=0.0)
         for name in ("velocity", "acceleration", "jerk")
     }
-    feed_s = float(use.feed_seconds.sum())
-    nominal = feed_s - float(use.lost_s().sum())
+    feed_s, lost = float(use.feed_seconds.sum()), use.lost_s()
+    nominal = feed_s - float(lost.sum())
+    longest = np.argsort(-use.seconds, kind="stable")[:MOST]
+    slowest = np.argsort(-lost, kind="stable")[:MOST]
     return {
         "duration_s": sum(t.duration_s for t in trajectories),
         "dwell_s": float(use.dwell_s.sum()),
@@ -46,25 +48,26 @@ def summary(trajectories: Sequence[Trajectory], use: LineUse, slow: Sequence[Slo
             "achieved": nominal / feed_s if feed_s > 0.0 else 1.0,
         },
         "below_half_feed": _slow(slow),
-        "longest_lines": [_line(use, i) for i in np.argsort(-use.seconds, kind="stable")[:MOST].tolist()],
-        "slowest_lines": [
-            _line(use, i)
-            for i in np.argsort(-use.lost_s(), kind="stable")[:MOST].tolist()
-            if use.feed_length_mm[i] > 0.0
-        ],
+        "longest_lines": _lines(use, lost, longest),
+        "slowest_lines": _lines(use, lost, slowest[use.feed_length_mm[slowest] > 0.0]),
     }
 
 
-def _line(use: LineUse, i: int) -> dict[str, Any]:
-    feed = float(use.feed_mm_s[i])
-    return {
-        "line": int(use.line[i]),
-        "seconds": float(use.seconds[i]),
-        "lost_s": float(use.lost_s()[i]),
-        "feed_mm_s": feed if np.isfinite(feed) else None,
-        "achieved_mm_s": float(use.achieved_mm_s()[i]),
-        "limit": LIMITS[int(use.limit()[i])],
-    }
+def _lines(use: LineUse, lost_s: Array, which: Index) -> list[dict[str, Any]]:
+    columns = (use.line, use.seconds, lost_s, use.feed_mm_s, use.achieved_mm_s(), use.limit())
+    return [
+        {
+            "line": line,
+            "seconds": seconds,
+            "lost_s": lost,
+            "feed_mm_s": feed if np.isfinite(feed) else None,
+            "achieved_mm_s": achieved,
+            "limit": LIMITS[limit],
+        }
+        for line, seconds, lost, feed, achieved, limit in zip(
+            *(column[which].tolist() for column in columns), strict=True
+        )
+    ]
 
 
 def _slow(parts: Sequence[SlowPlaces]) -> dict[str, Any]:

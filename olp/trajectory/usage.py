@@ -57,11 +57,6 @@ class LineUse:
             np.where(rapid, self.seconds, self.feed_seconds),
         )
 
-    def achieved(self) -> Array:
-        """(m,) mean speed of the feed moves over their feed, 1 where there are none."""
-        moving = np.isfinite(self.feed_mm_s) & (self.feed_length_mm > 0.0)
-        return np.where(moving, _over(self.achieved_mm_s(), self.feed_mm_s), 1.0)
-
     def lost_s(self) -> Array:
         """(m,) time beyond what the feed moves would take at their feed."""
         return np.asarray(self.feed_seconds - _over(self.feed_length_mm, self.feed_mm_s))
@@ -111,11 +106,6 @@ class SlowPlaces:
 
     def __len__(self) -> int:
         return len(self.line)
-
-    @staticmethod
-    def joined(parts: Sequence[SlowPlaces]) -> SlowPlaces:
-        """Those of several stretches; times are from the start of each."""
-        return SlowPlaces(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(SlowPlaces)))
 
 
 def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:

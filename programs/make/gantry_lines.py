@@ -1,11 +1,12 @@
-"""The files of `programs/gantry-lines`: lines of laser, level and square on the machine of `gantry-plate`, as a shop
-would take them, simulated.
+"""The files of `programs/gantry-lines`: lines of laser, level and square on the machine of `gantry-plate`, as
+a shop would take them, simulated.
 
     python programs/make/gantry_lines.py
 
-The machine's errors are those of `gantry-plate/calibration.toml`. All lines pass through one place, the reflector
-hangs 85 mm below the gauge point. Noise: laser 0.5 um and a wavelength off by up to 0.5 um/m, straightness
-0.5 um + 0.5 um/m, levels and angles 1 urad, squares 5 urad; drift of some um or urad; five runs there and back.
+The machine's errors are those of `gantry-plate/calibration.toml`. All lines pass through one place, the
+reflector hangs 85 mm below the gauge point. Noise: laser 0.5 um and a wavelength off by 0.5 um/m, of
+straightness 0.5 um + 0.5 um/m, levels and angles 1 urad, squares 5 urad; drift of some um or urad; five runs
+there and back.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Simulated machines and the readings that instruments would take of them: written from the contract, without
 the project's code.
 
-Two families. Smooth: harmonics of some waves over the travel. Rough: the same at half the size, with kinks, steps
-at rail joints that all six errors of an axis share, and the pitch of a screw. Curves hold on lines through the
-datum with no tool, zero there, straightness without a mean slope. Lengths in mm, angles in rad.
+Two families. Smooth: harmonics of some waves over the travel. Rough: the same at half the size, with kinks,
+steps at rail joints that all six errors of an axis share, and the pitch of a screw. Curves hold on lines
+through the datum with no tool, zero there, straightness without a mean slope. Lengths in mm, angles in rad.
 """
 
 from __future__ import annotations
@@ -165,8 +165,9 @@ def take(
     tool: Any = TOOL, runs: int = 5, slope: float | None = None, square: str | None = None,
     reference: str = "functional-point", drift: float = 1.0,
 ) -> Taken:  # fmt: skip
-    """Read a component there and back along a line through `at`: laser 0.5 um + 0.5 um/m (noise grows with the
-    distance for straightness; a scale of the line for positioning), angles 1 urad, drift over some um or urad."""
+    """Read a component there and back along a line through `at`: laser 0.5 um + 0.5 um/m (noise that grows
+    with the distance for straightness, a scale of the line for positioning), angles 1 urad, drift over some
+    um or urad."""
     d, axis = "XYZABC".index(component[1]), AXES.index(component[2])
     one = np.concatenate([targets, targets[::-1]])
     side = np.concatenate([np.ones(len(targets)), -np.ones(len(targets))])
@@ -208,7 +209,7 @@ def all_lines(
     m: Machine, seed: int, *, at: Any = LINE, tool: Any = TOOL, tables: str = "", jitter: float = 5.0,
     runs: int = 5, drift: float = 1.0,
 ) -> list[Taken]:  # fmt: skip
-    """The lines of a full set: positioning, eight angles (none of roll about the vertical), straightness pairs
+    """The lines of a full set: positioning, eight angles (not roll of the vertical axis), straightness pairs
     that share a square, and straightness of Z with the reflector at two offsets."""
     rng = np.random.default_rng([seed, 77])
     targets = []
@@ -222,11 +223,8 @@ def all_lines(
         axis = AXES.index(name[2])
         reference = "table" if name[2] in tables else "functional-point"
         more.setdefault("tool", tool)
-        out.append(
-            take(
-                m, rng, name, targets=targets[axis], at=at, runs=runs, drift=drift, reference=reference, **more
-            )
-        )
+        same: dict[str, Any] = {"at": at, "runs": runs, "drift": drift, "reference": reference}
+        out.append(take(m, rng, name, targets=targets[axis], **same, **more))
 
     for a in AXES:
         add(f"E{a}{a}")
@@ -262,3 +260,88 @@ def off_frame(position: np.ndarray, error: np.ndarray) -> np.ndarray:
 def rms_um(error: np.ndarray) -> float:
     """Root mean square length of errors (n, 3) in mm, in um."""
     return float(np.sqrt((error**2).sum(axis=1).mean()) * 1e3)
+
+
+#: tools of a planned set of points: not on one line, so that every angle acts
+OFFSETS = ((0.0, 0.0, -120.0), (150.0, 0.0, -120.0), (-60.0, 130.0, -260.0))
+
+
+def points(
+    m: Machine, seed: int, n: int, sigma: float, tools: Any = OFFSETS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Axis positions, tool vectors and places (n, 3) in a tracker's frame: a Latin hypercube, with noise."""
+    rng = np.random.default_rng([seed, n, 11])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    place = at + tool + rng.normal(0.0, sigma, (n, 3))
+    for vector in np.array(tools):
+        own = (tool == vector).all(axis=1)
+        place[own] += m.error(at[own], vector)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    return at, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
+
+
+def stations(m: Machine, seed: int, count: int) -> np.ndarray:
+    """(count, 3) places of a tracking interferometer about the machine."""
+    rng = np.random.default_rng([seed, count, 5])
+    low, span = m.box[:, 0], np.ptp(m.box, axis=1)
+    corners = np.array([(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1), (0.5, 0, 0.2), (0.5, 1, 1)])
+    outward = (corners[:count] - 0.5) * np.array([600.0, 600.0, 300.0])
+    return low + corners[:count] * span + outward + rng.uniform(-100, 100, (count, 3))
+
+
+def lengths(
+    m: Machine, seed: int, station: np.ndarray, number: int, n: int, tools: Any = OFFSETS,
+    sigma: tuple[float, float] = (0.2e-3, 0.3e-6),
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Axis positions, tool vectors, lengths less a dead length, and their uncertainty (mm + mm/mm) from a
+    station."""
+    rng = np.random.default_rng([seed, number, n, 13])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    place = at + tool
+    for vector in np.array(tools):
+        own = (tool == vector).all(axis=1)
+        place[own] += m.error(at[own], vector)
+    true = np.linalg.norm(place - station, axis=1)
+    noise = sigma[0] + sigma[1] * true
+    return at, tool, true - 321.0 - 40.0 * number + rng.normal(0.0, noise), noise
+
+
+def directions(
+    m: Machine, seed: int, n: int, places: np.ndarray, sigma: float, tools: Any = OFFSETS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axis positions, tool vectors, azimuths and elevations (n, k) of pods at places (k, 3), each turned in
+    its own way."""
+    rng = np.random.default_rng([seed, n, 17])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    place = at + tool
+    for vector in np.array(tools):
+        own = (tool == vector).all(axis=1)
+        place[own] += m.error(at[own], vector)
+    angles = []
+    for pod in places:
+        # upright, turned about the vertical, a little out of level
+        heading, tilt = rng.uniform(-np.pi, np.pi), rng.normal(0.0, 0.01, 2)
+        c, s = np.cos(heading), np.sin(heading)
+        turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        lean = np.array([[1.0, 0.0, tilt[0]], [0.0, 1.0, tilt[1]], [-tilt[0], -tilt[1], 1.0]])
+        u, _, v = np.linalg.svd(lean @ turn)
+        x, y, z = ((place - pod) @ (u @ v).T).T
+        angles.append((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))))
+    azimuth, elevation = (np.stack([a[k] for a in angles], axis=1) for k in range(2))
+    return (
+        at,
+        tool,
+        azimuth + rng.normal(0.0, sigma, azimuth.shape),
+        elevation + rng.normal(0.0, sigma, elevation.shape),
+    )
+
+
+#: two pods in front of the machine, 4 m apart
+PODS = ((-500.0, -1500.0, -300.0), (3500.0, -1500.0, -100.0))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-_TYPES = {"f4": np.float32, "f8": np.float64, "i4": np.int32, "u4": np.uint32, "u1": np.uint8}
+_TYPES = {"f4": np.float32, "u4": np.uint32, "u1": np.uint8}
 
 
 class _Scripts(HTMLParser):

@@ -1,7 +1,7 @@
 "use strict";
 // The packed arrays of the page: base64 -> inflate -> arrays decoded when first asked for.
 (() => {
-  const TYPES = {f4: Float32Array, f8: Float64Array, i4: Int32Array, u4: Uint32Array, u1: Uint8Array};
+  const TYPES = {f4: Float32Array, u4: Uint32Array, u1: Uint8Array};
 
   async function inflate(text) {
     let bytes;
