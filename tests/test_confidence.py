@@ -10,15 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from calibration_cases import measurements_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import simulated
-from judge.uncertain import measured, sampled
+from judge.uncertain import sampled
 
 import olp
 from olp.calibration.covariance import covariance_of
 from olp.calibration.curves import calibration_of
 from olp.calibration.estimator import Fit, fit
+from olp.calibration.observations import Measurements
 from olp.confidence.components import components, unsure
 from olp.confidence.probability import within
 from olp.confidence.spread import Confidence, Points, Unknowns, bands, confidence, covariances
@@ -38,6 +40,12 @@ TOOL = np.array([40.0, -60.0, -150.0])
 TOUCH = ((600.0, 300.0, -200.0), (0.0, 0.0, -80.0))
 rng = np.random.default_rng(3)
 AT = rng.uniform(*np.array(simulated.BOX).T, (7, 3))
+
+
+def taken(machine: simulated.Machine, seed: int) -> Measurements:
+    """The readings of a full set of lines."""
+    found = measurements_of(simulated.all_lines(machine, seed), simulated.PITCH)
+    return replace(found, measured=datetime.date(2026, 5, 14))
 
 
 def flat(**more: Any) -> Calibration:
@@ -259,7 +267,7 @@ def test_uncertainties_grow_with_age_as_stated() -> None:
 
 @pytest.fixture(scope="module")
 def fitted() -> Iterator[tuple[Fit, Calibration, Uncertainty]]:
-    found = fit(measured(simulated.machine(1, "rough"), 1), "FXYZ")
+    found = fit(taken(simulated.machine(1, "rough"), 1), "FXYZ")
     calibration = calibration_of(found)
     yield found, calibration, covariance_of(found, calibration)
 
@@ -473,7 +481,7 @@ def test_two_sigma_cover_the_errors_of_fresh_machines() -> None:
     inside, count = 0.0, 0
     for seed in range(10):
         machine = simulated.machine(100 + seed, ("smooth", "rough")[seed % 2])
-        found = fit(measured(machine, seed), "FXYZ")
+        found = fit(taken(machine, seed), "FXYZ")
         calibration = calibration_of(found)
         known = Sensitivity.of(calibration, "FXYZ", covariance_of(found, calibration))
         at = np.random.default_rng(seed).uniform(*calibration.box_mm.T, (40, 3))

@@ -23,7 +23,7 @@ AGED = 2.0
 _MOST_LINES, _LISTED = 10, 20
 _NOT_INCLUDED = (
     "what the control does between blocks, forces, and the process",
-    "maps and load",
+    "maps, load and thermal structures",
 )
 
 

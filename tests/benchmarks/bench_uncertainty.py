@@ -11,20 +11,23 @@ touch-off it is the difference from a place that counts.
 
 from __future__ import annotations
 
+import datetime
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from calibration_cases import measurements_of
 from judge import simulated
-from judge.uncertain import measured
 
 from olp.calibration.covariance import covariance_of
 from olp.calibration.curves import calibration_of
 from olp.calibration.estimator import fit
+from olp.calibration.observations import Measurements
 from olp.confidence.spread import Points, Unknowns, confidence
 from olp.errormodel import build
 from olp.errormodel.sensitivity import Sensitivity
@@ -34,11 +37,17 @@ from olp.toolpath import Frame, Toolpath
 POSES = 60
 
 
+def taken(machine: simulated.Machine, seed: int) -> Measurements:
+    """The readings of a full set of lines."""
+    found = measurements_of(simulated.all_lines(machine, seed), simulated.PITCH)
+    return replace(found, measured=datetime.date(2026, 5, 14))
+
+
 def standardised(seed: int, family: str, chain: str = "FXYZ") -> tuple[np.ndarray, np.ndarray]:
     """(POSES, 3) true errors of the calibration over their standard uncertainties, at places and against a
     touch-off."""
     machine = simulated.machine(seed, family, chain)
-    found = fit(measured(machine, seed), chain)
+    found = fit(taken(machine, seed), chain)
     calibration = calibration_of(found)
     model = build(calibration, chain)
     known = Sensitivity.of(calibration, chain, covariance_of(found, calibration))
@@ -75,7 +84,7 @@ def coverage(family: str, seeds: int) -> None:
 def speed(count: int = 100_000) -> None:
     """Bands and probabilities of a program of many way-points."""
     machine = simulated.machine(1, "rough")
-    found = fit(measured(machine, 1), "FXYZ")
+    found = fit(taken(machine, 1), "FXYZ")
     calibration = calibration_of(found)
     known = Unknowns(Sensitivity.of(calibration, "FXYZ", covariance_of(found, calibration)), (0.0, 0.0, 0.0))
     rng = np.random.default_rng(0)

@@ -1,34 +1,12 @@
-"""An independent Monte-Carlo of what unknown curves do to the tip, and readings of simulated machines."""
+"""An independent Monte-Carlo of what unknown curves do to the tip."""
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from olp.calibration.observations import Line, Measurements, Square
-
 from . import simulated
-
-
-def measured(
-    machine: simulated.Machine, seed: int, *, periods: bool = True, square_sigma: float = 5e-6
-) -> Measurements:
-    """The readings of a full set of lines; `square_sigma` is what the plan says of the squares."""
-    taken = simulated.all_lines(machine, seed)
-    lines = [
-        Line(
-            t.component, t.target, t.value, t.run, t.direction, t.line, t.tool, t.reference, t.square, 0.0,
-            t.scale_sigma,
-        )
-        for t in taken
-    ]  # fmt: skip
-    squares = tuple(Square(name, 0.0, square_sigma) for name in sorted({t.square for t in taken if t.square}))
-    return Measurements(
-        "simulated", tuple(lines), squares, measured=datetime.date(2026, 5, 14),
-        periods_mm=tuple((p,) for p in simulated.PITCH) if periods else ((), (), ()),
-    )  # fmt: skip
 
 
 def sampled(
