@@ -10,18 +10,10 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import (
-    LENGTH,
-    MISFIT,
-    POINT,
-    Fit,
-    LengthsResult,
-    LineResult,
-    PointsResult,
-    misfit,
-)
+from olp.calibration.estimator import MISFIT, Fit, LengthsResult, LineResult, PointsResult, misfit
 from olp.calibration.parameters import SHEAR
 from olp.calibration.prior import class_of
+from olp.calibration.screening import LENGTH, POINT
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.findings import Finding
