@@ -81,7 +81,7 @@ def command(
         files[Path(report_file)] = fit_report(fitted, report_file, None)
     write_files(files, force=force, inputs=inputs)
     if output is not None:
-        talk(f"wrote {output} and {curves} curves beside it")
+        talk(f"wrote {output} and {curves} files of curves and covariance beside it")
     if report_file is not None:
         talk(f"wrote {report_file}")
     report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}

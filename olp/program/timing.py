@@ -114,7 +114,7 @@ def _of_statements(program: Program, said: Statements, feed: Array, blend_mm: fl
 
 def path_modes(program: Program, *, block_delete: bool = False) -> tuple[Mode, ...]:
     """The path modes of a program that was read with its words, in the order of lines; before the first one
-    the control blends, with a tolerance of its own. Statements say none: theirs is that of the machine file."""
+    the control blends, with a tolerance of its own. Statements say none: the machine file does."""
     if program.statements is not None:
         return tuple(Mode(m.line, PathControl.EXACT_STOP) for m in program.path_modes if m.name == "G61.1")
     assert program.words is not None
