@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from olp.metrology import fit_diagonals as fit_diagonals
     from olp.metrology import fit_postures as fit_postures
     from olp.metrology import go_return as go_return
+    from olp.result_correction import ResultCorrection as ResultCorrection
+    from olp.result_correction import correct_results as correct_results
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -79,6 +81,8 @@ _HOME = {
     "view": "olp.review.job",
     "add_layers": "olp.review.notebook",
     "Retiming": "olp.retiming",
+    "ResultCorrection": "olp.result_correction",
+    "correct_results": "olp.result_correction",
     "simulate": "olp.api",
     "verify": "olp.api",
     "fit_thermal": "olp.thermal_fitting",

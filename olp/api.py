@@ -12,33 +12,37 @@ import numpy as np
 from olp import checks
 from olp.compensation.plan import zero_shifts
 from olp.compensation.stamp import find_stamp
+from olp.confidence.spread import Confidence
 from olp.correction import correct_bytes, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import ConfigError, OlpError, naming
 from olp.files.config import load_setup as load_setup
 from olp.findings import Finding
-from olp.loading import PathLike, lever_of, load, profile_of, setup_of, source_of, unrolled
+from olp.loading import PathLike, lever_of, load, reading, setup_of, source_of, unrolled
 from olp.machine import Setup
-from olp.program.reader import Options, read
+from olp.program.dialects import Options, read
 from olp.progress import Progress, silent
 from olp.toolpath import Kind, carried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correction:
-    """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings."""
+    """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
+    `confidence` has bands and probabilities by way-point where the calibration states uncertainties."""
 
     data: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verification:
-    """The proof of a corrected program from two texts alone."""
+    """The proof of a corrected program from two texts alone; `confidence` as in Correction."""
 
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +75,8 @@ def correct(
     peck_clearance_mm: float | None = None,
     contour: bool = False,
     split_rapids: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
 ) -> Correction:
@@ -79,17 +85,22 @@ def correct(
     `program` is a path or the bytes of the text, `machine` the machine file or a Setup. The corrected text is
     in the program's own dialect; only coordinate words differ, and inserted words and blocks. With `flatten`
     loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out;
-    on controls that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck. Raises
-    InputError (ProgramError with its line, ConfigError, OutsideBox) and CannotCompute.
+    on controls that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck.
+
+    Where the calibration states uncertainties, the report says how probable it is that the tip stays within
+    `within_um` (default: `tolerance_um`). With `only_sure_components` components within their own
+    uncertainty are not corrected. Raises InputError (ProgramError with its line, ConfigError, OutsideBox) and
+    CannotCompute.
     """
     data, name = source_of(program)
     with naming(name):
         run = correct_bytes(
-            data, name, load(machine, job, outside_box), tolerance_um=tolerance_um,
+            data, name, load(machine, job, outside_box, only_sure=only_sure_components),
+            tolerance_um=tolerance_um, within_um=within_um,
             hold=outside_box == "hold", unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm,
             contour=contour, rapids=split_rapids, date=date, tell=progress or silent,
         )  # fmt: skip
-    return Correction(run.text, run.report, run.findings)
+    return Correction(run.text, run.report, run.findings, run.confidence)
 
 
 def verify(
@@ -101,6 +112,8 @@ def verify(
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
 ) -> Verification:
@@ -108,21 +121,24 @@ def verify(
 
     Raises ProgramError where the second is no correction of the first.
     """
-    loaded = load(machine, job, outside_box)
+    loaded = load(machine, job, outside_box, only_sure=only_sure_components)
     tell = progress or silent
     options = Options(contour=contour)
     texts = [source_of(p) for p in (nominal, corrected)]
+    with naming(texts[0][1]):
+        loaded = loaded.reading(*texts[0])
     programs = []
     for data, name in texts:
         tell("read", 0.0)
         try:
-            programs.append((read(data, loaded.setup, loaded.profile, options), name))
+            programs.append((read(data, loaded.setup, loaded.dialect, options), name))
         except OlpError as error:
             raise error.in_file(name or "<program>") from None
     run = verify_programs(
-        programs[0], programs[1], loaded, tolerance_um=tolerance_um, contour=contour, date=date
-    )
-    return Verification(run.report, run.findings)
+        programs[0], programs[1], loaded, tolerance_um=tolerance_um, contour=contour, date=date,
+        within_um=within_um,
+    )  # fmt: skip
+    return Verification(run.report, run.findings, run.confidence)
 
 
 def simulate(
@@ -139,9 +155,9 @@ def simulate(
     from olp.deviation import Tracer
 
     data, name = source_of(program)
-    loaded = load(machine, job, outside_box)
     try:
-        path = read(data, loaded.setup, loaded.profile, Options(contour=contour), words=False).toolpath
+        loaded = load(machine, job, outside_box).reading(data, name)
+        path = read(data, loaded.setup, loaded.dialect, Options(contour=contour), words=False).toolpath
         shift = zero_shifts(path.frames, loaded.model)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
@@ -149,11 +165,11 @@ def simulate(
         return Simulation(np.zeros((0, 3)), np.zeros(0), "")
     actual, move = Tracer.trace(path, loaded.model, step_mm)
     home = path.frames[int(path.frame[0])]
-    origin = np.array(home.offset_mm) - np.array(home.length_mm)
     lengths = path.per_frame([f.length_mm for f in path.frames])
-    actual = actual - origin - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    tip = actual - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    actual = home.tip_mm(tip)
     known = np.isfinite(actual).all(axis=1)
-    return Simulation(actual[known], path.line[move[known]], home.work_offset)
+    return Simulation(actual[known], path.line[move[known]].astype(np.float64), home.work_offset)
 
 
 def inspect(
@@ -162,10 +178,9 @@ def inspect(
     """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
     matrix."""
     data, name = source_of(program)
-    setup = setup_of(machine, job)
-    profile = profile_of(setup)
     try:
-        found = read(data, setup, profile)
+        setup, dialect = reading(setup_of(machine, job), data, name)
+        found = read(data, setup, dialect)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
     path = found.toolpath
@@ -178,8 +193,8 @@ def inspect(
     findings = checks.program_findings(found, setup, contour=False)
     return {
         "name": Path(name).name if name else "",
-        "dialect": profile.name,
-        "dialect_title": profile.title,
+        "dialect": dialect.name,
+        "dialect_title": dialect.title,
         "lines": found.lines,
         "moves": {kind.name.lower(): int((path.kind == kind).sum()) for kind in Kind},
         "cycles": len(found.holes),
@@ -192,7 +207,7 @@ def inspect(
         ],
         "stamped": find_stamp(data) is not None,
         "findings": [f.as_dict() for f in findings],
-        "support": profile.support(),
+        "support": dialect.support(),
     }
 
 
@@ -241,7 +256,8 @@ def flatten(
     """Unroll loops, subprograms, expressions and, if asked, canned cycles into plain blocks. Not lossless."""
     data, name = source_of(program)
     try:
-        return unrolled(data, name, setup_of(machine, job), expand_cycles)
+        setup = setup_of(machine, job)
+        return unrolled(data, name, setup, reading(setup, data, name)[1], expand_cycles)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
 

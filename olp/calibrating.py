@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from olp.calibration.covariance import covariance_of
 from olp.calibration.curves import calibration_of, sigmas_of
 from olp.calibration.estimator import Fit, fit
 from olp.calibration.nonrigid import NonRigid, nonrigid
@@ -44,8 +45,11 @@ class FittedCalibration:
     def files(self, target: PathLike) -> dict[Path, bytes]:
         """The bytes of the calibration file `target` and of its curves beside it."""
         sigma = sigmas_of(self.fit, self.calibration)
+        covariance = covariance_of(self.fit, self.calibration)
         notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
-        return calibration_files(self.calibration, Path(target), sigma=sigma, notes=notes)
+        return calibration_files(
+            self.calibration, Path(target), sigma=sigma, covariance=covariance, notes=notes
+        )
 
 
 def fit_calibration(
@@ -81,6 +85,13 @@ def fit_calibration(
             f'the measurements are of machine "{measurements.machine}", and the machine file is of '
             f'"{described.name}"; expected one machine'
         )
+    if described is not None:
+        both = sorted(described.compensated_by_controller & measurements.active_during_measurement)
+        if both:
+            raise ConfigError(
+                f"active_during_measurement names {', '.join(both)}, and so does compensated_by_controller "
+                "of the machine file; expected each in one of them"
+            )
     travel = None if described is None else [described.axes[axis].travel_mm for axis in "XYZ"]
     found = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
     wish = measurements.map if map is None else (map or None)

@@ -26,8 +26,8 @@ from olp.measured.path import Array, Index, Path
 from olp.nominal import Nominal, nominal_of
 from olp.poses import part_frame as poses_frame
 from olp.poses import poses_report
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.progress import Progress, silent
 from olp.units import UM_PER_MM
 
@@ -193,9 +193,9 @@ def _source(
             f"{name or 'the nominal path'} is no table of points, and a program needs its machine; "
             "name the machine file with -m, or a job with -j"
         )
-    loaded = load(setup, None, "hold")
     try:
-        program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
+        loaded = load(setup, None, "hold").reading(data, name)
+        program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
     except OlpError as error:
         raise error.in_file(name or "<stdin>") from None
     return _Source(name, data, None, program, loaded)

@@ -11,21 +11,23 @@ from typing import Any
 import numpy as np
 
 from olp import checks
+from olp.assessing import assess
 from olp.checks import state
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
-from olp.compensation.writer import Writer
+from olp.compensation.writing import write
+from olp.confidence.spread import Confidence
 from olp.errormodel.base import Array
-from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, naming
+from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, UsageError, naming
 from olp.findings import Finding
 from olp.loading import Loaded, unrolled
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.program.reader import Options, read
-from olp.progress import Progress
+from olp.progress import Progress, silent
 from olp.proof import ROUNDING_SHARE, Proof, prove
 from olp.toolpath import Flag, Index, Toolpath
 from olp.units import MM_PER_UM, UM_PER_MM
@@ -43,7 +45,7 @@ _DOES_NOT_PROVE = (
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
-    report ("olp-report-1") and the findings."""
+    report ("olp-report-1"), the findings, and how sure it is where the calibration states uncertainties."""
 
     text: bytes
     nominal: Program
@@ -52,6 +54,7 @@ class Run:
     passed: Index
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
 
 
 def correct_bytes(
@@ -69,8 +72,10 @@ def correct_bytes(
     date: datetime.date | None,
     tell: Progress,
     outside: str = "OLP403",
+    within_um: float | None = None,
 ) -> Run:
-    """Correct a program and prove it; `outside` is the code of what is held at the face of the box."""
+    """Correct a program and prove it; `outside` is the code of what is held at the face of the box,
+    `within_um` the tolerance whose probability is wanted (default: that of the proof)."""
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
@@ -78,25 +83,34 @@ def correct_bytes(
             "model twice; correct the nominal program",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
+    loaded = loaded.reading(data, name)
     if unroll or expand:
-        data = unrolled(data, name, loaded.setup, expand, clearance)
+        data = unrolled(data, name, loaded.setup, loaded.dialect, expand, clearance)
     tell("read", 0.0)
-    program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
+    program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
+    if rapids and program.statements is not None and program.statements.decimal:
+        raise UsageError(
+            "--split-rapids does not go with this dialect: nothing says how the machine goes between its "
+            "places; "
+            'state joined = "lines" and insert = true in the profile'
+        )
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
-    limits = Limits(tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold)
+    lettered = program.statements is not None and bool(program.statements.decimal)
+    limits = Limits(
+        tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=rapids, refuse_outside=not hold,
+        insert=not lettered,
+    )  # fmt: skip
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
-    writer = Writer(
+    written = write(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.profile.comment),
+        stamp=stamp_line(loaded.digest, loaded.dialect.comment) if loaded.dialect.marks else b"",
     )  # fmt: skip
-    text = writer.text()
-    if not writer.changed:
-        text = data
-    parts, tally, holes = writer.parts, writer.tally, writer.holes
-    del writer
+    text = written.text if written.changed else data
+    parts, tally, holes = written.parts, written.tally, written.holes
+    del written
     tell("prove", 0.7)
     path = program.toolpath
     nominal = replace(program, words=None, slot=program.slot[:0])
@@ -104,7 +118,7 @@ def correct_bytes(
     passed = rows.passed
     corrections = _largest_correction(path, _ends(rows, len(path)))
     del rows
-    corrected = read(text, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    corrected = read(text, loaded.setup, loaded.dialect, Options(contour=contour), words=False)
     proof = prove(
         nominal,
         corrected,
@@ -115,13 +129,27 @@ def correct_bytes(
         parts=parts,
     )
     _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
+    sure = assess(
+        loaded,
+        nominal,
+        corrected,
+        proof.groups,
+        passed,
+        within_um or tolerance_um,
+        date,
+        tell,
+        asked=within_um is not None,
+    )
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
+        *checks.between_findings(nominal, proof, loaded.model),
         *checks.hole_findings(holes, limits.tolerance_mm),
+        *checks.stroke_findings(nominal, loaded.model, limits.tolerance_mm),
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
+        *(sure[2] if sure else ()),
         *_model(path, loaded, limits.tolerance_mm),
     )
     report = report_of(nominal, (data, name), loaded, proof, findings, tolerance_um)
@@ -132,7 +160,9 @@ def correct_bytes(
     }
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     report["largest_correction_um"] = corrections * 1e3
-    return Run(text, nominal, corrected, proof, passed, report, findings)
+    if sure:
+        report["uncertainty"] = sure[1]
+    return Run(text, nominal, corrected, proof, passed, report, findings, sure[0] if sure else None)
 
 
 def verify_programs(
@@ -143,6 +173,7 @@ def verify_programs(
     tolerance_um: float,
     contour: bool,
     date: datetime.date | None,
+    within_um: float | None = None,
 ) -> Run:
     """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError
     where the second is no correction of the first."""
@@ -158,14 +189,29 @@ def verify_programs(
         )  # fmt: skip
     except OlpError as error:
         raise error.in_file(other or "<corrected>") from None
+    sure = assess(
+        loaded,
+        first,
+        second,
+        proof.groups,
+        rows.passed,
+        within_um or tolerance_um,
+        date,
+        silent,
+        asked=within_um is not None,
+    )
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
+        *checks.between_findings(first, proof, loaded.model),
         *checks.program_findings(first, loaded.setup, contour=contour),
+        *(sure[2] if sure else ()),
         *_model(first.toolpath, loaded, limits.tolerance_mm),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)
-    return Run(second.data, first, second, proof, rows.passed, report, findings)
+    if sure:
+        report["uncertainty"] = sure[1]
+    return Run(second.data, first, second, proof, rows.passed, report, findings, sure[0] if sure else None)
 
 
 def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
@@ -196,8 +242,8 @@ def _prove_without_deleted(
         return
     options = Options(block_delete=True, contour=contour)
     line = int(path.line[deleted][0])
-    nominal = read(program.data, loaded.setup, loaded.profile, options, words=False)
-    corrected = read(text, loaded.setup, loaded.profile, options, words=False)
+    nominal = read(program.data, loaded.setup, loaded.dialect, options, words=False)
+    corrected = read(text, loaded.setup, loaded.dialect, options, words=False)
     try:
         rows = plan(nominal.toolpath, loaded.model, replace(limits, refuse_outside=False))
         proof = prove(
@@ -240,7 +286,7 @@ def report_of(
             "name": Path(name).name if name else "",
             "sha256": hashlib.sha256(data).hexdigest(),
             "lines": program.lines,
-            "dialect": loaded.profile.name,
+            "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),
         },
         "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
@@ -277,7 +323,7 @@ def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> d
     halves = [
         0.5 * least
         if any(
-            not _multiple(10.0 ** -fewest_decimals(least, u, program.profile.inch_decimals) * u, least)
+            not _multiple(10.0 ** -fewest_decimals(least, u, loaded.dialect.inch_decimals) * u, least)
             for u in units
         )
         else 0.0
@@ -318,7 +364,7 @@ def _largest_correction(path: Toolpath, command_mm: Array) -> float:
 def last_digit_mm(program: Program, setup: Setup) -> float:
     """The coarsest last digit that the corrected program is written with."""
     units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
-    inch = program.profile.inch_decimals
+    inch = program.dialect.inch_decimals
     return max(
         10.0 ** -fewest_decimals(least, unit, inch) * unit
         for least in setup.machine.least_increment_mm

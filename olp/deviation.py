@@ -57,8 +57,11 @@ def _figures(values: Single) -> dict[str, float]:
 
 
 def cutting_moves(path: Toolpath) -> Mask:
-    """(n,) moves on which the whole path counts and not its end alone: feed moves, not of canned cycles."""
-    return np.asarray((path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0), bool)
+    """(n,) moves on which the whole path counts and not its end alone: feed moves, not of canned cycles, nor
+    to a touch whose way is the control's own."""
+    own = (path.kind == Kind.PROBE) & ((path.flag & np.uint8(Flag.WHOLE)) != 0)
+    cutting = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
+    return np.asarray(cutting & ~own, bool)
 
 
 def measure(

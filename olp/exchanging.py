@@ -22,7 +22,7 @@ from olp.files.exchange.registry import FORMATS, format_named, read_table, write
 from olp.findings import Finding
 from olp.loading import Loaded, PathLike, load, setup_of, source_of
 from olp.machine import Machine, Setup
-from olp.program.reader import read
+from olp.program.dialects import read
 from olp.progress import silent
 from olp.report import number
 from olp.residuals import CORRECT, Left, along, in_box, left_by
@@ -273,7 +273,8 @@ def _along(
     data, name = source_of(program)
     file = name or "<program>"
     try:
-        path = read(data, loaded.setup, loaded.profile, words=False).toolpath
+        loaded = loaded.reading(data, name)
+        path = read(data, loaded.setup, loaded.dialect, words=False).toolpath
     except OlpError as error:
         raise error.in_file(file) from None
     places = along(path, box, source.chain)

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from olp.calibration_rules import CALIBRATION
+from olp.confidence_rules import CONFIDENCE
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
 from olp.model_rules import MODEL
@@ -182,6 +183,35 @@ _TABLE = (
         "`G0 X10`, then `G1 X50 F600`, with Y and Z unknown at the G0.",
     ),
     Rule(
+        "OLP331",
+        "told from the text",
+        Severity.INFO,
+        "The file does not state this; it was told from its rows or taken from the machine file.",
+        "Look whether it is so; state it in the header, or in a profile (--profile).",
+        "`10;20;30` as the first row: the delimiter is a semicolon, the columns are X, Y and Z.",
+    ),
+    Rule(
+        "OLP332",
+        "orientation changes",
+        Severity.WARNING,
+        "Three linear axes cannot turn the tool: orientations are carried as they are, and the lever of the "
+        "tool is taken as the same all along.",
+        "Correct lists of one orientation at a time, each with the tool vector that it has there.",
+        "A column C that goes from 0 to 90 degrees.",
+    ),
+    Rule(
+        "OLP333",
+        "between places of a list",
+        Severity.INFO,
+        "A list says where the machine goes and not how. If it goes straight, its errors bend the way "
+        "between "
+        "two corrected places by more than the tolerance.",
+        'State joined = "lines" and insert = true in the profile, if the machine goes straight and rows '
+        "may be "
+        "inserted.",
+        "Two tag points 2 m apart on a machine whose straightness is 5 um.",
+    ),
+    Rule(
         "OLP401",
         "calibration expired",
         Severity.WARNING,
@@ -212,6 +242,26 @@ _TABLE = (
         "These errors are left to the control, which corrects them already.",
         "Nothing, as long as the control's tables stay active.",
         'compensated_by_controller = ["EXX"].',
+    ),
+    Rule(
+        "OLP412",
+        "thermal compensation in the program",
+        Severity.WARNING,
+        "The program switches on a compensation of the control's own for temperature (TECOMP, TEMPR). Where "
+        "the calibration was measured without it, or the job states temperatures too, expansion is "
+        "corrected twice.",
+        "State in active_during_measurement what was on while measuring, and leave temperatures_degC out of "
+        "the job, or switch the control's compensation off.",
+        "`TECOMP/ON,0.0000105` in a DMIS program.",
+    ),
+    Rule(
+        "OLP413",
+        "sense of arcs assumed",
+        Severity.WARNING,
+        "CIRCLE statements of this form (NX) are read as turning right-handed about their normal, and no "
+        "joint of the program tells whether they do: along the other part of the circle errors differ.",
+        "Compare one arc with the simulation of the CAM system (olp view), or have it write GOTOs for arcs.",
+        "`CIRCLE/0,0,0,0,0,-1,5,0.06,0.5,10,0` behind a corner.",
     ),
     Rule(
         "OLP601",
@@ -303,15 +353,72 @@ _TABLE = (
         "Nothing; OLP604 says where this hides errors.",
         "Points of a tracker that stands beside the machine.",
     ),
+    Rule(
+        "OLP621",
+        "taken for granted",
+        Severity.INFO,
+        "What the file does not state was told from its rows, such as which columns hold what, or which side "
+        "of the tip touched.",
+        "Look whether it is so; state it in the header, or in a profile (--profile).",
+        "`X;Y;Z` in the first row, and no profile.",
+    ),
+    Rule(
+        "OLP622",
+        "values carried uncorrected",
+        Severity.WARNING,
+        "These values come from several touches that the file does not hold one by one, or were evaluated "
+        "from "
+        "such values, so they still hold the machine's error beside points that do not.",
+        "Let the machine write its touch points, correct those, and evaluate the features from them.",
+        "`FA(BORE)=FEAT/CIRCLE,INNER,CART,50.0021,..` in DMIS output.",
+    ),
+    Rule(
+        "OLP623",
+        "touch not known",
+        Severity.WARNING,
+        "The error of a machine changes over the radius of a tip, and the file does not say on which side of "
+        "the tip the surface was, or whether points are centres.",
+        'Give columns I, J, K (out of the surface), or point = "centre" in the profile.',
+        "A tip of 4 mm radius where the error changes by 50 um/m: 0.2 um.",
+    ),
+    Rule(
+        "OLP624",
+        "rotation of a frame set on the raw machine",
+        Severity.WARNING,
+        "A frame whose directions come from touches on the raw machine is turned by the machine's errors at "
+        "those touches; only its zero can be corrected from one place.",
+        "Correct the points of the alignment too (--frame machine), fit the frame to them, and state it with "
+        'set_by = "true".',
+        "A part aligned along an edge by two touches 400 mm apart.",
+    ),
+    Rule(
+        "OLP625",
+        "compensation active while measuring",
+        Severity.WARNING,
+        "The file says that the control or its program compensated while it was measured. That is right only "
+        "if the calibration was measured with the same compensation active.",
+        "Look whether active_during_measurement and the table [thermal] of the calibration say the same.",
+        "`TECOMP/ON` in DMIS, or `# volumetric compensation: on`.",
+    ),
+    Rule(
+        "OLP626",
+        "no stamp",
+        Severity.WARNING,
+        "Without a comment that says so, nothing keeps a corrected file from being corrected again.",
+        "Keep corrected files apart, or let the profile allow a comment (stamp = true).",
+        "`stamp = false` in a profile.",
+    ),
 )
 
 RULES = {
     rule.code: rule
     for rule in sorted(
-        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL), key=lambda rule: rule.code
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *CONFIDENCE), key=lambda rule: rule.code
     )
 }
 
+#: findings of uncertainty
+CONFIDENCE_CODES = tuple(rule.code for rule in CONFIDENCE)
 #: what a gate looks for: all but those of measured paths and of measurements of a machine
 GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))
 

@@ -1,4 +1,5 @@
-"""Points of circular and helical moves, and distances to straight and circular paths. Rows (n, 3), mm."""
+"""Points of circular and helical moves, distances to straight and circular paths, rotations. Rows (n, 3),
+mm."""
 
 from __future__ import annotations
 
@@ -93,3 +94,12 @@ def arc_directions(
     out[rows, second] = np.cos(angle) * np.sign(sweep)
     out[rows, third] = end[rows, third] - start[rows, third]
     return np.asarray(np.sign(np.where(np.abs(out) < 1e-9, 0.0, out)), float)
+
+
+def rotation_matrix(angles_deg: tuple[float, float, float]) -> Array:
+    """(3, 3) rotation by A about X first, then B about Y, then C about Z, of axes that stay: Rz Ry Rx."""
+    (sa, sb, sc), (ca, cb, cc) = np.sin(np.radians(angles_deg)), np.cos(np.radians(angles_deg))
+    about_x = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
+    about_y = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))
+    about_z = np.array(((cc, -sc, 0.0), (sc, cc, 0.0), (0.0, 0.0, 1.0)))
+    return np.asarray(about_z @ about_y @ about_x, float)

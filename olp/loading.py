@@ -7,31 +7,61 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from olp.confidence.components import unsure
 from olp.errormodel import Calibration, ErrorModel, build
-from olp.exceptions import ConfigError
+from olp.errormodel.uncertainty import Uncertainty
+from olp.exceptions import ConfigError, UsageError
 from olp.files.calibration import files_beside, load_calibration
 from olp.files.config import load_setup
+from olp.files.covariance import load_uncertainty
+from olp.files.described import described
 from olp.files.structure import read_drift_log, sensors_of
 from olp.files.write import read_bytes
 from olp.machine import Job, Setup
-from olp.program.profiles import PROFILES, Profile
+from olp.program.dialect import Dialect
+from olp.program.dialects import DIALECTS, dialect_of
 
 PathLike = str | Path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """Everything loaded that a run needs."""
+    """Everything loaded that a run needs. `dialect` is that of the control until a program is there
+    (`reading`). `skip` are components that the control corrects, `left_out` those that are not corrected
+    because they are within their own uncertainty; `model` has neither."""
 
     setup: Setup
-    profile: Profile
+    dialect: Dialect
     calibration: Calibration
     model: ErrorModel
     digest: str
+    uncertainty: Uncertainty | None
+    skip: frozenset[str]
+    left_out: frozenset[str] = frozenset()
+
+    @property
+    def full(self) -> ErrorModel:
+        """The model with the components that were left out for being within their own uncertainty."""
+        if not self.left_out:
+            return self.model
+        return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
+
+    def reading(self, data: bytes, name: str) -> Loaded:
+        """The same for a program: its dialect is settled here, also for what is made of it later. Raises
+        ProgramError where it cannot be told."""
+        setup, dialect = reading(self.setup, data, name)
+        return replace(self, setup=setup, dialect=dialect)
 
 
-def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refuse", "hold"]) -> Loaded:
-    """Machine, calibration and job of a run, and the error model that they make."""
+def load(
+    machine: PathLike | Setup,
+    job: PathLike | None,
+    outside: Literal["refuse", "hold"],
+    *,
+    only_sure: bool = False,
+) -> Loaded:
+    """Machine, calibration and job of a run, and the error model that they make; `only_sure` leaves out
+    components within their own uncertainty. Raises InputError, ConfigError."""
     setup = setup_of(machine, job)
     described = setup.machine
     if described.calibration is None:
@@ -45,9 +75,20 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
         )
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
     calibration = at_temperatures(calibration, setup.job)
-    skip = described.compensated_by_controller - calibration.active_during_measurement
-    model = build(calibration, described.chain, outside=outside, skip_components=frozenset(skip))
-    return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
+    skip = frozenset(described.compensated_by_controller - calibration.active_during_measurement)
+    uncertainty = load_uncertainty(described.calibration, calibration)
+    left_out: frozenset[str] = frozenset()
+    if only_sure:
+        if uncertainty is None:
+            raise ConfigError(
+                "the calibration states no uncertainty, so nobody knows which components are sure; give the "
+                "file of [covariance] or sigma columns, or correct without --only-sure-components",
+                file=described.calibration,
+            )
+        left_out = unsure(calibration, uncertainty) - skip
+    model = build(calibration, described.chain, outside=outside, skip_components=skip | left_out)
+    digest = _digest(described.calibration, described, left_out)
+    return Loaded(setup, control_of(setup), calibration, model, digest, uncertainty, skip, left_out)
 
 
 def at_temperatures(calibration: Calibration, job: Job) -> Calibration:
@@ -75,22 +116,35 @@ def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
     return machine if isinstance(machine, Setup) else load_setup(machine, job)
 
 
-def profile_of(setup: Setup) -> Profile:
+def control_of(setup: Setup) -> Dialect:
     """What the control of a machine reads and writes."""
-    profile = PROFILES.get(setup.machine.controller)
-    if profile is None:
+    dialect = DIALECTS.get(setup.machine.controller) or described(setup.machine.controller)
+    if dialect is None:
         raise ConfigError(
-            f"controller {setup.machine.controller!r} has no profile; expected one of {', '.join(PROFILES)}"
+            f"controller {setup.machine.controller!r} has no dialect; expected one of {', '.join(DIALECTS)}"
         )
-    return profile
+    return dialect
 
 
-def _digest(calibration: str, machine: object) -> str:
+def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
+    """The dialect of a program, and the setup with it named, so that what is made of the program later is
+    read alike. Raises ProgramError where it cannot be told, UsageError for a name that there is not."""
+    own = setup.job.described
+    if isinstance(own, Dialect):
+        return setup, own
+    dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
+    own = None if dialect.name in DIALECTS else dialect
+    return replace(setup, job=replace(setup.job, dialect=dialect.name, described=own)), dialect
+
+
+def _digest(calibration: str, machine: object, left_out: frozenset[str]) -> str:
     """Hash of the calibration file, the files that it names and the machine values that decide the model."""
     digest = hashlib.sha256(read_bytes(calibration))
     for file in files_beside(calibration):
         digest.update(read_bytes(file))
     digest.update(repr(getattr(machine, "chain", "")).encode())
+    if left_out:
+        digest.update(repr(sorted(left_out)).encode())
     return digest.hexdigest()
 
 
@@ -101,14 +155,18 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: float | None = None) -> bytes:
+def unrolled(
+    data: bytes, name: str, setup: Setup, dialect: Dialect, expand: bool, clearance: float | None = None
+) -> bytes:
     """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
-    Payloads that the job gives by line become comments first, as lines are others afterwards."""
+    Payloads that the job gives by line become comments first, as lines are others afterwards. Raises
+    UsageError for a dialect that has none of them."""
     from olp.program.directives import with_payloads
     from olp.program.flatten import flatten as unroll
 
-    profile = profile_of(setup)
-    data = with_payloads(data, setup.job.payloads, profile.comment)
+    if dialect.family != "rs274":
+        raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
+    data = with_payloads(data, setup.job.payloads, dialect.comment)
     folder = Path(name).parent if name else None
 
     def beside(wanted: str) -> bytes | None:
@@ -121,7 +179,7 @@ def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: floa
         return None
 
     return unroll(
-        data, profile=profile.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
+        data, profile=dialect.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
     )
 
 

@@ -117,6 +117,7 @@ class Machine:
 
     `decimal_point` tells what a length without a decimal point means to a control that makes a difference
     (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator.
+    `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
     (None: not stated).
     """
@@ -129,6 +130,7 @@ class Machine:
     compensated_by_controller: frozenset[str] = frozenset()
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
+    styli: Mapping[str, Vector] = field(default_factory=dict)
     default_tool: int | None = None
     default_work_offset: str = "G54"
     length_active: bool = False
@@ -158,7 +160,9 @@ class Mesh:
 class Job:
     """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `payloads` leads
     from a line of the program, counted from 1, to the payload from there on. Temperatures of the structure's
-    sensors come from `sensors_degC`, settled, or from `sensor_log` at a time in it."""
+    sensors come from `sensors_degC`, settled, or from `sensor_log` at a time in it. `dialect` is that of the
+    program, None: what its text and the ending of its file say; `described` is a dialect that a file
+    describes (`olp.program.dialect.Dialect`)."""
 
     program: str | None = None
     machine: str | None = None
@@ -171,6 +175,9 @@ class Job:
     sensor_log_at_s: float | None = None
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
+    styli: Mapping[str, Vector] = field(default_factory=dict)
+    dialect: str | None = None
+    described: object | None = None
     meshes: tuple[Mesh, ...] = ()
 
 
@@ -183,6 +190,11 @@ class Setup:
 
     def work_offset(self, name: str) -> WorkOffset | None:
         return self.job.work_offsets.get(name) or self.machine.work_offsets.get(name)
+
+    def stylus(self, name: str) -> Vector | None:
+        """End of the ram to centre of the tip, for the label of a sensor in any case of letters."""
+        styli = {key.upper(): offset for key, offset in {**self.machine.styli, **self.job.styli}.items()}
+        return styli.get(name.upper())
 
     def tool(self, number: int) -> Tool | None:
         return self.job.tools.get(number) or self.machine.tools.get(number)

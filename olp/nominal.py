@@ -42,8 +42,7 @@ def nominal_of(toolpath: Toolpath, model: ErrorModel | None, positions: Literal[
         first = int(toolpath.frame[0])
         home = toolpath.frames[first]
         lengths = toolpath.per_frame([f.length_mm for f in toolpath.frames])
-        origin = np.array(home.offset_mm) - np.array(home.length_mm) + shift[first]
-        points = points - origin - (lengths if lengths.ndim == 1 else lengths[move])
+        points = home.tip_mm(points - shift[first] - (lengths if lengths.ndim == 1 else lengths[move]))
     known = np.isfinite(points).all(axis=1)
     points, move = points[known], move[known]
     cutting = toolpath.kind[move] != Kind.RAPID

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from olp.exceptions import CannotCompute, OlpError, UsageError, naming
-from olp.loading import profile_of, unrolled
+from olp.loading import reading, unrolled
 from olp.machine import Setup
+from olp.program.dialects import Options, read
 from olp.program.feed_words import Shared, check_feeds, write_feeds
 from olp.program.feeds import lengths_mm
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.program.state import PathMode
 from olp.program.timing import BLEND_MM, PathControl, path_modes
 from olp.progress import Progress
@@ -57,9 +57,9 @@ class Case:
         """Raises ProgramError with its file and line; CannotCompute where nothing of it can be timed."""
         stated = setup.machine.blend_mm
         with naming(name):
-            profile = profile_of(setup)
-            text = unrolled(data, name, setup, False) if flatten else data
-            program = read(text, setup, profile, Options(block_delete=block_delete, contour=contour))
+            setup, dialect = reading(setup, data, name)
+            text = unrolled(data, name, setup, dialect, False) if flatten else data
+            program = read(text, setup, dialect, Options(block_delete=block_delete, contour=contour))
             if setup.machine.path_mode == "exact-stop" and blend_mm is None:
                 # a mode of line 0 holds from the start
                 program = replace(program, path_modes=(PathMode(0, "G61.1"), *program.path_modes))
@@ -80,7 +80,7 @@ class Case:
     def rewritten(self, data: bytes) -> Case:
         """Another text in place of this one's, read in the same way. Raises ProgramError."""
         options = Options(block_delete=self.block_delete, contour=self.contour)
-        program = read(data, self.setup, profile_of(self.setup), options)
+        program = read(data, self.setup, self.program.dialect, options)
         # the machine's mode at the start is no word of the text
         modes = (*(m for m in self.program.path_modes if m.line == 0), *program.path_modes)
         return replace(self, program=replace(program, path_modes=modes)).driven()

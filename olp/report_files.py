@@ -19,8 +19,9 @@ from olp.measured.figures import Run
 from olp.measured.pairing import pair
 from olp.measured.path import Path
 from olp.nominal import nominal_of
-from olp.program.reader import Options, read
+from olp.program.dialects import Options, read
 from olp.report import to_json
+from olp.result_correction import ResultCorrection
 from olp.testpaths import predicted
 from olp.toolpath import carried
 
@@ -54,6 +55,15 @@ def comparison(result: Comparison, setup: Setup | None, name: str, date: datetim
     )
 
 
+def results(result: ResultCorrection, name: str, date: datetime.date | None) -> bytes:
+    """The report of a correction of results in the form that `name` ends in."""
+    from olp import report_results
+
+    if FilePath(name).suffix.lower() == ".json":
+        return to_json(result.report)
+    return _written(report_results.to_document(result.report, __version__, date), name)
+
+
 def correction(
     result: api.Correction,
     nominal: bytes,
@@ -72,6 +82,10 @@ def correction(
     plots: dict[str, bytes] = {}
     if FilePath(name).suffix.lower() == ".html":
         plots = _predicted_plots(result, nominal, setup, contour)
+        if result.confidence is not None and len(result.confidence):
+            from olp import plots_path
+
+            plots = plots | {"bands": plots_path.bands(result.confidence)}
     return _written(
         report_document.correction(report, plots | _test_plots(report, name), __version__, date), name
     )
@@ -112,8 +126,9 @@ def _path_plots(path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float 
 
 def _predicted_plots(result: api.Correction, nominal: bytes, setup: Setup, contour: bool) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
-    loaded = load(setup, None, "hold")
-    program = read(nominal, loaded.setup, loaded.profile, Options(contour=contour), words=False)
+    loaded = load(setup, None, "hold").reading(nominal, str(result.report["program"]["name"]))
+    setup = loaded.setup
+    program = read(nominal, setup, loaded.dialect, Options(contour=contour), words=False)
     try:
         path = nominal_of(program.toolpath, loaded.model, "tip").path
     except CannotCompute:

@@ -13,7 +13,7 @@ from olp.exceptions import CannotCompute, UsageError
 from olp.files import trajectory as files
 from olp.files.write import write_files
 from olp.findings import Finding
-from olp.loading import PathLike, profile_of, setup_of, source_of
+from olp.loading import PathLike, setup_of, source_of
 from olp.machine import Setup
 from olp.plots import Format as Picture
 from olp.program.feed_words import Shared
@@ -215,7 +215,6 @@ def retime(
     ConfigError), UsageError and CannotCompute.
     """
     setup = setup_of(machine, job)
-    profile_of(setup)
     proved = None if proof is None else _proved(proof, setup)
     tell = progress or silent
 

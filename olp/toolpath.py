@@ -55,7 +55,10 @@ class Frame:
     Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
     `length_mm`). `tool_mm` is the lever, gauge point to tip, `payload_kg` what the machine carries.
     `touched` is (axis position, lever and payload) of the touch-off of the work offset on the raw machine,
-    None where it was located by other means; `tool_touched` likewise for the length of the active tool.
+    None where it was located by other means; `tool_touched` likewise for the length of the active tool. In a
+    rotated frame the words are turned first, by the rows of `turn`, None where nothing turns: axis position =
+    `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is the part of the offset by which the tip stays off
+    the point that is said, as over a hole.
     """
 
     unit_mm: float = 1.0
@@ -67,6 +70,26 @@ class Frame:
     touched: Touch | None = None
     tool_touched: Touch | None = None
     payload_kg: float = 0.0
+    turn: tuple[Vector, Vector, Vector] | None = None
+    lift_mm: Vector = ZERO
+
+    def origin_mm(self) -> Vector:
+        """The axis position of the program's origin, no tool length active."""
+        parts = zip(self.offset_mm, self.length_mm, self.lift_mm, strict=True)
+        x, y, z = (offset - length - lift for offset, length, lift in parts)
+        return (x, y, z)
+
+    def placed_mm(self, words: Sequence[float]) -> tuple[float, ...]:
+        """The axis position that three words say."""
+        said = [w * self.unit_mm for w in words]
+        if self.turn is not None:
+            said = [sum(r * v for r, v in zip(row, said, strict=True)) for row in self.turn]
+        return tuple(v + o for v, o in zip(said, self.offset_mm, strict=True))
+
+    def tip_mm(self, point: Array) -> Array:
+        """Places of the tip (n, 3) in this frame, from axis positions less the length."""
+        away = point - np.array(self.origin_mm())
+        return away if self.turn is None else np.asarray(away @ np.array(self.turn), float)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

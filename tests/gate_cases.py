@@ -15,7 +15,20 @@ import olp
 DAY = datetime.date(2026, 11, 21)
 #: units, a path tolerance and known axes, so that nothing else is found
 HEAD = b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"
+DMIS = b"DMISMN/'CHECK',05.2\nUNITS/MM,ANGDEC\n"
+MCS = '[work_offsets.MCS]\nset_by = "true"\n'
+PROBED = b"GOTO/10,10,10\nMEAS/POINT,F(A),1\nPTMEAS/CART,10,10,0,0,0,1\nENDMES\nENDFIL\n"
+APT = b"UNITS/MM\nRAPID\nGOTO/-5,-10,0\nFEDRAT/600,MMPM\n"
+#: an arc of NX that begins upwards in Y
+TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
 TOUCH = "[work_offsets.G54]\n"
+LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
+TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
+LISTED = 'dialect = "layout.toml"\n'
+LAYOUT = {
+    "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\n'
+    b'unit = "mm"\nframe = "G54"\n[columns]\nX = "X_mm"\nY = "Y_mm"\nZ = "Z_mm"\n'
+}
 
 
 @dataclass(frozen=True)
@@ -86,6 +99,17 @@ def scaled(um: float) -> dict[str, Any]:
     }
 
 
+def known(sigma_um: float, more: str = "") -> dict[str, Any]:
+    """An error of X of 10 um everywhere, known to so much."""
+    table = f'[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n{more}'
+    rows = "".join(f"{q},10,{sigma_um}\n" for q in (-1000, 2000))
+    return {"calibration": table, "curves": {"x.csv": f"X_mm,EXX_um,sigma_EXX_um\n{rows}"}}
+
+
+def growing(share: float) -> dict[str, Any]:
+    return known(0.01, f"[covariance]\ngrowth_per_year = {share}\n")
+
+
 def total_map() -> dict[str, Any]:
     nodes = [f"{x},{y},{z},0,0,0" for x in (-1000, 2000) for y in (-1000, 2000) for z in (-1000, 2000)]
     text = "\n".join(["X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um", *nodes])
@@ -97,6 +121,13 @@ def load(um_kg: float) -> dict[str, Any]:
     """A sag that does not depend on the place."""
     text = f"X_mm,EZX_um_kg\n-1000,{-um_kg}\n2000,{-um_kg}\n"
     return {"calibration": '[[compliance]]\nfile = "load.csv"\n', "curves": {"load.csv": text}}
+
+
+def sag(um: float) -> dict[str, Any]:
+    """Straightness that is zero at both ends of a metre and `um` in its middle."""
+    text = f"X_mm,EZX_um\n-1000,0\n0,0\n500,{um}\n1000,0\n2000,0\n"
+    table = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
+    return {"calibration": table, "curves": {"x.csv": text}}
 
 
 def structure() -> dict[str, Any]:
@@ -241,6 +272,26 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
     ),
+    "OLP331": (
+        Call(b"10,20,30\n20,20,30\n", LIST, controller="list"),
+        Call(b"10,20,30\n20,20,30\n", LIST, job=LISTED, files=LAYOUT),
+    ),
+    "OLP332": (
+        Call(b"10,20,30,0\n20,20,30,0.002\n", TURNED, controller="list"),
+        Call(b"10,20,30,0\n20,20,30,0\n", TURNED, controller="list"),
+    ),
+    "OLP333": (
+        Call(b"0.000,0.000,0.000\n1000.000,0.000,0.000\n", LIST, controller="list", **sag(2.1)),
+        Call(b"0.000,0.000,0.000\n1000.000,0.000,0.000\n", LIST, controller="list", **sag(1.7)),
+    ),
+    "OLP412": (
+        Call(b"TECOMP/ON,0.00001\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
+        Call(b"TECOMP/OFF\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
+    ),
+    "OLP413": (
+        Call(b"GOTO/5,1,0\n" + TURN, APT, controller="apt"),
+        Call(b"GOTO/10,-10,0\n" + TURN, APT, controller="apt"),
+    ),
     "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
     "OLP421": (
         Call(b"G1 X100\n(olp payload 30)\nG1 X90\n", **load(0.11)),
@@ -252,6 +303,27 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(job=sensor(30.1), options={"outside_box": "hold"}, **structure()),
         Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
     ),
+    # one way-point: the gain of 10 um is sure up to a sigma of 5 um
+    "OLP431": (Call(**known(5.1)), Call(**known(4.9))),
+    "OLP432": (Call(**known(5.1)), Call(**known(4.9))),
+    # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer
+    "OLP433": (
+        Call(**known(11.2), options={"within_um": 20.0}),
+        Call(**known(9.2), options={"within_um": 20.0}),
+    ),
+    # 11.5 um/(m K) at 100 mm, half a um
+    "OLP434": (
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n"),
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n"),
+    ),
+    # the mean of a curve of two independent halves is known to sigma / sqrt(2)
+    "OLP435": (Call(**known(7.2)), Call(**known(6.9))),
+    "OLP436": (
+        Call(**known(7.2), options={"only_sure_components": True}),
+        Call(**known(6.9), options={"only_sure_components": True}),
+    ),
+    # 310 days after measuring
+    "OLP437": (Call(**growing(1.19)), Call(**growing(1.16))),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),
         Call(OVER, tables=tool(50.0), **clamp(9.999)),

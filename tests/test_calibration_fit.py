@@ -209,6 +209,17 @@ def test_what_lengths_leave() -> None:
     assert np.median(left_other) <= 1.2
 
 
+def test_a_length_that_slipped_is_left_out_and_named() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    all_rays = rays(machine, 0, 6, 120)
+    wrong = all_rays[2].length_mm.copy()
+    wrong[33] += 0.05
+    bad = (*all_rays[:2], dataclasses.replace(all_rays[2], length_mm=wrong), *all_rays[3:])
+    found = fit(Measurements("m", lengths=bad), "FXYZ")
+    assert [(outlier.source, outlier.row) for outlier in found.outliers] == [("station-2.csv", 34)]
+    assert not told(found, "OLP808")
+
+
 def test_lengths_of_points_in_a_plane_are_refused() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
     (one,) = rays(machine, 0, 1, 50, [(0.0, 0.0, 0.0)])
@@ -417,6 +428,17 @@ def test_noise_and_drift_of_a_line() -> None:
     noise = noise_of(line)
     assert noise.spread == pytest.approx(np.sqrt(rest @ rest / (len(rest) - rank)), rel=1e-6)
     assert noise.sigma == pytest.approx(0.5 * UM, rel=0.2)
+
+
+def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    lines = []
+    for a in "XYZ":
+        targets = np.linspace(*machine.box["XYZ".index(a)], 40)
+        taken = simulated.take(machine, np.random.default_rng(1), f"E{a}{a}", targets=targets, runs=1)
+        lines.append(line_of(taken, 0.5 * UM))
+    calibration = calibration_of(fit(Measurements("m", tuple(lines)), "FXYZ"))
+    assert not any(curve.forward for curve in calibration.curves)
 
 
 def test_recordings_of_many_samples_are_read_in_reasonable_memory() -> None:

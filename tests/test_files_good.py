@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 
 from olp.exceptions import UsageError
 from olp.files.config import load_calibration, load_job, load_machine, load_setup
-from olp.files.fields import CONTROLLERS
+from olp.files.described import described
+from olp.files.fields import CONTROLLERS, SHIPPED
 from olp.files.starter import machine_toml, starter_machine, starter_set, write_starter
 from olp.files.tables import parse_curves
 from olp.files.toml_text import key_lines, read_toml, toml_value
 from olp.machine import CHAINS, COMPONENTS, SQUARENESS, Axis, Job, Machine, Mesh, Setup, Tool, WorkOffset
-from olp.program.profiles import PROFILES
+from olp.program.dialects import DIALECTS
 
 GOOD = Path(__file__).parent / "broken" / "good"
 TRAVEL = {"X": (-5.0, 300.0), "Y": (0.0, 200.0), "Z": (-120.5, 0.0)}
@@ -165,7 +166,8 @@ def test_all_compensated_errors_stay_recognisable(tmp_path: Path) -> None:
 
 
 def test_controllers_are_the_profiles_that_programs_are_read_with() -> None:
-    assert set(CONTROLLERS) == set(PROFILES)
+    assert set(CONTROLLERS) == set(DIALECTS)
+    assert all(described(name) is not None for name in SHIPPED)
 
 
 @pytest.mark.parametrize("chain", sorted(CHAINS))

@@ -19,7 +19,7 @@ PUBLIC = {
     *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
-    *("fit_thermal", "ThermalFitting"),
+    *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

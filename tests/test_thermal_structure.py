@@ -48,7 +48,7 @@ def test_a_lag_is_exact_for_steps_and_ramps(lag: float, steps: list[float], rate
     # theta = rate (t - lag + lag exp(-t / lag)) is the answer to a ramp from rest
     ramp = lagged(time, rate * time, lag)
     np.testing.assert_allclose(ramp, rate * (time - lag * -np.expm1(-time / lag)), atol=1e-6 * time[-1])
-    np.testing.assert_allclose(lagged(time, rate * time, -lag), 2.0 * rate * time - ramp)
+    np.testing.assert_allclose(lagged(time, rate * time, -lag), 2.0 * rate * time - ramp, atol=1e-12)
 
 
 def test_a_distortion_worked_by_hand() -> None:

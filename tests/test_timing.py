@@ -19,10 +19,10 @@ from test_acceptance_linuxcnc import NEAR_MM, samples, spacious
 import olp
 from olp.exceptions import ProgramError, UsageError
 from olp.files.config import load_setup
+from olp.program.dialects import Options, read
 from olp.program.feeds import lengths_mm
 from olp.program.profiles import PROFILES
 from olp.program.program import Program
-from olp.program.reader import Options, read
 from olp.program.timing import BLEND_MM, PathControl, Timing, timing
 
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"

@@ -24,6 +24,8 @@ from olp.units import AXES
 SAME_MM = 0.05
 #: No instrument reads better than this: 10 nm, 10 nrad.
 LEAST = 1e-5, 1e-8
+#: What an instrument may drift in a run where one run alone cannot tell: 2 um, 2 urad.
+DRIFT = 2e-3, 2e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ def noise_of(line: Line) -> Noise:
             file=line.source,
         )
     sigma = max(line.sigma, spread or 0.0, least)
-    return Noise(sigma, max(drift, 0.2 * sigma) if several else 0.0, spread)
+    return Noise(sigma, max(drift, 0.2 * sigma) if several else DRIFT[line.quantity == "angle"], spread)
 
 
 def _means(columns: Array, groups: np.ndarray, count: int) -> Array:
@@ -93,8 +95,6 @@ def targets_of(line: Line) -> Array:
 
 def drift_ramps(line: Line) -> Array:
     """(n, runs) columns: each rises from 0 to 1 during one run and stays there."""
-    if len(np.unique(line.run)) < 2:
-        return np.zeros((len(line.run), 0))
     index = np.arange(len(line.run), dtype=float)
     starts = np.concatenate([[0], np.flatnonzero(np.diff(line.run)) + 1, [len(line.run)]])
     return np.stack(

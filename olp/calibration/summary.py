@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import MISFIT, POINT, Fit, LengthsResult, LineResult, PointsResult, misfit
+from olp.calibration.estimator import MISFIT, Fit, LengthsResult, LineResult, PointsResult, misfit
 from olp.calibration.parameters import SHEAR
 from olp.calibration.prior import class_of
+from olp.calibration.screening import LENGTH, POINT
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.findings import Finding
@@ -291,7 +292,7 @@ def _outlier_findings(fit: Fit) -> Iterator[Finding]:
     files = dict.fromkeys((o.source, o.component) for o in fit.outliers)
     for source, component in files:
         own = [o for o in fit.outliers if (o.source, o.component) == (source, component)]
-        unit, scale = ("um", UM_PER_MM) if component == POINT else unit_of(component)
+        unit, scale = ("um", UM_PER_MM) if component in (POINT, LENGTH) else unit_of(component)
         rows = ", ".join(f"row {o.row} ({o.value * scale:.2f} {unit})" for o in own[:_LISTED])
         more = f" and {len(own) - _LISTED} more" if len(own) > _LISTED else ""
         yield Finding(

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks.base import finding, lines_of
+from olp.checks.listed import between_findings as between_findings
+from olp.checks.listed import told_findings
 from olp.compensation.holes import HolePlan
 from olp.errormodel import ErrorModel
 from olp.findings import Finding
@@ -26,13 +28,14 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
     """What the program's text alone tells."""
     out = []
     path = program.toolpath
-    for name, line, _ in program.remarks:
+    for name, line, text in program.remarks:
         if name == "unit":
-            out.append(
-                finding(
-                    "OLP301", "neither G20 nor G21 stands before the first move; millimetres assumed", [line]
-                )
-            )
+            which = "neither G20 nor G21 stands before the first move" if text == "mm" else text
+            out.append(finding("OLP301", f"{which}; millimetres assumed", [line]))
+        elif name == "thermal":
+            out.append(finding("OLP412", text, [line]))
+        elif name == "arcs":
+            out.append(finding("OLP413", text, [line]))
         elif name == "increments":
             out.append(
                 finding(
@@ -41,8 +44,9 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
                     [line],
                 )
             )
-    whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
-    if whole.any():
+    out += told_findings(program)
+    whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
+    if whole.any() and not (program.statements and program.statements.decimal):
         lines = lines_of(path, whole)
         out.append(
             finding(
@@ -75,13 +79,13 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     """Does the control leave the path by more than it is corrected?"""
     out: list[Finding] = []
-    if program.profile.name != "linuxcnc":
+    if program.dialect.name != "linuxcnc":
         return out
     if not program.path_modes and len(program.toolpath):
         out.append(
             finding(
                 "OLP201",
-                f"no path mode is stated: {program.profile.path_mode}",
+                f"no path mode is stated: {program.dialect.path_mode}",
                 [int(program.toolpath.line[0])],
             )
         )
@@ -162,6 +166,24 @@ def hole_findings(holes: HolePlan, tolerance_mm: float) -> list[Finding]:
             leaning,
         )
     ]
+
+
+def stroke_findings(program: Program, model: ErrorModel, tolerance_mm: float) -> list[Finding]:
+    """Holes whose stroke, which is the control's own, cannot follow the error."""
+    said = program.statements
+    if said is None or not len(said.strokes):
+        return []
+    path = program.toolpath
+    top, bottom = said.strokes[:, 0], said.strokes[:, 1]
+    tool = path.tool_mm()
+    levers = tool if tool.ndim == 1 else tool[top]
+    change = model.error(path.end_mm[bottom], levers) - model.error(path.end_mm[top], levers)
+    lean = np.nan_to_num(np.sqrt((change * change).sum(axis=1))) / 2
+    wide = lean > tolerance_mm
+    if not wide.any():
+        return []
+    what = f"{int(wide.sum())} holes lean by up to {lean.max() * 1e3:.2f} um at clearance and bottom"
+    return [finding("OLP105", what, path.line[top[wide]].tolist())]
 
 
 def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:

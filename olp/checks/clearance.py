@@ -24,6 +24,7 @@ from olp.compensation.plan import zero_shifts
 from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array, Mask
 from olp.findings import Finding
+from olp.geometry import rotation_matrix
 from olp.machine import Mesh, Setup, WorkOffset
 from olp.toolpath import Flag, Index, Kind, Toolpath
 
@@ -210,15 +211,9 @@ def _placed(solid: Solid, setup: Setup) -> Array:
     offset = solid.offset(setup)
     if offset is None:
         return solid.triangle
-    return np.asarray(solid.triangle @ rotation(offset).T + np.array(offset.offset_mm), float)
-
-
-def rotation(offset: WorkOffset) -> Array:
-    """(3, 3) from the axes of a work offset to those of the machine: A about X first, then B about Y, C
-    about Z."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_euler("xyz", offset.rotation_deg, degrees=True).as_matrix(), float)
+    return np.asarray(
+        solid.triangle @ rotation_matrix(offset.rotation_deg).T + np.array(offset.offset_mm), float
+    )
 
 
 def _by_line(
@@ -237,7 +232,7 @@ def _by_line(
         offset = each.offset(setup)
         if offset is not None:
             rows = solid == number
-            point[rows] = (point[rows] - np.array(offset.offset_mm)) @ rotation(offset)
+            point[rows] = (point[rows] - np.array(offset.offset_mm)) @ rotation_matrix(offset.rotation_deg)
     labels = tuple(dict.fromkeys(names))
     index = np.array([labels.index(name) for name in names] or [0])
     moving = (path.flag & np.uint8(Flag.CONTROL)) == 0

@@ -16,8 +16,9 @@ from olp.exceptions import ProgramError
 from olp.findings import Finding
 from olp.geometry import PLANES, quarter_shares
 from olp.machine import Machine
-from olp.program.feeds import Scan, feeds, lengths_mm
+from olp.program.feeds import Scan, lengths_mm
 from olp.program.program import Program
+from olp.program.stated_feeds import programmed
 from olp.proof import Proof
 from olp.toolpath import Flag, Index, Kind, Toolpath
 
@@ -47,15 +48,17 @@ class Feeds:
     @staticmethod
     def of(program: Program) -> Feeds:
         """The feeds of a program that was read with its words."""
-        assert program.words is not None
-        scan = Scan.of(program, program.words, block_delete=False)
-        modes = {
-            code: scan.code_line[scan.code == code].tolist()
-            for code in (_INVERSE, _PER_TURN)
-            if (scan.code == code).any()
-        }
+        modes: dict[int, list[int]] = {}
+        if program.statements is None:
+            assert program.words is not None
+            scan = Scan.of(program, program.words, block_delete=False)
+            modes = {
+                code: scan.code_line[scan.code == code].tolist()
+                for code in (_INVERSE, _PER_TURN)
+                if (scan.code == code).any()
+            }
         try:
-            return Feeds(feeds(scan), modes, None)
+            return Feeds(programmed(program), modes, None)
         except ProgramError as error:
             line = [] if error.line is None else [error.line]
             return Feeds(None, modes, finding("OLP307", error.message, line))

@@ -26,7 +26,7 @@ VERBS = {
     "view": "Show a job in the browser: paths, enlarged errors, time, program text.",
     "compare": "Hold measured runs against a nominal path: deviations, ISO 9283 figures.",
     "calibrate": "Make a calibration from measurements; read and write the tables of controls.",
-    "schema": "Print the JSON Schema of a machine, calibration, job or measurements file.",
+    "schema": "Print the JSON Schema of a file that people write.",
     "explain": "Explain the code of a finding, or list all codes.",
 }
 

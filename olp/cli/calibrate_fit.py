@@ -87,8 +87,8 @@ def command(
         files[Path(report_file)] = fit_report(fitted, report_file, None)
     write_files(files, force=force, inputs=inputs)
     if output is not None:
-        maps = len(fitted.calibration.maps)
-        talk(f"wrote {output} and {curves - maps} curves{' and a map' if maps else ''} beside it")
+        kinds = "curves, map and covariance" if fitted.calibration.maps else "curves and covariance"
+        talk(f"wrote {output} and {curves} files of {kinds} beside it")
     if report_file is not None:
         talk(f"wrote {report_file}")
     report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}

@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -41,9 +41,23 @@ class Length(click.FloatRange):
 
 
 def setup_options(function: F) -> F:
-    """-m and -j, which every verb that needs a machine takes."""
+    """-m, -j and --dialect, which every verb that needs a machine takes."""
+    function = click.option(
+        "--dialect",
+        metavar="NAME",
+        expose_value=False,
+        callback=_keep_dialect,
+        help="The dialect, such as apt, or a file that describes it. Default: what text and ending say.",
+    )(function)
     function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
     return click.option("-m", "--machine", metavar="machine.toml", help="The machine file.")(function)
+
+
+_DIALECT = "olp.dialect"
+
+
+def _keep_dialect(context: click.Context, _: click.Parameter, value: str | None) -> None:
+    context.meta[_DIALECT] = value
 
 
 def _day(
@@ -116,6 +130,25 @@ def unroll_options(function: F) -> F:
     return function
 
 
+def confidence_options(function: F) -> F:
+    """What every verb that looks at uncertainties has in common."""
+    for option in (
+        click.option(
+            "--within-um",
+            type=Length(),
+            help="The tolerance of the part: how probable is it that the tip stays within? "
+            "Default: --tolerance-um.",
+        ),
+        click.option(
+            "--only-sure-components",
+            is_flag=True,
+            help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
 def proof_options(function: F) -> F:
     """What `correct` and `verify` have in common."""
     for option in (fail_on_option, json_option, date_option(), contour_option, tolerance_option):
@@ -147,6 +180,11 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
     from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
+    dialect = click.get_current_context().meta.get(_DIALECT)
+    if dialect is not None:
+        from olp.files.described import described
+
+        setup = replace(setup, job=replace(setup.job, dialect=dialect, described=described(dialect)))
     meshes = (mesh.file for mesh in setup.job.meshes)
     named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
     inputs = files_of(*named, *meshes)

@@ -11,6 +11,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    confidence_options,
     exit_for,
     files_of,
     given,
@@ -26,7 +27,10 @@ from olp.cli.common import (
     talk,
     unroll_options,
 )
+from olp.cli.layouts import with_layout_of
 from olp.cli.progress import progress
+from olp.cli.results import Asked, default_output
+from olp.cli.results import run as run_results
 from olp.exceptions import ProgramError, UsageError
 
 if TYPE_CHECKING:
@@ -43,6 +47,7 @@ LAST_DIGITS_UM = 10.0
 @setup_options
 @click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
+@confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
 @unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
@@ -50,6 +55,21 @@ LAST_DIGITS_UM = 10.0
 @click.option(
     "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
 )
+@click.option("--results", is_flag=True, help="PROGRAM holds points that a measuring machine reported.")
+@click.option("--profile", metavar="NAME|FILE", help="How a table of points is laid out.")
+@click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
+@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a table.")
+@click.option(
+    "--frame", "frames", multiple=True, metavar="[NAME=]FRAME",
+    help="Work offset that results are stated in, or machine; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--tool", "tools", multiple=True, metavar="[NAME=]N", help="Stylus of results; may be repeated."
+)
+@click.option(
+    "--tip-radius-mm", type=click.FloatRange(min=0.0), help="Radius of the tip of results, 0 for centres."
+)
+@click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
 @click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
 @click.option("--force", is_flag=True, help="Overwrite output files.")
@@ -61,6 +81,8 @@ def command(
     tolerance_um: float,
     outside_box: Literal["refuse", "hold"],
     contour: bool,
+    within_um: float | None,
+    only_sure_components: bool,
     date: datetime.date | None,
     as_json: bool,
     fail_on: str,
@@ -70,6 +92,14 @@ def command(
     split_rapids: bool,
     report_file: str | None,
     review_file: str | None,
+    results: bool,
+    profile: str | None,
+    columns: tuple[str, ...],
+    unit: str | None,
+    frames: tuple[str, ...],
+    tools: tuple[str, ...],
+    tip_radius_mm: float | None,
+    decimals: int | None,
     show_diff: bool,
     quiet: bool,
     force: bool,
@@ -78,9 +108,26 @@ def command(
 
     PROGRAM and the machine file may come from the job file; what the command line says wins. OUT is written
     also where the proof ends above the tolerance; the exit code is 1 then.
+
+    With --results, PROGRAM is a table of points or DMIS output of a measuring machine, and the error is added
+    to what it reported.
     """
-    call = given(program, machine, job)
-    output = output or _default_output(call.program)
+    if results:
+        for name in ("flatten", "expand_cycles", "split_rapids", "contour", "show_diff", "review_file"):
+            if click.get_current_context().params[name]:
+                raise UsageError(
+                    f"--{name.removesuffix('_file').replace('show_', '').replace('_', '-')} is of "
+                    "programs and does not go with --results"
+                )
+        run_results(program, machine, job, Asked(
+            profile, columns, unit, frames, tools, tip_radius_mm, decimals, outside_box == "hold",
+            date, output, report_file, as_json, fail_on, quiet, force,
+        ))  # fmt: skip
+        return
+    if frames or tools or decimals is not None:
+        raise UsageError("--frame, --tool and --decimals are of reported results; add --results")
+    call = with_layout_of(given(program, machine, job), profile, columns, unit)
+    output = output or default_output(call.program)
     as_json = as_json or report_file == STREAM
     if review_file == STREAM:
         raise UsageError("the page of --review goes to a file; olp view writes one to stdout")
@@ -110,6 +157,8 @@ def command(
                 peck_clearance_mm=peck_clearance_mm,
                 contour=contour,
                 split_rapids=split_rapids,
+                within_um=within_um,
+                only_sure_components=only_sure_components,
                 date=date,
                 progress=show,
             )
@@ -120,18 +169,20 @@ def command(
                 written[Path(review_file)] = view(
                     nominal, call.setup, correction=result, corrected_name="" if output == STREAM else output,
                     tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
-                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, progress=show,
+                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, within_um=within_um,
+                    only_sure_components=only_sure_components, date=date, progress=show,
                 ).parts()  # fmt: skip
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
     for name in files_of(report_file):
         from olp import report_files
-        from olp.loading import source_of, unrolled
+        from olp.loading import reading, source_of, unrolled
 
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
-            text = unrolled(text, origin, call.setup, expand_cycles, peck_clearance_mm)
+            dialect = reading(call.setup, text, origin)[1]
+            text = unrolled(text, origin, call.setup, dialect, expand_cycles, peck_clearance_mm)
         filed = report_files.correction(result, text, call.setup, name, date, contour=contour)
         written[Path(name)] = filed
     write_files(written, force=force, inputs=call.inputs)
@@ -150,22 +201,18 @@ def command(
     exit_for(result.findings, fail_on)
 
 
-def _default_output(program: str) -> str:
-    path = Path(program)
-    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
-
-
 def _diff(nominal: str | bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:
     from olp.cli.diff import render
     from olp.files.write import read_bytes
     from olp.program.profiles import PROFILES
 
-    profile = PROFILES.get(machine.controller)
+    profile = PROFILES.get(result.report["program"]["dialect"])
     largest_um = float(result.report.get("largest_correction_um", 0.0))
     return render(
         nominal if isinstance(nominal, bytes) else read_bytes(nominal),
         result.data,
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
         increments_mm=machine.least_increment_mm if profile and profile.increments_without_point else None,
+        statements=profile is None,
         colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
     )

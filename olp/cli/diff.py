@@ -38,6 +38,10 @@ _FORGET = frozenset(
 )
 #: Coordinates here are no positions of axes.
 _NO_MOVE = frozenset(("4", "10"))
+#: statements that say a point or a centre, and the unit of their numbers
+_POINT = re.compile(r"\s*(GOTO|GODLTA|PTMEAS|CIRCLE|MOVARC)\s*/(?:\s*CART\s*,)?(.*)")
+_UNITS = re.compile(r"\s*UNITS?\s*/\s*(INCH|MM)")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 _UNKNOWN = (math.nan, math.nan, math.nan)
 
 Increments = tuple[float, float, float]
@@ -106,6 +110,29 @@ class _Reader:
         return value * self._unit_um
 
 
+class _StatementReader:
+    """Reads lines of statements (APT, DMIS) that say a point or a centre."""
+
+    def __init__(self) -> None:
+        self._unit_um = 1000.0
+
+    def read(self, data: bytes) -> list[Line]:
+        return [self._line(text) for text in _END.split(data.decode("latin-1"))]
+
+    def _line(self, text: str) -> Line:
+        found = _POINT.match(text.upper())
+        if found is None:
+            if unit := _UNITS.match(text.upper()):
+                self._unit_um = 25400.0 if unit[1] == "INCH" else 1000.0
+            return Line(text, {}, [text] if text.strip() else [])
+        values = [float(n) * self._unit_um for n in _NUMBER.findall(found[2])[:3]]
+        lengths = dict(zip(AXES, values, strict=False))
+        place = _UNKNOWN
+        if len(values) == 3 and found[1] != "GODLTA":
+            place = (values[0], values[1], values[2])
+        return Line(text, lengths, [found[1]], place)
+
+
 def _same(nominal: Line, corrected: Line, near_um: float) -> bool:
     if nominal.text == corrected.text:
         return True
@@ -169,15 +196,18 @@ def render(
     *,
     near_um: float = 1000.0,
     increments_mm: Increments | None = None,
+    statements: bool = False,
     colour: bool = False,
 ) -> str:
     """The changed lines as text: line in the nominal program, nominal, corrected, change of lengths in um.
 
     The change of an axis is that of its position: corrected command minus nominal command. No correction is
     larger than `near_um`. `increments_mm` are the least increments of a control that counts them in numbers
-    without a point.
+    without a point; `statements`: the texts are APT or DMIS.
     """
-    nominal, corrected = _Reader(increments_mm).read(before), _Reader(increments_mm).read(after)
+    nominal, corrected = (
+        (_StatementReader() if statements else _Reader(increments_mm)).read(data) for data in (before, after)
+    )
     rows: list[tuple[str, str, str, str]] = []
     counts = {"changed": 0, "inserted": 0, "left out": 0}
     for i, j in align(nominal, corrected, near_um):

@@ -8,9 +8,11 @@ from olp.cli.common import put
 
 
 @click.command("schema")
-@click.argument("kind", type=click.Choice(["machine", "calibration", "job", "measurements"]))
+@click.argument(
+    "kind", type=click.Choice(["machine", "calibration", "job", "measurements", "points", "dialect"])
+)
 def command(kind: str) -> None:
-    """Print the JSON Schema of a machine, calibration, job or measurements file.
+    """Print the JSON Schema of a file that people write.
 
     Editors complete and check TOML with it.
     """

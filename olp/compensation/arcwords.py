@@ -17,6 +17,7 @@ from olp.toolpath import Flag, Kind
 
 if TYPE_CHECKING:
     from olp.compensation.rows import Rows
+    from olp.compensation.statements import StatementWriter
     from olp.compensation.writer import Writer
 
 Index = npt.NDArray[np.int64]
@@ -25,7 +26,7 @@ _AXES = np.array(PLANES)
 
 
 @dataclass(frozen=True, slots=True)
-class _Arc:
+class Arc:
     """One part of an arc as it will be written, positions in mm."""
 
     row: int
@@ -39,7 +40,7 @@ class _Arc:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Arcs:
+class ArcRows:
     """The same in columns."""
 
     row: Index
@@ -51,11 +52,11 @@ class _Arcs:
     sweep: Array
     plane: npt.NDArray[np.int8]
 
-    def pick(self, which: Mask) -> _Arcs:
-        return _Arcs(*(getattr(self, name)[which] for name in _Arcs.__slots__))
+    def pick(self, which: Mask) -> ArcRows:
+        return ArcRows(*(getattr(self, name)[which] for name in ArcRows.__slots__))
 
-    def one(self, i: int) -> _Arc:
-        return _Arc(
+    def one(self, i: int) -> Arc:
+        return Arc(
             int(self.row[i]), int(self.move[i]), int(self.line[i]), self.start[i], self.end[i],
             self.centre[i], float(self.sweep[i]), int(self.plane[i]),
         )  # fmt: skip
@@ -72,7 +73,7 @@ def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     )
     if not arc_row.size:
         return []
-    solved = _solve(writer, rows, arc_row)
+    solved = solve(writer, rows, arc_row)
     plain = _is_plain(writer, rows, solved)
     edits = EditList(writer.prefixes)
     for i in np.flatnonzero(~plain).tolist():
@@ -81,7 +82,7 @@ def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     return [edits.done(), *_plain_words(writer, solved.pick(plain))]
 
 
-def _is_plain(writer: Writer, rows: Rows, arcs: _Arcs) -> Mask:
+def _is_plain(writer: Writer, rows: Rows, arcs: ArcRows) -> Mask:
     """Arcs whose block keeps both its centre words, from the start: nearly all there are."""
     index = np.searchsorted(writer.path.arcs.move, arcs.move)
     slots = writer.program.arc_slots.word[index]
@@ -95,7 +96,7 @@ def _is_plain(writer: Writer, rows: Rows, arcs: _Arcs) -> Mask:
     return np.asarray(plain, bool)
 
 
-def _plain_words(writer: Writer, arcs: _Arcs) -> list[Edits]:
+def _plain_words(writer: Writer, arcs: ArcRows) -> list[Edits]:
     """Centre words of many arcs at once."""
     words, style = writer.words, writer.style
     index = np.searchsorted(writer.path.arcs.move, arcs.move)
@@ -124,7 +125,7 @@ def _plain_words(writer: Writer, arcs: _Arcs) -> list[Edits]:
     return out
 
 
-def _solve(writer: Writer, rows: Rows, arc_row: Index) -> _Arcs:
+def solve(writer: Writer | StatementWriter, rows: Rows, arc_row: Index) -> ArcRows:
     """Centres for rows, from the emitted end points and the bent path between them."""
     path, plan = writer.path, writer.plan
     move = rows.move[arc_row]
@@ -152,7 +153,7 @@ def _solve(writer: Writer, rows: Rows, arc_row: Index) -> _Arcs:
         kept[part] = bend.rigid & alike & (~absolute | (np.abs(shift).max(axis=1) < 1e-9))
     kept &= rows.head[arc_row] & (reach == 1.0)
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
-    solved = _Arcs(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)
+    solved = ArcRows(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)
     return solved.pick(~kept)
 
 
@@ -175,7 +176,7 @@ def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.
 
 
 def _centre_words(
-    writer: Writer, arc: _Arc, absolute: bool, own: dict[int, int]
+    writer: Writer, arc: Arc, absolute: bool, own: dict[int, int]
 ) -> list[tuple[int, int, int]]:
     """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own`
     words."""
@@ -217,7 +218,7 @@ def _check_sweep(
         )
 
 
-def _head(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
+def _head(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
     """The part that keeps the block's own line: its centre words replaced, or inserted where omitted."""
     program, words, style = writer.program, writer.words, writer.style
     index = int(np.searchsorted(writer.path.arcs.move, arc.move))
@@ -246,12 +247,12 @@ def _head(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
             writer.tally.inserted_words += 1
 
 
-def _turns(arc: _Arc) -> int:
+def _turns(arc: Arc) -> int:
     """The P word that an arc of this sweep needs."""
     return int((abs(arc.sweep) - 1e-6) // (2 * np.pi)) + 1
 
 
-def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
+def _radius_word(writer: Writer, arc: Arc, slot: int, edits: EditList) -> None:
     """R of the corrected arc; where R cannot say it well (near half circles), I, J, K in its place."""
     words, style = writer.words, writer.style
     first, second, _ = PLANES[arc.plane]
@@ -287,7 +288,7 @@ def _radius_word(writer: Writer, arc: _Arc, slot: int, edits: EditList) -> None:
     edits.add(end, end, second_value, second_digits, style.lead(slot) + letters[b : b + 1], 1)
 
 
-def _tail(writer: Writer, rows: Rows, arc: _Arc, edits: EditList) -> None:
+def _tail(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
     """A later part: a block of its own with both end points, the third axis where it moves, and the
     centre."""
     place = int(writer.program.line_end[arc.line - 1])

@@ -143,7 +143,7 @@ class _Words:
         self.anchor = max(words.values())
         self.new: list[tuple[str, int, int]] = []
         counter = hole.words.get(
-            "L", hole.words.get("K") if writer.program.profile.name != "linuxcnc" else None
+            "L", hole.words.get("K") if writer.program.dialect.name != "linuxcnc" else None
         )
         if hole.incremental and hole.repeats > 1 and hole.repeat == 0 and counter is not None:
             edits.add(int(writer.words.number[counter]), int(writer.words.end[counter]), 1, 0)

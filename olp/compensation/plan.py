@@ -36,12 +36,14 @@ _UNSPLIT = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.
 @dataclass(frozen=True, slots=True)
 class Limits:
     """What the plan must keep: tolerance of model and chords and the last digit written, in mm; whether
-    rapids are subdivided too, and whether commands outside the calibrated box are refused."""
+    rapids are subdivided too, whether commands outside the calibrated box are refused, and whether a step may
+    be put before a move that is not split (to take up lost motion)."""
 
     tolerance_mm: float
     digit_mm: float = 0.0
     split_rapids: bool = False
     refuse_outside: bool = True
+    insert: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +114,7 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
         path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model, reversal is not None
     )
     if reversal is not None:
-        rows = carry_play(path, model, rows, reversal)
+        rows = carry_play(path, model, rows, reversal, insert=limits.insert)
     if limits.refuse_outside:
         _check_box(path, model, rows)
     return rows

@@ -21,6 +21,7 @@ from olp.toolpath import Flag, Kind, Toolpath
 if TYPE_CHECKING:
     from olp.compensation.plan import Plan
 
+Index = npt.NDArray[np.int64]
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 _NO_TOOL = np.zeros(3)
@@ -52,9 +53,11 @@ class Reversal:
         return Reversal(axes, band_mm, lost.max(axis=0)) if axes.any() else None
 
 
-def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal) -> Plan:
+def carry_play(
+    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool = True
+) -> Plan:
     """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed
-    move, a row that only takes it up comes first.
+    move, a row that only takes it up comes first; without `insert` not before moves that are never split.
 
     Where one axis turns the straightness of another may jump with it, and that one turns too: the states are
     gone through until they agree.
@@ -64,12 +67,15 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     play = np.zeros((len(rows), 3))
     turns = np.zeros((len(rows), 3), bool)
     command, held = rows.command_mm, np.zeros((len(rows), 3))
+    still = _still(path, rows)
     for _ in range(_PASSES):
         lost = model.lost_motion_mm(command)
         assert lost is not None
         lost = np.maximum(np.nan_to_num(lost), 0.0)
         # where the load is: the command without its lead, and without the hold of the pass before
         wanted = np.where(rows.raw, rows.target_mm, command - lost / 2 * play - held)
+        if still is not None:
+            wanted = np.take_along_axis(wanted, still, axis=0)
         before = play.copy()
         for axis in np.flatnonzero(reversal.axes).tolist():
             play[:, axis], load, turns[:, axis] = _follow(wanted[:, axis], lost[:, axis], reversal.band_mm)
@@ -80,14 +86,31 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
         if np.abs(play - before).max(initial=0.0) < 1e-3:
             break
     rows = replace(rows, command_mm=command, play=play)
-    turns &= _may_turn(path, rows)[:, None]
+    turns &= _may_turn(path, rows, insert=insert)[:, None]
     return _take_up(model, rows, tool, held, turns) if turns.any() else rows
 
 
-def _may_turn(path: Toolpath, rows: Plan) -> Mask:
-    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place."""
+def _still(path: Toolpath, rows: Plan) -> Index | None:
+    """(r, 3) the row where each axis came to where it is: the strokes of one hole move no axis across them,
+    though the error there would ask for it. None without canned cycles."""
+    cycle = (path.flag[rows.move] & np.uint8(Flag.CYCLE)) != 0
+    if not cycle.any():
+        return None
+    end = path.end_mm[rows.move]
+    stays = np.zeros((len(rows), 3), bool)
+    line = path.line[rows.move]
+    stays[1:] = (cycle[1:] & (line[1:] == line[:-1]))[:, None] & (end[1:] == end[:-1])
+    order = np.broadcast_to(np.arange(len(rows))[:, None], stays.shape)
+    return np.asarray(np.maximum.accumulate(np.where(stays, 0, order), axis=0), np.int64)
+
+
+def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:
+    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place.
+    Without `insert` not before those that are never split."""
     may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
+    if not insert:
+        may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0
     may[:1] = False
     may[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
     return np.asarray(may, bool)

@@ -20,13 +20,13 @@ def stamp_line(digest: str, comment: tuple[bytes, bytes]) -> bytes:
     return before + f"olp-corrected {digest[:12]} olp {__version__}".encode() + after
 
 
-def stamped(text: bytes, stamp: bytes, eol: bytes) -> bytes:
-    """The text with the stamp as a line of its own in front, behind a tape mark and a program number."""
+def stamped(text: bytes, stamp: bytes, eol: bytes, first: tuple[bytes, ...]) -> bytes:
+    """The text with the stamp as a line of its own in front, behind lines that have to be `first`, such as a
+    tape mark and a program number: each kind of them once, in this order."""
     at = 3 if text[:3] == b"\xef\xbb\xbf" else 0
-    if text[at : at + 1] == b"%":
-        at = _line_after(text, at)
-    if text[at : at + 1] and text[at : at + 1] in b"Oo:":
-        at = _line_after(text, at)
+    for beginnings in first:
+        if text[at : at + 40].lstrip(b" \t").upper().startswith(tuple(beginnings.split(b"|"))):
+            at = _line_after(text, at)
     return text[:at] + stamp + eol + text[at:]
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from olp.machine import Vector
 from olp.program.program import Program
 from olp.toolpath import Flag
+from olp.units import MM_PER_INCH
 
 _MOST_DECIMALS = 9
 _SPACE = (b"", b" ", b"\t")
@@ -20,6 +21,8 @@ Slots = npt.NDArray[np.int32] | npt.NDArray[np.int64]
 
 def fewest_decimals(increment_mm: float, unit_mm: float, inch_decimals: int) -> int:
     """Decimals that a least increment needs: 0.001 mm needs 3, and in inch what the control takes for it."""
+    if unit_mm not in (1.0, MM_PER_INCH):
+        return max(0, math.ceil(-math.log10(increment_mm / unit_mm) - 1e-9))
     metric = max(0, math.ceil(-math.log10(increment_mm) - 1e-9))
     return metric if unit_mm == 1.0 else metric + inch_decimals - 3
 
@@ -89,7 +92,7 @@ class Style:
         return letters.lower() if int(self.separators(np.array([word]), self.program)[0]) >= 3 else letters
 
     def least(self, axis: int, unit_mm: float) -> int:
-        return fewest_decimals(self.increments_mm[axis], unit_mm, self.program.profile.inch_decimals)
+        return fewest_decimals(self.increments_mm[axis], unit_mm, self.program.dialect.inch_decimals)
 
     def usual(self, axis: int, unit_mm: float) -> int:
         """Digits of an inserted word."""
@@ -102,7 +105,7 @@ class Style:
     def centre(self, axis: int, unit_mm: float) -> int:
         """Digits of a centre word: one more than positions where the control takes it, since the far side of
         an arc moves by twice what its centre does."""
-        return min(self.usual(axis, unit_mm) + self.program.profile.free_digits, _MOST_DECIMALS)
+        return min(self.usual(axis, unit_mm) + self.program.dialect.free_digits, _MOST_DECIMALS)
 
     def word(self, line: int, letter: str) -> int | None:
         """Index of the first word with a letter in a line."""

@@ -6,7 +6,6 @@ per chunk of text.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +19,7 @@ from olp.compensation.plan import Plan, targets
 from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
+from olp.compensation.tally import Tally
 from olp.errormodel import ErrorModel
 from olp.errormodel.base import Mask
 from olp.machine import Vector
@@ -31,15 +31,6 @@ Index = npt.NDArray[np.int64]
 
 CHUNK = 1 << 15
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
-
-
-@dataclass(slots=True)
-class Tally:
-    """What was changed."""
-
-    changed_words: int = 0
-    inserted_words: int = 0
-    inserted_blocks: int = 0
 
 
 class Writer:
@@ -95,7 +86,7 @@ class Writer:
             at = to
         out.append(self.program.data[at:])
         if self.changed and self.stamp:
-            out[0] = stamped(out[0], self.stamp, self.program.eol(1))
+            out[0] = stamped(out[0], self.stamp, self.program.eol(1), self.program.dialect.first)
         return b"".join(out)
 
     def frame_of(self, move: int) -> Frame:

@@ -41,7 +41,9 @@ def files_beside(path: PathLike) -> list[FilePath]:
         values = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
         names = [t["file"] for name in ("curves", "maps", "compliance") for t in values.get(name, ())]
         structure = values.get("thermal", {}).get("structure")
-        return [FilePath(path).parent / name for name in (*names, *([structure] if structure else ()))]
+        covariance = values.get("covariance", {}).get("file")
+        names += [name for name in (structure, covariance) if name]
+        return [FilePath(path).parent / name for name in names]
     except (ValueError, TypeError, KeyError, AttributeError):
         return []
 

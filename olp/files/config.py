@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 
 from olp.exceptions import UsageError
 from olp.files.calibration import load_calibration
+from olp.files.described import described
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
@@ -86,6 +87,7 @@ def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
         compensated_by_controller=file.compensated_by_controller,
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
+        styli={name: table.offset_mm for name, table in file.styli.items()},
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         length_active=file.job_defaults.length_active,
@@ -127,9 +129,12 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
             missing.append((line_of(key, lines), sentence))
     if missing:
         raise config_error(missing, str(path))
+    own = described(file.dialect, beside(path, file.dialect)) if file.dialect is not None else None
     job = Job(
         program=beside(path, file.program),
         machine=beside(path, file.machine),
+        dialect=None if own is not None else file.dialect,
+        described=own,
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
@@ -141,6 +146,7 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
         sensor_log_at_s=file.temperatures_degC.sensor_log_at_s,
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
+        styli={name: table.offset_mm for name, table in file.styli.items()},
         meshes=tuple(meshes),
     )
     return job, lines

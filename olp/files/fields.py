@@ -14,7 +14,9 @@ from pydantic_core import PydanticCustomError
 from olp.machine import CHAINS, COMPONENTS, SQUARENESS
 
 #: Dialect profiles that can be read and written today.
-CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas")
+CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list")
+#: Dialects that are described by files which come with `olp`.
+SHIPPED = ("kawasaki-as", "val2", "karel", "irl")
 ISO_NAMES = COMPONENTS + SQUARENESS
 SIGN = "actual-minus-commanded"
 
@@ -59,9 +61,20 @@ def _chain(value: object) -> object:
 
 
 def _controller(value: object) -> object:
-    if value not in CONTROLLERS:
+    if value not in (*CONTROLLERS, *SHIPPED):
         raise refusal(
-            f"= {shown(value)} is not a controller that olp knows; built are: {', '.join(CONTROLLERS)}"
+            f"= {shown(value)} is not a controller that olp knows; built are: "
+            f"{', '.join((*CONTROLLERS, *SHIPPED))}"
+        )
+    return value
+
+
+def _dialect(value: object) -> object:
+    described = isinstance(value, str) and value.endswith(".toml")
+    if not described and value not in (*CONTROLLERS, *SHIPPED):
+        raise refusal(
+            f"= {shown(value)} is not a dialect that olp knows; built are: "
+            f"{', '.join((*CONTROLLERS, *SHIPPED))}; or name a file that describes one (.toml)"
         )
     return value
 
@@ -147,6 +160,11 @@ ToolNumber = Annotated[
 OffsetName = Annotated[str, Field(min_length=1), AfterValidator(_offset_name)]
 Chain = Annotated[str, BeforeValidator(_chain), Field(json_schema_extra={"enum": sorted(CHAINS)})]
 Controller = Annotated[
-    str, BeforeValidator(_controller), Field(json_schema_extra={"enum": list(CONTROLLERS)})
+    str, BeforeValidator(_controller), Field(json_schema_extra={"enum": [*CONTROLLERS, *SHIPPED]})
+]
+ProgramDialect = Annotated[
+    str,
+    BeforeValidator(_dialect),
+    Field(json_schema_extra={"anyOf": [{"enum": [*CONTROLLERS, *SHIPPED]}, {"pattern": r"\.toml$"}]}),
 ]
 Sign = Annotated[str, BeforeValidator(_sign), Field(json_schema_extra={"const": SIGN})]

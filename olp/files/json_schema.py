@@ -6,12 +6,19 @@ import json
 from typing import Any
 
 from olp.exceptions import UsageError
+from olp.files.described import DialectFile
 from olp.files.measurement_schemas import MeasurementsFile
+from olp.files.point_profile import PointProfile
 from olp.files.schema_base import Table
 from olp.files.schemas import FILES
 
 #: kind of file to its model
-KINDS: dict[str, type[Table]] = {**FILES, "measurements": MeasurementsFile}
+KINDS: dict[str, type[Table]] = {
+    **FILES,
+    "measurements": MeasurementsFile,
+    "points": PointProfile,
+    "dialect": DialectFile,
+}
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 

@@ -2,47 +2,64 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from olp.exceptions import UsageError
-from olp.files.fields import Positive, Text
+from olp.files.fields import NotNegative, Positive, Text
 from olp.files.problems import nearest, validate
 from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, read_bytes
+from olp.program.delimited import ROLES, Layout, mapping, told
 
-MM = {"mm": 1.0, "um": 1e-3, "m": 1e3, "inch": 25.4}
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": None}
-COLUMNS = ("X", "Y", "Z", "t", "name", "line")
+#: the columns of measured points that are compared
+MEASURED = ("X", "Y", "Z", "t", "name", "line")
+
+#: keys that a profile and a layout have alike
+_SAME = (
+    "delimiter", "decimal", "time_unit", "speed_unit", "header", "comment", "frame", "point", "tip_radius_mm",
+    "approach_mm", "joined", "insert", "stamp",
+)  # fmt: skip
 
 Column = Text | Annotated[int, Field(ge=1)]
+
+
+def _column(what: str) -> Any:
+    return Field(default=None, description=f"the column of {what}: its name, or its number from 1")
 
 
 class ColumnsTable(Table):
     X: Column = Field(default="X_mm", description="the column of X: its name, or its number from 1")
     Y: Column = Field(default="Y_mm", description="the column of Y: its name, or its number from 1")
     Z: Column = Field(default="Z_mm", description="the column of Z: its name, or its number from 1")
-    t: Column | None = Field(default=None, description="the column of time: its name, or its number from 1")
-    name: Column | None = Field(
-        default=None, description="the column of point names: its name, or its number from 1"
-    )
-    line: Column | None = Field(
-        default=None, description="the column of program lines: its name, or its number from 1"
-    )
+    t: Column | None = _column("time")
+    name: Column | None = _column("point names")
+    line: Column | None = _column("program lines")
+    A: Column | None = _column("the first angle of orientation")
+    B: Column | None = _column("the second angle of orientation")
+    C: Column | None = _column("the third angle of orientation")
+    I: Column | None = _column("X of the direction out of the surface")  # noqa: E741
+    J: Column | None = _column("Y of the direction out of the surface")
+    K: Column | None = _column("Z of the direction out of the surface")
+    speed: Column | None = _column("speed")
+    blend: Column | None = _column("blending")
+    tool: Column | None = _column("tool numbers")
+    SX: Column | None = _column("X of the stylus, gauge point to tip, in the unit of X")
+    SY: Column | None = _column("Y of the stylus, gauge point to tip, in the unit of Y")
+    SZ: Column | None = _column("Z of the stylus, gauge point to tip, in the unit of Z")
 
     @property
     def given(self) -> dict[str, str | int]:
         """Column by what it holds, without those that the file has not."""
-        return {key: value for key in COLUMNS if (value := getattr(self, key)) is not None}
+        return {key: value for key in ROLES if (value := getattr(self, key)) is not None}
 
 
 class PointProfile(Table):
-    """olp-points-1: the layout of files of measured points."""
+    """olp-points-1: the layout of tables of points, measured ones and those of a program."""
 
     schema_: Literal["olp-points-1"] = Field(
         alias="schema", default="olp-points-1", description='the format, "olp-points-1"'
@@ -55,6 +72,9 @@ class PointProfile(Table):
     )
     unit: Literal["mm", "um", "m", "inch"] = Field(default="mm", description="the unit of X, Y and Z")
     time_unit: Literal["s", "ms", "us"] = Field(default="s", description="the unit of time")
+    speed_unit: Literal["mm/s", "mm/min", "m/s", "m/min", "inch/min"] | None = Field(
+        default=None, description="the unit of speed; not known if left out"
+    )
     sample_period_s: Positive | None = Field(
         default=None, description="seconds from point to point, where points come without time"
     )
@@ -69,7 +89,39 @@ class PointProfile(Table):
         default=None,
         description='the frame that the points are stated in, such as "G54"; not known if left out',
     )
+    point: Literal["surface", "centre"] | None = Field(
+        default=None,
+        description='what a measured point states: "surface" or "centre" (of the tip); not known if left out',
+    )
+    tip_radius_mm: NotNegative | None = Field(
+        default=None, description="the radius of the tip, in mm; that of the tool if left out"
+    )
+    approach_mm: NotNegative | None = Field(
+        default=None,
+        description="how far the machine moves against the surface before a touch, in mm; not known if left "
+        "out",
+    )
+    joined: Literal["points", "lines"] = Field(
+        default="points",
+        description='how the machine goes from row to row of a program: "points" (not known) or "lines" '
+        "(straight)",
+    )
+    insert: bool = Field(
+        default=False, description="whether rows may be inserted where a straight line would bend"
+    )
+    stamp: bool = Field(
+        default=True, description="whether a corrected table may begin with a comment that says so"
+    )
     columns: ColumnsTable = Field(default_factory=ColumnsTable, description="the table [columns]")
+
+    @property
+    def layout(self) -> Layout:
+        """The same as a value."""
+        return Layout(
+            columns=mapping(self.columns.given),
+            unit=self.unit,
+            **{key: getattr(self, key) for key in _SAME},
+        )
 
     def to_toml(self) -> str:
         """The text of a profile file."""
@@ -89,10 +141,6 @@ BUILT_IN = {
     ),
 }  # fmt: skip
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_COMMA_NUMBER = re.compile(r"[-+]?\d+,\d+")
-_AXIS = r"{}(?:[ _]*[\[(]?(mm|um|m|inch)[\])]?)?"
-
 
 def load_profile(name: PathLike) -> PointProfile:
     """A built-in profile by its name, or the profile in a TOML file. Raises InputError."""
@@ -107,9 +155,9 @@ def with_options(profile: PointProfile, columns: Sequence[str], **values: str | 
     table = dict(profile.columns.given)
     for item in columns:
         key, mark, column = item.partition("=")
-        if not mark or not column or key not in COLUMNS:
-            near = nearest(key, COLUMNS)
-            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(COLUMNS)}"
+        if not mark or not column or key not in ROLES:
+            near = nearest(key, ROLES)
+            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(ROLES)}"
             raise UsageError(f"--column {item} is not understood; {hint}, as in --column X=East")
         number = int(column) if column.isdecimal() else None
         if number == 0:
@@ -123,63 +171,18 @@ def with_options(profile: PointProfile, columns: Sequence[str], **values: str | 
 
 
 def looked_at(lines: Sequence[str]) -> PointProfile | None:
-    """The profile that the first rows of a file suggest, None where they leave a choice.
-
-    A header that names X, Y and Z, with or without their unit; names and three numbers, as SpatialAnalyzer
-    writes them; or three numbers and nothing else.
-    """
-    comment = "//" if any(line.lstrip().startswith("//") for line in lines) else "#"
-    rows = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith(("#", "//"))]
-    if not rows:
+    """The profile of measured points that the first rows of a file suggest, in mm where they state no unit;
+    None where they leave a choice."""
+    found = told(lines)
+    if found is None:
         return None
-    delimiter = _delimiter(rows)
-    cells = [_cells(row, delimiter) for row in rows]
-    decimal = "comma" if any(_COMMA_NUMBER.fullmatch(c) for row in cells for c in row) else "point"
-    common: dict[str, Any] = {"delimiter": delimiter, "decimal": decimal, "comment": comment}
-    found = _named(cells[0])
-    if found is not None:
-        columns, unit = found
-        return PointProfile(**common, unit=unit, columns=columns)
-    number = [bool(_NUMBER.fullmatch(c.replace(",", "."))) for c in cells[0]]
-    if number == [True] * 3:
-        return PointProfile(**common, header=False, columns=ColumnsTable(X=1, Y=2, Z=3))
-    text = next((i for i, is_number in enumerate(number) if is_number), 0)
-    # a point may be named by a number: what counts are three numbers at the end behind a word
-    if text and all(number[text:]) and len(number) - 3 in (text, text + 1):
-        x = len(number) - 2
-        columns = ColumnsTable(X=x, Y=x + 1, Z=x + 2, name=x - 1)
-        return PointProfile(**common, header=False, columns=columns)
-    return None
+    columns = {role: column for role, column in found.columns.items() if role in MEASURED}
+    return from_layout(replace(found, columns=columns))
 
 
-def _delimiter(rows: Sequence[str]) -> str:
-    row = rows[-1]
-    for name, mark in (("semicolon", ";"), ("tab", "\t")):
-        if mark in row:
-            return name
-    decimal_commas = sum(bool(_COMMA_NUMBER.fullmatch(cell)) for cell in row.split())
-    return "comma" if "," in row and decimal_commas < 3 else "space"
-
-
-def _cells(row: str, delimiter: str) -> list[str]:
-    return [cell.strip().strip('"') for cell in row.split(DELIMITERS[delimiter])]
-
-
-def _named(header: Sequence[str]) -> tuple[ColumnsTable, Any] | None:
-    """Columns whose names say what they hold, and the unit in them."""
-    found: dict[str, str] = {}
-    units = set()
-    for axis in "XYZ":
-        for cell in header:
-            match = re.fullmatch(_AXIS.format(axis), cell, re.IGNORECASE)
-            if match and axis not in found:
-                found[axis] = cell
-                units.add((match[1] or "mm").lower())
-    if len(found) < 3 or len(units) != 1:
-        return None
-    others = {"t": ("t_s", "t", "time_s", "time"), "name": ("name", "point"), "line": ("line",)}
-    for key, names in others.items():
-        match_ = next((cell for cell in header if cell.lower() in names), None)
-        if match_ is not None:
-            found[key] = match_
-    return ColumnsTable(**found), units.pop()
+def from_layout(found: Layout) -> PointProfile:
+    """The profile of a layout, in mm where it states no unit."""
+    values = {key: getattr(found, key) for key in _SAME} | {
+        "unit": found.unit or "mm", "columns": ColumnsTable(**dict[str, Any](found.columns)),
+    }  # fmt: skip
+    return PointProfile(**values)

@@ -14,17 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import InputError
-from olp.files.point_profile import DELIMITERS, MM, SECONDS, PointProfile, looked_at
+from olp.files.point_profile import MEASURED, PointProfile, looked_at
 from olp.files.problems import nearest
 from olp.files.write import PathLike, read_bytes
+from olp.program.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
 
 Array = npt.NDArray[np.float64]
-
-#: lines, and bytes, from which a layout is told
-_LOOK, _HEAD = 40, 1 << 16
-
-
-_FRAME = re.compile(r"[#/;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,17 +55,13 @@ def row_line(points: Points, row: int) -> int:
     """The line of the file, counted from 1, in which a point stands."""
     text = _lines(read_bytes(points.file).decode("utf-8-sig"))
     profile = points.profile
-    skip, _ = _header(list(itertools.islice(io.StringIO(text), _LOOK)), profile)
+    skip, _ = _header(list(itertools.islice(io.StringIO(text), LOOK)), profile)
     return next(itertools.islice(_rows(text, profile, skip), row, None))[0]
 
 
 def layout_of(data: bytes) -> PointProfile | None:
     """The layout that the first rows of a file tell, None where they leave a choice."""
-    head = _lines(data[:_HEAD].decode("utf-8-sig", "replace"))
-    if len(data) > _HEAD:
-        # the last line may be cut
-        head = head[: head.rfind("\n") + 1] or head
-    return looked_at(head.split("\n")[:_LOOK])
+    return looked_at(first_lines(data))
 
 
 def parse_points(data: bytes, file: str, profile: PointProfile | None = None) -> Points:
@@ -83,7 +74,7 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8",
             file=file, line=line,
         ) from None  # fmt: skip
-    first = list(itertools.islice(io.StringIO(text), _LOOK))
+    first = list(itertools.islice(io.StringIO(text), LOOK))
     found = profile or layout_of(data)
     if not text.strip():
         raise InputError("holds no points; expected a row a point", file=file)
@@ -93,11 +84,13 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
-    stated = _frame(first, file)
+    stated = stated_frame(first, file)
     skip, header = _header(first, found)
     if next(_rows(text, found, skip), None) is None:
         raise InputError("holds no points; expected a row a point", file=file)
-    columns = {key: _place(column, header, file) for key, column in found.columns.given.items()}
+    columns = {
+        key: _place(column, header, file) for key, column in found.columns.given.items() if key in MEASURED
+    }
     numbers = [key for key in columns if key != "name"]
     table = _table(text, file, found, skip, [columns[key] for key in numbers])
     column = dict(zip(numbers, table.T, strict=True))
@@ -122,20 +115,6 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
 def _lines(text: str) -> str:
     """A text with one kind of line ends."""
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _frame(first: Sequence[str], file: str) -> str | None:
-    """The frame that the head of a file states."""
-    stated = None
-    for number, line in enumerate(first, 1):
-        match = _FRAME.match(line)
-        if match and stated not in (None, match[1]):
-            raise InputError(
-                f"the frame is {match[1]} here and {stated} before; expected one frame a file",
-                file=file, line=number,
-            )  # fmt: skip
-        stated = match[1] if match else stated
-    return stated
 
 
 def _header(first: Sequence[str], profile: PointProfile) -> tuple[int, list[str]]:

@@ -23,6 +23,7 @@ from olp.files.fields import (
     NotNegative,
     OffsetName,
     Positive,
+    ProgramDialect,
     Sign,
     Text,
     ToolNumber,
@@ -203,6 +204,13 @@ class JobDefaultsTable(Table):
     length_active: bool = Field(default=False, description="whether the tool length is active at the start")
 
 
+class StylusTable(Table):
+    offset_mm: Triple = Field(
+        description="from the end of the ram to the centre of the tip, in mm; the lever of angular errors"
+    )
+
+
+Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]
 
@@ -238,6 +246,7 @@ class MachineFile(Table):
     )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
+    styli: Styli = Field(default={}, description="tables [styli.LABEL], for the sensors of DMIS programs")
     job_defaults: JobDefaultsTable = Field(
         default_factory=JobDefaultsTable, description="the state at the start of a program"
     )
@@ -265,12 +274,35 @@ class SquarenessTable(Table):
     C0Y_urad: float = Field(default=0.0, description="the squareness of Y to X, in urad")
     B0Z_urad: float = Field(default=0.0, description="the squareness of Z to X, in urad")
     A0Z_urad: float = Field(default=0.0, description="the squareness of Z to Y, in urad")
+    sigma_C0Y_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of C0Y, in urad")
+    sigma_B0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of B0Z, in urad")
+    sigma_A0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of A0Z, in urad")
 
 
 class BacklashTable(Table):
     X_um: float = Field(default=0.0, description="the lost motion of axis X, in um")
     Y_um: float = Field(default=0.0, description="the lost motion of axis Y, in um")
     Z_um: float = Field(default=0.0, description="the lost motion of axis Z, in um")
+    sigma_X_um: NotNegative = Field(default=0.0, description="the standard uncertainty of X_um, in um")
+    sigma_Y_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Y_um, in um")
+    sigma_Z_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Z_um, in um")
+
+
+class CovarianceTable(Table):
+    file: Text | None = Field(
+        default=None,
+        description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
+        "this file; the sigma columns and keys if left out",
+    )
+    growth_per_year: NotNegative = Field(
+        default=0.0,
+        description="the share of themselves by which standard uncertainties grow in a year after measured: "
+        "0.5 makes half as much again",
+    )
+    temperature_K: NotNegative = Field(
+        default=0.0,
+        description="the standard uncertainty of the temperatures of scales and workpiece, in K",
+    )
 
 
 class RepeatabilityTable(Table):
@@ -329,9 +361,7 @@ class ThermalTable(Table):
 class CalibrationFile(Table):
     """olp-calibration-1: the measured errors of one machine, actual minus commanded."""
 
-    not_built: ClassVar[dict[str, str]] = {
-        "covariance": "uncertainty of the calibration",
-    }
+    not_built: ClassVar[dict[str, str]] = {}
     schema_: Literal["olp-calibration-1"] = Field(
         alias="schema", description='the format, "olp-calibration-1"'
     )
@@ -370,6 +400,9 @@ class CalibrationFile(Table):
         default=[], description="tables [[compliance_beam]], beams that bend under the payload"
     )
     thermal: ThermalTable | None = Field(default=None, description="the table [thermal]")
+    covariance: CovarianceTable | None = Field(
+        default=None, description="the table [covariance]: how well all this is known"
+    )
 
     @field_validator("valid_until")
     @classmethod
@@ -439,6 +472,11 @@ class JobFile(Table):
     machine: Text | None = Field(
         default=None, description="the path of the machine file, relative to this file"
     )
+    dialect: ProgramDialect | None = Field(
+        default=None,
+        description="the dialect of the program, where its text and its ending do not say: "
+        + ", ".join(CONTROLLERS),
+    )
     start_mm: Position = Field(
         default_factory=Position,
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
@@ -459,6 +497,7 @@ class JobFile(Table):
         default={}, description="tables [work_offsets.NAME], which override the machine's"
     )
     tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
+    styli: Styli = Field(default={}, description="tables [styli.LABEL], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
 
     @field_validator("payloads")

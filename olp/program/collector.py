@@ -78,7 +78,7 @@ class Collector:
         """All of it, with the frames and path modes of the final `state`. Takes the columns: once only."""
         return Program(
             data=self.data,
-            profile=state.profile,
+            dialect=state.profile,
             toolpath=self._toolpath(state),
             words=self._words() if self.keep_words else None,
             slot=self.columns.take("slot", np.int32, 3),

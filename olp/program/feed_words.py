@@ -13,9 +13,10 @@ from typing import Literal
 import numpy as np
 
 from olp.exceptions import CannotCompute, ProgramError
-from olp.program.feeds import Scan, feeds, governing, lengths_mm, numbers
+from olp.program.feeds import lengths_mm, numbers
 from olp.program.motion import Array, Index
 from olp.program.program import Program, Words
+from olp.program.stated_feeds import feed_words, programmed
 
 Shared = Literal["mean", "least"]
 
@@ -62,9 +63,8 @@ def write_feeds(
     words = program.words
     if words is None:
         raise CannotCompute("the program was read without its words, so none can be changed")
-    scan = Scan.of(program, words, block_delete=block_delete)
-    word, at = scan.of_letter(b"F")
-    move, owner = governing(scan)
+    found = feed_words(program, words, block_delete=block_delete)
+    word, at, move, owner = found.word, found.line, found.move, found.owner
     if not len(move):
         return FeedsWritten(program.data, len(word), 0, 0, 0, ())
     of_move = program.toolpath.line[move].astype(np.int64)
@@ -143,10 +143,7 @@ def check_feeds(before: Program, after: Program, *, block_delete: bool = False) 
         and np.array_equal(here.line, there.line)
     )
     if same and before.words is not None and after.words is not None:
-        first, second = (
-            feeds(Scan.of(p, w, block_delete=block_delete))
-            for p, w in ((before, before.words), (after, after.words))
-        )
+        first, second = (programmed(p, block_delete=block_delete) for p in (before, after))
         # NaN, a feed that nobody knows, stays what it is
         same = bool(((second <= first * (1.0 + _ROUNDING)) | (np.isnan(first) & np.isnan(second))).all())
     if not same:

@@ -95,17 +95,17 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
     marks = _line_heads(text, starts, ends, keep, deleted)
     comments = _drop_comments(text, ends, keep)
     where: Index | None = None
-    compact, begin, stop = _runs(_blanked(text, keep))
+    compact, begin, stop = runs(blanked(text, keep))
     line_breaks = newline
     if begin.size and (compact[begin + (_PAD - 1)] == 32).any():
         # blanks inside words: take them all out
         where = np.flatnonzero(keep)
-        compact, begin, stop = _runs(text[where])
+        compact, begin, stop = runs(text[where])
         line_breaks = np.flatnonzero(compact[_PAD : _PAD + len(where)] == 10)
     body = compact[_PAD : len(compact) - _PAD]
     letter = compact[begin + (_PAD - 1)] & np.uint8(0xDF)
     bad = _misplaced(body, begin, stop, letter)
-    mantissa, decimals, pointed, malformed = _numbers(compact, body, begin, stop)
+    mantissa, decimals, pointed, malformed = numbers(compact, body, begin, stop)
     if malformed.size:
         bad = np.concatenate((bad, begin[malformed]))
 
@@ -144,12 +144,12 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
     )
 
 
-def _blanked(text: Bytes, keep: Mask) -> Bytes:
+def blanked(text: Bytes, keep: Mask) -> Bytes:
     """The text with a blank for all that is not kept."""
     return np.where(keep, text, np.uint8(32))
 
 
-def _runs(text: Bytes) -> tuple[Bytes, Index, Index]:
+def runs(text: Bytes) -> tuple[Bytes, Index, Index]:
     """The text between two pads of line ends, and where runs of the characters of numbers begin and stop."""
     compact = np.full(len(text) + 2 * _PAD + 1, 10, np.uint8)
     compact[_PAD : _PAD + len(text)] = text
@@ -231,7 +231,7 @@ def _misplaced(body: Bytes, begin: Index, stop: Index, letter: Bytes) -> Index:
     return np.concatenate((np.flatnonzero(wrong), begin[~alphabetic]))
 
 
-def _numbers(
+def numbers(
     compact: Bytes, body: Bytes, begin: Index, stop: Index
 ) -> tuple[Index, npt.NDArray[np.int8], Mask, Index]:
     """Mantissa, decimals, has-a-point and the indices of malformed numbers, eight digits at a time."""
@@ -266,7 +266,7 @@ def _numbers(
     decimals = fraction.astype(np.int8)
     malformed = []
     for i in suspects.tolist():
-        parsed = _slow_number(bytes(body[begin[i] : stop[i]]))
+        parsed = slow_number(bytes(body[begin[i] : stop[i]]))
         if parsed is None:
             malformed.append(i)
         else:
@@ -283,7 +283,7 @@ def _eight_digits(window: npt.NDArray[np.uint64], count: Index) -> Index:
     return ((low + high) >> _U(32)).astype(np.int64)
 
 
-def _slow_number(text: bytes) -> tuple[int, int] | None:
+def slow_number(text: bytes) -> tuple[int, int] | None:
     """One number of any length; None where it is not one. Beyond 18 digits the last ones are dropped."""
     body = text[1:] if text[:1] in b"+-" else text
     whole, _, fraction = body.partition(b".")

@@ -6,9 +6,11 @@ documentation alike. G codes are keyed by ten times their number (G5.1 is 51).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+
+from olp.program.dialect import Dialect, Row, Support
 
 
 class Act(IntEnum):
@@ -25,12 +27,15 @@ class Act(IntEnum):
     REFUSE = 8
 
 
-@dataclass(frozen=True, slots=True)
-class Profile:
+_SUPPORT = {Act.CARRY: Support.CARRIED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile(Dialect):
     """One control's reading of word-address text."""
 
-    name: str
-    title: str
+    family: str = "rs274"
+    first: tuple[bytes, ...] = (b"%", b"O|:")
     codes: Mapping[int, Act]
     refusals: Mapping[int, str]
     harmless_m: frozenset[int]
@@ -40,30 +45,20 @@ class Profile:
     motion: int | None
     #: G52 writes the same offset as G92
     g52_is_g92: bool
-    #: path mode at the start where the program sets none, as people name it
-    path_mode: str
-    #: decimals that the control takes in inch programs for a least increment of 0.001 mm
-    inch_decimals: int
-    #: decimals that centre words may have beyond those of positions
-    free_digits: int
     #: canned cycles and G80 are a modal group of their own
     cycles_apart: bool
-    comment: tuple[bytes, bytes] = (b"(", b")")
 
     def dwell_s(self, number: float, *, pointed: bool) -> float:
         """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
         return number / 1000.0 if self.increments_without_point and not pointed else number
 
-    def support(self) -> list[dict[str, str]]:
-        """The support matrix, from the table that the interpreter uses: statement, what becomes of it,
-        why."""
-        what = {Act.CARRY: "carried", Act.REFUSE: "refused", Act.EVENT: "read", Act.MOTION: "corrected"}
+    def rows(self) -> Sequence[Row]:
         return [
-            {
-                "statement": f"G{code / 10:g}",
-                "support": what.get(act, "read"),
-                "why": self.refusals.get(code, "") if act is Act.REFUSE else "",
-            }
+            Row(
+                f"G{code / 10:g}",
+                _SUPPORT.get(act, Support.READ),
+                self.refusals.get(code, "is no code of this control") if act is Act.REFUSE else "",
+            )
             for code, act in sorted(self.codes.items())
         ]
 

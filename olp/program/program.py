@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from olp.program.dialect import Dialect
 from olp.program.profiles import Profile
 from olp.program.state import Capture, PathMode
 from olp.toolpath import Toolpath
@@ -71,13 +72,71 @@ class Hole:
     rests: tuple[tuple[int, float], ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ArcText:
+    """How a program of statements says an arc: bytes `begin`..`end` of what says it beside its end point,
+    indices of the words of its centre (two of them where it stands twice), of its `radius` and of its `angle`
+    in degrees (-1 where not said) and of the direction in which it begins (empty where not said). `whole`:
+    its end point is said in there too. `long` are the bytes that belong to arcs of more than half a circle
+    only."""
+
+    begin: int
+    end: int
+    centres: tuple[tuple[int, int, int], ...]
+    radius: int = -1
+    angle: int = -1
+    direction: tuple[int, ...] = ()
+    whole: bool = False
+    long: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StatedFeeds:
+    """(k,) feeds as they are said: the first `move` of each, its `line`, and the `word` of its number, -1
+    where no word could be changed."""
+
+    move: Index
+    line: Index
+    word: Index
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Statements:
+    """What a program of whole statements has beside its words.
+
+    (n,) `begin`, `end`: the bytes that say the end of each move, -1 where no statement does. (n,)
+    `feed_mm_s`, inf for rapids and NaN where it is not known; (n + 1,) `rest` and `dwell_s` of the places
+    before, between and after the moves; `feeds` are where feeds are said. `arcs` by move. `broken`: the marks
+    of continuation inside words, by word. `rapid` is the line that makes the next statement a rapid; `mark`
+    joins lines, none of which becomes longer than `width` bytes (0: as long as they come); `cards` have
+    their numbers behind that width, in the last eight columns. `strokes` (k, 2):
+    the moves to the place and to the bottom of each hole. `decimal` is the decimal mark of texts
+    whose numbers keep their own form and column, empty for others.
+    """
+
+    begin: Small
+    end: Small
+    feed_mm_s: npt.NDArray[np.float64]
+    rest: npt.NDArray[np.bool_]
+    dwell_s: npt.NDArray[np.float64]
+    arcs: Mapping[int, ArcText]
+    broken: Mapping[int, bytes]
+    strokes: npt.NDArray[np.int64]
+    feeds: StatedFeeds
+    rapid: bytes = b""
+    cards: bool = False
+    mark: bytes = b"$"
+    width: int = 0
+    decimal: bytes = b""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
-    a decimal point are whole units."""
+    a decimal point are whole units. `statements` is there where the text is no blocks of words."""
 
     data: bytes
-    profile: Profile
+    dialect: Dialect
     toolpath: Toolpath
     words: Words | None
     slot: Small
@@ -90,10 +149,17 @@ class Program:
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
     calculator: bool = True
+    statements: Statements | None = None
 
     @property
     def lines(self) -> int:
         return len(self.line_start)
+
+    @property
+    def rs274(self) -> Profile:
+        """The dialect of a program of blocks of words."""
+        assert isinstance(self.dialect, Profile)
+        return self.dialect
 
     def text(self, line: int) -> str:
         """The text of a line, counted from 1, for people."""

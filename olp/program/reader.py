@@ -16,6 +16,7 @@ import numpy.typing as npt
 from olp.exceptions import ProgramError
 from olp.machine import Setup
 from olp.program.collector import Collector
+from olp.program.dialect import Options
 from olp.program.directives import Directives, with_payloads
 from olp.program.lexer import WordChunk, chunks
 from olp.program.modes import PLANE_OF, Context, Modes, check_odd, scaled
@@ -32,15 +33,6 @@ _KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _ALONE = np.array(sorted(CYCLES | PROBES))
 #: Events that need the present position
 _POSITION = (100, 280, 300, 530, 920)
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """How a program is to be read: `block_delete` leaves `/` blocks out; `contour` takes the contour under
-    G41/G42 as the tool path."""
-
-    block_delete: bool = False
-    contour: bool = False
 
 
 def read(

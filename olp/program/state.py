@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from olp.exceptions import ProgramError
 from olp.machine import ZERO, Setup, Vector, WorkOffset
+from olp.program.frames import lever_of, touch_of
 from olp.program.profiles import Profile
 from olp.toolpath import Frame, Touch, carried
 from olp.units import MM_PER_INCH
@@ -154,49 +155,15 @@ class State:
         number = self.spindle if self.spindle is not None else self.length_tool
         if number is None or number == 0:
             return ZERO
-        tool = self.setup.tool(number)
-        if tool is None:
-            raise ProgramError(
-                f"tool {number} is in the spindle but not defined; give [tools.{number}] in the machine or "
-                "job file",
-                line=line,
-            )
-        lever = tool.lever_mm
-        if lever is None:
-            raise ProgramError(
-                f"tool {number} has Z_mm = {tool.length_mm[2]:g}, a touch-off value and no length; "
-                f"give tools.{number}.gauge_to_tip_mm",
-                line=line,
-            )
-        return lever
+        return lever_of(self.setup, number, line)
 
     def _touch(self, name: str, base: Sequence[float], line: int) -> Touch | None:
         """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's
         part; one that G10 L2 changed keeps its own."""
         if name in self.inherited:
             return self.inherited[name]
-        work = self._work_offset(name)
-        if work is not None and work.set_by == "true":
-            return None
-        touch = work or WorkOffset(name, (base[0], base[1], base[2]))
-        length = lever = ZERO
-        if touch.touch_tool is not None:
-            tool = self.setup.tool(touch.touch_tool)
-            if tool is None or tool.lever_mm is None:
-                raise ProgramError(
-                    f"work offset {name} was touched off with tool {touch.touch_tool}, "
-                    "whose lever is not defined; give its Z_mm or gauge_to_tip_mm",
-                    line=line,
-                )
-            length, lever = tool.length_mm, tool.lever_mm
-        at = [
-            touch.offset_mm[i] + length[i] if stated is None else stated
-            for i, stated in enumerate(touch.touched_at_mm)
-        ]
-        payload = touch.touched_payload_kg
-        return (at[0], at[1], at[2]), carried(
-            lever, self.setup.job.payload_kg if payload is None else payload
-        )
+        work = self._work_offset(name) or WorkOffset(name, (base[0], base[1], base[2]))
+        return touch_of(self.setup, work, line)
 
     def _tool_touched(self, line: int) -> Touch | None:
         if self.length_tool is None:

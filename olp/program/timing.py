@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.exceptions import ProgramError, UsageError
-from olp.program.feeds import Scan, feeds, numbers
+from olp.program.feeds import Scan, numbers
 from olp.program.motion import Array, Index, Mask
-from olp.program.program import Program
+from olp.program.program import Program, Statements
+from olp.program.stated_feeds import programmed
 from olp.toolpath import Kind
 
 #: How far a control may round corners where a program does not say: Grbl's default of $11, and what a person
@@ -73,9 +74,11 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
         raise UsageError(f"the tolerance of G64 is {blend_mm:g} mm; expected a length above zero")
     if program.words is None:
         raise UsageError("the program was read without its words; re-timing needs them")
-    scan = Scan.of(program, program.words, block_delete=block_delete)
     path = program.toolpath
-    feed = feeds(scan)
+    feed = np.array(programmed(program, block_delete=block_delete))
+    if program.statements is not None:
+        return _of_statements(program, program.statements, feed, blend_mm)
+    scan = Scan.of(program, program.words, block_delete=block_delete)
     control, blend = _path_control(program, _modes(program, scan), blend_mm)
     rest, dwell = _rests(program, scan)
     probes = np.flatnonzero(path.kind == Kind.PROBE)
@@ -95,9 +98,25 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
     return Timing(feed, control, blend, rest, dwell)
 
 
+def _of_statements(program: Program, said: Statements, feed: Array, blend_mm: float) -> Timing:
+    """Statements say no path mode: the control blends within the tolerance, but for its mode at the start."""
+    count = len(program.toolpath)
+    rest, dwell = said.rest.copy(), said.dwell_s.copy()
+    probes = np.flatnonzero(program.toolpath.kind == Kind.PROBE)
+    rest[probes + 1] = True
+    stops = any(mode.name == "G61.1" for mode in program.path_modes)
+    control = np.full(count, PathControl.EXACT_STOP if stops else PathControl.BLEND, np.uint8)
+    blend = np.full(count, 0.0 if stops else blend_mm)
+    for column in (feed, control, blend, rest, dwell):
+        column.setflags(write=False)
+    return Timing(feed, control, blend, rest, dwell)
+
+
 def path_modes(program: Program, *, block_delete: bool = False) -> tuple[Mode, ...]:
     """The path modes of a program that was read with its words, in the order of lines; before the first one
-    the control blends, with a tolerance of its own."""
+    the control blends, with a tolerance of its own. Statements say none: the machine file does."""
+    if program.statements is not None:
+        return tuple(Mode(m.line, PathControl.EXACT_STOP) for m in program.path_modes if m.name == "G61.1")
     assert program.words is not None
     return _modes(program, Scan.of(program, program.words, block_delete=block_delete))
 
@@ -139,7 +158,7 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     dwell = np.zeros(len(line) + 1)
     word, at = scan.of_letter(b"M")
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
-    if program.profile.name == "linuxcnc":
+    if program.dialect.name == "linuxcnc":
         at, code = at[~np.isin(code, _ALONG)], code[~np.isin(code, _ALONG)]
     late = np.isin(code, _AFTER + _AFTER_ISO if scan.iso else _AFTER)
     rest[np.searchsorted(line, at[late], "right")] = True

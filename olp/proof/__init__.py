@@ -15,7 +15,7 @@ from olp.errormodel.base import Array, Mask
 from olp.exceptions import ProgramError
 from olp.program.program import Program
 from olp.proof.matching import match
-from olp.toolpath import Flag, Kind, Toolpath
+from olp.toolpath import Flag, Toolpath
 
 #: the proof samples so finely that the error bends by less than this share of the tolerance between samples
 _BEND_SHARE = 0.1
@@ -66,7 +66,7 @@ def uncorrected_starts(path: Toolpath, passed: Mask) -> Mask:
     """(n,) feed moves that begin where the move before ended uncorrected, or a canned cycle left the tool."""
     loose = passed | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
     before = np.concatenate(([False], loose[:-1]))
-    return np.asarray(before & (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0), bool)
+    return np.asarray(before & cutting_moves(path), bool)
 
 
 def prove(

@@ -9,11 +9,12 @@ from olp.errormodel import ErrorModel, plays
 from olp.errormodel.base import Array
 from olp.exceptions import ProgramError
 from olp.program.program import Program
-from olp.toolpath import Flag
+from olp.toolpath import Flag, Kind
 
 #: a way-point counts as reached within this where nothing comes nearer; corrections are far smaller
 GATE_MM = 0.05
 _BLOCK = 4096
+_ARCS = (Kind.ARC_CW, Kind.ARC_CCW)
 
 
 def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel, near_mm: float) -> Index:
@@ -36,18 +37,23 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
     actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
     loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)
+    # what takes up lost motion before a whole circle is where that ends, and is no part of an arc
+    curved = np.isin(nominal.kind, _ARCS)
+    straight = ~np.isin(path.kind, _ARCS)
     groups = np.zeros(count, np.int64)
     i = j = 0
     while i < count:
         span = min(_BLOCK, count - i, len(path) - j)
         away = np.abs(actual[j : j + span] - target_mm[i : i + span]).max(axis=1, initial=0.0)
-        near = (away < near_mm) | loose[i : i + span]
+        near = ((away < near_mm) & ~(curved[i : i + span] & straight[j : j + span])) | loose[i : i + span]
         run = span if near.all() else int(np.argmin(near))
         groups[i : i + run] = np.arange(j, j + run)
         i, j = i + run, j + run
         if i == count or (run == span and span):
             continue
         ahead = np.abs(actual[j : j + extra + 1] - target_mm[i]).max(axis=1, initial=0.0)
+        if curved[i]:
+            ahead[straight[j : j + extra + 1]] = np.inf
         skip = (
             int(np.argmax(ahead < near_mm))
             if (ahead < near_mm).any()
@@ -64,4 +70,8 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         groups[i] = j + skip
         extra -= skip
         i, j = i + 1, j + skip + 1
+    last = len(path) - 1
+    if count and groups[-1] < last and np.abs(actual[last] - target_mm[-1]).max() < near_mm:
+        # a whole circle at the end comes to its last point twice
+        groups[-1] = last
     return groups

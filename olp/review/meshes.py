@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from olp.checks.clearance import rotation
 from olp.errormodel.base import Array
 from olp.files.meshes import read_mesh
+from olp.geometry import rotation_matrix
 from olp.machine import Machine, Mesh, Setup
 from olp.units import AXES
 
@@ -64,7 +64,7 @@ def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array) -> Body:
     vertices = vertices * mesh.unit_mm
     offset = None if mesh.frame == "machine" else setup.work_offset(mesh.frame)
     if offset is not None:
-        vertices = vertices @ rotation(offset).T + np.array(offset.offset_mm)
+        vertices = vertices @ rotation_matrix(offset.rotation_deg).T + np.array(offset.offset_mm)
     name = Path(mesh.file).stem
     return Body(f"mesh-{number}", name, mesh.role, vertices - origin_mm, faces)
 

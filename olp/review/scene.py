@@ -33,10 +33,10 @@ class Frame:
 
     @staticmethod
     def of(path: Toolpath) -> Frame:
-        """The work offset of a program that has one and the same all through, else the machine."""
+        """The work offset of a program that has one all through, and not turned, else the machine."""
         used = [path.frames[k] for k in np.unique(path.frame).tolist()]
-        places = {(f.work_offset, *np.round(np.subtract(f.offset_mm, f.length_mm), 9).tolist()) for f in used}
-        if len(places) == 1:
+        places = {(f.work_offset, *np.round(f.origin_mm(), 9).tolist()) for f in used}
+        if len(places) == 1 and all(f.turn is None for f in used):
             name, x, y, z = places.pop()
             return Frame(f"{name}, as programmed", str(name), (x, y, z))
         return Frame("machine, less tool lengths", "machine", (0.0, 0.0, 0.0))
@@ -49,10 +49,21 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Sureness:
+    """How sure the samples are: (n,) `band_mm`, expanded uncertainty (k = 2) in the worst direction, and by
+    layer the probability (n,) that the tip is farther than `within_mm` from its place."""
+
+    within_mm: float
+    band_mm: Single
+    beyond: Mapping[str, Single]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) when they are passed, by the re-timed
     motion where there is one and else by the feed. `sources` are (name, (n,) mm) by size; `report` is that of
-    the correction or verification ("olp-report-1")."""
+    the correction or verification ("olp-report-1"); `sureness` is None where the
+    calibration states no uncertainty."""
 
     name: str
     corrected_name: str
@@ -72,3 +83,4 @@ class Scene:
     report: Mapping[str, Any]
     tolerance_um: float
     tool_radius_mm: float
+    sureness: Sureness | None = None

@@ -3,7 +3,7 @@ tests/benchmarks/bench_clearance.py`.
 
 A free-form part of 300 x 300 mm with ripples, milled in lines of 0.3 mm moves, with a tool of 5 mm radius
 and a holder; the moves are feed moves, the mesh is a fixture, so that all of it counts. Once close above
-the part, once 20 mm above it, once along the wall of a fine tube. """
+the part, once 20 mm above it, once along the wall of a fine tube."""
 
 from __future__ import annotations
 

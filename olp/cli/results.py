@@ -1,0 +1,101 @@
+"""`olp correct --results`: what a measuring machine reported, corrected."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass
+from pathlib import Path
+
+from olp.cli.common import STREAM, exit_for, files_of, given, put, refuse_early, refuse_twice, source, talk
+from olp.cli.layouts import layout_of
+from olp.exceptions import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the call asks for."""
+
+    profile: str | None
+    columns: tuple[str, ...]
+    unit: str | None
+    frames: tuple[str, ...]
+    tools: tuple[str, ...]
+    tip_radius_mm: float | None
+    decimals: int | None
+    hold: bool
+    date: datetime.date | None
+    output: str | None
+    report_file: str | None
+    as_json: bool
+    fail_on: str
+    quiet: bool
+    force: bool
+
+
+def run(results: str | None, machine: str | None, job: str | None, asked: Asked) -> None:
+    """Correct a file of results, write it, and report."""
+    call = given(results, machine, job)
+    output = asked.output or default_output(call.program)
+    as_json = asked.as_json or asked.report_file == STREAM
+    if as_json and output == STREAM:
+        raise UsageError("JSON on stdout does not go with -o -; write the report to a file with --report")
+    inputs = (*call.inputs, *files_of(asked.profile))
+    outputs = files_of(output, asked.report_file)
+    refuse_early(outputs, inputs, force=asked.force)
+    refuse_twice(outputs)
+
+    from olp import report, report_results
+    from olp.files.write import Content, write_files
+    from olp.result_correction import correct_results
+
+    text = source(call.program)
+    result = correct_results(
+        text, call.setup, profile=layout_of(asked.profile, asked.columns, asked.unit, text),
+        frame=_names("--frame", asked.frames), tool=_numbers(asked.tools), tip_radius_mm=asked.tip_radius_mm,
+        decimals=asked.decimals,
+        outside_box="hold" if asked.hold else "refuse", date=asked.date,
+    )  # fmt: skip
+    written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
+    for name in files_of(asked.report_file):
+        from olp import report_files
+
+        written[Path(name)] = report_files.results(result, name, asked.date)
+    write_files(written, force=asked.force, inputs=inputs)
+    on_stderr = output == STREAM
+    if on_stderr:
+        put(result.data)
+    if as_json:
+        put(report.to_json(result.report))
+    elif not asked.quiet:
+        put(report_results.to_text(result.report), err=on_stderr)
+    if not asked.quiet:
+        for path in written:
+            talk(f"wrote {path}")
+    exit_for(result.findings, asked.fail_on)
+
+
+def default_output(program: str) -> str:
+    """PROGRAM.corrected.SUFFIX beside PROGRAM."""
+    path = Path(program)
+    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
+
+
+def _names(option: str, given: tuple[str, ...]) -> str | dict[str, str] | None:
+    """One name for all, or names of the file with those of machine and job."""
+    if len(given) == 1 and "=" not in given[0]:
+        return given[0]
+    pairs = [item.partition("=") for item in given]
+    wrong = next((item for item, (name, _, value) in zip(given, pairs, strict=True) if not value), None)
+    if wrong is not None:
+        raise UsageError(f"{option} {wrong} is given beside others; expected NAME IN FILE=NAME, a pair each")
+    return {name: value for name, _, value in pairs} or None
+
+
+def _numbers(given: tuple[str, ...]) -> int | dict[str, int] | None:
+    named = _names("--tool", given)
+    values = named if isinstance(named, dict) else {"": named or "0"}
+    wrong = next((value for value in values.values() if not value.isdigit()), None)
+    if wrong is not None:
+        raise UsageError(f"--tool {wrong} is no tool number; expected the number of a table [tools.N]")
+    numbers = {name: int(value) for name, value in values.items()}
+    return numbers if isinstance(named, dict) else None if named is None else numbers[""]

@@ -1,0 +1,163 @@
+"""Arcs of programs of statements: centres, radii and angles, and the later parts of arcs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from olp.compensation.arcwords import Arc, solve
+from olp.compensation.rows import Rows
+from olp.geometry import PLANES
+from olp.program.edits import BARE, EditList, Edits
+from olp.program.program import ArcText
+from olp.toolpath import Flag, Kind
+
+if TYPE_CHECKING:
+    from olp.compensation.statements import StatementWriter
+
+#: doubles of positions are good for so many digits behind the point
+MOST_DECIMALS = 10
+#: digits of inserted numbers, where the program itself has as many
+FINE_DECIMALS = 6
+#: pieces of one inserted statement at the most, for their order among insertions at one place
+ROW = 64
+
+
+def arc_edits(writer: StatementWriter, rows: Rows) -> list[Edits]:
+    """Centres, radii and angles of arcs, and the later parts of arcs."""
+    row = np.flatnonzero(
+        np.isin(writer.path.kind[rows.move], (Kind.ARC_CW, Kind.ARC_CCW))
+        & ((rows.flag & np.uint8(Flag.PASS)) == 0)
+        & ~writer.plan.take_up[rows.first : rows.first + len(rows.move)]
+    )
+    if not row.size:
+        return []
+    edits = EditList(writer.prefixes)
+    arcs = solve(writer, rows, row)
+    frame = writer.path.frame[arcs.move]
+    centres = writer.local(arcs.centre, frame).tolist()
+    units, fewest = writer.unit[frame].tolist(), writer.fewest(writer.unit[frame]).tolist()
+    for i in range(len(arcs.row)):
+        arc = arcs.one(i)
+        text = writer.statements.arcs[arc.move]
+        changes = _arc_words(writer, arc, text, centres[i], units[i], fewest[i])
+        if rows.head[arc.row]:
+            for word, mantissa, decimals in changes:
+                _replace(writer, word, mantissa, decimals, edits)
+            if text.long is not None and abs(arc.sweep) <= np.pi:
+                edits.add(*text.long, BARE, 0)
+        else:
+            _arc_again(writer, rows, arc, text, changes, edits)
+    return [edits.done()]
+
+
+def _arc_words(
+    writer: StatementWriter, arc: Arc, text: ArcText, number: list[float], unit: float, fewest: list[int]
+) -> list[tuple[int, int, int]]:
+    """(word, mantissa, decimals) of all that says an arc beside its end; `number` is its centre as said."""
+    out = [
+        _rounded(writer, word, number[axis], fewest[axis] + 1)
+        for words in text.centres
+        for axis, word in enumerate(words)
+    ]
+    if text.radius >= 0:
+        a, b = PLANES[arc.plane][:2]
+        away = (arc.start - arc.centre).tolist()
+        out.append(_rounded(writer, text.radius, math.hypot(away[a], away[b]) / unit, max(fewest) + 1))
+    if text.angle >= 0:
+        out.append(_rounded(writer, text.angle, math.degrees(abs(_sweep(arc))), FINE_DECIMALS))
+    return out
+
+
+def _sweep(arc: Arc) -> float:
+    """The angle between the ends of an arc as they are written."""
+    a, b = PLANES[arc.plane][:2]
+    first, last = (arc.start - arc.centre).tolist(), (arc.end - arc.centre).tolist()
+    angle = math.atan2(last[b], last[a]) - math.atan2(first[b], first[a])
+    return angle + 2 * math.pi * round((arc.sweep - angle) / (2 * math.pi))
+
+
+def _rounded(writer: StatementWriter, word: int, value: float, fewest: int) -> tuple[int, int, int]:
+    decimals = min(max(int(writer.words.decimals[word]), fewest), MOST_DECIMALS)
+    return word, round(value * 10**decimals), decimals
+
+
+def _replace(writer: StatementWriter, word: int, mantissa: int, decimals: int, edits: EditList) -> None:
+    own = int(writer.words.decimals[word])
+    said = int(writer.words.mantissa[word])
+    same = said * 10 ** (decimals - own) if decimals >= own else round(said / 10 ** (own - decimals))
+    if same != mantissa:
+        prefix = writer.statements.broken.get(word, b"")
+        edits.add(int(writer.words.number[word]), int(writer.words.end[word]), mantissa, decimals, prefix)
+        writer.tally.changed_words += 1
+
+
+def _arc_again(
+    writer: StatementWriter,
+    rows: Rows,
+    arc: Arc,
+    text: ArcText,
+    changes: Sequence[tuple[int, int, int]],
+    edits: EditList,
+) -> None:
+    """A later part: all that says the arc, and its end, once more with other numbers."""
+    eol = writer.program.eol(arc.line)
+    numbers = {word: (mantissa, decimals) for word, mantissa, decimals in changes}
+    slot = writer.program.slot[arc.move].tolist()
+    end = {
+        word: (int(rows.mantissa[arc.row, axis]), int(rows.decimals[arc.row, axis]))
+        for axis, word in enumerate(slot)
+    }
+    if text.direction:
+        numbers |= _direction(writer, arc, text)
+    place = int(writer.statements.end[arc.move])
+    order = arc.row * ROW
+    spans = [(text.begin, text.end, numbers | (end if text.whole else {}))]
+    long = text.long if abs(arc.sweep) <= np.pi else None
+    if not text.whole:
+        begin, stop = int(writer.statements.begin[arc.move]), int(writer.statements.end[arc.move])
+        spans.append((begin, stop, end))
+    for begin, stop, values in spans:
+        order = _again(writer, begin, stop, values, long, place, eol, order, edits)
+    writer.tally.inserted_blocks += 1
+
+
+def _again(
+    writer: StatementWriter, begin: int, stop: int, values: dict[int, tuple[int, int]],
+    long: tuple[int, int] | None, place: int, eol: bytes, order: int, edits: EditList,
+) -> int:  # fmt: skip
+    """Bytes once more, with other numbers in place of some words. A comment at the end is left out, and
+    what is `long`."""
+    at, lead = begin, eol
+    for word in sorted(values, key=lambda w: int(writer.words.number[w])):
+        start = int(writer.words.number[word])
+        if long is not None and at <= long[0] < start:
+            lead += writer.program.data[at : long[0]] + writer.program.data[long[1] : start]
+        else:
+            lead += writer.program.data[at:start]
+        edits.add(place, place, *values[word], lead, order)
+        at, lead, order = int(writer.words.end[word]), b"", order + 1
+    trail = writer.program.data[at:stop]
+    comment = trail.rfind(b"$$")
+    if comment >= 0 and b"\n" not in trail[comment:]:
+        trail = trail[:comment].rstrip()
+    edits.add(place, place, BARE, 0, trail, order)
+    return order + 1
+
+
+def _direction(writer: StatementWriter, arc: Arc, text: ArcText) -> dict[int, tuple[int, int]]:
+    """The way in which a part of an arc begins."""
+    first, second = PLANES[arc.plane][:2]
+    way = np.zeros(3)
+    away = arc.start - arc.centre
+    way[first], way[second] = -away[second] * np.sign(arc.sweep), away[first] * np.sign(arc.sweep)
+    way /= np.linalg.norm(way)
+    if writer.turn is not None:
+        way = way @ writer.turn[int(writer.path.frame[arc.move])]
+    return {
+        word: (round(float(way[axis]) * 10**FINE_DECIMALS), FINE_DECIMALS)
+        for axis, word in enumerate(text.direction)
+    }

@@ -1,0 +1,14 @@
+"""What a writing changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts of what was changed."""
+
+    changed_words: int = 0
+    inserted_words: int = 0
+    inserted_blocks: int = 0

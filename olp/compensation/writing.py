@@ -1,0 +1,87 @@
+"""Writes a plan back into the text of its program, whatever the dialect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.holes import HolePlan
+from olp.compensation.lettered import LetteredWriter
+from olp.compensation.plan import Plan
+from olp.compensation.statements import StatementWriter
+from olp.compensation.tally import Tally
+from olp.compensation.writer import Writer
+from olp.errormodel import ErrorModel
+from olp.machine import Vector
+from olp.program.numbertext import Placing
+from olp.program.program import Program
+from olp.units import MM_PER_INCH
+
+_POW10 = 10 ** np.arange(19, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Written:
+    """The corrected bytes, and whether anything of the path is `changed`; (n,) `parts`, how many moves
+    they have for each nominal one; what was changed, and the holes of canned cycles."""
+
+    text: bytes
+    changed: bool
+    parts: npt.NDArray[np.int32]
+    tally: Tally
+    holes: HolePlan
+
+
+def write(
+    program: Program,
+    rows: Plan,
+    model: ErrorModel,
+    *,
+    tolerance_mm: float,
+    increments_mm: Vector,
+    stamp: bytes,
+) -> Written:
+    """Write a plan. The program is one that was read with its words. Raises ProgramError where it cannot be
+    said in its dialect."""
+    if program.statements is not None:
+        lettered = bool(program.statements.decimal) and not _plain(program, rows)
+        kind = LetteredWriter if lettered else StatementWriter
+        made = kind(program, rows, model, tolerance_mm=tolerance_mm, increments_mm=increments_mm, stamp=stamp)
+        text = made.text()
+        return Written(text, text != program.data, made.parts, made.tally, HolePlan.of(program, rows, model))
+    writer = Writer(program, rows, model, tolerance_mm=tolerance_mm, increments_mm=increments_mm, stamp=stamp)
+    text = writer.text()
+    return Written(text, writer.changed, writer.parts, writer.tally, writer.holes)
+
+
+def _plain(program: Program, rows: Plan) -> bool:
+    """Whether numbers that keep their own form are all written as the writer of statements does: no column is
+    padded, no number has a sign or zeros that it need not have, none is shared, and nothing stands behind a
+    move that is split."""
+    words, said = program.words, program.statements
+    if words is None or said is None or not len(words.start):
+        return False
+    split = np.unique(rows.move[1:][rows.move[1:] == rows.move[:-1]])
+    if not np.isin(said.end[split], program.line_end).all():
+        return False
+    if said.decimal != b"." or any(f.unit_mm not in (1.0, MM_PER_INCH) for f in program.toolpath.frames):
+        return False
+    slot = program.slot[program.slot >= 0]
+    if len(slot) != program.slot.size or len(slot) != len(words.start):
+        return False
+    text = np.frombuffer(program.data, np.uint8)
+    size = np.abs(words.mantissa)
+    whole = size // _POW10[words.decimals]
+    length = 1 + (whole[:, None] >= _POW10[1:10]).sum(axis=1) + (words.mantissa < 0)
+    length += np.where(words.decimals > 0, words.decimals + 1, 0)
+    # zero behind a minus, which rounding leaves
+    length += (size == 0) & (text[words.number] == ord("-"))
+    # a plus, zeros in front and exponents all show in the length
+    if (words.end - words.number != length).any() or (slot != np.arange(len(slot))).any():
+        return False
+    return (
+        not Placing(program.data, words.number, words.end).padded
+        and not (text[words.number] == ord("+")).any()
+    )

@@ -1,0 +1,110 @@
+"""The statements of APT and CLDATA: what becomes of each. One table for the reader and for `olp inspect`.
+
+Forms after ISO 4343 and ISO 3592, and the habits of Creo, NX, CATIA, SolidWorks CAM and Autodesk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from olp.program.dialect import Dialect, Row, Support, statement_rows
+
+_C, _R, _X = Support.CORRECTED, Support.READ, Support.CARRIED
+_NO = Support.REFUSED
+
+_CONTOUR = "drives the tool along geometry that only an APT processor knows; send its output (CLDATA)"
+_LOGIC = "branches or repeats; send the output of the APT processor (CLDATA)"
+_TURNS = "turns the part or the head, and where the part is after that is not known"
+_GEOMETRY = "defines geometry; send the output of the APT processor (CLDATA), which has points"
+_CYCLE = "is a path that the control makes itself"
+
+TABLE: Mapping[bytes, tuple[Support, str]] = {
+    b"GOTO": (_C, "points with or without a tool axis"),
+    b"GODLTA": (_C, "distances, which do not drift; one number is along the tool axis"),
+    b"CIRCLE": (_C, "arc to the next GOTO: centre, normal, radius (Creo, NX, SolidWorks CAM)"),
+    b"MOVARC": (_C, "arc to the next GOTO: centre, normal, radius, ANGLE (Autodesk)"),
+    b"TLON": (_C, "arc of CATIA: INDIRV, TLON,GOFWD/(CIRCLE…),ON,(LINE…)"),
+    b"INDIRV": (_R, "the direction in which the next TLON begins"),
+    b"FROM": (_R, "where the tool stands; passes as it is"),
+    b"GOHOME": (_R, "goes where FROM was; passes as it is"),
+    b"RAPID": (_R, "for the next GOTO only"),
+    b"FEDRAT": (_R, "MMPM, IPM, MMPR, IPR, in either order"),
+    b"UNITS": (_R, "MM or INCH"),
+    b"UNIT": (_R, "MM or INCH"),
+    b"LOADTL": (_R, "the tool and its length, from the tables of machine and job"),
+    b"LOAD": (_R, "LOAD/TOOL: as LOADTL"),
+    b"TOOLNO": (_R, "as LOADTL"),
+    b"TURRET": (_R, "as LOADTL"),
+    b"CYCLE": (_R, "the GOTOs under it are places of holes: corrected where the tool meets the part"),
+    b"CUTCOM": (_R, "LEFT and RIGHT are refused, unless --contour says that points are the tool's path"),
+    b"MULTAX": (_R, "points carry a tool axis"),
+    b"TLAXIS": (_R, "the tool axis from here on"),
+    b"CSYS": (_R, "a coordinate system: a frame of the job"),
+    b"MSYS": (_R, "a coordinate system: a frame of the job"),
+    b"ORIGIN": (_R, "a coordinate system: a frame of the job"),
+    b"$$-> CSYS": (_R, "Creo's coordinate system, in a comment: a frame of the job"),
+    b"TRACUT": (_R, "NOMORE only"),
+    b"COPY": (_NO, "repeats moves in other places from the same text; send the output of the APT processor"),
+    b"SPINDL": (_R, "the spindle, for feeds by turns"),
+    b"DELAY": (_R, "a dwell in seconds"),
+    b"STOP": (_R, "rests"),
+    b"OPSTOP": (_R, "rests"),
+    b"RETRCT": (_R, "a move of the control: positions are unknown until the next GOTO"),
+    b"GOCLER": (_R, "a move of the control: positions are unknown until the next GOTO"),
+    b"FINI": (_R, "the end"),
+    b"INSERT": (_X, "text for the control; refused where it reads as a block that moves"),
+    **dict.fromkeys(
+        (
+            b"PARTNO", b"PPRINT", b"REMARK", b"REM", b"TITLE", b"TPRINT", b"DISPLY", b"PRINT", b"PAINT",
+            b"TOOL PATH", b"END-OF-PATH", b"END", b"MACHIN", b"INTOL", b"OUTTOL", b"TOLER", b"CUTTER",
+            b"TOOL", b"SELECT", b"SELCTL", b"COOLNT", b"CLEARP", b"CLRSRF", b"AUXFUN", b"PREFUN", b"SEQNO",
+            b"SETUP", b"TRNTYP", b"ARCSLP", b"LEADER", b"NOPOST", b"CLPRNT",
+            b"PITCH", b"MCHTOL", b"DPMULTAX", b"INDEX", b"TLDATA",
+            b"CSI_SET_FLUTE_LENGTH", b"CSI_SET_EXTENSION_LENGTH", b"TOOL_OFFSET",
+            b"CLAMP", b"CHKPTS", b"MAXIPM", b"LINTOL",
+        ),
+        (_X, ""),
+    ),
+    **dict.fromkeys(
+        (b"GOLFT", b"GORGT", b"GOFWD", b"GOBACK", b"GOUP", b"GODOWN", b"GO", b"TLLFT", b"TLRGT", b"TLNDON",
+         b"TLOFPS", b"TLONPS", b"INDIRP", b"AUTOPS", b"CONTUR", b"PROFIL", b"POCKET", b"SCURV", b"NOPS"),
+        (_NO, _CONTOUR),
+    ),
+    **dict.fromkeys(
+        (b"POINT", b"LINE", b"PLANE", b"VECTOR", b"MATRIX", b"CYLNDR", b"SPHERE", b"PATERN", b"TABCYL",
+         b"ELLIPS", b"REFSYS", b"ZSURF", b"OBTAIN"),
+        (_NO, _GEOMETRY),
+    ),
+    **dict.fromkeys(
+        (b"MACRO", b"TERMAC", b"CALL", b"LOOPST", b"LOOPND", b"JUMPTO", b"IF", b"TRANTO", b"CALSUB", b"BREAK",
+         b"RESERV", b"READ", b"REPEAT", b"DO"),
+        (_NO, _LOGIC),
+    ),
+    **dict.fromkeys((b"ROTABL", b"ROTATE", b"ROTHED", b"TILT", b"PALLET"), (_NO, _TURNS)),
+    **dict.fromkeys((b"THREAD", b"NURBS", b"SPLINE", b"BSPLIN", b"POLYLN", b"PIERCE"), (_NO, _CYCLE)),
+    b"TRANS": (_NO, "shifts coordinates in the post-processor; state the shift as a frame of the job"),
+    b"MIRROR": (_NO, "mirrors coordinates in the post-processor"),
+}  # fmt: skip
+
+#: statements that take the rest of their line as text
+FREE = (b"PARTNO", b"PPRINT", b"INSERT", b"REMARK", b"REM", b"TITLE", b"TPRINT", b"DISPLY", b"CATPROCESS")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Apt(Dialect):
+    """APT and CLDATA."""
+
+    family: str = "apt"
+
+    def rows(self) -> Sequence[Row]:
+        return statement_rows(TABLE)
+
+
+APT = Apt(
+    name="apt",
+    title="APT and cutter-location data (ISO 4343, ISO 3592)",
+    path_mode="the post-processor's",
+    comment=(b"$$ ", b""),
+    first=(b"%", b"$$*", b"PARTNO"),
+)

@@ -1,0 +1,101 @@
+"""The statements of DMIS: what becomes of each. One table for the reader and for `olp inspect`.
+
+Forms after ISO 22093, and the habits of WinWerth and MODUS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from olp.program.dialect import Dialect, Row, Support, statement_rows
+
+_C, _R, _X, _NO = Support.CORRECTED, Support.READ, Support.CARRIED, Support.REFUSED
+
+_FEATURE = "nominals, tolerances and actuals are never edited"
+_RUN_TIME = "goes where only the run of the program decides"
+
+TABLE: Mapping[bytes, tuple[Support, str]] = {
+    b"GOTO": (_C, "x,y,z or CART,x,y,z; POL and INCR are refused"),
+    b"PTMEAS": (_C, "CART,x,y,z, with or without a direction, inside MEAS or RMEAS"),
+    b"MEAS": (_R, "a feature is measured; without a PTMEAS the control makes its own points"),
+    b"RMEAS": (_R, "as MEAS; its points are corrected where they are nominally"),
+    b"ENDMES": (_R, ""),
+    b"FROM": (_R, "where GOHOME goes; passes as it is"),
+    b"GOHOME": (_R, "passes as it is"),
+    b"RAPID": (_R, "for the next GOTO"),
+    b"UNITS": (_R, "MM, CM, M or INCH"),
+    b"SNSDEF": (_R, "FIXED,CART: the offset of the stylus, its lever"),
+    b"SNSLCT": (_R, "the stylus; its offset from the job, else from SNSDEF"),
+    b"TRANS": (_R, "D() = …: a frame of the job, under the label of the datum"),
+    b"ROTATE": (_R, "D() = …: a frame of the job, under the label of the datum"),
+    b"DATSET": (_R, "D() = …: a frame of the job, under the label of the datum"),
+    b"RECALL": (_R, "D(): a frame of the job, under the label of the datum"),
+    b"MODE": (_R, "what is said under MODE/MAN is left to the person"),
+    b"TECOMP": (_R, "thermal compensation is found and warned of"),
+    b"TEMPR": (_R, "thermal compensation is found and warned of"),
+    b"FEDRAT": (_R, "POSVEL and MESVEL in MMPS, MPM, IPS or IPM"),
+    b"IF": (_R, "points are corrected on both ways; frames and styli must not change there"),
+    b"ELSE": (_R, ""),
+    b"ELSEIF": (_R, ""),
+    b"ENDIF": (_R, ""),
+    b"DO": (_R, "points are corrected; frames and styli must not change there"),
+    b"ENDDO": (_R, ""),
+    b"MACRO": (_R, "M() = MACRO … ENDMAC: refused where it moves"),
+    b"ENDMAC": (_R, ""),
+    b"CALL": (_R, "a macro of this program, which does not move"),
+    b"ENDFIL": (_R, "the end"),
+    **dict.fromkeys(
+        (b"FEAT", b"TOL", b"CONST", b"DATDEF", b"DATTRG", b"OUTPUT", b"EVAL", b"REFMNT", b"BOUND"),
+        (_X, _FEATURE),
+    ),
+    **dict.fromkeys(
+        (
+            b"FILNAM", b"DMISMN", b"DMISMD", b"DVPOFT", b"DECPL", b"TEXT", b"SNSET", b"ACLRAT", b"FLY",
+            b"PRCOMP", b"WKPLAN", b"SAVE", b"DISPLY", b"DISPLAY", b"VFORM", b"OPEN", b"CLOSE", b"WRITE",
+            b"REPORT", b"GEOALG", b"ALGDEF", b"LITDEF", b"FILDEF", b"CZSLCT", b"CZONE", b"PIEZOWFP",
+            b"POINTDIST", b"SCANFILTER", b"SPLINESCAN3D", b"W3D", b"DELETE", b"DEVICE", b"DID", b"FINPOS",
+            b"MFGDEV", b"PARTID", b"PARTREV", b"PARTSER", b"QISDEF", b"OPERID", b"PLANID", b"LOTID", b"DATE",
+            b"TIME", b"CMPNTGRP", b"SENSOR", b"SNSMNT", b"SNSGRP", b"WRIST", b"EXTENS", b"THLDEF", b"CLMPID",
+            b"CLMPSN", b"FIXTID", b"FIXTSN", b"PREVOP", b"PROCID", b"ROTDEF", b"CRGDEF", b"ERROR", b"BADTST",
+            b"ALGOR", b"LOTNUM", b"KEYCHAR", b"QUERY", b"VALUE", b"LIGHTOPTION", b"SIMREQT", b"UNCERTSET",
+            b"UNCERTALG", b"ENDXTN", b"DECL", b"PSTHRU",
+        ),
+        (_X, ""),
+    ),
+    **dict.fromkeys(
+        (b"PATH", b"PAMEAS", b"SCNMOD", b"SCNSET", b"SCNPLN", b"SCAN"),
+        (_NO, "scans along a path that is not read; measure with PTMEAS, or correct the results"),
+    ),
+    **dict.fromkeys(
+        (b"JUMPTO", b"XTERN", b"INCLUD", b"LOCATE", b"ITERAT", b"BFSET",
+         b"PTBUFF", b"CALIB", b"RESUME"),
+        (_NO, _RUN_TIME),
+    ),
+    **dict.fromkeys(
+        (b"ASSIGN", b"OBTAIN", b"PROMPT"), (_X, "a motion that names what it sets is refused")
+    ),
+    **dict.fromkeys((b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves what is not read")),
+}  # fmt: skip
+
+#: majors of assignments that run and input statements make; their value is text or logic, never motion
+FREE = (b"TEXT", b"DISPLAY", b"PSTHRU")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dmis(Dialect):
+    """DMIS."""
+
+    family: str = "dmis"
+
+    def rows(self) -> Sequence[Row]:
+        return statement_rows(TABLE)
+
+
+DMIS = Dmis(
+    name="dmis",
+    title="DMIS part programs of coordinate measuring machines (ISO 22093)",
+    path_mode="the control's own approach and retract",
+    comment=(b"$$ ", b""),
+    first=(b"FILNAM|DMISMN|DMISMD",),
+)

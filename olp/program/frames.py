@@ -1,0 +1,151 @@
+"""Named frames, tools and their levers, as frames of a toolpath: shared by all readers of programs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.exceptions import ProgramError
+from olp.machine import ZERO, Setup, Vector, WorkOffset
+from olp.toolpath import Frame, Touch, carried
+
+Array = npt.NDArray[np.float64]
+Turn = tuple[Vector, Vector, Vector]
+
+UP: Vector = (0.0, 0.0, 1.0)
+#: A direction is an axis of the machine where its other components are below this.
+ALONG = 1e-7
+
+
+def turn_of(angles_deg: Vector) -> Turn | None:
+    """The rows of Rz(C) Ry(B) Rx(A); None where nothing turns."""
+    if not any(angles_deg):
+        return None
+    (ca, cb, cc), (sa, sb, sc) = np.cos(np.radians(angles_deg)), np.sin(np.radians(angles_deg))
+    rows = (
+        (cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa),
+        (sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa),
+        (-sb, cb * sa, cb * ca),
+    )
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in rows)
+    return (a, b, c)
+
+
+def turned(turn: Turn | None, vector: Vector) -> Vector:
+    """A direction of a frame, as the machine sees it."""
+    if turn is None:
+        return vector
+    x, y, z = (sum(r * v for r, v in zip(row, vector, strict=True)) for row in turn)
+    return (x, y, z)
+
+
+def lever_of(setup: Setup, number: int, line: int) -> Vector:
+    """Gauge point to tip of a tool. Raises ProgramError where it is not defined."""
+    tool = setup.tool(number)
+    if tool is None:
+        raise ProgramError(
+            f"tool {number} is in the spindle but not defined; give [tools.{number}] in the machine or "
+            "job file",
+            line=line,
+        )
+    lever = tool.lever_mm
+    if lever is None:
+        raise ProgramError(
+            f"tool {number} has Z_mm = {tool.length_mm[2]:g}, a touch-off value and no length; "
+            f"give tools.{number}.gauge_to_tip_mm",
+            line=line,
+        )
+    return lever
+
+
+def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
+    """Where a work offset was touched off on the raw machine, axis position, lever and payload; None where it
+    was located by other means."""
+    if work.set_by == "true":
+        return None
+    length = lever = ZERO
+    if work.touch_tool is not None:
+        tool = setup.tool(work.touch_tool)
+        if tool is None or tool.lever_mm is None:
+            raise ProgramError(
+                f"work offset {work.name} was touched off with tool {work.touch_tool}, "
+                "whose lever is not defined; give its Z_mm or gauge_to_tip_mm",
+                line=line,
+            )
+        length, lever = tool.length_mm, tool.lever_mm
+    at = [
+        work.offset_mm[i] + length[i] if stated is None else stated
+        for i, stated in enumerate(work.touched_at_mm)
+    ]
+    payload = setup.job.payload_kg if work.touched_payload_kg is None else work.touched_payload_kg
+    return (at[0], at[1], at[2]), carried(lever, payload)
+
+
+class FrameTable:
+    """Frames of one reading: each is made once, where it is first used."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.frames: list[Frame] = []
+        self._index: dict[Frame, int] = {}
+
+    def work_offset(self, name: str, line: int, what: str) -> WorkOffset:
+        """A frame of machine or job by its name. Raises ProgramError: never the identity in silence."""
+        found = self.setup.work_offset(name)
+        if found is None:
+            raise ProgramError(
+                f"{what} needs the frame {name}, which is not defined; give [work_offsets.{name}] in the job "
+                "file: X_mm, Y_mm, Z_mm and, where it is turned, A_deg, B_deg, C_deg",
+                line=line,
+            )
+        return found
+
+    def index(
+        self,
+        work: WorkOffset,
+        line: int,
+        *,
+        unit_mm: float,
+        tool: int | None = None,
+        length: Vector = ZERO,
+        lever: Vector = ZERO,
+        axis: Vector = UP,
+        tool_touched: Touch | None = None,
+    ) -> int:
+        """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
+        machine from tip to gauge point. Raises ProgramError for a tilted tool with a lever to the side."""
+        if axis != UP:
+            length, lever = (_tilted(v, axis, tool, line) for v in (length, lever))
+        x, y, z = (o + n for o, n in zip(work.offset_mm, length, strict=True))
+        frame = Frame(
+            unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=lever, tool=tool,
+            work_offset=work.name, touched=touch_of(self.setup, work, line), tool_touched=tool_touched,
+            turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg,
+        )  # fmt: skip
+        return self._known(frame)
+
+    def lifted(self, number: int, lift: Vector) -> int:
+        """A frame in which the tip stays off the points that are said."""
+        frame = self.frames[number]
+        x, y, z = (o + v for o, v in zip(frame.offset_mm, lift, strict=True))
+        return self._known(replace(frame, offset_mm=(x, y, z), lift_mm=lift))
+
+    def _known(self, frame: Frame) -> int:
+        known = self._index.get(frame)
+        if known is None:
+            known = self._index[frame] = len(self.frames)
+            self.frames.append(frame)
+        return known
+
+
+def _tilted(vector: Vector, axis: Vector, tool: int | None, line: int) -> Vector:
+    if vector[0] or vector[1]:
+        raise ProgramError(
+            f"tool {tool} is tilted and has a lever across its axis, and how the head turns that one is not "
+            "known; give its X and Y as 0",
+            line=line,
+        )
+    x, y, z = (vector[2] * a for a in axis)
+    return (x, y, z)

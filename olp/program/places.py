@@ -1,0 +1,21 @@
+"""The frame of positions in a named work offset with a tool: refused where either is not defined."""
+
+from __future__ import annotations
+
+from olp.machine import ZERO, Setup
+from olp.program.frames import FrameTable, lever_of
+
+
+def frame_index(
+    table: FrameTable, setup: Setup, name: str, tool: int | None, unit_mm: float, line: int
+) -> int:
+    """The number of the frame; `tool` None is the one in the spindle at the start. Raises ProgramError."""
+    work = table.work_offset(name, line, "this position")
+    number = setup.machine.default_tool if tool is None else tool
+    length = lever = ZERO
+    if number:
+        lever = lever_of(setup, number, line)
+        found = setup.tool(number)
+        if found is not None and setup.machine.length_active:
+            length = found.length_mm
+    return table.index(work, line, unit_mm=unit_mm, tool=number or None, length=length, lever=lever)

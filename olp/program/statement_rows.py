@@ -1,0 +1,297 @@
+"""What the reading of a program of statements collects: points of a chunk, then words, moves and arcs of all
+of it, at its end the `Program`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.program.columns import Columns
+from olp.program.dialect import Dialect
+from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
+from olp.program.statement_lexer import Chunk, Field, Statement, is_cards
+from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+_POW10 = 10.0 ** np.arange(19)
+_NONE = (-1, -1, -1)
+#: columns of cards and of old terminals: a text that keeps to them goes on keeping to them
+_WIDTHS = (72, 80)
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point that was read by itself: its line, the bytes of its statement, the fields of its coordinates
+    and of its direction, and whether these are distances (then one alone is along Z)."""
+
+    line: int
+    begin: int
+    end: int
+    fields: Sequence[Field]
+    direction: Sequence[Field] = ()
+    incremental: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class Points:
+    """The points of a chunk in order: (m,) `line` from 1, `begin` and `end` of their statements, (m, 3)
+    `slot` word or -1, `value` as written, `direction` (NaN where none is said), (m,) `incremental`."""
+
+    line: Index
+    begin: Index
+    end: Index
+    slot: Index
+    value: Array
+    direction: Array
+    incremental: Mask
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+class StatementCollector:
+    """Columns of one program on their way. Without `keep_words` those that only writing needs are left
+    out."""
+
+    def __init__(self, data: bytes, dialect: Dialect, *, keep_words: bool) -> None:
+        self.data, self.dialect, self.keep_words = data, dialect, keep_words
+        self.columns = Columns(len(data) // 12)
+        self.moves = self.words = self._base = 0
+        self._lone: list[tuple[int, int, bool, int, int]] = []
+        self.arcs: dict[int, ArcText] = {}
+        self.broken: dict[int, bytes] = {}
+        self.strokes: list[tuple[int, int]] = []
+        self.remarks: dict[str, tuple[int, str]] = {}
+        self._feeds: list[tuple[int, float, int, int]] = [(0, float("nan"), 0, -1)]
+        self.pauses: list[tuple[int, float]] = []
+
+    # -- words and points of a chunk -----------------------------------------------------------------
+
+    def begin(self, chunk: Chunk) -> None:
+        """Begin a chunk: its lines, and the words of its plain points."""
+        self.columns.put("line_start", chunk.line_start, np.int32)
+        self.columns.put("line_end", chunk.line_end, np.int32)
+        self._base = self.words
+        self._put_words(chunk.mantissa, chunk.decimals, chunk.pointed, chunk.start, chunk.end)
+
+    def finish(self) -> None:
+        """End a chunk: the words that were read alone stand behind those of its plain points."""
+        if self._lone:
+            mantissa, decimals, pointed, start, end = zip(*self._lone, strict=True)
+            self.words -= len(self._lone)
+            self._lone = []
+            self._put_words(mantissa, decimals, pointed, start, end)
+
+    def points(self, chunk: Chunk, alone: Sequence[Point]) -> Points:
+        """The points of a chunk, those that were read in columns and those that were read alone."""
+        three = np.arange(3)
+        slot = chunk.first[:-1, None] + three
+        direction = np.full((len(slot), 3), np.nan)
+        value = chunk.mantissa / _POW10[chunk.decimals]
+        wide = chunk.width == 6
+        if wide.any():
+            direction[wide] = value[slot[wide] + 3]
+        out = Points(
+            line=chunk.point + (chunk.first_line + 1),
+            begin=chunk.line_start[chunk.point],
+            end=chunk.line_end[chunk.point],
+            slot=slot + self._base,
+            value=value[slot],
+            direction=direction,
+            incremental=np.zeros(len(slot), bool),
+        )
+        return _merged(out, [self._alone(p) for p in alone]) if alone else out
+
+    def _alone(self, point: Point) -> tuple[Point, tuple[int, ...], Array, Array]:
+        slot = tuple(self.word(f) for f in point.fields)
+        value = np.array([_value(f) for f in point.fields])
+        if len(slot) == 1:
+            slot, value = (-1, -1, slot[0]), np.array([0.0, 0.0, value[0]])
+        direction = np.array([_value(f) for f in point.direction] or [np.nan] * 3)
+        return point, slot, value, direction
+
+    def word(self, field: Field) -> int:
+        """A word of its own for a number; returns its index."""
+        found = field.number
+        assert found is not None
+        if not self.keep_words:
+            return -1
+        mantissa, decimals = found
+        said = self.data[field.start : field.end]
+        if b"$" in said:
+            at = said.index(b"$")
+            stop = max(said.rfind(b"\n"), said.rfind(b"\r")) + 1
+            self.broken[self.words] = said[at:stop]
+        self._lone.append((mantissa, decimals, b"." in said, field.start, field.end))
+        self.words += 1
+        return self.words - 1
+
+    def _put_words(
+        self,
+        mantissa: npt.ArrayLike,
+        decimals: npt.ArrayLike,
+        pointed: npt.ArrayLike,
+        start: npt.ArrayLike,
+        end: npt.ArrayLike,
+    ) -> None:
+        count = len(np.asarray(start))
+        if self.keep_words:
+            self.columns.put("mantissa", mantissa, np.int64)
+            self.columns.put("decimals", decimals, np.int8)
+            self.columns.put("pointed", pointed, np.bool_)
+            self.columns.put("word_start", start, np.int32)
+            self.columns.put("word_end", end, np.int32)
+        self.words += count
+
+    # -- moves ---------------------------------------------------------------------------------------
+
+    def put_moves(
+        self,
+        kind: npt.NDArray[np.uint8],
+        flag: npt.NDArray[np.uint8],
+        line: npt.ArrayLike,
+        frame: npt.ArrayLike,
+        end_mm: Array,
+        slot: npt.ArrayLike,
+        begin: npt.ArrayLike,
+        end: npt.ArrayLike,
+    ) -> None:
+        self.columns.put("kind", kind, np.uint8)
+        self.columns.put("flag", flag, np.uint8)
+        self.columns.put("line", line, np.int32)
+        self.columns.put("frame", frame, np.int32)
+        self.columns.put("end", end_mm, np.float64)
+        if self.keep_words:
+            self.columns.put("slot", slot, np.int32)
+            self.columns.put("begin_byte", begin, np.int32)
+            self.columns.put("end_byte", end, np.int32)
+        self.moves += len(kind)
+
+    def put_lone(
+        self,
+        kind: Kind,
+        flag: Flag,
+        line: int,
+        frame: int,
+        end_mm: Iterable[float],
+        slot: Sequence[int] = _NONE,
+    ) -> None:
+        """One move without a statement that could be edited."""
+        self.put_moves(
+            np.array([kind], np.uint8), np.array([flag], np.uint8), [line], [frame],
+            np.array([list(end_mm)], float), [slot], [-1], [-1],
+        )  # fmt: skip
+
+    def put_feed(self, move: int, mm_s: float, line: int, word: int = -1) -> None:
+        """A feed from a move on, and the word that says it."""
+        self._feeds.append((move, mm_s, line, word))
+
+    def put_arcs(self, move: Index, centre: Array, plane: Index, sweep: Array) -> None:
+        self.columns.put("arc_move", move, np.int64)
+        self.columns.put("arc_centre", centre, np.float64)
+        self.columns.put("arc_plane", plane, np.int8)
+        self.columns.put("arc_sweep", sweep, np.float64)
+
+    # -- the end -------------------------------------------------------------------------------------
+
+    def program(
+        self, frames: Sequence[Frame], start_mm: tuple[float, float, float], end_line: int, rapid: bytes
+    ) -> Program:
+        """All of it. Takes the columns: once only."""
+        take = self.columns.take
+        kind = take("kind", np.uint8)
+        arcs = Arcs(
+            take("arc_move", np.int64), take("arc_centre", np.float64, 3), take("arc_plane", np.int8),
+            take("arc_sweep", np.float64),
+        )  # fmt: skip
+        path = Toolpath(
+            kind=kind, flag=take("flag", np.uint8), line=take("line", np.int32),
+            frame=take("frame", np.int32), end_mm=take("end", np.float64, 3), frames=tuple(frames), arcs=arcs,
+            start_mm=start_mm,
+        )  # fmt: skip
+        line_start, line_end = take("line_start", np.int32), take("line_end", np.int32)
+        longest = int((line_end - line_start).max(initial=0))
+        rest, dwell = np.zeros(len(kind) + 1, bool), np.zeros(len(kind) + 1)
+        for move, seconds in self.pauses:
+            rest[move] = True
+            dwell[move] += seconds
+        cards = is_cards(self.data)
+        move, line, word = np.array([(m, n, w) for m, _, n, w in self._feeds], np.int64).T
+        feeds = StatedFeeds(move, line, word)
+        statements = Statements(
+            begin=take("begin_byte", np.int32), end=take("end_byte", np.int32),
+            feed_mm_s=self._feed(kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
+            broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
+            feeds=feeds, rapid=rapid,
+            cards=cards,
+            width=72 if cards else next((w for w in _WIDTHS if longest <= w), 0),
+        )  # fmt: skip
+        count = len(arcs)
+        return Program(
+            data=self.data,
+            dialect=self.dialect,
+            toolpath=path,
+            words=self._words() if self.keep_words else None,
+            slot=take("slot", np.int32, 3),
+            arc_slots=ArcSlots(np.full((count, 5), -1, np.int32), np.ones(count, bool)),
+            line_start=line_start,
+            line_end=line_end,
+            remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
+            end_line=end_line,
+            statements=statements,
+        )
+
+    def _feed(self, kind: npt.NDArray[np.uint8], flag: npt.NDArray[np.uint8]) -> Array:
+        move, value, *_ = (np.array(column) for column in zip(*self._feeds, strict=True))
+        out = value[np.searchsorted(move, np.arange(len(kind)), "right") - 1]
+        out[kind == Kind.RAPID] = np.inf
+        out[(flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
+        return np.asarray(out, float)
+
+    def _words(self) -> Words:
+        """Words as they came, which is not in the order of lines: so nothing leads from lines to words."""
+        take = self.columns.take
+        start = take("word_start", np.int32)
+        return Words(
+            letter=np.zeros(len(start), np.uint8),
+            mantissa=take("mantissa", np.int64),
+            decimals=take("decimals", np.int8),
+            pointed=take("pointed", np.bool_),
+            start=start,
+            number=start,
+            end=take("word_end", np.int32),
+            first_word=np.zeros(0, np.int32),
+        )
+
+
+def _value(field: Field) -> float:
+    found = field.number
+    assert found is not None
+    return found[0] / 10.0 ** found[1]
+
+
+def _merged(points: Points, alone: Sequence[tuple[Point, tuple[int, ...], Array, Array]]) -> Points:
+    """Points read in columns and points read alone, in the order of their lines."""
+    more = Points(
+        line=np.array([p.line for p, *_ in alone], np.int64),
+        begin=np.array([p.begin for p, *_ in alone], np.int64),
+        end=np.array([p.end for p, *_ in alone], np.int64),
+        slot=np.array([s for _, s, _, _ in alone], np.int64),
+        value=np.array([v for _, _, v, _ in alone]),
+        direction=np.array([d for *_, d in alone]),
+        incremental=np.array([p.incremental for p, *_ in alone]),
+    )
+    order = np.argsort(np.concatenate((points.line, more.line)), kind="stable")
+    columns = (
+        np.concatenate((getattr(points, name), getattr(more, name)))[order] for name in Points.__slots__
+    )
+    return Points(*columns)
+
+
+__all__ = ["Point", "Points", "Statement", "StatementCollector"]

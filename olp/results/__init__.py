@@ -1,0 +1,1 @@
+"""Points that a coordinate measuring machine reported, and where they truly were."""

@@ -1,0 +1,239 @@
+"""Reads reported points from DMIS output (ISO 22093): feature actuals of points, and point data.
+
+Only points can be corrected one by one: `FA(name)=FEAT/POINT,CART,x,y,z,i,j,k`, and `PTDATA` and `RAWDAT` in
+the same form. Features of several touches and tolerances evaluated from them are carried, with the reason;
+nominals (`F`, `T`) are nobody's error.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NoReturn, TypeVar
+
+import numpy as np
+
+from olp.exceptions import InputError
+from olp.program.dmis_events import MACHINE_FRAME
+from olp.program.numbertext import Number, number
+from olp.program.statement_lexer import Comment, Statement, chunks
+from olp.results.reported import Carried, Reported, Stated
+from olp.results.table import stated_in
+
+_UNITS = {b"MM": 1.0, b"CM": 10.0, b"M": 1000.0, b"INCH": 25.4, b"FEET": 304.8}
+_HEAD = re.compile(rb"\s*(?:([A-Za-z]+)\s*\(\s*([^)]*?)\s*\)\s*=\s*)?([A-Za-z]\w*)\s*(?:/\s*|$)")
+_LABEL = re.compile(rb"\s*([A-Za-z]+)\s*\(\s*([^)]*?)\s*\)")
+_IS_DMIS = re.compile(
+    rb"^\s*(?:(?:FA|F|TA|T|D|DA|DAT|S)\s*\([^)\n]*\)\s*=\s*\w|"
+    rb"(?:DMISMN|DMISMD|FILNAM|UNITS|OUTPUT|PTDATA|RAWDAT|ENDFIL)\s*/?)",
+    re.MULTILINE | re.IGNORECASE,
+)
+_MOTION = {b"GOTO", b"FROM", b"RAPID", b"PTMEAS", b"GOHOME", b"RMEAS", b"PATH"}
+#: In DMIS text stands in quotes.
+_NO_TEXT = re.compile(rb"(?!)")
+T = TypeVar("T")
+_COMPOSED = "its touches are not in it one by one; correct the touch points and evaluate the feature again"
+_EVALUATED = "it was evaluated from values before correction; evaluate it again"
+_LOOK = 1 << 16
+
+
+def is_dmis(data: bytes) -> bool:
+    """Whether a text has statements of DMIS."""
+    return _IS_DMIS.search(data[:_LOOK]) is not None
+
+
+def _refuse_motion(major: bytes, line: int) -> NoReturn:
+    raise InputError(
+        f"{major.decode('latin-1')} makes this a part program, no file of results; correct it without "
+        "--results",
+        line=line,
+    )
+
+
+class _Reader:
+    """One reading of one file: units, frame and sensor as they change from statement to statement."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.unit_mm: float | None = None
+        self.frame = MACHINE_FRAME
+        self.tool: str | None = None
+        self.approach = float("nan")
+        self.frames: list[str] = []
+        self.tools: list[str | None] = []
+        self.lines: list[int] = []
+        self.spans: list[list[tuple[int, int]]] = []
+        self.forms: list[tuple[Number, ...]] = []
+        self.normals: list[list[float]] = []
+        self.frame_of: list[int] = []
+        self.tool_of: list[int] = []
+        self.units: list[float] = []
+        self.approaches: list[float] = []
+        self.names: list[str] = []
+        self.carried: list[Carried] = []
+        self.stated: list[Stated] = []
+
+    def statement(self, found: Statement) -> None:
+        head = _HEAD.match(found.text)
+        if head is None:
+            return
+        kind, label, major = (
+            part.upper() if part and i != 1 else part for i, part in enumerate(head.groups())
+        )
+        rest, at = found.text[head.end() :], head.end()
+        if kind == b"FA" and major == b"FEAT":
+            self._actual(found, (label or b"").decode("latin-1"), rest, at)
+        elif kind is None and major in (b"PTDATA", b"RAWDAT"):
+            self._point(found, major.decode(), rest, at)
+        elif kind == b"TA":
+            name = f"TA({(label or b'').decode('latin-1')})"
+            self.carried.append(Carried(found.line, name, _EVALUATED))
+        elif kind in (b"D", b"DA"):
+            self.frame = (label or b"").decode("latin-1")
+        elif kind is None:
+            self._state(found, major or b"", rest)
+
+    def _state(self, found: Statement, major: bytes, rest: bytes) -> None:
+        words = [w.strip().upper() for w in rest.split(b",")]
+        if major == b"UNITS":
+            if words[0] not in _UNITS:
+                raise InputError(
+                    f"UNITS/{words[0].decode('latin-1')} is no unit of length; expected MM, CM, M, INCH, "
+                    "FEET",
+                    line=found.line,
+                )
+            self.unit_mm = _UNITS[words[0]]
+        elif major in (b"RECALL", b"SNSLCT"):
+            label = _LABEL.match(rest)
+            if label is None:
+                return
+            kind, name = label[1].upper().decode("latin-1"), label[2].decode("latin-1")
+            if major == b"SNSLCT":
+                self.tool = name
+            elif kind in ("D", "DA"):
+                self.frame = name
+        elif major == b"SNSET" and words[0] == b"APPRCH" and len(words) > 1:
+            told = number(words[1])
+            self.approach = float("nan") if told is None else told.value * (self.unit_mm or 1.0)
+        elif major == b"TECOMP" and b"ON" in words:
+            text = found.text.strip().decode("latin-1")
+            self.stated.append(Stated(found.line, "temperature", text))
+        elif major in _MOTION:
+            _refuse_motion(major, found.line)
+
+    def remarks(self) -> None:
+        """What comments say of compensation that was active."""
+        for line, raw in enumerate(self.data.splitlines(), 1):
+            at = raw.find(b"$$")
+            said = stated_in(line, raw[at + 2 :].decode("latin-1").strip()) if at >= 0 else None
+            if said is not None:
+                self.stated.append(said)
+
+    def _actual(self, found: Statement, label: str, rest: bytes, at: int) -> None:
+        name = f"FA({label})"
+        kind, _, tail = rest.partition(b",")
+        if kind.strip().upper() != b"POINT":
+            what = kind.strip().upper().decode("latin-1")
+            self.carried.append(Carried(found.line, f"{name}, a {what},", _COMPOSED))
+            return
+        self._point(found, name, tail, at + len(kind) + 1)
+
+    def _point(self, found: Statement, name: str, rest: bytes, at: int) -> None:
+        system, _, tail = rest.partition(b",")
+        if system.strip().upper() != b"CART":
+            raise InputError(
+                f"{name} is stated in {system.strip().decode('latin-1') or 'no coordinates'}; only Cartesian "
+                "points (CART) are read; let the machine write them so",
+                line=found.line,
+            )
+        if self.unit_mm is None:
+            raise InputError(
+                f"{name} stands before any UNITS statement, so its unit is not known; put UNITS/MM,ANGDEC or "
+                "the like in front",
+                line=found.line,
+            )
+        at += len(system) + 1
+        spans: list[tuple[int, int]] = []
+        values: list[Number] = []
+        for word in tail.split(b","):
+            bare = word.strip()
+            told = number(bare)
+            if told is None:
+                if len(values) < 3:
+                    raise InputError(
+                        f'{name}: "{bare.decode("latin-1")[:40]}" is no number; expected x, y, z',
+                        line=found.line,
+                    )
+                break
+            first = at + word.index(bare)
+            # behind the last byte, not before the next: a continuation may stand between
+            spans.append((found.place(first), found.place(first + len(bare) - 1) + 1))
+            values.append(told)
+            at += len(word) + 1
+        if len(values) < 3:
+            raise InputError(f"{name} has {len(values)} coordinates; expected x, y, z", line=found.line)
+        self.lines.append(found.line)
+        self.spans.append(spans[:3])
+        self.forms.append(tuple(values[:3]))
+        normal = [v.value for v in values[3:6]]
+        self.normals.append(normal if len(normal) == 3 else [float("nan")] * 3)
+        self.frame_of.append(_index(self.frames, self.frame))
+        self.tool_of.append(_index(self.tools, self.tool))
+        self.units.append(self.unit_mm)
+        self.approaches.append(self.approach)
+        self.names.append(name)
+
+
+def _index(known: list[T], value: T) -> int:
+    if value not in known:
+        known.append(value)
+    return known.index(value)
+
+
+def read_dmis(data: bytes) -> Reported:
+    """The points of DMIS output. Raises InputError with the line of what is wrong."""
+    reader = _Reader(data)
+    reader.remarks()
+    for chunk in chunks(data):
+        if len(chunk.point):
+            _refuse_motion(b"GOTO", chunk.first_line + int(chunk.point[0]) + 1)
+        goes_on = 0
+        for found in chunk.statements(_NO_TEXT):
+            if isinstance(found, Comment):
+                text = found.text.rstrip()
+                goes_on = found.line + 1 if text.endswith(b"$") and text.strip() != b"$$" else 0
+                continue
+            if found.line == goes_on:
+                raise InputError(
+                    "a comment that ends in $ stands before this statement, which may be part of it then; "
+                    "take the $ off the comment, or begin this line with $$",
+                    line=found.line,
+                )
+            reader.statement(found)
+    if not reader.lines:
+        why = f" ({reader.carried[0].name} {reader.carried[0].reason})" if reader.carried else ""
+        raise InputError(f"holds no points (FA(..)=FEAT/POINT or PTDATA){why}")
+    span = np.array(reader.spans, np.int64)
+    unit = np.array(reader.units)
+    return Reported(
+        data=data,
+        dialect="dmis",
+        line=np.array(reader.lines, np.int64),
+        start=span[:, :, 0],
+        end=span[:, :, 1],
+        form=tuple((row[0], row[1], row[2]) for row in reader.forms),
+        value_mm=np.array([[n.value for n in row] for row in reader.forms]) * unit[:, None],
+        unit_mm=unit,
+        normal=np.array(reader.normals),
+        frame=np.array(reader.frame_of, np.int64),
+        frames=tuple(reader.frames),
+        tool=np.array(reader.tool_of, np.int64),
+        tools=tuple(reader.tools),
+        stylus_mm=np.full((len(unit), 3), np.nan),
+        approach_mm=np.array(reader.approaches),
+        names=tuple(reader.names),
+        comment=(b"$$ ", b""),
+        point="surface",
+        carried=tuple(reader.carried),
+        stated=tuple(reader.stated),
+        assumed=("DMIS output: points lie on the surface, their directions point out of it",),
+    )

@@ -1,0 +1,162 @@
+"""Reported points to true ones: true = reported + e(axis position at the touch, stylus vector).
+
+What a measuring machine reports is where its scales say that the tip is, so the error of the machine adds to
+it (error = actual - commanded): the model runs forward, and nothing is inverted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel import ErrorModel
+from olp.exceptions import OutsideBox
+from olp.machine import Vector
+from olp.results.reported import Reported
+from olp.toolpath import Touch
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+#: Where the touch lies about a tip is tried in these directions where nothing states it.
+_ROUND = np.array([s * np.eye(3)[i] for i in range(3) for s in (1.0, -1.0)])
+#: A direction out of the surface must be a unit vector within this.
+_UNIT = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """A frame of reported points: axis position = `rotation` @ point + `offset_mm`. `touched` is (axis
+    position, lever and payload) where its zero was set on the raw machine, None where it was set by other
+    means."""
+
+    name: str
+    rotation: Array
+    offset_mm: Vector
+    touched: Touch | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stylus:
+    """Length that enters axis positions, lever from gauge point to tip, radius of the tip, all in mm."""
+
+    length_mm: Vector
+    lever_mm: Vector
+    radius_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forward:
+    """(n, 3) `axis_mm` at the touches with levers `lever_mm`, what to add to the reported points in their own
+    frame `added_mm`, and play of the axes (n, 3), None where no axis has lost motion.
+
+    `doubt_mm` (n,) is how far the sum may differ because the side of the touch is not stated, `play_mm` (n,)
+    because the direction of the approach is not.
+    """
+
+    axis_mm: Array
+    lever_mm: Array
+    added_mm: Array
+    play: Array | None
+    doubt_mm: Array
+    play_mm: Array
+
+
+def forward(
+    reported: Reported,
+    places: Sequence[Place],
+    styli: Sequence[Stylus],
+    model: ErrorModel,
+    *,
+    axes: Literal["tip", "tool", "ram"],
+    hold: bool,
+    payload_kg: float = 0.0,
+) -> Forward:
+    """What has to be added to each point. `places` are the frames, `styli` the tools of `reported`. Axis
+    positions count at the tip, or stand off it by the lengths of the tools, or count at the end of the ram,
+    which the stylus leads from to the tip.
+
+    Raises OutsideBox, with the line, for a touch outside the calibrated box unless it is held at its face.
+    """
+    rotation = np.array([p.rotation for p in places])[reported.frame]
+    offset = np.array([p.offset_mm for p in places])[reported.frame]
+    length = np.array([s.length_mm for s in styli])[reported.tool]
+    lever = np.array([s.lever_mm for s in styli], float)[reported.tool]
+    radius = np.array([s.radius_mm for s in styli])[reported.tool]
+    own = np.isfinite(reported.stylus_mm).all(axis=1)
+    # a row's own stylus vector stands for the tool's, whose length is minus its vector
+    length[own], lever[own] = -reported.stylus_mm[own], reported.stylus_mm[own]
+    if axes == "ram":
+        length = -lever
+    elif axes == "tip":
+        length[:] = 0.0
+    if reported.tip_radius_mm is not None:
+        radius = np.full(len(reported), reported.tip_radius_mm)
+    normal = _unit(reported.normal)
+    known = np.asarray(np.isfinite(normal).all(axis=1), bool)
+    surface = reported.point != "centre"
+    centre = reported.value_mm + np.where(known[:, None] & surface, normal * radius[:, None], 0.0)
+    axis = np.einsum("nij,nj->ni", rotation, centre) + offset + length
+    if not hold:
+        _inside(reported, axis, model)
+    toward = np.einsum("nij,nj->ni", rotation, normal)
+    play, play_doubt = _play(model, axis, toward, reported.approach_mm)
+    arms = np.column_stack([lever, np.full(len(lever), payload_kg)]) if payload_kg else lever
+    error = model.error(axis, arms, play)
+    doubt = np.zeros(len(reported))
+    # centre or surface, and from which side: the error at the other places of the tip bounds the doubt
+    blind = np.flatnonzero((radius > 0) & surface & ~known)
+    for way in _ROUND:
+        about = model.error(axis[blind] + way * radius[blind, None], arms[blind], None)
+        away = np.abs(about - model.error(axis[blind], arms[blind], None)).max(axis=1, initial=0.0)
+        doubt[blind] = np.maximum(doubt[blind], away)
+    shift = np.zeros((len(places), 3))
+    for k, place in enumerate(places):
+        if place.touched is not None:
+            at, arm = place.touched
+            shift[k] = model.error(np.array([at]), np.array(arm, float))[0]
+    added = np.einsum("nji,nj->ni", rotation, error - shift[reported.frame])
+    return Forward(axis, lever, added, play, doubt, play_doubt)
+
+
+def _unit(normal: Array) -> Array:
+    """Unit vectors; NaN where a row states none. DMIS writes 0, 0, 0 for none."""
+    size = np.sqrt((normal * normal).sum(axis=1, keepdims=True))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        out = np.where(np.abs(size - 1.0) <= _UNIT, normal / size, np.nan)
+    return np.asarray(out, float)
+
+
+def _inside(reported: Reported, axis: Array, model: ErrorModel) -> None:
+    inside = model.inside(axis)
+    if inside.all():
+        return
+    i = int(np.flatnonzero(~inside.all(axis=1))[0])
+    j = int(np.flatnonzero(~inside[i])[0])
+    low, high = model.box_mm[j]
+    raise OutsideBox(
+        f"axis {'XYZ'[j]} stood at {axis[i, j]:.3f} mm, outside the calibrated box {low:g} to {high:g} mm; "
+        "check the frame, calibrate there, or accept the error at the box face with --outside-box hold",
+        line=int(reported.line[i]),
+    )
+
+
+def _play(model: ErrorModel, axis: Array, toward: Array, approach: Array) -> tuple[Array | None, Array]:
+    """Play of the axes at the touch, and half the lost motion where it is not known.
+
+    A touch is made while the machine moves against the surface, so axes that took up their lost motion on the
+    way of the approach rest on that flank.
+    """
+    lost = model.lost_motion_mm(axis)
+    if lost is None:
+        return None, np.zeros(len(axis))
+    away = np.nan_to_num(toward)
+    reach = np.abs(away) * np.nan_to_num(approach)[:, None]
+    known = np.asarray((reach > np.abs(lost)) | (lost == 0.0))
+    play = np.asarray(np.where(known, -np.sign(away), 0.0), float)
+    doubt = np.sqrt((np.where(known, 0.0, 0.5 * lost) ** 2).sum(axis=1))
+    return play, np.asarray(doubt, float)

@@ -1,0 +1,70 @@
+"""Where reported points lie on the machine: frames and styli of a job, by the names that a file gives
+them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.exceptions import ConfigError, InputError
+from olp.geometry import rotation_matrix
+from olp.machine import ZERO, Setup, Tool
+from olp.program.frames import touch_of
+from olp.results.forward import Place, Stylus
+
+#: the frame whose points are axis positions
+MACHINE = "machine"
+
+
+def place_of(setup: Setup, name: str | None) -> Place:
+    """The frame with a name. Raises InputError where the file names none, ConfigError where nothing defines
+    it."""
+    if name is None:
+        raise InputError(
+            "states no frame, so where its points lie on the machine is not known; name one of "
+            "[work_offsets] with --frame, or --frame machine for axis positions"
+        )
+    if name == MACHINE:
+        return Place(MACHINE, np.eye(3), ZERO, None)
+    known = (*setup.job.work_offsets, *setup.machine.work_offsets)
+    # labels of DMIS are the same in any case of letters
+    meant = name if name in known else next((n for n in known if n.upper() == name.upper()), name)
+    work = setup.work_offset(meant)
+    if work is None:
+        raise ConfigError(
+            f'frame {name} is not defined; give [work_offsets."{name}"] in the job file: where the part '
+            "lies, "
+            "with X_mm, Y_mm, Z_mm and A_deg, B_deg, C_deg"
+        )
+    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, touch_of(setup, work, None))
+
+
+def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
+    """The stylus that a file calls `label`: one of [styli] or the number of a tool; None is the tool in the
+    spindle at the start. With `by_row` the rows state their vectors, and a tool only gives the radius. Raises
+    ConfigError."""
+    usual = setup.tool(setup.machine.default_tool) if setup.machine.default_tool else None
+    lever = setup.stylus(str(label)) if label is not None else None
+    if lever is not None:
+        x, y, z = lever
+        return Stylus((0.0 - x, 0.0 - y, 0.0 - z), lever, usual.radius_mm if usual else 0.0)
+    number = setup.machine.default_tool if label is None else label
+    if number is None and by_row:
+        return Stylus(ZERO, ZERO, 0.0)
+    if number is None:
+        raise ConfigError(
+            "no stylus is known, and angular errors act through it; give job_defaults.tool in the machine "
+            "file, --tool, or columns SX, SY, SZ (gauge point to tip)"
+        )
+    if isinstance(number, str) and number.isdigit():
+        number = int(number)
+    if number == 0:
+        return Stylus(ZERO, ZERO, 0.0)
+    tool: Tool | None = setup.tool(number) if isinstance(number, int) else None
+    if tool is None:
+        raise ConfigError(
+            f'stylus {number} is not defined; give [styli."{number}"] offset_mm = [x, y, z] in the machine '
+            "or job file, end of the ram to centre of the tip, or the number of a tool with --tool"
+        )
+    if tool.lever_mm is None and not by_row:
+        raise ConfigError(f"stylus {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm")
+    return Stylus(tool.length_mm, tool.lever_mm or ZERO, tool.radius_mm)

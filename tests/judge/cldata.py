@@ -1,0 +1,171 @@
+"""A reader of cutter-location data and of DMIS motion that shares nothing with olp: text to canonical moves.
+
+Written from the statement forms alone, for judging: what it does not know, it does not read (KeyError). One
+regular expression a statement, no columns. Frames are given as (3, 3) rotation and (3,) origin by name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .linuxcnc import ARC, FEED, RAPID, CanonMoves
+
+NUMBER = r"[-+]?(?:\d+\.\d*|\.\d+|\d+)(?:[eEdD][-+]?\d+)?"
+Frame = tuple[np.ndarray, np.ndarray]
+AXIS_OF_PLANE = {2: 0, 0: 1, 1: 2}  # normal Z: XY, X: YZ, Y: ZX, as in `path.PLANE_AXES`
+TEXT = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TITLE")
+QUIET = re.compile(
+    r"(UNITS?|PARTNO|PPRINT|INSERT|REMARK|TITLE|SPINDL|COOLNT|CUTTER|SELECT|SETUP|TRNTYP|CSI_\w+|MACHIN|FEDRAT"
+    r"|CUTCOM|PAINT|TOOL PATH|MULTAX|DELAY|STOP|OPSTOP|MSYS|CSYS|LOAD|LOADTL|CYCLE|INTOL|OUTTOL|END-OF-PATH"
+    r"|SEQNO|DISPLY|FROM)\b"
+)
+
+
+def at(frame: Frame, point: Sequence[float], unit: float, length: np.ndarray) -> np.ndarray:
+    rotation, origin = frame
+    return np.asarray(rotation @ (unit * np.array(point, float)) + origin + length)
+
+
+def numbers(text: str) -> list[float]:
+    return [float(n.upper().replace("D", "E")) for n in re.findall(NUMBER, text)]
+
+
+def joined(data: bytes) -> list[tuple[int, str]]:
+    """(line, statement) with comments cut off and lines joined."""
+    out: list[tuple[int, str]] = []
+    pending, first, comment = "", 0, False
+    for number, raw in enumerate(data.decode("latin-1").replace("\r", "").split("\n"), 1):
+        text = raw
+        if comment or text.lstrip().startswith("$$"):
+            comment = (comment or "$$->" in text[:8]) and text.rstrip().endswith("$")
+            continue
+        if not pending and text.strip().upper().startswith(TEXT):
+            out.append((number, text.strip().upper()))
+            continue
+        text = re.sub(r"\$\$.*", "", text)
+        first = first if pending else number
+        if text.rstrip().endswith("$"):
+            pending += text.rstrip()[:-1]
+            continue
+        out.append((first, (pending + text).strip().upper()))
+        pending = ""
+    return [(line, text) for line, text in out if text]
+
+
+@dataclass
+class Moves:
+    """Moves on their way."""
+
+    line: list[int] = field(default_factory=list)
+    kind: list[int] = field(default_factory=list)
+    axis: list[np.ndarray] = field(default_factory=list)
+    length: list[np.ndarray] = field(default_factory=list)
+    tool: list[int] = field(default_factory=list)
+    centre: list[np.ndarray] = field(default_factory=list)
+    turns: list[int] = field(default_factory=list)
+    plane: list[int] = field(default_factory=list)
+    lever: list[np.ndarray] = field(default_factory=list)
+
+    def add(
+        self, line: int, kind: int, axis: np.ndarray, length: np.ndarray, tool: int, lever: np.ndarray,
+        centre: np.ndarray | None = None, turns: int = 0, plane: int = 0,
+    ) -> None:  # fmt: skip
+        self.line.append(line)
+        self.kind.append(kind)
+        self.axis.append(axis)
+        self.length.append(length)
+        self.tool.append(tool)
+        self.lever.append(lever)
+        self.centre.append(np.zeros(3) if centre is None else centre)
+        self.turns.append(turns)
+        self.plane.append(plane)
+
+    def canon(self) -> CanonMoves:
+        bare = CanonMoves.polyline(np.vstack([self.axis[:1], *self.axis]), lines=np.array(self.line))
+        return replace(
+            bare, kind=np.array(self.kind), length=np.array(self.length), tool=np.array(self.tool),
+            tip=np.array(self.axis) - np.array(self.length), centre=np.array(self.centre),
+            turns=np.array(self.turns), plane=np.array(self.plane), start_known=False,
+        )  # fmt: skip
+
+
+def read_apt(
+    data: bytes,
+    frames: Mapping[str, Frame],
+    tools: Mapping[int, float],
+    *,
+    tool: int = -1,
+    first: str = "G54",
+) -> Moves:
+    """`tools`: lengths by number, which count once loaded; `tool`: in the spindle at the start, its length
+    not active. The second coordinate system of the program is the frame CSYS2, and so on."""
+    out = Moves()
+    unit, rapid, system, systems = 1.0, False, "", [""]
+    here, length, aim = np.full(3, np.nan), np.zeros(3), np.array([0.0, 0.0, 1.0])
+    tall = tools.get(tool, 0.0)
+    arc: tuple[np.ndarray, np.ndarray, int] | None = None
+    way, size = None, 0.0
+    for line, text in joined(data):
+        major = text.partition("/")[0].strip()
+        value = numbers(text.partition("/")[2]) if not text.startswith(TEXT) else []
+        place = systems.index(system) + 1
+        frame = frames[first if place == 1 else f"CSYS{place}"]
+        rotation = frame[0]
+        if major == "RAPID":
+            rapid = True
+        elif major in ("GOTO", "GODLTA"):
+            if len(value) == 6:
+                aim = rotation @ np.array(value[3:])
+            lever = -tall * aim
+            length = tall * aim if size else np.zeros(3)
+            if major == "GOTO":
+                here = at(frame, value[:3], unit, length)
+            else:
+                step = value if len(value) == 3 else [0.0, 0.0, value[0]]
+                here = here + rotation @ (unit * np.array(step))
+            if arc is not None:
+                centre, normal, turns = arc
+                k = int(np.abs(normal).argmax())
+                sign = 1 if normal[k] > 0 else -1
+                out.add(line, ARC, here, length, tool, lever, centre + length, sign * turns, AXIS_OF_PLANE[k])
+            else:
+                out.add(line, RAPID if rapid else FEED, here, length, tool, lever)
+            rapid, arc = False, None
+        elif major in ("CIRCLE", "MOVARC"):
+            times = re.search(r"TIMES\s*,\s*(\d+)", text)
+            arc = (at(frame, value[:3], unit, np.zeros(3)), rotation @ np.array(value[3:6]),
+                   int(times[1]) if times else 1)  # fmt: skip
+        elif major == "INDIRV":
+            way = rotation @ np.array(value)
+        elif major == "TLON,GOFWD":
+            circle = numbers(re.search(r"\((?:CIRCLE|CYLNDR)/([^)]*)\)", text)[1])  # type: ignore[index]
+            straight = numbers(re.search(r"\(LINE/([^)]*)\)", text)[1])  # type: ignore[index]
+            normal = rotation @ np.array(circle[3:6] if len(circle) == 7 else (0.0, 0.0, 1.0))
+            k = int(np.abs(normal).argmax())
+            centre = at(frame, circle[:3], unit, length)
+            sense = np.cross(here - centre, way)[k]
+            here = at(frame, straight[3:], unit, length)
+            turns = 1 if sense > 0 else -1
+            out.add(line, ARC, here, length, tool, -tall * aim, centre, turns, AXIS_OF_PLANE[k])
+        elif major in ("LOADTL", "LOAD"):
+            tool, size = int(value[0]), 1.0
+            tall = tools[tool]
+        elif major in ("UNITS", "UNIT"):
+            unit = 25.4 if "INCH" in text else 1.0
+        elif major in ("CSYS", "MSYS"):
+            same = ([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], [0, 0, 0, 1, 0, 0, 0, 1, 0])
+            key = "" if value in same else repr(value)
+            if not out.line and key:
+                systems[0] = key
+            system = key
+            if key not in systems:
+                systems.append(key)
+        elif major == "FINI":
+            break
+        elif not QUIET.match(text):
+            raise KeyError(f"line {line}: {text}")
+    return out
