@@ -120,7 +120,7 @@ def methods(m: simulated.Machine, seed: int, kind: str) -> dict[str, Errors]:
         out[f"estimator, two pods, {n} points"] = found.error
         if n == 1000:
             beyond = nonrigid(found)
-            out["the same with a map"] = lambda at, tool, b=beyond: b.fit.error(at, tool) + b.value(at)
+            out["the same, map where evident"] = lambda at, tool, b=beyond: b.fit.error(at, tool) + b.value(at)
     both = Measurements(
         "gantry", laser.lines, laser.squares, periods_mm=laser.periods_mm, pods=(two_pods(m, seed, 250),)
     )
