@@ -32,7 +32,7 @@ from calibration_cases import measurements_of, two_pods
 from judge import simulated
 
 from olp.calibration.estimator import fit
-from olp.calibration.nonrigid import nonrigid
+from olp.calibration.nonrigid import NonRigid, nonrigid
 from olp.calibration.observations import Measurements
 from olp.errormodel import Calibration, build
 from olp.errormodel.calibration import Curve
@@ -103,6 +103,11 @@ def equation_1(m: simulated.Machine, lines: list[simulated.Taken], at: tuple[flo
     return build(Calibration("gantry", m.box, "huddersfield", at, tuple(curves), square), CHAIN).error
 
 
+def mapped(found: NonRigid) -> Errors:
+    """Curves and map together."""
+    return lambda at, tool: found.fit.error(at, tool) + found.value(at)
+
+
 def methods(m: simulated.Machine, seed: int, kind: str) -> dict[str, Errors]:
     """What each way of calibrating makes of a machine: errors by axis position and tool."""
     rng = np.random.default_rng([seed, 23])
@@ -119,8 +124,7 @@ def methods(m: simulated.Machine, seed: int, kind: str) -> dict[str, Errors]:
         found = fit(pods, CHAIN)
         out[f"estimator, two pods, {n} points"] = found.error
         if n == 1000:
-            beyond = nonrigid(found)
-            out["the same, map where evident"] = lambda at, tool, b=beyond: b.fit.error(at, tool) + b.value(at)
+            out["the same, map where evident"] = mapped(nonrigid(found))
     both = Measurements(
         "gantry", laser.lines, laser.squares, periods_mm=laser.periods_mm, pods=(two_pods(m, seed, 250),)
     )
