@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from olp.calibrating import fit_calibration as fit_calibration
     from olp.comparing import Comparison as Comparison
     from olp.comparing import compare as compare
+    from olp.diagnosing import CalibrationDiagnosis as CalibrationDiagnosis
+    from olp.diagnosing import diagnose_calibration as diagnose_calibration
     from olp.exceptions import CannotCompute as CannotCompute
     from olp.exceptions import ConfigError as ConfigError
     from olp.exceptions import InputError as InputError
@@ -53,6 +55,8 @@ _HOME = {
     "Comparison": "olp.comparing",
     "FittedCalibration": "olp.calibrating",
     "fit_calibration": "olp.calibrating",
+    "CalibrationDiagnosis": "olp.diagnosing",
+    "diagnose_calibration": "olp.diagnosing",
     "correct": "olp.api",
     "error_at": "olp.api",
     "flatten": "olp.api",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from olp.calibration_rules import CALIBRATION
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
+from olp.planning_rules import PLANNING
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
 
@@ -304,7 +305,8 @@ _TABLE = (
 )
 
 RULES = {
-    rule.code: rule for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY), key=lambda rule: rule.code)
+    rule.code: rule
+    for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *PLANNING), key=lambda rule: rule.code)
 }
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine

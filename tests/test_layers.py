@@ -14,7 +14,7 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"calibration_rules", "gate_rules", "metrology_rules"},
+    {"calibration_rules", "gate_rules", "metrology_rules", "planning_rules"},
     {"findings"},
     {"geometry", "tables"},
     {"machine"},
@@ -33,7 +33,7 @@ LAYERS = (
     {"loading", "poses"},
     {"replanning"},
     {"comparing_parts"},
-    {"calibrating", "correction", "retiming", "comparing"},
+    {"calibrating", "correction", "diagnosing", "retiming", "comparing"},
     {"gate"},
     {"api"},
     {"report_files"},

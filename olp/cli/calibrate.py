@@ -7,6 +7,7 @@ from olp.cli.late import LateGroup
 #: Verb to what it does; each is a module `olp.cli.calibrate_VERB`.
 VERBS: dict[str, str] = {
     "fit": "Make a calibration from lines, points, lengths and directions.",
+    "doctor": "Judge sign, unit and place of every curve of a calibration by independent points.",
     "read": "Show what is understood of the file of an instrument.",
 }
 

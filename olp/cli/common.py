@@ -143,22 +143,29 @@ def given(program: str | None, machine: str | None, job: str | None) -> Given:
 
 def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
     """Machine and job, and the files that describe them. Raises UsageError, InputError."""
-    import tomllib
-
-    from olp.files.config import beside, load_setup
-    from olp.files.write import read_bytes
+    from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
     meshes = (mesh.file for mesh in setup.job.meshes)
-    inputs = files_of(machine, job, setup.job.machine, setup.machine.calibration, *meshes)
+    inputs = files_of(machine, job, setup.job.machine, *meshes)
     if setup.machine.calibration is not None:
-        try:
-            curves = tomllib.loads(read_bytes(setup.machine.calibration).decode("utf-8-sig")).get("curves")
-            inputs += files_of(*(beside(setup.machine.calibration, curve["file"]) for curve in curves or ()))
-        except (ValueError, TypeError, KeyError, AttributeError):
-            # The loader of calibrations says what is wrong with it.
-            pass
+        inputs += files_of_calibration(setup.machine.calibration)
     return setup, tuple(inputs)
+
+
+def files_of_calibration(name: str) -> list[str]:
+    """A calibration file and the curve files that it names."""
+    import tomllib
+
+    from olp.files.config import beside
+    from olp.files.write import read_bytes
+
+    try:
+        curves = tomllib.loads(read_bytes(name).decode("utf-8-sig")).get("curves")
+        return [name, *files_of(*(beside(name, curve["file"]) for curve in curves or ()))]
+    except (OlpError, ValueError, TypeError, KeyError, AttributeError):
+        # The loader of calibrations says what is wrong with it.
+        return [name]
 
 
 def source(name: str) -> str | bytes:
