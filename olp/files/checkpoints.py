@@ -1,9 +1,12 @@
 """Points that stand alone: a CSV file that says in comments how it was taken, or the points of a plan.
 
-# sigma_um = 8
-# tool_mm = [0.0, 0.0, -120.0]
-# frame = "instrument"
-X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm
+    # sigma_um = 8
+    # tool_mm = [0.0, 0.0, -120.0]
+    # frame = "instrument"
+    X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm
+
+Columns deviation_X_um, deviation_Y_um, deviation_Z_um (actual minus commanded) may stand in place of the
+measured ones.
 """
 
 from __future__ import annotations
@@ -19,11 +22,11 @@ from olp.calibration.observations import Points
 from olp.exceptions import ConfigError
 from olp.files.fields import NotNegative, Positive, Triple
 from olp.files.measurements import PER_UNIT, load_measurements
-from olp.files.point_readings import PointReadings, read_point_readings
+from olp.files.point_readings import DEVIATION, MEASURED, PointReadings, parse_point_readings
 from olp.files.problems import config_error, validate
 from olp.files.schemas import Table
 from olp.files.toml_text import Path
-from olp.files.write import PathLike
+from olp.files.write import PathLike, read_bytes
 from olp.machine import Vector
 from olp.units import MM_PER_UM
 
@@ -63,7 +66,9 @@ def load_checkpoints(
                 f"holds {len(found)} sets of points; expected one; name its file", file=str(path)
             )
         return found[0], False
-    readings = read_point_readings(source)
+    data = read_bytes(source)
+    deviates = DEVIATION[0].encode() in data
+    readings = parse_point_readings(data, str(path), DEVIATION if deviates else MEASURED)
     stated = _stated(readings)
     problems = []
     if stated.sigma_um is not None and sigma_um is not None and stated.sigma_um != sigma_um:
@@ -82,10 +87,13 @@ def load_checkpoints(
     if problems:
         raise config_error([(None, text) for text in problems], str(path))
     vector = np.array(tool) if readings.tool_mm is None else readings.tool_mm
+    places = readings.measured
+    if deviates:
+        places = readings.axis_mm + vector + readings.measured * MM_PER_UM
     points = Points(
         axis_mm=readings.axis_mm,
         tool_mm=vector,
-        measured_mm=readings.measured_mm(vector),
+        measured_mm=places,
         sigma=(sigma or 0.0) * MM_PER_UM,
         sigma_scale=stated.sigma_scale_um_m * PER_UNIT,
         source=str(path),
