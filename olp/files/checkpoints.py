@@ -67,7 +67,8 @@ def load_checkpoints(
             )
         return found[0], False
     data = read_bytes(source)
-    deviates = DEVIATION[0].encode() in data
+    header = next((line for line in data.splitlines() if line.strip() and not line.startswith(b"#")), b"")
+    deviates = b"deviation_" in header
     readings = parse_point_readings(data, str(path), DEVIATION if deviates else MEASURED)
     stated = _stated(readings)
     problems = []
