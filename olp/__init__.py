@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from olp.findings import Finding as Finding
     from olp.gate import Check as Check
     from olp.gate import check as check
+    from olp.planning import MeasurementPlan as MeasurementPlan
+    from olp.planning import plan_measurements as plan_measurements
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -57,6 +59,8 @@ _HOME = {
     "fit_calibration": "olp.calibrating",
     "CalibrationDiagnosis": "olp.diagnosing",
     "diagnose_calibration": "olp.diagnosing",
+    "MeasurementPlan": "olp.planning",
+    "plan_measurements": "olp.planning",
     "correct": "olp.api",
     "error_at": "olp.api",
     "flatten": "olp.api",

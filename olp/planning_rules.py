@@ -64,4 +64,20 @@ PLANNING = (
         "Look at the tables that are active in the control, and list them in compensated_by_controller.",
         "EXX while the pitch compensation of X is on.",
     ),
+    Rule(
+        "OLP887",
+        "wanted uncertainty out of reach",
+        Severity.WARNING,
+        "None of the methods that were compared gets there in the given box with the given instruments.",
+        "Use a better instrument or more points (--points), make the box smaller (--box), or want less.",
+        "2 um over 3 x 2 x 1 m from a tracker of 15 um.",
+    ),
+    Rule(
+        "OLP888",
+        "plan leaves errors unseen",
+        Severity.WARNING,
+        "Whatever the readings will be, nothing in this plan depends on these errors, or too little.",
+        "Use three reflectors that are not on one line, or another method.",
+        "ECZ with one straight reflector.",
+    ),
 )

@@ -33,7 +33,7 @@ LAYERS = (
     {"loading", "poses"},
     {"replanning"},
     {"comparing_parts"},
-    {"calibrating", "correction", "diagnosing", "retiming", "comparing"},
+    {"calibrating", "correction", "diagnosing", "planning", "retiming", "comparing"},
     {"gate"},
     {"api"},
     {"report_files"},

@@ -17,7 +17,7 @@ PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
     *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
-    *("diagnose_calibration", "CalibrationDiagnosis"),
+    *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

@@ -233,12 +233,17 @@ def _verdict(found: Marginal, column: Array, others: Sequence[Marginal | None], 
     """`others` are the same under arrangements that are not excluded: they must agree. `doubted`: it may not
     even be this curve."""
     decided, sign = found.candidate, found.sign
-    agree = not doubted and all(o is None or o.sign in (0, sign) for o in others)
+    if doubted:
+        decided, sign = None, 0
+    if any(o is not None and o.sign not in (0, sign) for o in others):
+        sign = 0
+    if any(o is not None and o.candidate != decided for o in others):
+        decided = None
     words: Sign = "undecided"
     applied, unit = 1.0, "undecided"
-    if decided is not None and decided.factor == 0.0 and not doubted:
+    if decided is not None and decided.factor == 0.0:
         words = "absent"
-    elif sign and agree:
+    elif sign:
         words = "right" if sign > 0 else "flipped"
         applied = float(sign)
         if decided is not None:
