@@ -235,7 +235,7 @@ def _verdict(found: Marginal, column: Array, others: Sequence[Marginal | None], 
     decided, sign = found.candidate, found.sign
     if doubted:
         decided, sign = None, 0
-    if any(o is not None and o.sign not in (0, sign) for o in others):
+    if any(o is not None and o.sign != sign for o in others):
         sign = 0
     if any(o is not None and o.candidate != decided for o in others):
         decided = None
