@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from olp.calibration.covariance import covariance_of
 from olp.calibration.curves import calibration_of, sigmas_of
 from olp.calibration.estimator import Fit, fit
 from olp.calibration.observations import Measurements
@@ -38,8 +39,11 @@ class FittedCalibration:
     def files(self, target: PathLike) -> dict[Path, bytes]:
         """The bytes of the calibration file `target` and of its curves beside it."""
         sigma = sigmas_of(self.fit, self.calibration)
+        covariance = covariance_of(self.fit, self.calibration)
         notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
-        return calibration_files(self.calibration, Path(target), sigma=sigma, notes=notes)
+        return calibration_files(
+            self.calibration, Path(target), sigma=sigma, covariance=covariance, notes=notes
+        )
 
 
 def fit_calibration(

@@ -72,7 +72,7 @@ def command(
     if output is not None:
         files = fitted.files(output)
         write_files(files, force=force, inputs=inputs)
-        talk(f"wrote {output} and {len(files) - 1} curves beside it")
+        talk(f"wrote {output} and {len(files) - 1} files of curves and covariance beside it")
     report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
     if as_json:
         put(to_json(report))

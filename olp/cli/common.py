@@ -154,15 +154,17 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[st
 
 
 def files_of_calibration(name: str) -> list[str]:
-    """A calibration file and the curve files that it names."""
+    """A calibration file and the files of curves and covariance that it names."""
     import tomllib
 
     from olp.files.config import beside
     from olp.files.write import read_bytes
 
     try:
-        curves = tomllib.loads(read_bytes(name).decode("utf-8-sig")).get("curves")
-        return [name, *files_of(*(beside(name, curve["file"]) for curve in curves or ()))]
+        tables = tomllib.loads(read_bytes(name).decode("utf-8-sig"))
+        named = [curve["file"] for curve in tables.get("curves", ())]
+        named += [tables["covariance"]["file"]] if "file" in tables.get("covariance", ()) else []
+        return [name, *files_of(*(beside(name, file) for file in named))]
     except (OlpError, ValueError, TypeError, KeyError, AttributeError):
         # The loader of calibrations says what is wrong with it.
         return [name]

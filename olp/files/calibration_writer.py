@@ -11,7 +11,9 @@ import numpy as np
 
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.errormodel.uncertainty import Uncertainty
 from olp.exceptions import ConfigError
+from olp.files.covariance import covariance_bytes
 from olp.files.fields import SIGN
 from olp.files.toml_text import comment, toml_lines
 from olp.machine import SQUARENESS, ZERO, Vector
@@ -26,15 +28,16 @@ def calibration_files(
     target: Path,
     *,
     sigma: Mapping[str, Array] | None = None,
+    covariance: Uncertainty | None = None,
     notes: Sequence[str] = (),
 ) -> dict[Path, bytes]:
     """The bytes of `target`, an olp-calibration-1 file, and of its curves `<stem>-x.csv` ... beside it.
 
-    `sigma` holds standard uncertainties by component, (n,) in mm or rad at the positions of its curve; notes
-    become comments. Curves read back as the very same doubles; so does every other number of 15 digits or
-    fewer in the unit of its key, longer ones within the last bit. The temperatures of a job are no part of a
-    calibration and are not written. Raises ConfigError where it has no date of measuring, or where a sigma
-    fits no curve.
+    `sigma` holds standard uncertainties by component, (n,) in mm or rad at the positions of its curve, and
+    `covariance` becomes `<stem>-covariance.npz`; notes become comments. Curves read back as the very same
+    doubles; so does every other number of 15 digits or fewer in the unit of its key, longer ones within the
+    last bit. The temperatures of a job are no part of a calibration and are not written. Raises ConfigError
+    where it has no date of measuring, or where a sigma fits no curve.
     """
     if calibration.measured is None:
         raise ConfigError("the calibration has no date of measuring; give it, such as 2026-05-14")
@@ -61,6 +64,10 @@ def calibration_files(
         *(line for cyclic in calibration.cyclic for line in _cyclic(cyclic)),
         *(_thermal(calibration.thermal) if calibration.thermal is not None else ()),
     ]
+    if covariance is not None:
+        archive = target.with_name(f"{target.stem}-covariance.npz")
+        files[archive] = covariance_bytes(covariance)
+        lines += ["", "[covariance]", *toml_lines({"file": archive.name})]
     return {target: ("\n".join(lines) + "\n").encode(), **files}
 
 

@@ -283,12 +283,44 @@ class SquarenessTable(Table):
     C0Y_urad: float = Field(default=0.0, description="the squareness of Y to X, in urad")
     B0Z_urad: float = Field(default=0.0, description="the squareness of Z to X, in urad")
     A0Z_urad: float = Field(default=0.0, description="the squareness of Z to Y, in urad")
+    sigma_C0Y_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of C0Y, in urad")
+    sigma_B0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of B0Z, in urad")
+    sigma_A0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of A0Z, in urad")
 
 
 class BacklashTable(Table):
     X_um: float = Field(default=0.0, description="the lost motion of axis X, in um")
     Y_um: float = Field(default=0.0, description="the lost motion of axis Y, in um")
     Z_um: float = Field(default=0.0, description="the lost motion of axis Z, in um")
+    sigma_X_um: NotNegative = Field(default=0.0, description="the standard uncertainty of X_um, in um")
+    sigma_Y_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Y_um, in um")
+    sigma_Z_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Z_um, in um")
+
+
+class CovarianceTable(Table):
+    file: Text | None = Field(
+        default=None,
+        description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
+        "this file; the sigma columns and keys if left out",
+    )
+    X_repeatability_um: NotNegative = Field(
+        default=0.0, description="the standard deviation of the scatter of axis X at one place, in um"
+    )
+    Y_repeatability_um: NotNegative = Field(
+        default=0.0, description="the standard deviation of the scatter of axis Y at one place, in um"
+    )
+    Z_repeatability_um: NotNegative = Field(
+        default=0.0, description="the standard deviation of the scatter of axis Z at one place, in um"
+    )
+    growth_per_year: NotNegative = Field(
+        default=0.0,
+        description="the share of themselves by which standard uncertainties grow in a year after measured: "
+        "0.5 makes half as much again",
+    )
+    temperature_K: NotNegative = Field(
+        default=0.0,
+        description="the standard uncertainty of the temperatures of scales and workpiece, in K",
+    )
 
 
 class CyclicTable(Table):
@@ -338,7 +370,6 @@ class CalibrationFile(Table):
     not_built: ClassVar[dict[str, str]] = {
         "maps": "volumetric error maps",
         "compliance": "load-dependent errors",
-        "covariance": "uncertainty of the calibration",
     }
     schema_: Literal["olp-calibration-1"] = Field(
         alias="schema", description='the format, "olp-calibration-1"'
@@ -364,6 +395,9 @@ class CalibrationFile(Table):
     backlash: BacklashTable = Field(default_factory=BacklashTable, description="the table [backlash]")
     cyclic: list[CyclicTable] = Field(default=[], description="tables [[cyclic]]")
     thermal: ThermalTable | None = Field(default=None, description="the table [thermal]")
+    covariance: CovarianceTable | None = Field(
+        default=None, description="the table [covariance]: how well all this is known"
+    )
 
     @field_validator("valid_until")
     @classmethod

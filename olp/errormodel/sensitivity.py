@@ -1,0 +1,242 @@
+"""What an unknown part of the calibration's numbers does to the tip: linear, at any axis position.
+
+The same first-order law as `olp.errormodel.bodies`; against the exact matrices it is off by parts of a
+thousand of an uncertainty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.errormodel.base import Array
+from olp.errormodel.bodies import Body, build_bodies
+from olp.errormodel.boxed import as_points
+from olp.errormodel.calibration import Calibration, Thermal
+from olp.errormodel.thermal import REFERENCE_DEGC
+from olp.errormodel.uncertainty import EXPANSION_PER_K, Entry, Uncertainty
+from olp.machine import Vector
+from olp.tables import Column
+from olp.units import AXES
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+#: Half the memory, and far more digits than an uncertainty has.
+Rows = npt.NDArray[np.float32]
+
+#: Row and sign of what a squareness adds, times the distance of its axis from the datum.
+_SHEAR = {"C0Y": (0, -1.0), "B0Z": (0, 1.0), "A0Z": (1, -1.0)}
+
+Index = npt.NDArray[np.int32]
+#: What n positions take of one unknown each: its number and its weight.
+Slot = tuple[Index, Array]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expansion:
+    """Standard uncertainties of expansion: of each scale and of the workpiece, per mm from where it is
+    held. `unmodelled_K` is the largest difference of temperature that the job states and no expansion of the
+    calibration answers."""
+
+    scale: Vector
+    fixed_at_mm: Vector
+    workpiece: float
+    clamped_at_mm: Vector
+    unmodelled_K: float = 0.0
+
+    @classmethod
+    def of(
+        cls, calibration: Calibration, uncertainty: Uncertainty, temperatures_degC: dict[str, float]
+    ) -> Expansion:
+        """By the uncertainty of temperatures, and in full by stated differences that the calibration has no
+        coefficient for."""
+        thermal = calibration.thermal or Thermal()
+        rest, unmodelled = uncertainty.temperature_K, 0.0
+
+        def slope(name: str, known: float, reference: float) -> float:
+            nonlocal unmodelled
+            difference = 0.0
+            if known == 0.0 and name in temperatures_degC:
+                difference = abs(temperatures_degC[name] - reference)
+                unmodelled = max(unmodelled, difference)
+            return float(np.hypot((known or EXPANSION_PER_K) * rest, EXPANSION_PER_K * difference))
+
+        at = calibration.temperature_degC
+        x, y, z = (slope(f"{a}_scale", k, at) for a, k in zip(AXES, thermal.scale_per_K, strict=True))
+        workpiece = slope("workpiece", thermal.workpiece_per_K, REFERENCE_DEGC)
+        return cls((x, y, z), thermal.fixed_at_mm, workpiece, thermal.clamped_at_mm, unmodelled)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensitivity:
+    """Dependence of the tip's error on unknowns: the numbers of the calibration, whose covariance is
+    table @ table.T, one more for each independent part beside them, and four of expansion.
+
+    `first` and `spare` are the first unknown of each entry, and of its independent parts (-1: none). `table`
+    (unknowns, columns) makes all of them from independent ones of variance 1.
+    """
+
+    bodies: tuple[Body, ...]
+    entries: tuple[Entry, ...]
+    first: tuple[int, ...]
+    spare: tuple[int, ...]
+    expansion: Expansion | None
+    table: Rows
+    tool_terms: bool
+
+    @classmethod
+    def of(
+        cls,
+        calibration: Calibration,
+        chain: str,
+        uncertainty: Uncertainty,
+        *,
+        skip: frozenset[str] = frozenset(),
+        expansion: Expansion | None = None,
+    ) -> Sensitivity:
+        """`skip` are components that the control corrects. Raises ConfigError for an unknown chain."""
+        tool_terms = calibration.model != "huddersfield"
+        bodies = build_bodies(calibration, chain, skip, tool_terms=tool_terms)
+        entries = tuple(e for e in uncertainty.entries if e.name not in skip)
+        first = np.cumsum([0, *(len(e.rest) for e in entries)]).tolist()
+        at, spare = first[-1], []
+        for entry in entries:
+            parts = 0
+            if entry.rest.any():
+                parts = entry.cells + 1 if entry.kind in ("mean", "half") else len(entry.rest)
+            spare.append(at if parts else -1)
+            at += parts
+        at += 4 if expansion is not None else 0
+        rank, own = uncertainty.rank, at - first[-1]
+        table = np.zeros((at, rank + own), np.float32)
+        if first[-1]:
+            table[: first[-1], :rank] = np.concatenate([e.factor for e in entries])
+        table[first[-1] :, rank:] = np.eye(own, dtype=np.float32)
+        return cls(bodies, entries, tuple(first[:-1]), tuple(spare), expansion, table, tool_terms)
+
+    @property
+    def columns(self) -> int:
+        return int(self.table.shape[1])
+
+    def rows(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Rows:
+        """(3, n, columns): the error in mm is that times independent unknowns of variance 1."""
+        return np.stack([weights @ self.table for weights in self.weights(axis_mm, tool_mm, play)])
+
+    def weights(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> list[csr_array]:
+        """Three matrices (n, unknowns), of X, Y and Z, at known axis positions (n, 3) in mm with tool vectors
+        (3,) or (n, 3)."""
+        from scipy.sparse import csr_array
+
+        points = as_points(axis_mm)
+        n, unknowns = len(points), len(self.table)
+        slots: tuple[list[Slot], list[Slot], list[Slot]] = ([], [], [])
+        position = [np.ascontiguousarray(points[:, k]) for k in range(3)]
+        tool: list[Column] = [0.0, 0.0, 0.0]
+        if self.tool_terms:
+            tool = [tool_mm[..., k] for k in range(3)]
+        for body in self.bodies:
+            levers = [(rows, lever.at(position, tool)) for rows, lever in body.levers]
+            state, q = None if play is None else play[:, body.axis], position[body.axis]
+            for entry, first, spare in zip(self.entries, self.first, self.spare, strict=True):
+                if AXES.index(entry.name[-1]) != body.axis:
+                    continue
+                acts = list(_acts(entry, body, levers, q, state))
+                own = [*_numbers(entry, first, q), *_parts(entry, spare, q)] if acts else []
+                for row, coefficient in acts:
+                    slots[row].extend((number, weight * coefficient) for number, weight in own)
+        if self.expansion is not None:
+            for j, taken in enumerate(slots):
+                taken.extend(_expansion(self.expansion, j, unknowns - 4, position[j]))
+        out = []
+        for taken in slots:
+            width = len(taken)
+            number, weight = np.zeros((n, width), np.int32), np.zeros((n, width), np.float32)
+            for k, (one, value) in enumerate(taken):
+                number[:, k], weight[:, k] = one, value
+            ends = np.arange(0, n * width + 1, width) if width else np.zeros(n + 1, np.int32)
+            out.append(csr_array((weight.ravel(), number.ravel(), ends), shape=(n, unknowns)))
+        return out
+
+
+def _expansion(expansion: Expansion, j: int, first: int, q: Array) -> Iterator[Slot]:
+    n = len(q)
+    yield np.full(n, first + j, np.int32), expansion.scale[j] * (q - expansion.fixed_at_mm[j])
+    yield np.full(n, first + 3, np.int32), -expansion.workpiece * (q - expansion.clamped_at_mm[j])
+
+
+def _acts(
+    entry: Entry,
+    body: Body,
+    levers: list[tuple[tuple[int, ...], list[Column]]],
+    q: Array,
+    play: Array | None,
+) -> Iterator[tuple[int, Column]]:
+    """Rows of the error that a number acts on, and with what coefficient."""
+    if entry.kind == "squareness":
+        row, sign = _SHEAR[entry.name]
+        yield row, sign * (q - body.datum_mm)
+    elif entry.kind == "backlash":
+        if play is not None:
+            yield body.axis, -0.5 * play
+    elif entry.kind != "half" or play is not None:
+        side: Column = play if entry.kind == "half" and play is not None else 1.0
+        d = "XYZABC".index(entry.name[1])
+        if d < 3:
+            yield d, side
+            return
+        # eps x lever: an angle about a moves row a - 1 by its arm along a + 1, and row a + 1 by minus that
+        # along a - 1
+        after, before = (d - 2) % 3, (d - 1) % 3
+        for rows, arm in levers:
+            if before in rows:
+                yield before, side * arm[after]
+            if after in rows:
+                yield after, -(side * arm[before])
+
+
+def _numbers(entry: Entry, first: int, q: Array) -> Iterator[Slot]:
+    """The numbers of an entry that make its value at q (n,): those of the factor."""
+    n = len(q)
+    if not entry.factor.size:
+        return
+    if entry.kind in ("mean", "half"):
+        x = entry.position_mm
+        i = np.clip(np.searchsorted(x, q, side="right") - 1, 0, len(x) - 2).astype(np.int32)
+        share = (np.clip(q, x[0], x[-1]) - x[i]) / (x[i + 1] - x[i])
+        yield first + i, 1.0 - share
+        yield first + i + 1, share
+    elif entry.kind == "wave":
+        angle = q * (2.0 * np.pi / entry.period_mm)
+        yield np.full(n, first, np.int32), np.sin(angle)
+        yield np.full(n, first + 1, np.int32), np.cos(angle)
+    else:
+        yield np.full(n, first, np.int32), np.ones(n)
+
+
+def _parts(entry: Entry, first: int, q: Array) -> Iterator[Slot]:
+    """The independent parts beside them; the squares of the weights add up to their variance at q (n,),
+    wherever in a cell that is."""
+    n = len(q)
+    if first < 0:
+        return
+    if entry.kind == "wave":
+        angle = q * (2.0 * np.pi / entry.period_mm)
+        yield np.full(n, first, np.int32), entry.rest[0] * np.sin(angle)
+        yield np.full(n, first + 1, np.int32), entry.rest[1] * np.cos(angle)
+        return
+    if entry.kind not in ("mean", "half"):
+        yield np.full(n, first, np.int32), np.full(n, entry.rest[0])
+        return
+    x = entry.position_mm
+    sigma = np.interp(q, x, entry.rest)
+    at = np.clip((q - x[0]) / (x[-1] - x[0]), 0.0, 1.0) * entry.cells
+    cell = np.minimum(at.astype(np.int32), entry.cells - 1)
+    share = at - cell
+    size = sigma / np.sqrt(share**2 + (1.0 - share) ** 2)
+    yield first + cell, size * (1.0 - share)
+    yield first + cell + 1, size * share
