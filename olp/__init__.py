@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from olp.gate import check as check
     from olp.planning import MeasurementPlan as MeasurementPlan
     from olp.planning import plan_measurements as plan_measurements
+    from olp.refining import RefinedCalibration as RefinedCalibration
+    from olp.refining import refine_calibration as refine_calibration
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -59,6 +61,8 @@ _HOME = {
     "fit_calibration": "olp.calibrating",
     "CalibrationDiagnosis": "olp.diagnosing",
     "diagnose_calibration": "olp.diagnosing",
+    "RefinedCalibration": "olp.refining",
+    "refine_calibration": "olp.refining",
     "MeasurementPlan": "olp.planning",
     "plan_measurements": "olp.planning",
     "correct": "olp.api",

@@ -80,4 +80,15 @@ PLANNING = (
         "Use three reflectors that are not on one line, or another method.",
         "ECZ with one straight reflector.",
     ),
+    Rule(
+        "OLP889",
+        "run not foreseen by the calibration's uncertainty",
+        Severity.WARNING,
+        "The points differ from the calibration by more than noise and its covariance explain: the machine "
+        "has changed, or the covariance is too small. It was moved within its covariance all the same, and "
+        "the new uncertainty is larger by what was not foreseen.",
+        "Look for the change (temperature, crash, active tables); measure anew where it is large, refine "
+        "again where it is small.",
+        "15 um found, 6 um expected.",
+    ),
 )

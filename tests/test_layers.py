@@ -34,7 +34,7 @@ LAYERS = (
     {"replanning"},
     {"comparing_parts"},
     {"calibrating", "correction", "diagnosing", "planning", "retiming", "comparing"},
-    {"gate"},
+    {"gate", "refining"},
     {"api"},
     {"report_files"},
     {"review"},

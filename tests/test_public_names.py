@@ -18,6 +18,7 @@ PUBLIC = {
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
     *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
+    *("refine_calibration", "RefinedCalibration"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

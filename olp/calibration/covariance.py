@@ -54,7 +54,7 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
     for name in SQUARENESS:
         parts.append(("squareness", name, np.zeros(0), 0.0))
         rows.append(fit.squareness(name)[None, :])
-    factor, dropped = _factor(rows, fit.covariance)
+    factor, dropped = principal(rows, fit.covariance)
     entries = []
     at = 0
     for (kind, name, q, period), table in zip(parts, rows, strict=True):
@@ -90,8 +90,9 @@ def _positions(fit: Fit, name: str) -> Array:
     return np.concatenate([*parts, [high]])
 
 
-def _factor(rows: list[Array], covariance: Array) -> tuple[Array, float]:
-    """(m, k) factor, and the largest share of a variance that it drops."""
+def principal(rows: list[Array], covariance: Array) -> tuple[Array, float]:
+    """(m, k) factor of the covariance of numbers that are `rows` of unknowns, and the largest share of a
+    variance that it drops."""
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     full = [table @ root for table in rows]

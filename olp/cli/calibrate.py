@@ -9,6 +9,7 @@ VERBS: dict[str, str] = {
     "fit": "Make a calibration from lines, points, lengths and directions.",
     "doctor": "Judge sign, unit and place of every curve of a calibration by independent points.",
     "plan": "Propose what to measure for a wanted uncertainty, with programs that go there.",
+    "refine": "Update a calibration within its covariance by a measured run.",
     "read": "Show what is understood of the file of an instrument.",
 }
 

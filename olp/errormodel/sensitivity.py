@@ -163,6 +163,19 @@ class Sensitivity:
         return out
 
 
+def value_rows(entry: Entry, q: Array) -> Array:
+    """(n, columns) dependence of the value of an entry at q (n,) on independent unknowns of variance 1: those
+    of the factor, and then its own."""
+    rank, n = entry.factor.shape[1], len(q)
+    parts = entry.cells + 1 if entry.kind in ("mean", "half") else len(entry.rest)
+    out = np.zeros((n, rank + parts))
+    for number, weight in _numbers(entry, 0, q):
+        out[:, :rank] += weight[:, None] * entry.factor[number]
+    for number, weight in _parts(entry, 0, q):
+        out[np.arange(n), rank + number] += weight
+    return out
+
+
 def _expansion(expansion: Expansion, j: int, first: int, q: Array) -> Iterator[Slot]:
     n = len(q)
     yield np.full(n, first + j, np.int32), expansion.scale[j] * (q - expansion.fixed_at_mm[j])
