@@ -7,13 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from olp.calibration.covariance import sigmas_at
 from olp.calibration.deciding import Advice, advise
 from olp.calibration.doctor import Diagnosis, Verdict, diagnose
 from olp.calibration.observations import Points
 from olp.errormodel import Calibration
+from olp.errormodel.uncertainty import Uncertainty
+from olp.exceptions import ConfigError
 from olp.files.calibration import load_calibration
 from olp.files.calibration_writer import calibration_files
 from olp.files.checkpoints import load_checkpoints
+from olp.files.covariance import load_uncertainty
 from olp.findings import Finding
 from olp.loading import PathLike, setup_of
 from olp.machine import Setup, Vector
@@ -28,13 +32,15 @@ class CalibrationDiagnosis:
     """What points say of a calibration: the report ("olp-doctor-1") as a mapping, and findings.
 
     `diagnosis` holds verdicts and estimates, `corrected` the calibration with all that is decided put right,
-    `advice` the points that would decide the rest (None where nothing is open).
+    `advice` the points that would decide the rest (None where nothing is open), `uncertainty` what is known
+    of the corrected one (None where the old one states nothing, or its curves have changed places).
     """
 
     diagnosis: Diagnosis
     advice: Advice | None
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    uncertainty: Uncertainty | None = None
 
     @property
     def corrected(self) -> Calibration:
@@ -43,7 +49,14 @@ class CalibrationDiagnosis:
     def files(self, target: PathLike) -> dict[Path, bytes]:
         """The bytes of the corrected calibration file `target` and of its curves beside it."""
         notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
-        return calibration_files(self.corrected, Path(target), notes=notes)
+        known = self.uncertainty
+        return calibration_files(
+            self.corrected,
+            Path(target),
+            sigma=None if known is None else sigmas_at(self.corrected, known),
+            covariance=known,
+            notes=notes,
+        )
 
 
 def diagnose_calibration(
@@ -73,7 +86,24 @@ def diagnose_calibration(
     levers = [tool.lever_mm for tool in described.tools.values()]
     tools = list(dict.fromkeys(lever for lever in levers if lever is not None))
     advice = advise(found, tools) if found.undecided else None
-    return CalibrationDiagnosis(found, advice, _report(found, advice), tuple(_findings(found, advice)))
+    left, words = None, "none is stated"
+    if not isinstance(calibration, Calibration):
+        left, words = _carried(found, calibration, stated)
+    report = _report(found, advice) | {"uncertainty": words}
+    return CalibrationDiagnosis(found, advice, report, tuple(_findings(found, advice)), left)
+
+
+def _carried(found: Diagnosis, path: PathLike, stated: Calibration) -> tuple[Uncertainty | None, str]:
+    """The uncertainty of the corrected calibration, and words on what becomes of the stated one."""
+    try:
+        old = load_uncertainty(path, stated)
+    except ConfigError:
+        # curves that were edited by hand have a covariance of others; their signs can be judged all the same
+        return None, "not carried over: the covariance is that of another calibration"
+    if old is None or not old.entries:
+        return None, "none is stated"
+    left = found.uncertainty_of(old)
+    return left, "carried over" if left is not None else "not carried over: curves have changed places"
 
 
 def _report(found: Diagnosis, advice: Advice | None) -> dict[str, Any]:

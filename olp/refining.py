@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.curves import DIGITS
+from olp.calibration.covariance import sigmas_at
 from olp.calibration.observations import Points
 from olp.calibration.refinement import Refinement, refine
 from olp.comparing import compare
@@ -61,7 +61,7 @@ class RefinedCalibration:
         return calibration_files(
             self.calibration,
             Path(target),
-            sigma=_sigmas(self.calibration, self.uncertainty),
+            sigma=sigmas_at(self.calibration, self.uncertainty),
             covariance=self.uncertainty,
             notes=notes,
         )
@@ -160,18 +160,6 @@ def _along(
     tangent = np.where(length[:, None] > _MOVES, way / np.maximum(length, _MOVES)[:, None], 0.0)
     points = Points(command, tool, seen, sigma, source=str(measured), row=use + 1)
     return points, tangent, play
-
-
-def _sigmas(calibration: Calibration, uncertainty: Uncertainty) -> dict[str, Array]:
-    """Standard uncertainties of components at the positions of their curves."""
-    found = {}
-    for curve in calibration.curves:
-        for name in curve.names:
-            entry = uncertainty.find("mean", name)
-            if entry is not None:
-                sigma = np.interp(curve.position_mm, entry.position_mm, entry.sigma)
-                found[name] = np.round(sigma, DIGITS[name[1] in "ABC"])
-    return found
 
 
 def _report(calibration: Calibration, done: Refinement, points: int) -> dict[str, Any]:

@@ -21,9 +21,12 @@ from olp.calibration.doctor import diagnose
 from olp.calibration.observations import Points
 from olp.cli import main
 from olp.errormodel import build
+from olp.errormodel.uncertainty import fingerprint
 from olp.exceptions import ConfigError
 from olp.files.calibration import load_calibration
+from olp.files.calibration_writer import calibration_files
 from olp.files.checkpoints import load_checkpoints
+from olp.files.covariance import load_uncertainty
 from olp.machine import COMPONENTS, SQUARENESS
 
 PROGRAMS = Path(__file__).resolve().parents[1] / "programs"
@@ -195,6 +198,29 @@ def test_the_command_on_a_good_calibration(shop: Path) -> None:
     assert report["decided"] > 8
 
 
+def test_what_is_put_right_keeps_its_uncertainty(shop: Path, tmp_path: Path) -> None:
+    good = load_calibration(shop / "calibration.toml")
+    known = load_uncertainty(shop / "calibration.toml", good)
+    assert known is not None
+    factors = {"EXX": -1.0, "EYY": -1.0}
+    wrong = scaled(good, factors)
+    entries = [
+        dataclasses.replace(e, factor=e.factor * factors.get(e.name, 1.0)) for e in known.entries
+    ]
+    spoilt = dataclasses.replace(known, entries=tuple(entries), fingerprint=fingerprint(wrong))
+    for path, data in calibration_files(wrong, shop / "flipped.toml", covariance=spoilt).items():
+        path.write_bytes(data)
+    target = tmp_path / "right.toml"
+    done = call(shop, "flipped.toml", "-o", str(target), "--json", "--fail-on", "never")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["uncertainty"] == "carried over"
+    back = load_calibration(target)
+    left = load_uncertainty(target, back)
+    assert left is not None
+    for a, b in zip(left.entries, known.entries, strict=True):
+        assert np.array_equal(a.factor, b.factor)
+
+
 def test_the_command_puts_right_what_is_wrong(shop: Path, tmp_path: Path) -> None:
     good = load_calibration(shop / "calibration.toml")
     text = (shop / "calibration.toml").read_text("utf-8")
@@ -213,6 +239,8 @@ def test_the_command_puts_right_what_is_wrong(shop: Path, tmp_path: Path) -> Non
     for a, b in zip(new.curves, good.curves, strict=True):
         assert all(np.array_equal(a.mean(name), b.mean(name)) for name in a.names)
     assert (shop / "wrong.toml").read_text("utf-8") == wrong
+    # the covariance beside it is that of the calibration before somebody changed it
+    assert "[covariance]" not in target.read_text("utf-8")
     assert call(shop, "wrong.toml", "-o", str(shop / "wrong.toml"), "--force").exit_code == 2
 
 

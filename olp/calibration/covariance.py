@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from olp.calibration.basis import Kink
+from olp.calibration.curves import DIGITS
 from olp.calibration.estimator import Fit
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
@@ -110,3 +111,15 @@ def principal(rows: list[Array], covariance: Array) -> tuple[Array, float]:
     worst = left.max(axis=0, initial=0.0)
     count = int(np.argmax(worst <= DROPPED)) + 1 if (worst <= DROPPED).any() else len(worst)
     return table @ turned[:, :count], float(worst[count - 1])
+
+
+def sigmas_at(calibration: Calibration, uncertainty: Uncertainty) -> dict[str, Array]:
+    """Standard uncertainties of components at the positions of their curves, mm or rad."""
+    found = {}
+    for curve in calibration.curves:
+        for name in curve.names:
+            entry = uncertainty.find("mean", name)
+            if entry is not None:
+                sigma = np.interp(curve.position_mm, entry.position_mm, entry.sigma)
+                found[name] = np.round(sigma, DIGITS[name[1] in "ABC"])
+    return found

@@ -25,6 +25,7 @@ from olp.calibration.points import frame_columns
 from olp.errormodel import build
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
+from olp.errormodel.uncertainty import Uncertainty, fingerprint
 from olp.machine import COMPONENTS, SQUARENESS
 from olp.units import AXES
 
@@ -89,6 +90,24 @@ class Diagnosis:
     def wrong(self) -> tuple[Verdict, ...]:
         """Those that are decided not to be as stated."""
         return tuple(v for v in self.verdicts if v.applied != 1.0 or v.sign == "absent")
+
+    def uncertainty_of(self, stated: Uncertainty) -> Uncertainty | None:
+        """What is known of the corrected calibration; None where curves have changed places."""
+        if self.arrangements:
+            return None
+        applied = {verdict.name: verdict.applied for verdict in self.verdicts}
+        return dataclasses.replace(
+            stated,
+            entries=tuple(
+                dataclasses.replace(
+                    entry,
+                    factor=entry.factor * applied.get(entry.name, 1.0),
+                    rest=entry.rest * abs(applied.get(entry.name, 1.0)),
+                )
+                for entry in stated.entries
+            ),
+            fingerprint=fingerprint(self.corrected),
+        )
 
     @property
     def outliers(self) -> tuple[tuple[int, float], ...]:

@@ -68,7 +68,7 @@ def command(
     if output is not None:
         files = found.files(output)
         write_files(files, force=force, inputs=inputs)
-        talk(f"wrote {output} and {len(files) - 1} curves beside it")
+        talk(f"wrote {output} and {len(files) - 1} files beside it")
     report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
     if as_json:
         put(to_json(report))
