@@ -35,10 +35,20 @@ if TYPE_CHECKING:
     from olp.exceptions import InputError as InputError
     from olp.exceptions import OlpError as OlpError
     from olp.exceptions import ProgramError as ProgramError
+    from olp.exchanging import TableExport as TableExport
+    from olp.exchanging import TableImport as TableImport
+    from olp.exchanging import compare_tables as compare_tables
+    from olp.exchanging import export_table as export_table
+    from olp.exchanging import import_table as import_table
     from olp.files.config import load_setup as load_setup
     from olp.findings import Finding as Finding
     from olp.gate import Check as Check
     from olp.gate import check as check
+    from olp.metrology import evaluate_lines as evaluate_lines
+    from olp.metrology import fit_ballbar as fit_ballbar
+    from olp.metrology import fit_diagonals as fit_diagonals
+    from olp.metrology import fit_postures as fit_postures
+    from olp.metrology import go_return as go_return
     from olp.planning import MeasurementPlan as MeasurementPlan
     from olp.planning import plan_measurements as plan_measurements
     from olp.refining import RefinedCalibration as RefinedCalibration
@@ -48,6 +58,8 @@ if TYPE_CHECKING:
     from olp.review.job import Review as Review
     from olp.review.job import view as view
     from olp.review.notebook import add_layers as add_layers
+    from olp.thermal_fitting import ThermalFitting as ThermalFitting
+    from olp.thermal_fitting import fit_thermal as fit_thermal
 
 _HOME = {
     "Check": "olp.gate",
@@ -66,6 +78,11 @@ _HOME = {
     "MeasurementPlan": "olp.planning",
     "plan_measurements": "olp.planning",
     "correct": "olp.api",
+    "compare_tables": "olp.exchanging",
+    "export_table": "olp.exchanging",
+    "import_table": "olp.exchanging",
+    "TableExport": "olp.exchanging",
+    "TableImport": "olp.exchanging",
     "error_at": "olp.api",
     "flatten": "olp.api",
     "inspect": "olp.api",
@@ -76,6 +93,8 @@ _HOME = {
     "Retiming": "olp.retiming",
     "simulate": "olp.api",
     "verify": "olp.api",
+    "fit_thermal": "olp.thermal_fitting",
+    "ThermalFitting": "olp.thermal_fitting",
     "CannotCompute": "olp.exceptions",
     "ConfigError": "olp.exceptions",
     "InputError": "olp.exceptions",
@@ -83,6 +102,11 @@ _HOME = {
     "ProgramError": "olp.exceptions",
     "Finding": "olp.findings",
     "load_setup": "olp.files.config",
+    "evaluate_lines": "olp.metrology",
+    "fit_ballbar": "olp.metrology",
+    "fit_diagonals": "olp.metrology",
+    "fit_postures": "olp.metrology",
+    "go_return": "olp.metrology",
 }
 
 __all__ = sorted(_HOME)

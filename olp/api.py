@@ -21,7 +21,7 @@ from olp.loading import PathLike, lever_of, load, profile_of, setup_of, source_o
 from olp.machine import Setup
 from olp.program.reader import Options, read
 from olp.progress import Progress, silent
-from olp.toolpath import Kind
+from olp.toolpath import Kind, carried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,6 +186,7 @@ def inspect(
         "axis_range_mm": ranges,
         "tools": sorted({f.tool for f in path.frames if f.tool is not None}),
         "work_offsets": sorted({f.work_offset for f in path.frames}),
+        "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
         "path_modes": [
             {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in found.path_modes
         ],
@@ -214,12 +215,15 @@ def error_at(
         raise ConfigError(
             f"{axis} = {at[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose a place in it"
         )
-    lever = np.array(lever_of(loaded.setup, tool))
+    vector = lever_of(loaded.setup, tool)
+    payload = loaded.setup.job.payload_kg
+    lever = np.array(carried(vector, payload))
     return {
         "position_mm": [float(v) for v in position_mm],
-        "tool_mm": lever.tolist(),
+        "tool_mm": [float(v) for v in vector],
+        "payload_kg": payload,
         "error_um": (loaded.model.error(at, lever)[0] * 1e3).tolist(),
-        "rotation_urad": (loaded.model.rotation(at)[0] * 1e6).tolist(),
+        "rotation_urad": (loaded.model.rotation(at, None, payload)[0] * 1e6).tolist(),
         "sources": [
             {"name": source, "error_um": (part[0] * 1e3).tolist()}
             for source, part in loaded.model.contributions(at, lever)
@@ -237,7 +241,7 @@ def flatten(
     """Unroll loops, subprograms, expressions and, if asked, canned cycles into plain blocks. Not lossless."""
     data, name = source_of(program)
     try:
-        return unrolled(data, name, profile_of(setup_of(machine, job)), expand_cycles)
+        return unrolled(data, name, setup_of(machine, job), expand_cycles)
     except OlpError as error:
         raise error.in_file(name or "<program>") from None
 

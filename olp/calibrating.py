@@ -77,6 +77,13 @@ def fit_calibration(
             f'the measurements are of machine "{measurements.machine}", and the machine file is of '
             f'"{described.name}"; expected one machine'
         )
+    if described is not None:
+        both = sorted(described.compensated_by_controller & measurements.active_during_measurement)
+        if both:
+            raise ConfigError(
+                f"active_during_measurement names {', '.join(both)}, and so does compensated_by_controller "
+                "of the machine file; expected each in one of them"
+            )
     travel = None if described is None else [described.axes[axis].travel_mm for axis in "XYZ"]
     found = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
     calibration = calibration_of(found, valid_until)

@@ -78,4 +78,13 @@ CALIBRATION = (
         "Look at the lines with the largest residuals.",
         "chi-square of 3 a degree of freedom.",
     ),
+    Rule(
+        "OLP809",
+        "scale not observed",
+        Severity.WARNING,
+        "Angles alone show the shape of the errors, not their size: a machine that is larger by as much as "
+        "it is farther away looks the same.",
+        "State a known distance between two pods, or add a line of a laser or lengths.",
+        "Two theodolites, one offset of the reflector and no baseline.",
+    ),
 )

@@ -12,6 +12,8 @@ import numpy as np
 
 from olp import checks
 from olp.checks import state
+from olp.checks.model import model_findings
+from olp.compensation.invert import TOLERANCE_MM
 from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
@@ -24,9 +26,9 @@ from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
 from olp.progress import Progress
-from olp.proof import Proof, prove
+from olp.proof import ROUNDING_SHARE, Proof, prove
 from olp.toolpath import Flag, Index, Toolpath
-from olp.units import MM_PER_UM
+from olp.units import MM_PER_UM, UM_PER_MM
 
 _PROVES = (
     "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
@@ -77,7 +79,7 @@ def correct_bytes(
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
     if unroll or expand:
-        data = unrolled(data, name, loaded.profile, expand, clearance)
+        data = unrolled(data, name, loaded.setup, expand, clearance)
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.profile, Options(contour=contour))
     tell("correct", 0.2)
@@ -91,6 +93,8 @@ def correct_bytes(
         stamp=stamp_line(loaded.digest, loaded.profile.comment),
     )  # fmt: skip
     text = writer.text()
+    if not writer.changed:
+        text = data
     parts, tally, holes = writer.parts, writer.tally, writer.holes
     del writer
     tell("prove", 0.7)
@@ -118,6 +122,7 @@ def correct_bytes(
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
+        *_model(path, loaded, limits.tolerance_mm),
     )
     report = report_of(nominal, (data, name), loaded, proof, findings, tolerance_um)
     report["moves"] = checks.tally_moves(path, len(passed), parts) | {
@@ -157,6 +162,7 @@ def verify_programs(
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
         *checks.program_findings(first, loaded.setup, contour=contour),
+        *_model(first.toolpath, loaded, limits.tolerance_mm),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)
     return Run(second.data, first, second, proof, rows.passed, report, findings)
@@ -173,6 +179,11 @@ def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Fi
 def _calibration(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
     days = loaded.setup.machine.sanity.calibration_days
     return state.calibration_findings(loaded.calibration, date, days)
+
+
+def _model(path: Toolpath, loaded: Loaded, tolerance_mm: float) -> list[Finding]:
+    sanity = loaded.setup.machine.sanity
+    return model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
 
 
 def _prove_without_deleted(
@@ -248,7 +259,7 @@ def report_of(
             "allowed_um": proof.allowed_mm * 1e3,
             "holds": proof.holds,
         },
-        "budget_um": {"model_and_chords": bend * 1e3, "rounding": 0.87 * proof.digit_mm * 1e3},
+        "budget_um": _budget(bend, proof, program, loaded),
         "orientation": checks.orientation(program.toolpath, loaded.model),
         "sources": checks.sources(program.toolpath, loaded.model),
         "worst": checks.worst_blocks(program, proof),
@@ -256,6 +267,35 @@ def report_of(
         "proves": list(_PROVES),
         "does_not_prove": list(_DOES_NOT_PROVE),
     }
+
+
+def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> dict[str, float]:
+    """What remains, by where it comes from, in um; the largest of each, of the random part two standard
+    deviations. The control rounds to its least increment where the digits written are not multiples of it."""
+    machine, repeatability = loaded.setup.machine, loaded.calibration.repeatability_mm
+    units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
+    halves = [
+        0.5 * least
+        if any(
+            not _multiple(10.0 ** -fewest_decimals(least, u, program.profile.inch_decimals) * u, least)
+            for u in units
+        )
+        else 0.0
+        for least in machine.least_increment_mm
+    ]
+    budget = {
+        "model_and_chords": bend_mm,
+        "inversion": TOLERANCE_MM,
+        "rounding": ROUNDING_SHARE * proof.digit_mm,
+        "increment": float(np.linalg.norm(halves)),
+    }
+    if repeatability is not None:
+        budget["random_2_sigma"] = 2.0 * float(np.linalg.norm(repeatability))
+    return {name: value * UM_PER_MM for name, value in budget.items()}
+
+
+def _multiple(length_mm: float, of_mm: float) -> bool:
+    return abs(length_mm / of_mm - round(length_mm / of_mm)) < 1e-6 and length_mm > 0.5 * of_mm
 
 
 def _ends(rows: Plan, count: int) -> Array:

@@ -162,30 +162,30 @@ def _findings(found: Diagnosis, advice: Advice | None) -> Iterator[Finding]:
     for verdict in found.verdicts:
         spread = f"factor {verdict.factor:.3g} with a standard uncertainty of {verdict.sigma:.2g}"
         if verdict.sign == "absent":
-            yield Finding("OLP886", f"{verdict.name}: {spread}")
+            yield Finding("OLP836", f"{verdict.name}: {spread}")
         elif verdict.sign == "flipped" or (verdict.sign == "right" and verdict.applied != 1.0):
             words = [] if verdict.sign == "right" else ["in the other sense"]
             words += [] if verdict.unit in ("right", "undecided") else [verdict.unit]
-            yield Finding("OLP881", f"{verdict.name} {', '.join(words)}: {spread}")
+            yield Finding("OLP831", f"{verdict.name} {', '.join(words)}: {spread}")
         elif verdict.unit == "no factor explains":
-            yield Finding("OLP881", f"{verdict.name} in no known unit: {spread}")
+            yield Finding("OLP831", f"{verdict.name} in no known unit: {spread}")
     for change in found.arrangements:
-        yield Finding("OLP882", change.words)
+        yield Finding("OLP832", change.words)
     if found.undecided:
         names = ", ".join(v.name for v in found.undecided)
         doubts = f"; not excluded: {'; '.join(found.doubts)}" if found.doubts else ""
         hint = ""
         if advice is not None and len(advice.axis_mm):
             hint = f"; {len(advice.axis_mm)} points that would tell more are proposed"
-        yield Finding("OLP883", f"{names}{doubts}{hint}", count=len(found.undecided))
+        yield Finding("OLP833", f"{names}{doubts}{hint}", count=len(found.undecided))
     if not found.explained:
         yield Finding(
-            "OLP884",
+            "OLP834",
             f"points scatter {found.factors.inflation:.1f} times as much as their stated uncertainty",
         )
     if found.outliers:
         rows = ", ".join(f"row {row} ({off:.0f})" for row, off in found.outliers[:_LISTED])
-        yield Finding("OLP885", f"standard deviations off: {rows}", count=len(found.outliers))
+        yield Finding("OLP835", f"standard deviations off: {rows}", count=len(found.outliers))
 
 
 __all__ = ["CalibrationDiagnosis", "diagnose_calibration"]

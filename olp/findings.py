@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from olp.calibration_rules import CALIBRATION
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
+from olp.model_rules import MODEL
 from olp.planning_rules import PLANNING
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
+from olp.table_rules import TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,7 +308,9 @@ _TABLE = (
 
 RULES = {
     rule.code: rule
-    for rule in sorted((*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *PLANNING), key=lambda rule: rule.code)
+    for rule in sorted(
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *PLANNING), key=lambda rule: rule.code
+    )
 }
 
 #: what a gate looks for: all but those of measured paths and of measurements of a machine

@@ -14,6 +14,7 @@ from olp import checks
 from olp.checks import motion, state
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
+from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp
 from olp.correction import Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
@@ -190,6 +191,7 @@ def _findings(
         found += state.box_findings(path, loaded.model.box_mm, outside)
         found += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
         found += checks.program_findings(case.written, loaded.setup, contour=contour)
+        found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             found += checks.proof_findings(proof, run.passed)
     found += state.tool_findings(path, loaded.calibration, sanity)

@@ -112,7 +112,8 @@ GATE = (
         "temperature unlike that of the calibration",
         Severity.WARNING,
         "A temperature of the job is farther from temperature_degC of the calibration than "
-        "temperature_within_K of [check]. Expansion is only what [thermal] says; bending is not in it.",
+        "temperature_within_K of [check]. Expansion is only what [thermal] says; bending only what its "
+        "structure holds.",
         "Wait until the machine is back in its range, or measure it warm.",
         "temperature_degC = 20, X_scale = 28 in the job file.",
     ),

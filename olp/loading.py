@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from olp.errormodel import Calibration, ErrorModel, build
 from olp.exceptions import ConfigError
-from olp.files.calibration import load_calibration
+from olp.files.calibration import files_beside, load_calibration
 from olp.files.config import load_setup
+from olp.files.structure import read_drift_log, sensors_of
 from olp.files.write import read_bytes
-from olp.machine import Setup
+from olp.machine import Job, Setup
 from olp.program.profiles import PROFILES, Profile
 
 PathLike = str | Path
@@ -43,9 +44,30 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
             "would be corrected twice; list the components that it corrects, or switch its tables off"
         )
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
+    calibration = at_temperatures(calibration, setup.job)
     skip = described.compensated_by_controller - calibration.active_during_measurement
     model = build(calibration, described.chain, outside=outside, skip_components=frozenset(skip))
     return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
+
+
+def at_temperatures(calibration: Calibration, job: Job) -> Calibration:
+    """The calibration with its thermal structure at the temperatures of the job. Raises ConfigError where the
+    job names sensors that it does not have, or leaves some out."""
+    structure = calibration.structure
+    if structure is None:
+        if job.sensors_degC or job.sensor_log:
+            raise ConfigError(
+                "the job states temperatures of sensors, and the calibration has no thermal structure; give "
+                "[thermal] structure in the calibration file, or leave the sensors out"
+            )
+        return calibration
+    if job.sensors_degC is not None:
+        structure = structure.at(job.sensors_degC)
+    elif job.sensor_log is not None:
+        log = read_drift_log(job.sensor_log)
+        sensors = sensors_of(log, dict.fromkeys(s.name for s in structure.sensors))
+        structure = structure.settled(log.time_s, sensors, job.sensor_log_at_s)
+    return replace(calibration, structure=structure)
 
 
 def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
@@ -64,13 +86,10 @@ def profile_of(setup: Setup) -> Profile:
 
 
 def _digest(calibration: str, machine: object) -> str:
-    """Hash of the calibration file, its curve files and the machine values that decide the model."""
-    import tomllib
-
-    raw = read_bytes(calibration)
-    digest = hashlib.sha256(raw)
-    for curve in tomllib.loads(raw.decode()).get("curves", []):
-        digest.update(read_bytes(Path(calibration).parent / curve["file"]))
+    """Hash of the calibration file, the files that it names and the machine values that decide the model."""
+    digest = hashlib.sha256(read_bytes(calibration))
+    for file in files_beside(calibration):
+        digest.update(read_bytes(file))
     digest.update(repr(getattr(machine, "chain", "")).encode())
     return digest.hexdigest()
 
@@ -82,10 +101,14 @@ def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
     return read_bytes(program), str(program)
 
 
-def unrolled(data: bytes, name: str, profile: Profile, expand: bool, clearance: float | None = None) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it."""
+def unrolled(data: bytes, name: str, setup: Setup, expand: bool, clearance: float | None = None) -> bytes:
+    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
+    Payloads that the job gives by line become comments first, as lines are others afterwards."""
+    from olp.program.directives import with_payloads
     from olp.program.flatten import flatten as unroll
 
+    profile = profile_of(setup)
+    data = with_payloads(data, setup.job.payloads, profile.comment)
     folder = Path(name).parent if name else None
 
     def beside(wanted: str) -> bytes | None:

@@ -44,7 +44,8 @@ class WorkOffset:
 
     `set_by` is "touch" (touched off on the raw machine, so the touched point keeps its place) or
     "true" (located by other means). `touched_at_mm` is the axis position at the touch; an axis that
-    is None there takes its default, the offset plus the length of `touch_tool`.
+    is None there takes its default, the offset plus the length of `touch_tool`; `touched_payload_kg` None is
+    the job's payload.
     """
 
     name: str
@@ -53,6 +54,7 @@ class WorkOffset:
     set_by: Literal["touch", "true"] = "touch"
     touched_at_mm: tuple[float | None, float | None, float | None] = (None, None, None)
     touch_tool: int | None = None
+    touched_payload_kg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,13 +156,19 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What changes per job. `work_offsets` and `tools` override the machine's, one by one."""
+    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `payloads` leads
+    from a line of the program, counted from 1, to the payload from there on. Temperatures of the structure's
+    sensors come from `sensors_degC`, settled, or from `sensor_log` at a time in it."""
 
     program: str | None = None
     machine: str | None = None
     start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
     payload_kg: float = 0.0
+    payloads: Mapping[int, float] = field(default_factory=dict)
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)
+    sensors_degC: Mapping[str, float] | None = None
+    sensor_log: str | None = None
+    sensor_log_at_s: float | None = None
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
     meshes: tuple[Mesh, ...] = ()

@@ -69,4 +69,22 @@ METROLOGY = (
         "Look at the residuals, and give the lines to olp calibrate fit, which knows levers and drift.",
         "Body diagonals that leave 20 um where 1 um was stated.",
     ),
+    Rule(
+        "OLP858",
+        "readings not evaluated",
+        Severity.WARNING,
+        "These readings do not allow the evaluation that they are for; a fit may still use them.",
+        "Complete the run, or leave the incomplete one out; the message says what is missing.",
+        "A line whose last run ended half way.",
+    ),
+    Rule(
+        "OLP859",
+        "reading far from its repetitions",
+        Severity.WARNING,
+        "One reading differs from the others of its target and direction by many times what they differ "
+        "among themselves. It is part of the figures, as ISO 230-2 knows no outliers, and may be most of R "
+        "and A.",
+        "Look at the reading, and measure the run again; olp calibrate fit leaves such readings out by name.",
+        "A beam that was broken for a moment: +31 um in run 3.",
+    ),
 )

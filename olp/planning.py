@@ -292,9 +292,9 @@ def _report(
 def _findings(chosen: Method, wanted: float) -> Iterator[Finding]:
     rms = chosen.prediction.rms_mm * UM_PER_MM
     if rms > wanted:
-        yield Finding("OLP887", f"{chosen.name} leaves about {rms:.1f} um; wanted were {wanted:g} um")
+        yield Finding("OLP837", f"{chosen.name} leaves about {rms:.1f} um; wanted were {wanted:g} um")
     if chosen.prediction.hidden:
-        yield Finding("OLP888", f"{chosen.name} cannot see {', '.join(chosen.prediction.hidden)}")
+        yield Finding("OLP838", f"{chosen.name} cannot see {', '.join(chosen.prediction.hidden)}")
 
 
 def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> Iterator[tuple[Path, bytes]]:

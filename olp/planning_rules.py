@@ -6,7 +6,7 @@ from olp.rule import Rule, Severity
 
 PLANNING = (
     Rule(
-        "OLP881",
+        "OLP831",
         "curve in the wrong sense or unit",
         Severity.ERROR,
         "Independent points say that this error of the machine is the stated one times another factor: minus "
@@ -17,7 +17,7 @@ PLANNING = (
         "EBX flipped: a level that counts + where the nose goes down.",
     ),
     Rule(
-        "OLP882",
+        "OLP832",
         "curves of an axis in another arrangement",
         Severity.ERROR,
         "Independent points are explained much better where two columns change places, positions count from "
@@ -27,7 +27,7 @@ PLANNING = (
         "EAX and EBX in each other's place: pitch and roll of X confused.",
     ),
     Rule(
-        "OLP883",
+        "OLP833",
         "sense not decided by these points",
         Severity.WARNING,
         "With the noise of the points and an unknown frame either sense of this curve remains possible, or "
@@ -36,7 +36,7 @@ PLANNING = (
         "ECZ, which acts on offset tools only, from points with one straight tool.",
     ),
     Rule(
-        "OLP884",
+        "OLP834",
         "points not explained",
         Severity.WARNING,
         "Whatever sign and unit the curves have, points differ from the calibration by several times their "
@@ -46,7 +46,7 @@ PLANNING = (
         "Points taken after a crash.",
     ),
     Rule(
-        "OLP885",
+        "OLP835",
         "point far off",
         Severity.WARNING,
         "This point is off by many times its uncertainty while the others agree: another target, a broken "
@@ -55,7 +55,7 @@ PLANNING = (
         "Row 14, 9 standard deviations off.",
     ),
     Rule(
-        "OLP886",
+        "OLP836",
         "error not on the machine",
         Severity.ERROR,
         "Points show nothing of this curve, although they would: the control corrects it already, or the "
@@ -65,7 +65,7 @@ PLANNING = (
         "EXX while the pitch compensation of X is on.",
     ),
     Rule(
-        "OLP887",
+        "OLP837",
         "wanted uncertainty out of reach",
         Severity.WARNING,
         "None of the methods that were compared gets there in the given box with the given instruments.",
@@ -73,7 +73,7 @@ PLANNING = (
         "2 um over 3 x 2 x 1 m from a tracker of 15 um.",
     ),
     Rule(
-        "OLP888",
+        "OLP838",
         "plan leaves errors unseen",
         Severity.WARNING,
         "Whatever the readings will be, nothing in this plan depends on these errors, or too little.",
@@ -81,7 +81,7 @@ PLANNING = (
         "ECZ with one straight reflector.",
     ),
     Rule(
-        "OLP889",
+        "OLP839",
         "run not foreseen by the calibration's uncertainty",
         Severity.WARNING,
         "The points differ from the calibration by more than noise and its covariance explain: the machine "

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Format = Literal["svg", "png"]
 
@@ -26,6 +28,31 @@ _SENSES = {
     "C": ("EC", "tab:green"),
 }
 _POINTS = 400
+
+
+def drawn(
+    name: str, size: tuple[float, float], draw: Callable[[Figure], None], kind: Format = "svg"
+) -> bytes:
+    """The bytes of a figure; an SVG is the element alone, for a page or a file.
+
+    The same data give the same bytes; ids of two plots in a page differ by their name.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    style: Any = {
+        "svg.hashsalt": f"olp-{name}", "svg.fonttype": "none", "font.size": 8.0, "font.family": "sans-serif",
+        "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "0.5", "axes.linewidth": 0.6,
+        "xtick.color": "0.3", "ytick.color": "0.3",
+    }  # fmt: skip
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=size, layout="constrained")
+        draw(figure)
+        out = io.BytesIO()
+        metadata = {"Date": None} if kind == "svg" else {"Software": None}
+        figure.savefig(out, format=kind, dpi=160, metadata=metadata)
+    data = out.getvalue()
+    return data[data.index(b"<svg") :] if kind == "svg" else data
 
 
 def calibration_curves(calibration: Calibration, kind: Format = "svg") -> bytes:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from olp.measured.figures import Run
 from olp.measured.path import Array, Path
+from olp.plots import drawn
 from olp.units import UM_PER_MM
 
 if TYPE_CHECKING:
@@ -24,25 +24,6 @@ _DRAWN = 30_000
 _FLOOR_UM = 1e-2
 
 Runs = Mapping[str, Sequence[Run]]
-
-
-def _svg(name: str, size: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
-    """The same data give the same bytes; ids of two plots in a page differ by their name."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    style: Any = {
-        "svg.hashsalt": f"olp-{name}", "svg.fonttype": "none", "font.size": 8.0, "font.family": "sans-serif",
-        "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "0.5", "axes.linewidth": 0.6,
-        "xtick.color": "0.3", "ytick.color": "0.3",
-    }  # fmt: skip
-    with matplotlib.rc_context(style):
-        figure = Figure(figsize=size, layout="constrained")
-        draw(figure)
-        out = io.BytesIO()
-        figure.savefig(out, format="svg", dpi=160, metadata={"Date": None})
-    text = out.getvalue()
-    return text[text.index(b"<svg") :]
 
 
 def picture(path: Path, runs: Runs) -> bytes:
@@ -77,7 +58,7 @@ def picture(path: Path, runs: Runs) -> bytes:
     span = np.ptp(path.vertex_mm[:, :2], axis=0)
     sides = sum(bool(runs.get(name)) for name in ("before", "after"))
     height = (6.0 / max(sides, 1)) * float(span[1] / max(span[0], 1e-9)) + 0.7
-    return _svg("picture", (7.4, min(max(height, 1.8), 5.0)), draw)
+    return drawn("picture", (7.4, min(max(height, 1.8), 5.0)), draw)
 
 
 def _usual(xy: Array) -> float:
@@ -131,7 +112,7 @@ def along(path: Path, runs: Runs, tolerance_um: float | None) -> bytes:
         plot.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
-    return _svg("along", (7.4, 2.4), draw)
+    return drawn("along", (7.4, 2.4), draw)
 
 
 def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
@@ -162,7 +143,7 @@ def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
         plot.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, loc="upper left")
 
-    return _svg("histogram", (7.4, 2.2), draw)
+    return drawn("histogram", (7.4, 2.2), draw)
 
 
 def components(path: Path, runs: Runs) -> bytes:
@@ -183,7 +164,7 @@ def components(path: Path, runs: Runs) -> bytes:
         plots[0].legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
         plots[1].set(xlabel="along the path in m", xlim=(0.0, path.length_mm / 1e3))
 
-    return _svg("components", (7.4, 3.2), draw)
+    return drawn("components", (7.4, 3.2), draw)
 
 
 def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
@@ -212,7 +193,7 @@ def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
             plot.set_title(f"{row['plane']}, radius {row['radius_mm']:g} mm", fontsize=8)
         plots[0].legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.15, -0.12), fontsize=7)
 
-    return _svg("circles", (7.4, 2.7), draw)
+    return drawn("circles", (7.4, 2.7), draw)
 
 
 def diagonals(rows: Sequence[Mapping[str, Any]]) -> bytes:
@@ -232,4 +213,4 @@ def diagonals(rows: Sequence[Mapping[str, Any]]) -> bytes:
         plots[0].set_ylabel("deviation in um")
         plots[0].legend(frameon=False, fontsize=7)
 
-    return _svg("diagonals", (7.4, 2.0), draw)
+    return drawn("diagonals", (7.4, 2.0), draw)

@@ -192,13 +192,13 @@ def _findings(done: Refinement) -> Iterator[Finding]:
     ratio = done.chi_square / done.freedom
     if ratio > MISFIT:
         yield Finding(
-            "OLP889",
+            "OLP839",
             f"chi-square is {ratio:.1f} a degree of freedom: {done.before_mm * UM_PER_MM:.1f} um rms were "
             f"found, {done.expected_mm * UM_PER_MM:.1f} um expected",
         )
     if done.outliers:
         rows = ", ".join(f"row {row} ({off:.0f})" for row, off in done.outliers[:_LISTED])
-        yield Finding("OLP885", f"standard deviations off, left out: {rows}", count=len(done.outliers))
+        yield Finding("OLP835", f"standard deviations off, left out: {rows}", count=len(done.outliers))
 
 
 __all__ = ["RefinedCalibration", "refine_calibration"]

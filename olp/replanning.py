@@ -58,7 +58,7 @@ class Case:
         stated = setup.machine.blend_mm
         with naming(name):
             profile = profile_of(setup)
-            text = unrolled(data, name, profile, False) if flatten else data
+            text = unrolled(data, name, setup, False) if flatten else data
             program = read(text, setup, profile, Options(block_delete=block_delete, contour=contour))
             if setup.machine.path_mode == "exact-stop" and blend_mm is None:
                 # a mode of line 0 holds from the start

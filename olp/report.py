@@ -196,6 +196,9 @@ def _budget(report: Report) -> Iterator[str]:
     titles = {
         "model_and_chords": "model and chords, under the tolerance",
         "rounding": "rounding to the last digit",
+        "increment": "least increment of the control",
+        "random_2_sigma": "random: repeatability, two standard deviations",
+        "inversion": "inversion of the model",
         "lost_motion_unknown": "lost motion not yet taken up",
     }
     # What a later version adds shows under its own key.

@@ -15,7 +15,13 @@ from olp.report_compare import change, figure, table_rows, taken_by_fit
 
 Plots = Mapping[str, bytes]
 _MOST_SOURCES, _MOST_POSES = 24, 60
-_PART = {"model_and_chords": "model and chords", "rounding": "rounding to the last digit"}
+_PART = {
+    "model_and_chords": "model and chords",
+    "inversion": "inversion of the model",
+    "rounding": "rounding to the last digit",
+    "increment": "least increment of the control",
+    "random_2_sigma": "random: repeatability, two standard deviations",
+}
 
 
 def correction(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:

@@ -22,6 +22,7 @@ from olp.nominal import nominal_of
 from olp.program.reader import Options, read
 from olp.report import to_json
 from olp.testpaths import predicted
+from olp.toolpath import carried
 
 #: points of a predicted path in a picture, about
 _POINTS = 120_000
@@ -83,7 +84,8 @@ def _written(document: Document, name: str) -> bytes:
 def _tests(setup: Setup) -> dict[str, Any]:
     loaded = load(setup, None, "hold")
     digit = max(setup.machine.least_increment_mm)
-    return predicted(loaded.model, np.array(lever_of(setup, None), float), digit)
+    tool = carried(lever_of(setup, None), setup.job.payload_kg)
+    return predicted(loaded.model, np.array(tool, float), digit)
 
 
 def _test_plots(report: Mapping[str, Any], name: str) -> dict[str, bytes]:

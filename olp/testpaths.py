@@ -24,11 +24,11 @@ _PLANES = {"XY": (0, 1), "YZ": (1, 2), "ZX": (2, 0)}
 def predicted(model: ErrorModel, tool_mm: Array, digit_mm: float) -> dict[str, Any]:
     """What a ball-bar and a laser on the diagonals should show in the middle of the calibrated box, in um.
 
-    `tool_mm` (3,) is the tool vector, `digit_mm` the last digit of corrected commands. Following error and
-    thermal drift are not part of it.
+    `tool_mm` (3,) is the tool vector, or (4,) with the payload in kg, `digit_mm` the last digit of corrected
+    commands. Following error and thermal drift are not part of it.
     """
     return {
-        "tool_mm": tool_mm.tolist(),
+        "tool_mm": tool_mm[:3].tolist(),
         "circles": [_circle(model, tool_mm, digit_mm, plane) for plane in _PLANES],
         "diagonals": _diagonals(model, tool_mm, digit_mm),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 
@@ -12,6 +13,10 @@ from olp.geometry import arc_points, quarter_shares
 from olp.machine import ZERO, Vector
 
 Array = npt.NDArray[np.float64]
+#: A tool vector in mm, and the payload in kg behind it where there is one.
+Tool = tuple[float, ...]
+#: An axis position in mm, and the tool with which it was touched.
+Touch = tuple[Vector, Tool]
 Index = npt.NDArray[np.int64]
 
 
@@ -38,14 +43,19 @@ class Flag(IntFlag):
     CONTROL = 128  #: made by the control itself, without words: axes become unknown (M6, G28, after a probe)
 
 
+def carried(tool_mm: Vector, payload_kg: float) -> Tool:
+    """A tool as error models take it: the payload is a fourth number where there is one."""
+    return (*tool_mm, payload_kg) if payload_kg else tool_mm
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """How words became axis positions for a stretch of moves, and which tool was in the spindle.
 
     Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
-    `length_mm`). `tool_mm` is the lever, gauge point to tip. `touched` is (axis position, lever) of the
-    touch-off of the work offset on the raw machine, None where it was located by other means; `tool_touched`
-    likewise for the length of the active tool.
+    `length_mm`). `tool_mm` is the lever, gauge point to tip, `payload_kg` what the machine carries.
+    `touched` is (axis position, lever and payload) of the touch-off of the work offset on the raw machine,
+    None where it was located by other means; `tool_touched` likewise for the length of the active tool.
     """
 
     unit_mm: float = 1.0
@@ -54,8 +64,9 @@ class Frame:
     tool_mm: Vector = ZERO
     tool: int | None = None
     work_offset: str = ""
-    touched: tuple[Vector, Vector] | None = None
-    tool_touched: tuple[Vector, Vector] | None = None
+    touched: Touch | None = None
+    tool_touched: Touch | None = None
+    payload_kg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,18 +127,24 @@ class Toolpath:
         return low, high
 
     def tool_mm(self, first: int = 0, last: int | None = None) -> Array:
-        """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3)."""
-        return self.per_frame([f.tool_mm for f in self.frames], first, last)
+        """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3); with
+        payloads (4,) or (m, 4), kg in the last column."""
+        return self.per_frame(self._tools(), first, last)
 
     def tools_mm(self) -> Array:
-        """(k, 3) the tool vectors of all frames."""
-        return np.array([f.tool_mm for f in self.frames] or np.zeros((1, 3)), float)
+        """(k, 3) the tool vectors of all frames; with payloads (k, 4)."""
+        return np.array(self._tools() or np.zeros((1, 3)), float)
 
-    def per_frame(self, values: list[Vector], first: int = 0, last: int | None = None) -> Array:
+    def _tools(self) -> list[Tool]:
+        if any(f.payload_kg for f in self.frames):
+            return [(*f.tool_mm, f.payload_kg) for f in self.frames]
+        return [f.tool_mm for f in self.frames]
+
+    def per_frame(self, values: Sequence[Tool], first: int = 0, last: int | None = None) -> Array:
         """One vector a frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
         if not values:
             return np.zeros(3)
-        table = np.array(values, float).reshape(len(values), 3)
+        table = np.array(values, float)
         if len(values) == 1 or (table == table[0]).all():
             return np.asarray(table[0], float)
         part = self.frame[first:last]

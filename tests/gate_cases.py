@@ -86,6 +86,32 @@ def scaled(um: float) -> dict[str, Any]:
     }
 
 
+def total_map() -> dict[str, Any]:
+    nodes = [f"{x},{y},{z},0,0,0" for x in (-1000, 2000) for y in (-1000, 2000) for z in (-1000, 2000)]
+    text = "\n".join(["X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um", *nodes])
+    table = '[[maps]]\nfile = "map.csv"\nkind = "total"\ntool_mm = [0.0, 0.0, -150.0]\n'
+    return {"calibration": table, "curves": {"map.csv": text}}
+
+
+def load(um_kg: float) -> dict[str, Any]:
+    """A sag that does not depend on the place."""
+    text = f"X_mm,EZX_um_kg\n-1000,{-um_kg}\n2000,{-um_kg}\n"
+    return {"calibration": '[[compliance]]\nfile = "load.csv"\n', "curves": {"load.csv": text}}
+
+
+def structure() -> dict[str, Any]:
+    text = (
+        'schema = "olp-thermal-1"\nmachine = "m"\n[[sensors]]\nname = "beam"\nreference_degC = 20.0\n'
+        'range_degC = [15.0, 30.0]\n[[distortions]]\ncomponent = "EXX"\nsensor = "beam"\n'
+        "span_mm = [-1000.0, 2000.0]\noffset_um_K = 1.0\n"
+    )
+    return {"calibration": '[thermal]\nstructure = "t.toml"\n', "curves": {"t.toml": text}}
+
+
+def sensor(degC: float) -> str:
+    return f"[temperatures_degC.sensors]\nbeam = {degC}\n"
+
+
 def roll(urad: float) -> dict[str, Any]:
     table = '[[curves]]\nfile = "x.csv"\n'
     return {"calibration": table, "curves": {"x.csv": f"X_mm,EAX_urad\n-1000,{urad}\n2000,{urad}\n"}}
@@ -214,6 +240,17 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP411": (
         Call(increment_mm=0.001, options={"tolerance_um": 0.86}),
         Call(increment_mm=0.001, options={"tolerance_um": 0.88}),
+    ),
+    "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
+    "OLP421": (
+        Call(b"G1 X100\n(olp payload 30)\nG1 X90\n", **load(0.11)),
+        Call(b"G1 X100\n(olp payload 30)\nG0 X90\nG1 X80\n", **load(0.11)),
+    ),
+    "OLP422": (Call(job="payload_kg = 1.0\n"), Call(job="payload_kg = 1.0\n", **load(0.01))),
+    "OLP423": (Call(**structure()), Call(job=sensor(20.0), **structure())),
+    "OLP424": (
+        Call(job=sensor(30.1), options={"outside_box": "hold"}, **structure()),
+        Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
     ),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),

@@ -233,7 +233,7 @@ def test_the_command_puts_right_what_is_wrong(shop: Path, tmp_path: Path) -> Non
     target = tmp_path / "right.toml"
     done = call(shop, "wrong.toml", "-o", str(target))
     assert done.exit_code == 1
-    assert "OLP881" in done.stdout
+    assert "OLP831" in done.stdout
     new = load_calibration(target)
     assert new.squareness == pytest.approx(good.squareness, abs=1e-15)
     for a, b in zip(new.curves, good.curves, strict=True):

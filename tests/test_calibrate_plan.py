@@ -215,7 +215,7 @@ def test_the_quickest_good_method_is_chosen() -> None:
     assert plan.chosen.hours == min(m.hours for m in good)
     assert {m.instrument for m in plan.methods} == set(INSTRUMENTS)
     none = plan_measurements(MACHINE, uncertainty_um=0.01, instrument="tracker", points=30)
-    assert next(f.code for f in none.findings) == "OLP887"
+    assert next(f.code for f in none.findings) == "OLP837"
 
 
 def test_a_box_outside_the_travel_is_refused() -> None:

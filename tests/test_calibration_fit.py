@@ -14,6 +14,7 @@ from judge import simulated
 from olp.calibration.basis import CurveSpace, Kink, Spline, Step
 from olp.calibration.curves import calibration_of, sigmas_of
 from olp.calibration.estimator import Fit, fit
+from olp.calibration.lines import drift_ramps, group_of, noise_of
 from olp.calibration.normal import Block, Chunk, Normal, residuals_of, solve
 from olp.calibration.observations import Line, Measurements, SquarenessReading
 from olp.calibration.summary import findings_of, unseen
@@ -21,7 +22,7 @@ from olp.errormodel import build
 from olp.exceptions import CannotCompute, ConfigError
 from olp.findings import Finding
 
-SMOOTH, ROUGH = range(6), range(3)
+SMOOTH, ROUGH = range(4), range(2)
 UM = 1e-3
 
 
@@ -128,7 +129,7 @@ def test_zeros_and_slopes_of_instruments_mean_nothing(
 def test_what_points_leave_alone_and_with_lines() -> None:
     """The frame of the instrument is far away and turned; fresh tools."""
     alone, both = [], []
-    for seed in range(4):
+    for seed in range(2):
         machine, measurements = case(seed, "smooth")
         points = cloud(machine, seed, 120, 5.0)
         found = fit(Measurements("m", points=(points,)), machine.chain)
@@ -208,6 +209,17 @@ def test_what_lengths_leave() -> None:
     assert np.median(left_other) <= 1.2
 
 
+def test_a_length_that_slipped_is_left_out_and_named() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    all_rays = rays(machine, 0, 6, 120)
+    wrong = all_rays[2].length_mm.copy()
+    wrong[33] += 0.05
+    bad = (*all_rays[:2], dataclasses.replace(all_rays[2], length_mm=wrong), *all_rays[3:])
+    found = fit(Measurements("m", lengths=bad), "FXYZ")
+    assert [(outlier.source, outlier.row) for outlier in found.outliers] == [("station-2.csv", 34)]
+    assert not told(found, "OLP808")
+
+
 def test_lengths_of_points_in_a_plane_are_refused() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
     (one,) = rays(machine, 0, 1, 50, [(0.0, 0.0, 0.0)])
@@ -249,6 +261,7 @@ def test_without_a_distance_the_scale_stays_unknown() -> None:
             row += weight * (ends[1] - ends[0]) / np.ptp(found.box_mm[axis])
         return float(np.sqrt(row @ found.covariance @ row)) * 1e6
 
+    assert told(free, "OLP809") and not told(known, "OLP809")
     third = 1.0 / 3.0
     assert scales(free, (third, third, third)) > 3.0 * scales(known, (third, third, third))
     assert scales(free, (1.0, -1.0, 0.0)) < 1.3 * scales(known, (1.0, -1.0, 0.0))
@@ -401,6 +414,47 @@ def test_runs_that_scatter_more_than_stated_are_said(
     found = fit(dataclasses.replace(measurements, lines=tuple(lines)), "FXYZ")
     (finding,) = told(found, "OLP803")
     assert finding.message.startswith("exx.csv")
+
+
+def test_noise_and_drift_of_a_line() -> None:
+    """Against one least-squares problem with a mean for each target and direction."""
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    q = np.linspace(0.0, 3000.0, 16)
+    line = line_of(simulated.take(machine, np.random.default_rng(3), "EXX", targets=q))
+    groups, ramps = group_of(line), drift_ramps(line)
+    table = np.hstack([np.eye(groups.max() + 1)[groups], ramps])
+    found, _, rank, _ = np.linalg.lstsq(table, line.value, rcond=1e-9)
+    rest = line.value - table @ found
+    noise = noise_of(line)
+    assert noise.spread == pytest.approx(np.sqrt(rest @ rest / (len(rest) - rank)), rel=1e-6)
+    assert noise.sigma == pytest.approx(0.5 * UM, rel=0.2)
+
+
+def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    lines = []
+    for a in "XYZ":
+        targets = np.linspace(*machine.box["XYZ".index(a)], 40)
+        taken = simulated.take(machine, np.random.default_rng(1), f"E{a}{a}", targets=targets, runs=1)
+        lines.append(line_of(taken, 0.5 * UM))
+    calibration = calibration_of(fit(Measurements("m", tuple(lines)), "FXYZ"))
+    assert not any(curve.forward for curve in calibration.curves)
+
+
+def test_recordings_of_many_samples_are_read_in_reasonable_memory() -> None:
+    """Sweeps of 2000 places there and back: no table of samples by places."""
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    rng = np.random.default_rng(3)
+    fine = [
+        line_of(simulated.take(machine, rng, f"E{a}{a}", targets=np.linspace(*machine.box[k], 2000), runs=3))
+        for k, a in enumerate("XYZ")
+    ]
+    found = fit(Measurements("m", tuple(fine)), "FXYZ")
+    q = np.linspace(100.0, 2900.0, 50)
+    at = np.tile(np.array(simulated.LINE), (len(q), 1))
+    at[:, 0] = q
+    rest = found.curve("EXX", q) @ found.theta - machine.error(at, np.array(simulated.TOOL))[:, 0]
+    assert np.std(rest - np.polyval(np.polyfit(q, rest, 1), q)) < 0.3 * UM
 
 
 def test_one_run_without_sigma_is_refused() -> None:

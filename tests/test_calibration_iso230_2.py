@@ -1,4 +1,5 @@
-"""ISO 230-2: figures worked by hand from the definitions, and the unidirectional figures of a published set."""
+"""ISO 230-2: figures worked by hand from the definitions, and the unidirectional figures of a published
+set."""
 
 from __future__ import annotations
 
@@ -33,10 +34,13 @@ def test_by_hand() -> None:
 
     up 0: 0, 2 -> mean 1, s = sqrt(2); up 100: 4, 4 -> 4, 0; up 200: 6, 10 -> 8, 2 sqrt(2)
     down 0: -1, -1 -> -1, 0; down 100: 0, 2 -> 1, sqrt(2); down 200: 5, 5 -> 5, 0
-    B_i = 2, 3, 3: B = 3, mean 8/3. E_up = 7, E_down = 6, E = 8 - (-1) = 9. Means of both 0, 2.5, 6.5: M = 6.5.
-    A_up: top 8 + 4 sqrt2, bottom 1 - 2 sqrt2: 7 + 6 sqrt2. A_down: 5 - min(-1, 1 - 2 sqrt2) = 5 - (1 - 2 sqrt2).
+    B_i = 2, 3, 3: B = 3, mean 8/3. E_up = 7, E_down = 6, E = 8 - (-1) = 9.
+    Means of both 0, 2.5, 6.5: M = 6.5.
+    A_up: top 8 + 4 sqrt2, bottom 1 - 2 sqrt2: 7 + 6 sqrt2.
+    A_down: 5 - min(-1, 1 - 2 sqrt2) = 5 - (1 - 2 sqrt2).
     A: 8 + 4 sqrt2 - (1 - 2 sqrt2). R_up = 8 sqrt2, R_down = 4 sqrt2.
-    R_i: max(2 sqrt2 + 2, 4 sqrt2) = 5.657, max(2 sqrt2 + 3, 4 sqrt2) = 5.828, max(4 sqrt2 + 3, 8 sqrt2) = 11.31.
+    R_i: max(2 sqrt2 + 2, 4 sqrt2) = 5.657, max(2 sqrt2 + 3, 4 sqrt2) = 5.828,
+    max(4 sqrt2 + 3, 8 sqrt2) = 11.31.
     """
     found = evaluate(line([[0, 4, 6], [2, 4, 10]], [[-1, 0, 5], [-1, 2, 5]], [0, 100, 200]))
     root = math.sqrt(2)
@@ -59,8 +63,9 @@ def test_angles_are_the_same_in_urad() -> None:
     assert angle["targets"]["s_up_urad"] == pytest.approx(length["targets"]["s_up_um"])
 
 
-#: Readings of an axis in units of 1e-8 mm less the target: paulscherrerinstitute/ecmccfg, examples/test/fat_sat,
-#: report.md (the columns that the report calls forward and backward; its data file names them the other way).
+#: Readings of an axis less the target, in units of 1e-8 mm: paulscherrerinstitute/ecmccfg,
+#: examples/test/fat_sat/report.md (the columns that the report calls forward and backward; its data file
+#: names them the other way).
 TARGET = [-10.0, -4.88, 0.24, 5.36, 10.48]
 FORWARD = [
     [-8102, -10202, -8702, -9202, -10002],
@@ -155,6 +160,21 @@ def test_enough_readings_at_unequal_steps_are_no_finding() -> None:
     x = [0.0, 103.0, 198.0, 301.0, 400.0]
     values = np.random.default_rng(1).normal(0, 1, (5, 5))
     assert list(findings_of(evaluate(line(values, values, x)))) == []
+
+
+def test_a_slip_is_told_with_its_place_and_noise_is_not() -> None:
+    random = np.random.default_rng(4)
+    x = np.cumsum(random.uniform(40, 60, 12))
+    told = 0
+    for _ in range(30):
+        noise = random.normal(0, 1, (2, 5, 12)) * (0.5 + x / 600.0)
+        one = line(noise[0], noise[1], x)
+        told += sum(f.code == "OLP859" for f in findings_of(evaluate(one)))
+    assert told == 0
+    noise[0, 2, 7] += 31.0
+    [found] = findings_of(evaluate(line(noise[0], noise[1], x)))
+    assert found.code == "OLP859"
+    assert f"at {x[7]:g} mm in run 3" in found.message
 
 
 def test_incomplete_readings_are_refused_with_their_place() -> None:

@@ -72,7 +72,8 @@ def test_few_targets_say_so() -> None:
 
 @settings(max_examples=40)
 @given(
-    st.integers(0, 2**31), st.floats(0.5, 9.0), st.floats(-3.1, 3.1), st.floats(-6, 6), st.sampled_from([8.0, 10.0]),
+    st.integers(0, 2**31), st.floats(0.5, 9.0), st.floats(-3.1, 3.1), st.floats(-6, 6),
+    st.sampled_from([8.0, 10.0]),
 )  # fmt: skip
 def test_recovery(seed: int, amplitude: float, phase: float, lost: float, period: float) -> None:
     """A smooth curve, a cyclic error and lost motion come back apart."""
@@ -109,7 +110,8 @@ def test_superposition_and_order(seed: int) -> None:
     other = random.normal(0, 5e-3, len(one.value))
     zero = add(one, -one.value)
     total = parts(separate(add(one, other), [10.0]))
-    assert total == pytest.approx(parts(separate(one, [10.0])) + parts(separate(add(zero, other), [10.0])), abs=1e-9)
+    each = parts(separate(one, [10.0])), parts(separate(add(zero, other), [10.0]))
+    assert total == pytest.approx(each[0] + each[1], abs=1e-9)
     order = random.permutation(len(one.value))
     mixed = Line(
         "EXX", one.target_mm[order], one.value[order] + other[order], one.run[order], one.direction[order],
@@ -216,3 +218,51 @@ def test_program_of_go_and_return() -> None:
     assert values == [98, 100, 298, 300, 302, 300, 102, 100]
     with pytest.raises(UsageError, match="leave the travel of X"):
         program(machine, "X", [1, 300], over_mm=2.0, feed_mm_min=1000)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**31), st.booleans())
+def test_reversal_is_the_least_squares_of_all_readings(seed: int, drift: bool) -> None:
+    """Held against one large system: a mean and a reversal a target, and a drift with a knot a run."""
+    random = np.random.default_rng(seed)
+    m, runs = int(random.integers(2, 6)), int(random.integers(2, 5))
+    x = np.cumsum(random.uniform(10, 50, m))
+    one = add(line(x, np.zeros(m), runs=runs), random.normal(0, 1e-3, 2 * m * runs))
+    found = reversal_of(one, drift=drift)
+    place = np.searchsorted(x, one.target_mm)
+    own = np.eye(m)[place]
+    knots = np.append(np.arange(runs) * 2 * m, 2 * m * runs - 1)
+    hats = [np.interp(np.arange(len(place)), knots, hat) for hat in np.eye(runs + 1)[1:]]
+    extra = np.array(hats).T if drift else np.zeros((len(place), 0))
+    system = np.hstack((own, own * 0.5 * one.direction[:, None], extra))
+    inverse = np.linalg.pinv(system)
+    estimate = inverse @ one.value
+    assert found.at == pytest.approx(estimate[m : 2 * m], abs=1e-9)
+    dof = len(place) - np.linalg.matrix_rank(system)
+    noise = np.sqrt(((one.value - system @ estimate) ** 2).sum() / dof)
+    assert found.noise == pytest.approx(noise, rel=1e-6)
+    sigma = noise * np.sqrt(np.diag(inverse @ inverse.T)[m : 2 * m])
+    assert found.sigma_at == pytest.approx(sigma, rel=1e-6)
+
+
+def test_a_drift_that_swings_within_a_run_makes_no_reversal_along_the_axis() -> None:
+    random = np.random.default_rng(9)
+    x = np.linspace(0.0, 1500.0, 17)
+    time = np.arange(170) / 169
+    flagged = 0
+    for _ in range(60):
+        swing = random.normal() * np.sin(2 * np.pi * time * random.uniform(1.0, 3.0) + random.uniform(0, 6))
+        noise = swing * 1e-3 + random.normal(0, 0.5e-3, 170)
+        flagged += not reversal_of(add(line(x, np.full(17, -3.0), np.full(17, 3.0)), noise)).constant
+    assert flagged <= 4
+
+
+def test_a_recording_of_many_targets_needs_no_large_system() -> None:
+    """20,000 targets each way: as one dense system this would be 6 GB."""
+    random = np.random.default_rng(1)
+    x = np.arange(20_000) * 0.1
+    one = add(line(x, np.full(20_000, -2.0), np.full(20_000, 2.0), runs=2), random.normal(0, 1e-3, 80_000))
+    found = separate(one, [10.0])
+    assert found.reversal is not None
+    assert found.reversal.lost_motion / UM == pytest.approx(4.0, abs=0.1)
+    assert found.refused == ()

@@ -230,11 +230,38 @@ CALIBRATION = {
         "X_scale_um_K",
         ["thermal.X_scale_um_K", "did you mean X_scale_um_m_K?"],
     ),
-    "maps": ("[squareness]", '[[maps]]\nfile = "m.csv"\n[squareness]', ["maps", "not built", "remove it"]),
-    "compliance": (
+    "map without kind": (
+        "[squareness]",
+        '[[maps]]\nfile = "m.csv"\n[squareness]',
+        ["maps[0].kind is missing", '"residual"', '"total"'],
+    ),
+    "map file missing": (
+        "[squareness]",
+        '[[maps]]\nfile = "m.csv"\nkind = "residual"\n[squareness]',
+        ['maps[0].file = "m.csv"', "no such file"],
+    ),
+    "compliance file missing": (
         "[squareness]",
         '[[compliance]]\nfile = "m.csv"\n[squareness]',
-        ["compliance", "not built"],
+        ['compliance[0].file = "m.csv"', "no such file"],
+    ),
+    "beam with two sections": (
+        "[squareness]",
+        '[[compliance_beam]]\naxis = "X"\nsupport = "simple"\nspan_mm = [0, 2000]\nyoungs_modulus_GPa = 210\n'
+        "second_moment_mm4 = 1e8\nsection_mm = [100, 200, 8]\n[squareness]",
+        ["section_mm", "exactly one of the two"],
+    ),
+    "beam along its load": (
+        "[squareness]",
+        '[[compliance_beam]]\naxis = "Z"\nsupport = "simple"\nspan_mm = [0, 2000]\nyoungs_modulus_GPa = 210\n'
+        "second_moment_mm4 = 1e8\n[squareness]",
+        ["direction", "across it"],
+    ),
+    "beam shorter than the box": (
+        "[squareness]",
+        '[[compliance_beam]]\naxis = "X"\nsupport = "simple"\nspan_mm = [0, 20]\nyoungs_modulus_GPa = 210\n'
+        "second_moment_mm4 = 1e8\n[squareness]",
+        ["beam of axis X spans 0 to 20 mm", "all of the box"],
     ),
     "covariance": ("[squareness]", '[covariance]\nfile = "m.csv"\n[squareness]', ["covariance", "not built"]),
 }
@@ -334,8 +361,12 @@ ELSEWHERE = {
     "tool touch not said",
     "amplitude in the wrong unit",
     "amplitude missing",
-    "maps",
-    "compliance",
+    "map without kind",
+    "map file missing",
+    "compliance file missing",
+    "beam with two sections",
+    "beam along its load",
+    "beam shorter than the box",
     "covariance",
     "box beyond the curve",
     "backlash and direction",

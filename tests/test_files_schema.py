@@ -97,7 +97,7 @@ def test_schema_takes_the_good_file_and_the_starter_file(kind: str) -> None:
         ("machine", '["EXX", "C0Y"]', '["EXW"]', ".compensated_by_controller"),
         ("machine", "radius_mm", "radius", ".tools.1.radius"),
         ("calibration", "actual-minus", "nominal-minus", ".sign"),
-        ("calibration", "[squareness]", "[[maps]]\n[squareness]", ".maps"),
+        ("calibration", "[squareness]", "[[maps]]\nfile = 'm.csv'\n[squareness]", ".maps[0].kind"),
         ("calibration", "[10.0, 0.0, -5.0]", '[10.0, 0.0, "z"]', ".datum_mm[2]"),
         ("calibration", "measured = 2026-05-14\n", "", ".measured"),
         ("job", "= 12.5", "= -1", ".payload_kg"),

@@ -19,6 +19,9 @@ PUBLIC = {
     *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
     *("refine_calibration", "RefinedCalibration"),
+    *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
+    *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
+    *("fit_thermal", "ThermalFitting"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
 }
 

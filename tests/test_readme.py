@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from benchmarks import figures
 
-from olp.cli import VERBS
+from olp.cli import VERBS, calibrate
 from olp.findings import RULES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -136,11 +136,15 @@ def test_every_finding_is_listed_as_it_is() -> None:
 
 
 def test_every_verb_is_listed() -> None:
-    assert [re.findall(r"`olp (\w+)", row[0])[0] for row in rows_below("### Verbs")] == list(VERBS)
+    listed = [re.findall(r"`olp (\w+(?: [\w-]+)?)", row[0]) for row in rows_below("### Verbs")]
+    assert list(dict.fromkeys(name.split()[0] for names in listed for name in names)) == list(VERBS)
+    groups = [name.split()[1] for names in listed for name in names if name.startswith("calibrate ")]
+    assert sorted(groups) == sorted(calibrate.VERBS)
 
 
 def test_every_option_that_is_named_exists(copy: Path) -> None:
-    helps = run("\n".join(f"olp {verb} --help" for verb in VERBS), copy)
+    verbs = [*VERBS, *(f"calibrate {verb}" for verb in calibrate.VERBS)]
+    helps = run("\n".join(f"olp {verb} --help" for verb in verbs), copy)
     ours = re.sub(r"(apt-get|pip|pytest)[^`\n]*", "", TEXT)
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", ours)) <= set(re.findall(r"--[a-z-]+", helps))
 

@@ -7,7 +7,6 @@ covariance of all of it, so that what was not measured is known as unknown.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,9 +16,7 @@ from olp.calibration.basis import CurveSpace, Spline, Step, Wave, slope_grid, sl
 from olp.calibration.lengths import STILL_MM, Station, first_station, lengths_block
 from olp.calibration.lines import (
     Noise,
-    group_of,
     line_block,
-    noise_of,
     square_names,
     squareness_block,
     targets_of,
@@ -31,6 +28,7 @@ from olp.calibration.pods import STILL_MM as POD_STILL_MM
 from olp.calibration.pods import Pose, first_poses, pods_block
 from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
+from olp.calibration.screening import Outlier, screened, slips_of, without
 from olp.calibration.separation import aliased
 from olp.calibration.smoothing import Shape, shape_of
 from olp.errormodel.base import Array
@@ -45,27 +43,12 @@ HALF_CELLS = 5
 #: Cells where no lines but points or lengths tell of an axis, to begin with; they double as long as
 #: chi-square is off by more than MISFIT standard deviations and becomes BETTER by it.
 POINT_CELLS, MISFIT, BETTER = 12, 5.0, 0.8
-#: What stands for the component of a point.
-POINT = "point"
 #: The adjustment is made anew after cyclic terms or points were left out, so often at most.
 PASSES = 8
-#: A reading whose residual is so many standard deviations is left out, at most this share of a line.
-OUTLIER, SHARE = 6.0, 0.05
 #: A cyclic term below so many standard deviations is noise.
 CYCLIC_SEEN = 4.0
 #: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
 SWEEP = 0.3
-
-
-@dataclass(frozen=True, slots=True)
-class Outlier:
-    """A reading left out: its file, the line there, and how many standard deviations it is off."""
-
-    source: str
-    row: int
-    component: str
-    value: float
-    deviations: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,7 +234,7 @@ def _fit(
     cells: int,
 ) -> Fit:
     tell("noise", 0.0)
-    lines, noises, outliers = _screened(measurements.lines)
+    lines, noises, outliers = screened(measurements.lines)
     clouds = list(measurements.points)
     ranges, box = _ranges(lines, [*clouds, *measurements.lengths, *measurements.pods], travel_mm)
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
@@ -259,7 +242,8 @@ def _fit(
     scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
     waves, unseen = _waves(measurements, lines, scattered)
     shapes = _shapes(lines, noises, splines, waves, tell)
-    stations = [first_station(rays) for rays in measurements.lengths]
+    lengths = list(measurements.lengths)
+    stations = [first_station(rays) for rays in lengths]
     poses = [first_poses(pods) for pods in measurements.pods]
     theta = np.zeros(0)
     learnt: dict[str, tuple[float, float]] | None = None
@@ -273,7 +257,7 @@ def _fit(
         of_points = [points_block(cloud, parameters) for cloud in clouds]
         of_lengths = [
             lengths_block(rays, parameters, theta, station)
-            for rays, station in zip(measurements.lengths, stations, strict=True)
+            for rays, station in zip(lengths, stations, strict=True)
         ]
         of_pods = [
             pods_block(pods, parameters, theta, own)
@@ -287,16 +271,24 @@ def _fit(
         learnt = prior.classes
         theta = solved.theta
         seen = _waves_seen(parameters, solved)
-        slips = [_slips(block, cloud, solved) for block, cloud in zip(of_points, clouds, strict=True)]
+        slips = [slips_of(block, cloud, solved) for block, cloud in zip(of_points, clouds, strict=True)]
         steps = [residuals_of(block, theta)[0] for block in of_lengths]
         turns = [residuals_of(block, theta)[0].reshape(-1, 6) for block in of_pods]
         still = all(np.abs(step[:3]).max() < STILL_MM for step in steps)
         still = still and all(np.abs(turn[:, :3]).max() < POD_STILL_MM for turn in turns)
-        if seen == waves and not any(slips) and still:
+        # before the stations stand still, a residual may be theirs
+        pairs = zip(of_lengths if still else (), lengths, strict=False)
+        slips_of_lengths = [slips_of(block, rays, solved) for block, rays in pairs]
+        if seen == waves and not any(slips) and not any(slips_of_lengths) and still:
             break
         waves = seen
-        outliers += [slip for some in slips for slip in some]
-        clouds = [_without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
+        outliers += [slip for some in (*slips, *slips_of_lengths) for slip in some]
+        lengths = (
+            [without(rays, some) for rays, some in zip(lengths, slips_of_lengths, strict=True)]
+            if still
+            else lengths
+        )
+        clouds = [without(cloud, some) for cloud, some in zip(clouds, slips, strict=True)]
         stations = [station.moved(step) for station, step in zip(stations, steps, strict=True)]
         poses = [
             [pose.moved(step) for pose, step in zip(own, turn, strict=True)]
@@ -311,7 +303,7 @@ def _fit(
     ]
     rays_left = [
         LengthsResult(rays, station, *_left(block, theta))
-        for rays, station, block in zip(measurements.lengths, stations, of_lengths, strict=True)
+        for rays, station, block in zip(lengths, stations, of_lengths, strict=True)
     ]
     pods_left = [
         PodsResult(pods, tuple(own), *_left(block, theta))
@@ -326,8 +318,8 @@ def _fit(
     covariance = solved.covariance * max(1.0, chi_square / freedom)
     return Fit(
         measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
-        tuple(rays_left), tuple(pods_left), tuple(outliers), box, mean_slopes(parameters), chi_square, freedom,
-        unseen,
+        tuple(rays_left), tuple(pods_left), tuple(outliers), box, mean_slopes(parameters), chi_square,
+        freedom, unseen,
     )  # fmt: skip
 
 
@@ -362,77 +354,6 @@ def _left(block: Block, theta: Array) -> tuple[Array, float]:
     """Residuals of a block and the sum of squares of the standardised ones."""
     _, residual, sigma = residuals_of(block, theta)
     return residual, float(np.sum((residual / sigma) ** 2))
-
-
-def _slips(block: Block, cloud: Points, solved: Solved) -> list[Outlier]:
-    """Points whose residual is no noise, the worst ones first."""
-    _, residual, sigma = residuals_of(block, solved.theta)
-    rest = residual.reshape(-1, 3)
-    off = np.abs(residual / sigma).reshape(-1, 3).max(axis=1)
-    worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
-    return [
-        Outlier(cloud.source, int(cloud.row[k]), POINT, float(np.linalg.norm(rest[k])), float(off[k]))
-        for k in worst.tolist()
-        if off[k] > OUTLIER and off[k] > 0.3 * off.max()
-    ]
-
-
-def _without(cloud: Points, slips: Sequence[Outlier]) -> Points:
-    use = ~np.isin(cloud.row, [slip.row for slip in slips])
-    names = ("axis_mm", "tool_mm", "measured_mm", "row")
-    return dataclasses.replace(cloud, **{name: getattr(cloud, name)[use] for name in names})
-
-
-def _screened(lines: Sequence[Line]) -> tuple[list[Line], list[Noise], list[Outlier]]:
-    """Lines without the readings that their own repetitions speak against."""
-    kept, noises, outliers = [], [], []
-    for line in lines:
-        noise = noise_of(line)
-        use = np.ones(len(line.value), bool)
-        for _ in range(max(1, int(SHARE * len(use)))):
-            some = _part(line, use)
-            noise = noise_of(some)
-            rest = _about_group(some)
-            worst = int(np.argmax(np.abs(rest)))
-            if abs(rest[worst]) <= OUTLIER * noise.sigma:
-                break
-            k = int(np.flatnonzero(use)[worst])
-            use[k] = False
-            outliers.append(
-                Outlier(
-                    line.source, int(line.row[k]), line.component, float(line.value[k]),
-                    float(abs(rest[worst]) / noise.sigma),
-                )
-            )  # fmt: skip
-        kept.append(_part(line, use))
-        noises.append(noise)
-    return kept, noises, outliers
-
-
-def _part(line: Line, use: np.ndarray) -> Line:
-    if use.all():
-        return line
-    columns = ("target_mm", "value", "run", "direction", "row")
-    return dataclasses.replace(line, **{name: getattr(line, name)[use] for name in columns})
-
-
-def _about_group(line: Line) -> Array:
-    """(n,) deviation from the others of the same target and direction, freed of the level of its run; zero
-    where fewer than three were read."""
-    group = group_of(line)
-    rest = line.value.copy()
-    for _ in range(3):
-        for labels in (group, line.run - line.run.min()):
-            rest -= _medians(rest, labels)[labels]
-    counts = np.bincount(group)[group]
-    return np.where(counts >= 3, rest, 0.0)
-
-
-def _medians(values: Array, labels: np.ndarray) -> Array:
-    out = np.zeros(int(labels.max()) + 1)
-    for label in np.unique(labels):
-        out[label] = np.median(values[labels == label])
-    return out
 
 
 def _ranges(

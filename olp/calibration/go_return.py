@@ -1,5 +1,5 @@
-"""Reversal from readings approached from both sides: the paper's test B (go and return), and the reversal part
-of any bidirectional line.
+"""Reversal from readings approached from both sides: the paper's test B (go and return), and the reversal
+part of any bidirectional line.
 
 B_i = x_up - x_down as in ISO 230-2. An axis with lost motion b stays behind its command by b/2 on both sides,
 so its B is -b.
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.iso230_2 import SAME_MM, scale_of
+from olp.calibration.iso230_2 import scale_of, targets_of
 from olp.calibration.observations import Array, Index, Line
 from olp.exceptions import ConfigError, UsageError
 from olp.findings import Finding
@@ -22,6 +22,8 @@ from olp.units import AXES, UM_PER_MM
 
 #: A reversal whose dependence on position is less likely than this by chance depends on position.
 UNLIKELY = 0.01
+#: Runs from which on they tell their own scatter, and courses along the axis that are looked for.
+_RUNS, _COURSES = 3, 4
 #: an estimate this many standard uncertainties from zero is not zero
 _SURE = 3.0
 
@@ -79,23 +81,23 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     With `drift` the readings count as equally spaced in time, and a continuous drift, straight within each
     run, is taken out; without it the order of the rows does not matter. Raises ConfigError.
     """
-    target, place = targets_of(line)
-    for i, x in enumerate(target):
-        for d, side in ((1, "+"), (-1, "-")):
-            if not ((place == i) & (line.direction == d)).any():
-                raise ConfigError(
-                    f"line {line.component}: {x:g} mm was never approached in {side}; expected every target "
-                    "approached from both sides; leave it out, or measure it again",
-                    file=line.source,
-                )
+    target, place = targets_of(line.target_mm)
+    side = place * 2 + (line.direction < 0)
+    lacking = np.flatnonzero(np.bincount(side, minlength=2 * len(target)) == 0)
+    if len(lacking):
+        raise ConfigError(
+            f"line {line.component}: {target[lacking[0] // 2]:g} mm was never approached in "
+            f"{'-' if lacking[0] % 2 else '+'}; expected every target approached from both sides; leave it "
+            "out, or measure it again",
+            file=line.source,
+        )
     n, m = len(line.value), len(target)
-    own = np.zeros((n, m))
-    own[np.arange(n), place] = 1.0
-    moved = own * (0.5 * line.direction)[:, None]
     extra = _drift_columns(line.run) if drift else np.zeros((n, 0))
-    free = np.hstack((own, moved, extra))
-    one = np.hstack((own, moved.sum(axis=1, keepdims=True), extra))
-    found, covariance, rest, dof = _solve(free, line.value)
+    # a mean for each target and side, or a mean for each target and one reversal: both are taken out first
+    found, cofactor, rest, dof = _within(side, extra, line.value)
+    single, spread, rest_one, dof_one = _within(
+        place, np.column_stack((0.5 * line.direction, extra)), line.value
+    )
     noise = float(np.sqrt(rest / dof)) if dof > 0 else line.sigma
     if noise == 0.0 and line.sigma == 0.0 and dof <= 0:
         raise ConfigError(
@@ -105,25 +107,56 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
         )
     noise = max(noise, line.sigma)
     chance = 1.0
-    single, spread, rest_one, dof_one = _solve(one, line.value)
     if m > 1 and dof > 0:
         chance = _chance(rest_one - rest, dof_one - dof, rest, dof, float(np.abs(line.value).max()))
-    at = found[m : 2 * m]
-    sigma_at = noise * np.sqrt(np.diag(covariance)[m : 2 * m])
+    wander = extra @ found
+    sigma = float(noise * np.sqrt(spread[0, 0]))
+    between = _between_runs(line, place, line.value - wander) if m > 1 else None
+    if between is not None:
+        # a drift that is not straight within a run is no white noise: the runs themselves tell what it does
+        chance, scatter = between
+        sigma = max(sigma, scatter)
+    count = np.bincount(side, minlength=2 * m)
+    level = np.bincount(side, line.value - wander) / count
+    slope = np.column_stack(
+        [np.bincount(side, column) / count for column in extra.T] or [np.zeros((2 * m, 0))]
+    )
+    at, lean = level[::2] - level[1::2], slope[::2] - slope[1::2]
+    own = 1.0 / count[::2] + 1.0 / count[1::2]
+    sigma_at = noise * np.sqrt(own + np.einsum("ik,kl,il->i", lean, cofactor, lean))
     constant = chance >= UNLIKELY
-    mean = float(single[m]) if constant else float(at.mean())
-    wander = extra @ found[2 * m :]
+    mean = float(single[0]) if constant else float(at.mean())
     return Reversal(
-        line, target, at, sigma_at, mean, float(noise * np.sqrt(spread[m, m])), constant, chance, noise,
+        line, target, at, sigma_at, mean, sigma, constant, chance, noise,
         float(np.ptp(wander)) if len(wander) else 0.0,
     )  # fmt: skip
 
 
-def targets_of(line: Line) -> tuple[Array, Index]:
-    """(m,) targets, ascending, and (n,) the target of each reading."""
-    _, place = np.unique(np.round(line.target_mm / SAME_MM).astype(np.int64), return_inverse=True)
-    count = np.bincount(place)
-    return np.bincount(place, line.target_mm) / count, np.asarray(place, np.int64)
+def _between_runs(line: Line, place: Index, value: Array) -> tuple[float, float] | None:
+    """How likely the runs' reversals show such a course along the axis by chance, from how the runs differ (t
+    test of the first cosines along the targets, Bonferroni), and the standard uncertainty of their mean. None
+    for fewer than three runs, or where a run lacks a target."""
+    runs, row = np.unique(line.run, return_inverse=True)
+    m = int(place.max()) + 1
+    total, count = np.zeros((len(runs), m, 2)), np.zeros((len(runs), m, 2))
+    side = (line.direction < 0).astype(int)
+    np.add.at(total, (row, place, side), value)
+    np.add.at(count, (row, place, side), 1.0)
+    if len(runs) < _RUNS or (count == 0.0).any():
+        return None
+    mean = total / count
+    reversal = mean[:, :, 0] - mean[:, :, 1]
+    courses = min(_COURSES, m - 1)
+    cosines = np.cos(np.pi * np.outer((np.arange(m) + 0.5) / m, np.arange(courses + 1)))
+    part = reversal @ (cosines / (cosines**2).sum(axis=0))
+    spread = part.std(axis=0, ddof=1) / np.sqrt(len(runs))
+    floor = 1e-12 * max(float(np.abs(value).max()), 1e-12)
+    from scipy.special import stdtr
+
+    t = np.abs(part.mean(axis=0)) / np.maximum(spread, floor)
+    t[np.abs(part.mean(axis=0)) < floor] = 0.0
+    least = float(2.0 * stdtr(len(runs) - 1, -t[1:]).min())
+    return min(1.0, courses * least), float(spread[0])
 
 
 def _drift_columns(run: Index) -> Array:
@@ -138,13 +171,25 @@ def _drift_columns(run: Index) -> Array:
     return np.column_stack([np.interp(rows, knots, hat) for hat in hats[1:]])
 
 
-def _solve(design: Array, value: Array) -> tuple[Array, Array, float, int]:
-    """(k,) estimates of least norm, (k, k) cofactors, sum of squares left and its degrees of freedom."""
+def _within(group: Index, columns: Array, value: Array) -> tuple[Array, Array, float, int]:
+    """Least squares of value (n,) on columns (n, k) beside a mean of its own for each group (n,): (k,)
+    estimates of least norm, (k, k) cofactors, sum of squares left and its degrees of freedom."""
+    count = np.bincount(group)
+
+    def free(one: Array) -> Array:
+        return np.asarray(one - (np.bincount(group, one) / count)[group])
+
+    design = np.column_stack([free(column) for column in columns.T] or [np.zeros((len(value), 0))])
     inverse = np.linalg.pinv(design, rcond=1e-10)
-    found = inverse @ value
-    rest = value - design @ found
-    rank = int(round(float(np.trace(design @ inverse))))
-    return found, np.asarray(inverse @ inverse.T), float(rest @ rest), len(value) - rank
+    found = inverse @ free(value)
+    rest = free(value) - design @ found
+    rank = round(float(np.einsum("ij,ji->", design, inverse)))
+    return (
+        found,
+        np.asarray(inverse @ inverse.T),
+        float(rest @ rest),
+        len(value) - int((count > 0).sum()) - rank,
+    )
 
 
 def _chance(more: float, more_dof: int, rest: float, dof: int, size: float) -> float:

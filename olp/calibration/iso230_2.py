@@ -11,23 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
-from olp.calibration.observations import Array, Line
+from olp.calibration.observations import Array, Index, Line
 from olp.exceptions import ConfigError
 from olp.findings import Finding
 from olp.units import RAD_PER_URAD, UM_PER_MM
 
 Zone = Literal["least-squares", "minimum-zone"]
 
-#: Positions this close are one target.
-SAME_MM = 1e-6
+#: Positions this close to the next one are one target.
+SAME_MM = 0.05
 #: What ISO 230-2 asks for: readings of a target from one side, and targets (a metre, and in all up to 2 m).
 RUNS, PER_METRE, TARGETS, STEP_MM, LONG_MM = 5, 5, 5, 250.0, 2000.0
 #: Steps between targets that differ by less than this share of their mean are equal.
 _EQUAL = 0.01
+#: A reading so many usual deviations from at least so many repetitions is told, the first of them.
+_FAR, _REPEATED, _KEPT, _MOST = 7.0, 3, 0.95, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,24 +63,14 @@ class Side:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evaluation:
-    """A line evaluated; (m,) columns over the targets, in mm or rad. `up` is the approach in +, `down` that
-    in -; of readings from one side the other one is None, and so is all that needs both.
+class Statistics:
+    """Readings at targets (m,), evaluated; columns in mm or rad. `up` is the approach in +, `down` that in -;
+    of readings from one side the other one is None, and so is all that needs both."""
 
-    Of a straightness the reference line `slope` (rad) was taken out of everything first, once for both
-    directions.
-    """
-
-    line: Line
     target_mm: Array
     runs: int
     up: Side | None
     down: Side | None
-    slope: float = 0.0
-
-    @property
-    def component(self) -> str:
-        return self.line.component
 
     @property
     def sides(self) -> tuple[Side, ...]:
@@ -121,6 +114,19 @@ class Evaluation:
                 out[f"R_{name}"] = side.repeatability
         return out
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluation(Statistics):
+    """A line evaluated. Of a straightness the reference line `slope` (rad) was taken out of everything
+    first, once for both directions."""
+
+    line: Line
+    slope: float = 0.0
+
+    @property
+    def component(self) -> str:
+        return self.line.component
+
     def as_dict(self) -> dict[str, Any]:
         """Figures and columns for JSON; keys end in um or urad."""
         unit, scale = scale_of(self.line)
@@ -160,40 +166,59 @@ def evaluate(line: Line, zone: Zone = "least-squares") -> Evaluation:
     straightness: least squares, or the one with the least range (ISO 230-1, minimum zone), through the
     means of both directions. Raises ConfigError.
     """
-    target, place = np.unique(np.round(line.target_mm / SAME_MM).astype(np.int64), return_inverse=True)
-    target_mm = np.array([line.target_mm[place == i].mean() for i in range(len(target))])
-    if len(target_mm) < 2:
-        raise ConfigError(
-            f"line {line.component}: one target; expected at least 2, better {TARGETS}", file=line.source
-        )
-    directions = [d for d in (1, -1) if (line.direction == d).any()]
-    count = {d: np.bincount(place[line.direction == d], minlength=len(target_mm)) for d in directions}
-    runs = int(max(c.max() for c in count.values()))
-    for d, counts in count.items():
-        if (counts != runs).any() or runs < 2:
-            i = int(np.argmin(counts))
-            side = "in +" if d > 0 else "in -"
-            wanted = max(runs, 2)
-            raise ConfigError(
-                f"line {line.component}: {counts[i]} readings at {target_mm[i]:g} mm approached {side}; "
-                f"expected {wanted}, as many at every target and from each side, at least 2; leave out the "
-                "incomplete run, or the targets that it lacks",
-                file=line.source,
-            )
+    label = f"line {line.component}"
+    checked_runs(line.target_mm, line.direction, label, line.source)
     slope = 0.0
     value = line.value
     if line.quantity == "straightness":
         # runs of both sides weigh the same, so the line through all readings is that of the means
-        means = np.bincount(place, value) / np.bincount(place)
-        slope, offset = reference_line(target_mm, means, zone)
-        value = value - (offset + slope * target_mm[place])
+        target, place = targets_of(line.target_mm)
+        slope, offset = reference_line(target, np.bincount(place, value) / np.bincount(place), zone)
+        value = value - (offset + slope * line.target_mm)
+    found = statistics(line.target_mm, value, line.direction, label, line.source)
+    return Evaluation(found.target_mm, found.runs, found.up, found.down, line, slope)
+
+
+def statistics(target_mm: Array, value: Array, direction: Index, label: str, source: str = "") -> Statistics:
+    """Means and spreads of readings (n,) at targets (n,). Raises ConfigError as `evaluate` does."""
+    runs = checked_runs(target_mm, direction, label, source)
+    target, place = targets_of(target_mm)
     sides: dict[int, Side] = {}
-    for d in directions:
-        rows = line.direction == d
-        mean = np.bincount(place[rows], value[rows]) / runs
-        square = np.bincount(place[rows], (value[rows] - mean[place[rows]]) ** 2)
-        sides[d] = Side(d, mean, np.sqrt(square / (runs - 1)))
-    return Evaluation(line, target_mm, runs, sides.get(1), sides.get(-1), slope)
+    for d in (1, -1):
+        rows = direction == d
+        if rows.any():
+            mean = np.bincount(place[rows], value[rows]) / runs
+            square = np.bincount(place[rows], (value[rows] - mean[place[rows]]) ** 2)
+            sides[d] = Side(d, mean, np.sqrt(square / (runs - 1)))
+    return Statistics(target, runs, sides.get(1), sides.get(-1))
+
+
+def targets_of(target_mm: Array) -> tuple[Array, Index]:
+    """(m,) targets, ascending, and (n,) the target of each reading."""
+    order = np.argsort(target_mm, kind="stable")
+    place = np.zeros(len(target_mm), np.int64)
+    place[order[1:]] = np.cumsum(np.diff(target_mm[order]) > SAME_MM)
+    return np.bincount(place, target_mm) / np.bincount(place), place
+
+
+def checked_runs(target_mm: Array, direction: Index, label: str, source: str) -> int:
+    """How many readings each target has from each side. Raises ConfigError where they differ."""
+    target, place = targets_of(target_mm)
+    if len(target) < 2:
+        raise ConfigError(f"{label}: one target; expected at least 2, better {TARGETS}", file=source)
+    directions = [d for d in (1, -1) if (direction == d).any()]
+    count = {d: np.bincount(place[direction == d], minlength=len(target)) for d in directions}
+    runs = int(max(c.max() for c in count.values()))
+    for d, counts in count.items():
+        if (counts != runs).any() or runs < 2:
+            i = int(np.argmin(counts))
+            raise ConfigError(
+                f"{label}: {counts[i]} readings at {target[i]:g} mm approached in {'+' if d > 0 else '-'}; "
+                f"expected {max(runs, 2)}, as many at every target and from each side, at least 2; leave out "
+                "the incomplete run, or the targets that it lacks",
+                file=source,
+            )
+    return runs
 
 
 def reference_line(x: Array, y: Array, zone: Zone) -> tuple[float, float]:
@@ -219,12 +244,14 @@ def _hull_slopes(x: Array, y: Array) -> Iterator[float]:
                     break
                 hull.pop()
             hull.append((float(px), float(py)))
-        yield from (sign * (b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(hull, hull[1:], strict=False))
+        yield from (sign * (b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(hull))
 
 
 def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
-    """Where a line has less than ISO 230-2 asks for, and where its targets could hide a cyclic error."""
+    """Where a line has less than ISO 230-2 asks for, where its targets could hide a cyclic error, and
+    readings far from their repetitions."""
     line, x = evaluation.line, evaluation.target_mm
+    yield from _outliers(line)
     length = float(np.ptp(x))
     if length > LONG_MM:
         wanted = int(np.ceil(length / STEP_MM)) + 1
@@ -243,6 +270,41 @@ def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
         step = np.diff(x)
         if np.ptp(step) < _EQUAL * step.mean():
             yield Finding("OLP852", f"{_named(line)}: all {len(x)} targets stand {step.mean():g} mm apart")
+
+
+def _outliers(line: Line) -> Iterator[Finding]:
+    """Readings that their own repetitions speak against: from the median of their target and direction, the
+    level of their run taken out, in units of the usual deviation."""
+    place = targets_of(line.target_mm)[1] * 2 + (line.direction > 0)
+    run = np.unique(line.run, return_inverse=True)[1]
+    rest = line.value.copy()
+    for label in (place, run, place):
+        rest -= _medians(rest, label)[label]
+    counts = np.bincount(place)[place]
+    size = np.where(counts >= _REPEATED, np.abs(rest), 0.0)
+    # the largest twentieth left out, which of normal readings makes it smaller by 0.87
+    kept = np.sort(size[counts >= _REPEATED])[: int(_KEPT * (counts >= _REPEATED).sum())]
+    usual = float(np.sqrt((kept**2).mean())) / 0.87 if len(kept) else 0.0
+    far: list[int] = np.flatnonzero(size > _FAR * usual).tolist() if usual > 0.0 else []
+    unit, scale = scale_of(line)
+    for k in far[:_MOST]:
+        yield Finding(
+            "OLP859",
+            f"{_named(line)}: the reading at {line.target_mm[k]:g} mm in run {line.run[k]} stands "
+            f"{rest[k] * scale:+.1f} {unit} off its repetitions",
+            int(line.row[k]),
+        )
+
+
+def _medians(value: Array, label: Index) -> Array:
+    """The median of the values (n,) of each label from 0."""
+    order = np.lexsort((value, label))
+    count = np.bincount(label)
+    start = np.cumsum(count) - count
+    low, high = start + np.maximum(count - 1, 0) // 2, start + count // 2
+    ordered = value[order]
+    last = len(ordered) - 1
+    return np.asarray((ordered[np.minimum(low, last)] + ordered[np.minimum(high, last)]) / 2.0)
 
 
 def _named(line: Line) -> str:

@@ -24,6 +24,8 @@ from olp.units import AXES
 SAME_MM = 0.05
 #: No instrument reads better than this: 10 nm, 10 nrad.
 LEAST = 1e-5, 1e-8
+#: What an instrument may drift in a run where one run alone cannot tell: 2 um, 2 urad.
+DRIFT = 2e-3, 2e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +49,17 @@ def noise_of(line: Line) -> Noise:
     spread: float | None = None
     drift = 0.0
     if several:
-        table = np.zeros((n, groups.max() + 1 + ramps.shape[1]))
-        table[np.arange(n), groups] = 1.0
-        table[:, groups.max() + 1 :] = ramps
-        found, _, rank, _ = np.linalg.lstsq(table, line.value, rcond=1e-9)
-        free = n - int(rank)
+        # the mean of each target and direction is taken out of both sides: what is left is the drift
+        count = int(groups.max()) + 1
+        own = ramps - _means(ramps, groups, count)[groups]
+        value = line.value - _means(line.value[:, None], groups, count)[groups, 0]
+        steps, _, rank, _ = np.linalg.lstsq(own, value, rcond=1e-9)
+        free = n - count - int(rank)
         if free >= 3:
-            rest = line.value - table @ found
+            rest = value - own @ steps
             # by the median, so that one slip of the hand does not blunt all readings
             robust = 1.4826 * float(np.median(np.abs(rest))) * np.sqrt(n / free)
             spread = min(float(np.sqrt(rest @ rest / free)), 1.3 * robust)
-            steps = found[groups.max() + 1 :]
             drift = float(np.sqrt(np.mean(steps**2)))
     least = LEAST[line.quantity == "angle"]
     if spread is None and line.sigma <= 0.0:
@@ -67,7 +69,13 @@ def noise_of(line: Line) -> Noise:
             file=line.source,
         )
     sigma = max(line.sigma, spread or 0.0, least)
-    return Noise(sigma, max(drift, 0.2 * sigma) if several else 0.0, spread)
+    return Noise(sigma, max(drift, 0.2 * sigma) if several else DRIFT[line.quantity == "angle"], spread)
+
+
+def _means(columns: Array, groups: np.ndarray, count: int) -> Array:
+    """(count, k) mean of columns (n, k) in each group."""
+    sums = np.stack([np.bincount(groups, column, count) for column in columns.T], axis=1)
+    return np.asarray(sums / np.bincount(groups, minlength=count)[:, None])
 
 
 def group_of(line: Line) -> np.ndarray:
@@ -87,8 +95,6 @@ def targets_of(line: Line) -> Array:
 
 def drift_ramps(line: Line) -> Array:
     """(n, runs) columns: each rises from 0 to 1 during one run and stays there."""
-    if len(np.unique(line.run)) < 2:
-        return np.zeros((len(line.run), 0))
     index = np.arange(len(line.run), dtype=float)
     starts = np.concatenate([[0], np.flatnonzero(np.diff(line.run)) + 1, [len(line.run)]])
     return np.stack(

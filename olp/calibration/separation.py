@@ -1,5 +1,5 @@
-"""The parts of a line: what is not cyclic, cyclic errors by period, and reversal; and whether targets can see a
-period at all.
+"""The parts of a line: what is not cyclic, cyclic errors by period, and reversal; and whether targets can
+see a period at all.
 
 All estimates are linear in the readings: harmonic pairs beside columns that stand for any curve which is
 smooth at the density of the targets. So parts add as the readings do, and a period that the targets cannot
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.calibration.go_return import Reversal, reversal_of, targets_of
-from olp.calibration.iso230_2 import scale_of
+from olp.calibration.go_return import Reversal, reversal_of
+from olp.calibration.iso230_2 import scale_of, targets_of
 from olp.calibration.observations import Array, Line
 from olp.errormodel.calibration import Cyclic
 from olp.exceptions import ConfigError
@@ -27,6 +27,8 @@ from olp.findings import Finding
 SEEN = 0.25
 #: A smooth curve changes on no less than so many steps between targets, and so many periods.
 _STEPS, _PERIODS = 6.0, 3.0
+#: half-waves that stand for a smooth curve, at most
+_WAVES = 200
 #: Steps between targets this near to a multiple of half a period are called such in words.
 _NEAR = 0.35
 
@@ -127,8 +129,8 @@ def separate(
     line: Line, periods_mm: Sequence[float] = (), sweeps: Sequence[Line] = (), *, harmonics: int = 2,
     drift: bool = True,
 ) -> Separation:  # fmt: skip
-    """The parts of a line with cyclic errors of the given periods (each with its harmonics: the period over 1,
-    2 ... `harmonics`), seen by the line and by fine sweeps of the same component together.
+    """The parts of a line with cyclic errors of the given periods (each with its harmonics: the period over
+    1, 2 ... `harmonics`), seen by the line and by fine sweeps of the same component together.
 
     A period that they do not see is refused, never fitted. `drift` as in `reversal_of`. Raises ConfigError.
     """
@@ -180,7 +182,7 @@ def _fit(
     inverse = np.linalg.pinv(design, rcond=1e-10)
     estimate = inverse @ (y * weight)
     rest = y * weight - design @ estimate
-    dof = len(y) - int(round(float(np.trace(design @ inverse))))
+    dof = len(y) - round(float(np.einsum("ij,ji->", design, inverse)))
     variance = float(rest @ rest) / dof if dof > 0 else 0.0
     covariance = inverse @ inverse.T * max(variance, 1.0 if stated else 0.0)
     out = []
@@ -200,7 +202,7 @@ def _fit(
 
 def _means(line: Line) -> tuple[Array, Array]:
     """(m,) targets and (m,) means of both directions there."""
-    target, place = targets_of(line)
+    target, place = targets_of(line.target_mm)
     sides = []
     for d in (1, -1):
         rows = line.direction == d
@@ -231,7 +233,7 @@ def _smooth_columns(x: Array, period: float) -> Array:
     if len(x) < 2 or length == 0.0:
         return np.ones((len(x), 1))
     shortest = max(_STEPS * length / (len(x) - 1), _PERIODS * period)
-    waves = int(2.0 * length / shortest)
+    waves = min(int(2.0 * length / shortest), _WAVES)
     u = (x - x.min()) / length
     return np.column_stack(
         [np.ones(len(x)), 2.0 * u - 1.0, *(np.cos(np.pi * k * u) for k in range(1, waves + 1))]

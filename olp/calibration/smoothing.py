@@ -28,6 +28,8 @@ HALF = 0.02, 20e-6
 #: What one more feature must gain beyond its own cost, in nats; the same of a step where another error of the
 #: axis has one; and the most features of a curve.
 GAIN, SHARED_GAIN, MOST = 2.0, 0.0, 8
+#: Steps and kinks are looked for between so many targets at most.
+FINEST = 80
 
 Half = Literal["none", "constant", "curve"]
 
@@ -55,6 +57,8 @@ def shape_of(
     angle = lines[0][0].quantity == "angle"
     inside = [line for line, _ in lines if np.ptp(line.target_mm) > 0.2 * (spline.high_mm - spline.low_mm)]
     targets = np.unique(np.concatenate([targets_of(line) for line in inside] or [np.zeros(0)]))
+    if len(targets) > FINEST:
+        targets = targets[np.unique(np.linspace(0, len(targets) - 1, FINEST).round().astype(int))]
     candidates: list[Feature] = [
         Step(float(a), float(b)) for a, b in itertools.pairwise(targets) if b - a > 1.0
     ]

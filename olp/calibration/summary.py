@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import MISFIT, POINT, Fit, LengthsResult, LineResult, PointsResult, misfit
+from olp.calibration.estimator import MISFIT, Fit, LengthsResult, LineResult, PointsResult, misfit
 from olp.calibration.parameters import SHEAR
 from olp.calibration.prior import class_of
+from olp.calibration.screening import LENGTH, POINT
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.findings import Finding
@@ -57,6 +58,17 @@ def unseen(fit: Fit) -> dict[str, float]:
         if after.mean() > UNSEEN**2 * before.mean():
             found[name] = math.sqrt(float(after.mean()))
     return found
+
+
+def scale_unseen(fit: Fit) -> float | None:
+    """Standard deviation of the common scale of all axes, where no reading tells of it."""
+    prior = np.linalg.inv(fit.prior.precision()[0])
+    row = np.zeros(fit.parameters.size)
+    for axis, letter in enumerate(AXES):
+        ends = fit.curve(f"E{letter}{letter}", fit.box_mm[axis])
+        row += (ends[1] - ends[0]) / float(np.ptp(fit.box_mm, axis=1).sum())
+    before, after = float(row @ prior @ row), float(row @ fit.covariance @ row)
+    return math.sqrt(after) if after > UNSEEN**2 * before else None
 
 
 def squareness_unseen(fit: Fit) -> dict[str, float]:
@@ -221,6 +233,7 @@ def findings_of(
     """What a person should know about an adjustment."""
     return (
         *_unseen_findings(fit, tools),
+        *_scale_findings(fit),
         *_outlier_findings(fit),
         *_scatter_findings(fit),
         *_step_findings(fit),
@@ -254,6 +267,12 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
         )
 
 
+def _scale_findings(fit: Fit) -> Iterator[Finding]:
+    scale = scale_unseen(fit)
+    if scale is not None:
+        yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
+
+
 def _why(fit: Fit, name: str) -> str:
     """What points with too few offsets of the reflector have to do with an angle that they do not see."""
     seen = [*(r.points.tool_mm for r in fit.points), *(r.lengths.tool_mm for r in fit.lengths)]
@@ -273,7 +292,7 @@ def _outlier_findings(fit: Fit) -> Iterator[Finding]:
     files = dict.fromkeys((o.source, o.component) for o in fit.outliers)
     for source, component in files:
         own = [o for o in fit.outliers if (o.source, o.component) == (source, component)]
-        unit, scale = ("um", UM_PER_MM) if component == POINT else unit_of(component)
+        unit, scale = ("um", UM_PER_MM) if component in (POINT, LENGTH) else unit_of(component)
         rows = ", ".join(f"row {o.row} ({o.value * scale:.2f} {unit})" for o in own[:_LISTED])
         more = f" and {len(own) - _LISTED} more" if len(own) > _LISTED else ""
         yield Finding(

@@ -190,7 +190,9 @@ def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
     if not len(known):
         return {"max_urad": 0.0, "rms_urad": 0.0}
     pick = known[np.linspace(0, len(known) - 1, min(len(known), _SAMPLED)).astype(np.int64)]
-    angle = np.sqrt((model.rotation(path.end_mm[pick]) ** 2).sum(axis=1)) * 1e6
+    payload = path.per_frame([(f.payload_kg,) for f in path.frames])[..., 0]
+    turned = model.rotation(path.end_mm[pick], None, payload if payload.ndim == 0 else payload[pick])
+    angle = np.sqrt((turned**2).sum(axis=1)) * 1e6
     return {"max_urad": float(angle.max()), "rms_urad": float(np.sqrt(np.mean(angle * angle)))}
 
 

@@ -192,7 +192,7 @@ class _Tips:
         length = np.array([f.length_mm for f in frames]).reshape(-1, 3)
         chain = setup.machine.chain
         carried = np.array([chain.index(axis) < chain.index("F") for axis in "XYZ"])
-        return _Tips(start, end, (-shift - length)[path.frame], path.tools_mm()[path.frame], carried)
+        return _Tips(start, end, (-shift - length)[path.frame], path.tools_mm()[path.frame, :3], carried)
 
     def of_solid(self, solid: Solid) -> tuple[Array, Array]:
         """(n, 3) the tip at start and end of each move, in the coordinates that a mesh is placed in."""

@@ -10,7 +10,6 @@ from olp.cli.common import (
     exit_for,
     fail_on_option,
     files_of,
-    files_of_calibration,
     json_option,
     put,
     refuse_early,
@@ -55,9 +54,11 @@ def command(
     """
     if STREAM in (output, calibration, points):
         raise UsageError("a calibration is several files; name files, - is none")
+    from olp.files.calibration import files_beside
     from olp.files.measurements import files_of_measurements
 
-    inputs = (*files_of(machine), *files_of_calibration(calibration), *files_of_measurements([points]))
+    stated = map(str, (calibration, *files_beside(calibration)))
+    inputs = (*files_of(machine), *stated, *files_of_measurements([points]))
     refuse_early(files_of(output), inputs, force=force)
 
     from olp.diagnosing import diagnose_calibration

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, exit_for, files_of, put, refuse_early, talk
+from olp.cli.common import STREAM, exit_for, files_of, put, refuse_early, report_ending, talk
 from olp.cli.progress import progress
 from olp.exceptions import UsageError
 
@@ -26,6 +26,7 @@ from olp.exceptions import UsageError
     "--valid-until", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
     help="The last day of the calibration's validity.",
 )  # fmt: skip
+@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
 @click.option(
     "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
@@ -39,6 +40,7 @@ def command(
     machine: str | None,
     datum: tuple[float, float, float] | None,
     valid_until: datetime.datetime | None,
+    report_file: str | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -50,12 +52,14 @@ def command(
     describe themselves. All readings go into one adjustment: curves, squareness, lost motion and cyclic
     errors with their uncertainties.
     """
-    if STREAM in (output, *data):
+    if STREAM in (output, report_file, *data):
         raise UsageError("a calibration is several files; name files, - is none")
     from olp.files.measurements import files_of_measurements
 
     inputs = (*files_of_measurements(data), *files_of(machine))
-    refuse_early(files_of(output), inputs, force=force)
+    for name in files_of(report_file):
+        report_ending(name)
+    refuse_early(files_of(output, report_file), inputs, force=force)
 
     from olp.calibrating import fit_calibration
     from olp.files.write import write_files
@@ -69,10 +73,17 @@ def command(
             valid_until=valid_until.date() if valid_until else None,
             progress=tell,
         )
+    files: dict[Path, bytes] = {} if output is None else fitted.files(output)
+    curves = len(files) - 1
+    if report_file is not None:
+        from olp.report_lines import fit as fit_report
+
+        files[Path(report_file)] = fit_report(fitted, report_file, None)
+    write_files(files, force=force, inputs=inputs)
     if output is not None:
-        files = fitted.files(output)
-        write_files(files, force=force, inputs=inputs)
-        talk(f"wrote {output} and {len(files) - 1} files of curves and covariance beside it")
+        talk(f"wrote {output} and {curves} files of curves and covariance beside it")
+    if report_file is not None:
+        talk(f"wrote {report_file}")
     report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
     if as_json:
         put(to_json(report))
@@ -86,7 +97,7 @@ def command(
 def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
     """The report as people read it: lines by the names of their files."""
     shown = dict(report)
-    for key in ("sets_of_points", "stations"):
+    for key in ("sets_of_points", "stations", "sets_of_pods"):
         shown[key] = [{**row, "name": Path(row["name"]).name} for row in report[key]]
     for key in ("lines_of_lengths", "lines_of_angles"):
         shown[key] = [

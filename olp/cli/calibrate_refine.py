@@ -12,7 +12,6 @@ from olp.cli.common import (
     exit_for,
     fail_on_option,
     files_of,
-    files_of_calibration,
     json_option,
     put,
     refuse_early,
@@ -68,11 +67,12 @@ def command(
         raise UsageError("a calibration is several files; name files, - is none")
     if machine is None:
         raise UsageError("no machine file is given; name it with -m")
+    from olp.files.calibration import files_beside
     from olp.files.measurements import files_of_measurements
 
     inputs = (
         *files_of(machine, job, program),
-        *files_of_calibration(calibration),
+        *map(str, (calibration, *files_beside(calibration))),
         *files_of_measurements([measured]),
     )
     refuse_early(files_of(output), inputs, force=force)

@@ -143,31 +143,16 @@ def given(program: str | None, machine: str | None, job: str | None) -> Given:
 
 def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
     """Machine and job, and the files that describe them. Raises UsageError, InputError."""
+    from olp.files.calibration import files_beside
     from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
     meshes = (mesh.file for mesh in setup.job.meshes)
-    inputs = files_of(machine, job, setup.job.machine, *meshes)
+    named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
+    inputs = files_of(*named, *meshes)
     if setup.machine.calibration is not None:
-        inputs += files_of_calibration(setup.machine.calibration)
+        inputs += [str(file) for file in files_beside(setup.machine.calibration)]
     return setup, tuple(inputs)
-
-
-def files_of_calibration(name: str) -> list[str]:
-    """A calibration file and the files of curves and covariance that it names."""
-    import tomllib
-
-    from olp.files.config import beside
-    from olp.files.write import read_bytes
-
-    try:
-        tables = tomllib.loads(read_bytes(name).decode("utf-8-sig"))
-        named = [curve["file"] for curve in tables.get("curves", ())]
-        named += [tables["covariance"]["file"]] if "file" in tables.get("covariance", ()) else []
-        return [name, *files_of(*(beside(name, file) for file in named))]
-    except (OlpError, ValueError, TypeError, KeyError, AttributeError):
-        # The loader of calibrations says what is wrong with it.
-        return [name]
 
 
 def source(name: str) -> str | bytes:

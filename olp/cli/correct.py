@@ -127,12 +127,11 @@ def command(
 
     for name in files_of(report_file):
         from olp import report_files
-        from olp.loading import profile_of, source_of, unrolled
+        from olp.loading import source_of, unrolled
 
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
-            profile = profile_of(call.setup)
-            text = unrolled(text, origin, profile, expand_cycles, peck_clearance_mm)
+            text = unrolled(text, origin, call.setup, expand_cycles, peck_clearance_mm)
         filed = report_files.correction(result, text, call.setup, name, date, contour=contour)
         written[Path(name)] = filed
     write_files(written, force=force, inputs=call.inputs)

@@ -114,6 +114,7 @@ def _calibration(setup: Setup) -> Calibration:
 
 def machine_summary(setup: Setup) -> dict[str, Any]:
     """Axes, chain, calibration and the size of each of the 21 errors, with units in the keys."""
+    from olp.cli.inspect_parts import grid_summary
     from olp.machine import COMPONENTS, SQUARENESS
     from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
 
@@ -162,7 +163,7 @@ def machine_summary(setup: Setup) -> dict[str, Any]:
         },
         "cyclic_position_errors": cyclic_position,
         "cyclic_angular_errors": cyclic_angular,
-    }
+    } | grid_summary(calibration, described.chain)
 
 
 def _size(calibration: Calibration, name: str, unit: str, scale: float) -> dict[str, Any]:

@@ -40,13 +40,14 @@ class HolePlan:
         path, holes = program.toolpath, program.holes
         count = len(holes)
         level, bottom = np.zeros((count, 3)), np.zeros((count, 3))
-        tool, shift = np.zeros((count, 3)), np.zeros((count, 3))
+        tools = path.tools_mm()
+        tool, shift = np.zeros((count, tools.shape[1])), np.zeros((count, 3))
         for i, hole in enumerate(holes):
             first, second, third = PLANES[hole.plane]
             for point, depth in ((level, hole.r_mm), (bottom, hole.z_mm)):
                 point[i, first], point[i, second], point[i, third] = *hole.place_mm, depth
             frame = int(path.frame[hole.first])
-            tool[i], shift[i] = path.frames[frame].tool_mm, plan.shift_mm[frame]
+            tool[i], shift[i] = tools[frame], plan.shift_mm[frame]
         if not count:
             return HolePlan(holes, level, bottom, np.zeros(0))
         level_play, bottom_play = _play(program, plan)

@@ -7,6 +7,9 @@ Play state: `play` is (n, 3) in [-1, 1] per axis. +1: the axis last moved in + a
 taken up; -1: the same in -; 0: unknown or in the middle. With a lost motion of b mm an axis adds
 -b/2 * play to its own position. Without `play` models give the mean of both directions.
 
+A tool row is X, Y, Z of the tool vector in mm and, in a fourth column, the payload in kg; without that column
+the payload is 0. So the payload goes with the tool wherever a tool goes.
+
 A NaN axis position is unknown: error components that depend on that axis (`depends_on`) are NaN, the others
 finite. Models never test the box; without "hold" the caller asks `inside`.
 """
@@ -27,11 +30,12 @@ class ErrorModel(Protocol):
     """A vectorised model of the tip's position error."""
 
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-        """(n, 3) error in mm at axis positions (n, 3) with tool vectors (3,) or (n, 3)."""
+        """(n, 3) error in mm at axis positions (n, 3) with tool rows (3,) or (n, 3), or (4,) or (n, 4)."""
         ...
 
-    def rotation(self, axis_mm: Array, play: Array | None = None) -> Array:
-        """(n, 3) orientation error of the tool relative to the workpiece in rad."""
+    def rotation(self, axis_mm: Array, play: Array | None = None, payload_kg: Array | float = 0.0) -> Array:
+        """(n, 3) orientation error of the tool relative to the workpiece in rad, with payloads (n,) or
+        one."""
         ...
 
     def contributions(

@@ -7,12 +7,14 @@ component returns its measured value on its own line; so each row has a lever of
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from olp.errormodel.base import Array
-from olp.errormodel.calibration import Calibration, Curve
+from olp.errormodel.calibration import Calibration
 from olp.errormodel.components import AxisComponents
 from olp.exceptions import ConfigError
 from olp.machine import CHAINS, ZERO, Vector
@@ -25,6 +27,22 @@ TOOL_REACH_MM = 1000.0
 
 #: The third coordinate: the lever of angle a on row i is coordinate _OTHER[i, a].
 _OTHER = {(i, a): 3 - i - a for i in range(3) for a in range(3) if i != a}
+
+#: First order: eps_a adds sign * eps_a * lever_k to row i, as (i, a, k, sign).
+CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
+
+
+class Measured(Protocol):
+    """What was measured along a line of one axis: names of components, and where and with what."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def line_mm(self) -> Vector | None: ...
+    @property
+    def tool_mm(self) -> Vector: ...
+    @property
+    def reference(self) -> str: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +99,9 @@ def build_bodies(
         carries = chain.index(axis) < chain.index("F")
         j = AXES.index(axis)
         components = AxisComponents.of(calibration, axis, skip)
-        levers = _levers(calibration, axis, after, carries, tool_terms)
+        levers = levers_of(
+            calibration.curves_of(axis), calibration.datum_mm, axis, after, carries, tool_terms
+        )
         terms = _sine_terms(components, levers, calibration.box_mm)
         bodies.append(Body(j, carries, components, shears[axis], calibration.datum_mm[j], levers, terms))
     return tuple(bodies)
@@ -96,12 +116,14 @@ def _sine_terms(components: AxisComponents, levers: Levers, box_mm: Array) -> in
     return 2 if peak**3 / 6.0 * reach > TRIGONOMETRY_MM else 1
 
 
-def _levers(calibration: Calibration, axis: str, after: str, carries: bool, tool_terms: bool) -> Levers:
-    curves = calibration.curves_of(axis)
+def levers_of(
+    curves: Sequence[Measured], datum_mm: Vector, axis: str, after: str, carries: bool, tool_terms: bool
+) -> Levers:
+    """The levers of what was measured of one axis, `after` it in the chain toward the tool."""
     holder = {name: curve for curve in curves for name in curve.names}
     default = curves[0] if len(curves) == 1 else None
 
-    def lever(sources: list[Curve | None]) -> Lever:
+    def lever(sources: list[Measured | None]) -> Lever:
         """Of one row, coordinate by coordinate from the curve it was measured with."""
         moves, offset = [False] * 3, [0.0] * 3
         for k, source in enumerate(sources):
@@ -112,7 +134,7 @@ def _levers(calibration: Calibration, axis: str, after: str, carries: bool, tool
             line = source.line_mm if source is not None and not own else None
             # On its own line an axis stands where it stands; seen from a reflector on its table, it has moved
             # from the datum.
-            at = (calibration.datum_mm if line is None else line)[k] if moves[k] else 0.0
+            at = (datum_mm if line is None else line)[k] if moves[k] else 0.0
             offset[k] = at + tool
         return Lever((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
 
@@ -120,7 +142,7 @@ def _levers(calibration: Calibration, axis: str, after: str, carries: bool, tool
     for i in range(3):
         measured = holder.get(f"E{AXES[i]}{axis}", default)
         # A row without a curve is zero on the lines on which the angles were measured.
-        sources: list[Curve | None] = [measured] * 3
+        sources: list[Measured | None] = [measured] * 3
         if measured is None:
             for a, name in enumerate("ABC"):
                 if a != i:

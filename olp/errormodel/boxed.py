@@ -19,11 +19,22 @@ def as_points(axis_mm: object, name: str = "axis_mm") -> Array:
 
 
 def as_tool(tool_mm: object, n: int) -> Array:
-    """A tool vector (3,) or one per point (n, 3); raises UsageError on any other shape."""
+    """A tool vector (3,) or one per point (n, 3), without its payload; raises UsageError on any other
+    shape."""
     tool = np.asarray(tool_mm, dtype=np.float64)
-    if tool.shape not in ((3,), (n, 3)):
-        raise UsageError(f"tool_mm has shape {tool.shape}; expected (3,) or ({n}, 3)")
-    return tool
+    if tool.shape not in ((3,), (n, 3), (4,), (n, 4)):
+        raise UsageError(
+            f"tool_mm has shape {tool.shape}; expected (3,) or ({n}, 3), or a fourth column with the payload"
+        )
+    return tool[..., :3]
+
+
+def payload_of(tool_mm: object) -> Array | float:
+    """The payload in kg that goes with tool rows: their fourth column, 0 where there is none."""
+    tool = np.asarray(tool_mm, dtype=np.float64)
+    if tool.shape[-1] < 4:
+        return 0.0
+    return float(tool[3]) if tool.ndim == 1 else np.ascontiguousarray(tool[:, 3])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

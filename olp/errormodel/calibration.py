@@ -15,6 +15,9 @@ from typing import Literal
 import numpy as np
 
 from olp.errormodel.base import Array
+from olp.errormodel.beams import Beam
+from olp.errormodel.gridded import COVER_MM, ComponentTable, DeviationMap, cover_problems, frozen, refuse
+from olp.errormodel.structure import Structure
 from olp.exceptions import ConfigError
 from olp.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.units import AXES
@@ -22,20 +25,6 @@ from olp.units import AXES
 Model = Literal["rigid-body", "huddersfield"]
 Reference = Literal["functional-point", "table"]
 Interpolation = Literal["linear", "pchip"]
-
-#: A curve may miss a face of the box by rounding of its file, no more.
-COVER_MM = 1e-6
-
-
-def _frozen(values: object) -> Array:
-    array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
-    return array
-
-
-def _refuse(problems: list[str]) -> None:
-    if problems:
-        raise ConfigError(problems[0], problems=tuple(problems))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,11 +51,11 @@ class Curve:
     def __post_init__(self) -> None:
         if self.axis not in AXES or len(self.axis) != 1:
             raise ConfigError(f"curve of axis '{self.axis}'; expected X, Y or Z")
-        object.__setattr__(self, "position_mm", _frozen(self.position_mm))
+        object.__setattr__(self, "position_mm", frozen(self.position_mm))
         for name in ("columns", "forward", "backward"):
-            columns = {key: _frozen(value) for key, value in getattr(self, name).items()}
+            columns = {key: frozen(value) for key, value in getattr(self, name).items()}
             object.__setattr__(self, name, MappingProxyType(columns))
-        _refuse(self._problems())
+        refuse(self._problems())
 
     def _problems(self) -> list[str]:
         label, x = f"curve of axis {self.axis}", self.position_mm
@@ -126,7 +115,7 @@ class Cyclic:
             problems.append(f"cyclic {self.component}: period {self.period_mm} mm; expected more than 0")
         if not (np.isfinite(self.amplitude) and np.isfinite(self.phase_rad)):
             problems.append(f"cyclic {self.component}: amplitude and phase must be finite")
-        _refuse(problems)
+        refuse(problems)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +144,10 @@ class Thermal:
 class Calibration:
     """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y, B0Z,
     A0Z in rad, `backlash_mm` the constant lost motion per axis. Several curves of one axis hold different
-    components. Raises ConfigError with every problem found."""
+    components. `repeatability_mm` is the
+    standard deviation of each axis at one place, None where nobody stated it. `compliance` tables and
+    `beams` act per kg of payload beyond `payload_kg`, which was on the machine while measuring. Raises
+    ConfigError with every problem found."""
 
     machine: str
     box_mm: Array
@@ -164,20 +156,26 @@ class Calibration:
     curves: tuple[Curve, ...] = ()
     squareness: Mapping[str, float] = field(default_factory=dict)
     backlash_mm: Vector = ZERO
+    repeatability_mm: Vector | None = None
     cyclic: tuple[Cyclic, ...] = ()
     thermal: Thermal | None = None
+    structure: Structure | None = None
+    maps: tuple[DeviationMap, ...] = ()
+    compliance: tuple[ComponentTable, ...] = ()
+    beams: tuple[Beam, ...] = ()
+    payload_kg: float = 0.0
     temperature_degC: float = 20.0
     measured: datetime.date | None = None
     valid_until: datetime.date | None = None
     active_during_measurement: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "box_mm", _frozen(self.box_mm))
+        object.__setattr__(self, "box_mm", frozen(self.box_mm))
         object.__setattr__(self, "squareness", MappingProxyType(dict(self.squareness)))
         problems = self._own_problems()
         if not problems:
-            problems = self._curve_problems()
-        _refuse(problems)
+            problems = self._curve_problems() + self._grid_problems()
+        refuse(problems)
 
     def _own_problems(self) -> list[str]:
         problems = []
@@ -213,6 +211,77 @@ class Calibration:
             for name in sorted(seen & set(curve.names)):
                 problems.append(f"{name} stands in two curves; expected each component once; merge the files")
             seen |= set(curve.names)
+        return problems
+
+    def _grid_problems(self) -> list[str]:
+        problems = []
+        for described in self.maps:
+            problems += cover_problems(
+                described.name, AXES, described.knots_mm, self.box_mm, described.holds_along
+            )
+        totals = [m for m in self.maps if m.kind == "total"]
+        if len(totals) > 1:
+            problems.append(
+                f'{totals[1].name} is a second map of kind "total"; expected one, which is all that was '
+                f"measured; "
+                'give the others as kind = "residual"'
+            )
+        counted = [
+            name
+            for name, present in (
+                ("curves", bool(self.curves)),
+                ("squareness", any(self.squareness.values())),
+                ("cyclic", bool(self.cyclic)),
+            )
+            if present
+        ]
+        if totals and counted:
+            problems.append(
+                f'{totals[0].name} is of kind "total", so it holds {", ".join(counted)} already; expected '
+                f"none of "
+                'them beside it, or kind = "residual" where the map is what they leave'
+            )
+        seen: dict[str, str] = {}
+        for table in self.compliance:
+            for name in sorted(set(table.names) & set(seen)):
+                problems.append(
+                    f"{name} stands in {seen[name]} and in {table.name}; expected each component once, or "
+                    f"the load "
+                    "counts twice"
+                )
+            seen |= dict.fromkeys(table.names, table.name)
+            problems += cover_problems(table.name, table.arguments, table.knots_mm, self.box_mm)
+        if self.structure is not None:
+            problems += self.structure.cover_problems(self.box_mm)
+            scales = [
+                f"E{a}{a}"
+                for a, scale in zip(AXES, self.thermal.scale_per_K if self.thermal else ZERO, strict=True)
+                if scale != 0.0
+            ]
+            problems += [
+                f"the thermal structure holds {name}, and {name[2]}_scale_um_m_K expands the scale again; "
+                f"expected one "
+                f"of the two: the drift of {name} was read with the scale as it is"
+                for name in self.structure.components()
+                if name in scales
+            ]
+        for beam in self.beams:
+            bent = f"E{beam.direction[1]}{beam.axis}"
+            if bent in seen:
+                problems.append(
+                    f"{bent} stands in {seen[bent]}, and a beam of axis {beam.axis} bends it too; "
+                    f"expected one of the "
+                    "two: what was measured holds the beam"
+                )
+            problems += beam.problems(self.box_mm)
+        if self.repeatability_mm is not None and not (
+            np.all(np.isfinite(self.repeatability_mm)) and min(self.repeatability_mm) >= 0.0
+        ):
+            problems.append(
+                f"repeatability_mm = {self.repeatability_mm}; expected three lengths of 0 or above"
+            )
+        if not (np.isfinite(self.payload_kg) and self.payload_kg >= 0.0):
+            problems.append(f"payload_kg = {self.payload_kg}; expected the mass while measuring, 0 or above")
         return problems
 
     def curves_of(self, axis: str) -> tuple[Curve, ...]:

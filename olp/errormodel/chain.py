@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from olp.errormodel.base import Array, Mask
-from olp.errormodel.bodies import Body
+from olp.errormodel.bodies import CROSS, Body
 from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
@@ -26,8 +26,6 @@ _KEPT = 64
 
 #: A turn about axis a moves coordinate p toward q: (p, q) by axis.
 _PLANES = ((1, 2), (2, 0), (0, 1))
-#: First order: eps_a adds sign * eps_a * lever_k to row i, as (i, a, k, sign).
-_CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 
 Three = list[Column | None]
 
@@ -59,7 +57,7 @@ class RigidBody(Boxed):
                 result[part][unknown @ self.depends_on.T] = np.nan
         return result
 
-    def rotation(self, axis_mm: Array, play: Array | None = None) -> Array:
+    def rotation(self, axis_mm: Array, play: Array | None = None, payload_kg: Array | float = 0.0) -> Array:
         points = as_points(axis_mm)
         states = None if play is None else as_points(play, "play")
         position, unknown = self._positions(points)
@@ -207,7 +205,7 @@ class RigidBody(Boxed):
                     turned[pair] |= both
                     carried[pair] |= both
             else:
-                for i, a, k, _ in _CROSS:
+                for i, a, k, _ in CROSS:
                     if variation[3 + a] is not None and present[k]:
                         turned[i] |= arm[k] | (own & varies[3 + a])
             for i in rows:
@@ -219,7 +217,7 @@ def _first_order(six: Six, levers: list[tuple[tuple[int, ...], list[Column]]]) -
     """E + eps x lever, each row with its own lever."""
     value: Three = list(six[:3])
     for rows, lever in levers:
-        for i, a, k, sign in _CROSS:
+        for i, a, k, sign in CROSS:
             angle = six[3 + a]
             if i in rows and angle is not None:
                 value[i] = _sum(value[i], sign * (angle * lever[k]))

@@ -39,7 +39,7 @@ class ThermalExpansion(Boxed):
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         return sum((value for _, value in self._parts(axis_mm)), np.zeros(np.shape(axis_mm)))
 
-    def rotation(self, axis_mm: Array, play: Array | None = None) -> Array:
+    def rotation(self, axis_mm: Array, play: Array | None = None, payload_kg: Array | float = 0.0) -> Array:
         return np.zeros(as_points(axis_mm).shape)
 
     def contributions(

@@ -21,8 +21,8 @@ class Total:
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         return self._added(lambda model: model.error(axis_mm, tool_mm, play))
 
-    def rotation(self, axis_mm: Array, play: Array | None = None) -> Array:
-        return self._added(lambda model: model.rotation(axis_mm, play))
+    def rotation(self, axis_mm: Array, play: Array | None = None, payload_kg: Array | float = 0.0) -> Array:
+        return self._added(lambda model: model.rotation(axis_mm, play, payload_kg))
 
     def contributions(
         self, axis_mm: Array, tool_mm: Array, play: Array | None = None

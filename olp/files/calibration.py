@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
+from typing import TypeVar
 
 import numpy as np
 
+from olp.errormodel.beams import Beam, tube_mm4
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.errormodel.gridded import ComponentTable, DeviationMap
+from olp.errormodel.structure import Structure
 from olp.exceptions import ConfigError, InputError
+from olp.files.grids import read_component_grid, read_map
 from olp.files.problems import config_error, validate
+from olp.files.schema_base import Position
+from olp.files.schema_gridded import BeamTable, ComplianceTable, MapTable
 from olp.files.schemas import CalibrationFile, CurveTable, CyclicTable, ThermalTable
+from olp.files.structure import load_structure
 from olp.files.tables import read_curves
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
@@ -19,6 +28,23 @@ from olp.units import AXES, shifted
 
 #: The workpiece's size holds at this temperature (ISO 1) where the job states none.
 REFERENCE_DEGC = 20.0
+
+
+T = TypeVar("T", CurveTable, MapTable, ComplianceTable)
+V = TypeVar("V")
+
+
+def files_beside(path: PathLike) -> list[FilePath]:
+    """The files that a calibration file names, as far as it can be read; its loader says what is wrong with
+    it."""
+    try:
+        values = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        names = [t["file"] for name in ("curves", "maps", "compliance") for t in values.get(name, ())]
+        structure = values.get("thermal", {}).get("structure")
+        covariance = values.get("covariance", {}).get("file")
+        return [FilePath(path).parent / name for name in (*names, structure, covariance) if name]
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return []
 
 
 def load_calibration(
@@ -34,15 +60,34 @@ def load_calibration(
     file = validate(CalibrationFile, values, lines, str(path))
     found = [(line_of(key, lines), sentence) for key, sentence in _mismatches(file, machine)]
     errors: list[ConfigError] = []
-    curves: list[Curve] = []
-    for index, table in enumerate(file.curves):
-        key: Path = ("curves", index, "file")
+
+    def each(name: str, tables: Sequence[T], make: Callable[[FilePath, T, Vector], V]) -> tuple[V, ...]:
+        """What the tables [[name]] and their files hold."""
+        made = []
+        for index, table in enumerate(tables):
+            key: Path = (name, index, "file")
+            try:
+                made.append(make(FilePath(path).parent / table.file, table, file.datum_mm))
+            except ConfigError as error:
+                errors.append(error)
+            except InputError as error:
+                found.append((line_of(key, lines), f'{dotted(key)} = "{table.file}": {error.message}'))
+        return tuple(made)
+
+    curves = each("curves", file.curves, _curve)
+    maps = each("maps", file.maps, _map)
+    compliance = each("compliance", file.compliance, _compliance)
+    structure: Structure | None = None
+    if file.thermal is not None and file.thermal.structure is not None:
+        key = ("thermal", "structure")
         try:
-            curves.append(_curve(FilePath(path).parent / table.file, table, file.datum_mm))
+            structure = load_structure(FilePath(path).parent / file.thermal.structure, file.machine)
         except ConfigError as error:
             errors.append(error)
         except InputError as error:
-            found.append((line_of(key, lines), f'{dotted(key)} = "{table.file}": {error.message}'))
+            found.append(
+                (line_of(key, lines), f'{dotted(key)} = "{file.thermal.structure}": {error.message}')
+            )
     if found:
         errors.insert(0, config_error(found, str(path)))
     if errors:
@@ -53,10 +98,18 @@ def load_calibration(
             box_mm=np.array(file.box_mm),
             model=file.model,
             datum_mm=file.datum_mm,
-            curves=tuple(curves),
+            curves=curves,
+            maps=maps,
+            compliance=compliance,
+            beams=tuple(_beam(table, file.datum_mm) for table in file.compliance_beam),
+            payload_kg=file.payload_kg,
             squareness={name: shifted(getattr(file.squareness, f"{name}_urad"), -6) for name in SQUARENESS},
             backlash_mm=_vector([shifted(getattr(file.backlash, f"{axis}_um"), -3) for axis in AXES]),
+            repeatability_mm=None
+            if file.repeatability is None
+            else _vector([shifted(getattr(file.repeatability, f"{axis}_um"), -3) for axis in AXES]),
             cyclic=tuple(_cyclic(table) for table in file.cyclic),
+            structure=structure,
             thermal=_thermal(file.thermal, file.temperature_degC, temperatures_degC or {}),
             temperature_degC=file.temperature_degC,
             measured=file.measured,
@@ -96,7 +149,6 @@ def _mismatches(file: CalibrationFile, machine: Machine | None) -> Iterator[tupl
 def _curve(path: FilePath, table: CurveTable, datum_mm: Vector) -> Curve:
     columns = read_curves(path)
     both = columns.forward is not None
-    line = [datum if at is None else at for at, datum in zip(table.line_mm.values, datum_mm, strict=True)]
     try:
         return Curve(
             axis=columns.axis,
@@ -104,13 +156,72 @@ def _curve(path: FilePath, table: CurveTable, datum_mm: Vector) -> Curve:
             columns={} if both else columns.columns,
             forward=columns.forward or {},
             backward=columns.backward or {},
-            line_mm=_vector(line),
+            line_mm=_line(table.line_mm, datum_mm),
             tool_mm=table.tool_mm,
             reference=table.reference,
             interpolation=table.interpolation,
         )
     except ConfigError as error:
         raise error.in_file(str(path)) from None
+
+
+def _line(stated: Position, datum_mm: Vector) -> Vector:
+    """Where the other axes stood; an axis left out stood at the datum."""
+    return _vector([datum if at is None else at for at, datum in zip(stated.values, datum_mm, strict=True)])
+
+
+def _map(path: FilePath, table: MapTable, datum_mm: Vector) -> DeviationMap:
+    grid = read_map(path)
+    order = [grid.arguments.index(axis) for axis in AXES]
+    values = np.stack([grid.columns[f"D{axis}"].transpose(order) for axis in AXES], axis=-1)
+    x, y, z = (grid.knots_mm[k] for k in order)
+    try:
+        return DeviationMap(
+            knots_mm=(x, y, z),
+            values=values,
+            kind=table.kind,
+            tool_mm=table.tool_mm,
+            interpolation=table.interpolation,
+            holds_along=tuple(table.holds_along),
+            name=f"map {table.file}",
+        )
+    except ConfigError as error:
+        raise error.in_file(str(path)) from None
+
+
+def _compliance(path: FilePath, table: ComplianceTable, datum_mm: Vector) -> ComponentTable:
+    grid = read_component_grid(path)
+    try:
+        return ComponentTable(
+            axis=next(iter(grid.columns))[2],
+            arguments=grid.arguments,
+            knots_mm=grid.knots_mm,
+            columns=grid.columns,
+            line_mm=_line(table.line_mm, datum_mm),
+            tool_mm=table.tool_mm,
+            reference=table.reference,
+            interpolation=table.interpolation,
+            name=f"compliance {table.file}",
+        )
+    except ConfigError as error:
+        raise error.in_file(str(path)) from None
+
+
+def _beam(table: BeamTable, datum_mm: Vector) -> Beam:
+    second_moment = table.second_moment_mm4
+    if second_moment is None:
+        assert table.section_mm is not None
+        second_moment = tube_mm4(*table.section_mm)
+    return Beam(
+        axis=table.axis,
+        support=table.support,
+        span_mm=table.span_mm,
+        youngs_modulus_GPa=table.youngs_modulus_GPa,
+        second_moment_mm4=second_moment,
+        direction=table.direction,
+        line_mm=_line(table.line_mm, datum_mm),
+        tool_mm=table.tool_mm,
+    )
 
 
 def _cyclic(table: CyclicTable) -> Cyclic:

@@ -15,6 +15,8 @@ from olp.errormodel.uncertainty import Uncertainty
 from olp.exceptions import ConfigError
 from olp.files.covariance import covariance_bytes
 from olp.files.fields import SIGN
+from olp.files.gridded_writer import beam_lines, compliance_csv, compliance_lines, map_csv, map_lines
+from olp.files.structure import structure_text
 from olp.files.toml_text import comment, toml_lines
 from olp.machine import SQUARENESS, ZERO, Vector
 from olp.units import AXES, shifted
@@ -31,7 +33,8 @@ def calibration_files(
     covariance: Uncertainty | None = None,
     notes: Sequence[str] = (),
 ) -> dict[Path, bytes]:
-    """The bytes of `target`, an olp-calibration-1 file, and of its curves `<stem>-x.csv` ... beside it.
+    """The bytes of `target`, an olp-calibration-1 file, and of its curves `<stem>-x.csv` ..., maps
+    `<stem>-map.csv` and loads `<stem>-load.csv` beside it.
 
     `sigma` holds standard uncertainties by component, (n,) in mm or rad at the positions of its curve, and
     `covariance` becomes `<stem>-covariance.npz`; notes become comments. Curves read back as the very same
@@ -51,18 +54,35 @@ def calibration_files(
         files[target.with_name(name)] = _csv(curve, own).encode()
     if sigmas:
         raise ConfigError(f"sigma of {', '.join(sorted(sigmas))} fits no curve; expected names of its curves")
+    tables: list[str] = []
+    for described in calibration.maps:
+        names.append(_unused(f"{target.stem}-map", names))
+        files[target.with_name(names[-1])] = map_csv(described, in_unit_text).encode()
+        tables += map_lines(described, names[-1])
+    for table in calibration.compliance:
+        names.append(_unused(f"{target.stem}-load", names))
+        files[target.with_name(names[-1])] = compliance_csv(table, in_unit_text).encode()
+        tables += compliance_lines(table, names[-1])
+    warm, structure = calibration.thermal is not None or calibration.structure is not None, None
+    if calibration.structure is not None:
+        structure = f"{target.stem}-thermal.toml"
+        text = structure_text(calibration.structure, calibration.machine, in_unit)
+        files[target.with_name(structure)] = text
     lines = [
         *(line for note in notes for line in comment(note)),
         *_head(calibration),
         *(
             line
-            for curve, name in zip(calibration.curves, names, strict=True)
+            for curve, name in zip(calibration.curves, names, strict=False)
             for line in _curve(curve, name)
         ),
         *_squareness(calibration.squareness),
         *_backlash(calibration.backlash_mm),
+        *_repeatability(calibration.repeatability_mm),
         *(line for cyclic in calibration.cyclic for line in _cyclic(cyclic)),
-        *(_thermal(calibration.thermal) if calibration.thermal is not None else ()),
+        *tables,
+        *(line for beam in calibration.beams for line in beam_lines(beam)),
+        *(_thermal(calibration.thermal or Thermal(), structure) if warm else ()),
     ]
     if covariance is not None:
         archive = target.with_name(f"{target.stem}-covariance.npz")
@@ -111,6 +131,7 @@ def _head(calibration: Calibration) -> Iterator[str]:
             "model": calibration.model,
             "datum_mm": calibration.datum_mm,
             "box_mm": calibration.box_mm.tolist(),
+            "payload_kg": calibration.payload_kg or None,
             "active_during_measurement": "all" if active == ["all"] else active,
         }
     )
@@ -143,6 +164,14 @@ def _backlash(backlash_mm: Vector) -> Iterator[str]:
         yield from toml_lines({f"{a}_um": in_unit(b, -3) for a, b in zip(AXES, backlash_mm, strict=True)})
 
 
+def _repeatability(repeatability_mm: Vector | None) -> Iterator[str]:
+    if repeatability_mm is not None:
+        yield from ("", "[repeatability]")
+        yield from toml_lines(
+            {f"{a}_um": in_unit(s, -3) for a, s in zip(AXES, repeatability_mm, strict=True)}
+        )
+
+
 def _cyclic(cyclic: Cyclic) -> Iterator[str]:
     angular = cyclic.component[1] in "ABC"
     yield from ("", "[[cyclic]]")
@@ -157,12 +186,13 @@ def _cyclic(cyclic: Cyclic) -> Iterator[str]:
     )
 
 
-def _thermal(thermal: Thermal) -> Iterator[str]:
+def _thermal(thermal: Thermal, structure: str | None) -> Iterator[str]:
     scales = zip(AXES, thermal.scale_per_K, strict=True)
     yield from ("", "[thermal]")
     yield from toml_lines({f"{axis}_scale_um_m_K": in_unit(scale, -6) for axis, scale in scales})
     yield from toml_lines(
         {
+            "structure": structure,
             "workpiece_um_m_K": in_unit(thermal.workpiece_per_K, -6),
             "fixed_at_mm": None if thermal.fixed_at_mm == ZERO else _floats(thermal.fixed_at_mm),
             "clamped_at_mm": None if thermal.clamped_at_mm == ZERO else _floats(thermal.clamped_at_mm),

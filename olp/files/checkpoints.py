@@ -24,7 +24,7 @@ from olp.files.fields import NotNegative, Positive, Triple
 from olp.files.measurements import PER_UNIT, load_measurements
 from olp.files.point_readings import DEVIATION, MEASURED, PointReadings, parse_point_readings
 from olp.files.problems import config_error, validate
-from olp.files.schemas import Table
+from olp.files.schema_base import Table
 from olp.files.toml_text import Path
 from olp.files.write import PathLike, read_bytes
 from olp.machine import Vector

@@ -132,7 +132,13 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
         machine=beside(path, file.machine),
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
-        temperatures_degC=file.temperatures_degC.model_dump(exclude_none=True),
+        payloads={entry.line: entry.payload_kg for entry in file.payloads},
+        temperatures_degC=file.temperatures_degC.model_dump(
+            exclude_none=True, exclude={"sensors", "sensor_log", "sensor_log_at_s"}
+        ),
+        sensors_degC=file.temperatures_degC.sensors,
+        sensor_log=beside(path, file.temperatures_degC.sensor_log),
+        sensor_log_at_s=file.temperatures_degC.sensor_log_at_s,
         work_offsets=_work_offsets(file.work_offsets),
         tools=_tools(file.tools),
         meshes=tuple(meshes),
@@ -149,6 +155,7 @@ def _work_offsets(tables: WorkOffsets) -> dict[str, WorkOffset]:
             set_by=table.set_by,
             touched_at_mm=table.touched_at_mm.values,
             touch_tool=table.touch_tool,
+            touched_payload_kg=table.touched_payload_kg,
         )
         for name, table in tables.items()
     }

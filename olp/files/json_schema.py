@@ -7,7 +7,8 @@ from typing import Any
 
 from olp.exceptions import UsageError
 from olp.files.measurement_schemas import MeasurementsFile
-from olp.files.schemas import FILES, Table
+from olp.files.schema_base import Table
+from olp.files.schemas import FILES
 
 #: kind of file to its model
 KINDS: dict[str, type[Table]] = {**FILES, "measurements": MeasurementsFile}

@@ -8,7 +8,7 @@ each, in machine units.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -31,6 +31,7 @@ _TOOL_WORD = re.compile(rf"([A-Z])\s*({_NUMBER})", re.IGNORECASE)
 _MAX_INCLUDES = 20
 
 Sections = dict[str, dict[str, str]]
+Load = Callable[[Path], bytes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class Imported:
 
 
 @dataclass(slots=True)
-class _Reading:
-    """One import under way."""
+class Reading:
+    """An INI file that is read: its sections, what is noted on the way, and the length of its unit in mm."""
 
     file: str
     sections: Sections
@@ -74,9 +75,9 @@ def from_linuxcnc(ini_path: PathLike, chain: str = "FXYZ") -> Imported:
     not all of the axes X, Y, Z.
     """
     path = Path(ini_path)
-    reading = _Reading(str(path), _sections(path))
-    reading.mm = _unit_mm(reading)
-    joints = _joints(reading)
+    reading = Reading(str(path), sections_of(path))
+    reading.mm = unit_mm(reading)
+    joints = joints_of(reading)
     axes = {letter: _axis(reading, letter, joints[letter]) for letter in AXES}
     compensated = _compensated(reading, joints)
     tools = _tools(reading, path)
@@ -95,7 +96,7 @@ def from_linuxcnc(ini_path: PathLike, chain: str = "FXYZ") -> Imported:
     return Imported(machine, (f"The INI file does not state the chain; {chain} is assumed.", *reading.notes))
 
 
-def _unit_mm(reading: _Reading) -> float:
+def unit_mm(reading: Reading) -> float:
     """Length of a machine unit in mm; LinuxCNC takes a name, or a number of units per mm."""
     units = (reading.text("TRAJ", "LINEAR_UNITS") or "").casefold()
     if units in _UNITS_MM:
@@ -106,21 +107,21 @@ def _unit_mm(reading: _Reading) -> float:
     raise InputError(f"[TRAJ] LINEAR_UNITS is {found}; expected mm or inch", file=reading.file)
 
 
-def _lines(path: Path, depth: int = 0) -> Iterator[str]:
+def _lines(path: Path, load: Load, depth: int = 0) -> Iterator[str]:
     """The lines of an INI file, with those of `#INCLUDE` files in their place."""
-    for line in read_bytes(path).decode("utf-8", "replace").splitlines():
+    for line in load(path).decode("utf-8", "replace").splitlines():
         include = re.match(r"\s*#INCLUDE\s+(\S.*)", line)
         if include and depth < _MAX_INCLUDES:
-            yield from _lines(path.parent / Path(include[1].strip()).expanduser(), depth + 1)
+            yield from _lines(path.parent / Path(include[1].strip()).expanduser(), load, depth + 1)
         else:
             yield line.strip()
 
 
-def _sections(path: Path) -> Sections:
-    """Section to key to its first value."""
+def sections_of(path: Path, load: Load = read_bytes) -> Sections:
+    """Section to key to its first value; `load` gives the bytes of a file."""
     sections: Sections = {}
     current: dict[str, str] = {}
-    for line in _lines(path):
+    for line in _lines(path, load):
         if line.startswith("[") and "]" in line:
             current = sections.setdefault(line[1 : line.index("]")].strip(), {})
         elif line and line[0] not in "#;" and "=" in line:
@@ -129,7 +130,7 @@ def _sections(path: Path) -> Sections:
     return sections
 
 
-def _joints(reading: _Reading) -> dict[str, list[str]]:
+def joints_of(reading: Reading) -> dict[str, list[str]]:
     """The sections that describe the joints of each axis; none where kinematics lie between them."""
     coordinates = (reading.text("TRAJ", "COORDINATES") or "XYZ").upper().replace(" ", "")
     kinematics = reading.text("KINS", "KINEMATICS") or "trivkins"
@@ -159,7 +160,7 @@ def _joints(reading: _Reading) -> dict[str, list[str]]:
     return joints
 
 
-def _axis(reading: _Reading, letter: str, joints: list[str]) -> Axis:
+def _axis(reading: Reading, letter: str, joints: list[str]) -> Axis:
     """The tightest of what the sections of an axis and its joints state."""
     sections = [f"AXIS_{letter}", *joints]
 
@@ -196,7 +197,7 @@ def _axis(reading: _Reading, letter: str, joints: list[str]) -> Axis:
     )
 
 
-def _compensated(reading: _Reading, joints: Mapping[str, list[str]]) -> frozenset[str]:
+def _compensated(reading: Reading, joints: Mapping[str, list[str]]) -> frozenset[str]:
     """ISO names of what COMP_FILE corrects; a control's own backlash has no such name and gives a note."""
     names = set()
     for letter, sections in joints.items():
@@ -206,8 +207,8 @@ def _compensated(reading: _Reading, joints: Mapping[str, list[str]]) -> frozense
                 names.add(f"E{letter}{letter}")
                 reading.notes.append(
                     f"[{section}] COMP_FILE = {table} corrects E{letter}{letter}, so it is listed in "
-                    "compensated_by_controller; if it was active while measuring, list it in "
-                    "active_during_measurement of the calibration instead."
+                    "compensated_by_controller (olp calibrate import --format linuxcnc reads it); if it was "
+                    "active while measuring, list it in active_during_measurement of the calibration instead."
                 )
             elif backlash := reading.length(section, "BACKLASH"):
                 reading.notes.append(
@@ -217,7 +218,7 @@ def _compensated(reading: _Reading, joints: Mapping[str, list[str]]) -> frozense
     return frozenset(names)
 
 
-def _tools(reading: _Reading, ini: Path) -> dict[int, Tool]:
+def _tools(reading: Reading, ini: Path) -> dict[int, Tool]:
     name = reading.text("EMCIO", "TOOL_TABLE")
     if name is None:
         reading.notes.append("[EMCIO] TOOL_TABLE is not given: add [tools.N] by hand.")
@@ -247,7 +248,7 @@ def _tools(reading: _Reading, ini: Path) -> dict[int, Tool]:
     return tools
 
 
-def _offsets(reading: _Reading, ini: Path) -> tuple[dict[str, WorkOffset], str]:
+def _offsets(reading: Reading, ini: Path) -> tuple[dict[str, WorkOffset], str]:
     """Work offsets G54 to G59.3 and the name of the active one."""
     name = reading.text("RS274NGC", "PARAMETER_FILE")
     path = ini.parent / name if name else None

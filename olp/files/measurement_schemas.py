@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from olp.files.fields import Chain, Interval, IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
 from olp.files.readings import SENSES
-from olp.files.schemas import Position, Table
+from olp.files.schema_base import Position, Table
 from olp.machine import COMPONENTS
 
 

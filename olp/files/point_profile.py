@@ -11,7 +11,7 @@ from pydantic import Field
 from olp.exceptions import UsageError
 from olp.files.fields import Positive, Text
 from olp.files.problems import nearest, validate
-from olp.files.schemas import Table
+from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, read_bytes
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from olp.exceptions import ConfigError
 from olp.files.fields import shown
-from olp.files.schemas import Table, is_table
+from olp.files.schema_base import Table, is_table
 from olp.files.toml_text import Path, dotted, line_of
 
 #: A line, where it is known, and a sentence.

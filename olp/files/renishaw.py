@@ -18,7 +18,7 @@ from pydantic import Field
 
 from olp.exceptions import InputError
 from olp.files.readings import ANGULAR, UNITS, Readings
-from olp.files.schemas import Table
+from olp.files.schema_base import Table
 from olp.files.write import PathLike, read_bytes
 
 Array = npt.NDArray[np.float64]
@@ -135,22 +135,20 @@ def line_of_recording(
         if holds == "position":
             part = _moving(value, file)
             value = value[part]
-            target = np.linspace(layout.start_mm, layout.end_mm, len(value))
-            line = np.polynomial.Polynomial.fit(np.arange(len(value)), value, 1)
-            value = value - line(np.arange(len(value)))
+            target = np.linspace(layout.start_mm, layout.end_mm, len(value), dtype=np.float64)
+            slope, rest = np.polyfit(target, value, 1)
+            value = np.asarray(value - slope * target - rest, dtype=np.float64)
             notes.append("errors are departures from constant feed: scale and slow curve are not in them")
         else:
-            target = np.linspace(layout.start_mm, layout.end_mm, len(value))
+            target = np.linspace(layout.start_mm, layout.end_mm, len(value), dtype=np.float64)
     group = layout.every
     if group > 1:
         whole = len(value) // group * group
-        target = target[:whole].reshape(-1, group).mean(axis=1).astype(np.float64)
-        value = value[:whole].reshape(-1, group).mean(axis=1).astype(np.float64)
+        target, value = (np.array(a[:whole], float).reshape(-1, group).mean(axis=1) for a in (target, value))
     direction = 1 if target[-1] > target[0] else -1
     ones = np.ones(len(value), np.int64)
-    target, value = np.asarray(target, np.float64), np.asarray(value, np.float64)
     return Readings(
-        file, target, value, ones, direction * ones, 0 * ones, None, unit in ANGULAR,
+        file, np.asarray(target, np.float64), value, ones, direction * ones, 0 * ones, None, unit in ANGULAR,
         MappingProxyType({}), tuple(notes),
     )  # fmt: skip
 

@@ -7,9 +7,10 @@ One class per TOML table; a key that no class names is refused. Every descriptio
 from __future__ import annotations
 
 import datetime
-from typing import Annotated, Any, ClassVar, Literal
+from itertools import pairwise
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from olp.files.fields import (
     CONTROLLERS,
@@ -28,32 +29,9 @@ from olp.files.fields import (
     Triple,
     refusal,
 )
+from olp.files.schema_base import Position, Table
+from olp.files.schema_gridded import BeamTable, ComplianceTable, MapTable
 from olp.machine import COMPONENTS
-
-
-class Table(BaseModel):
-    """A TOML table. `not_built` holds keys of the contract that this version cannot honour, and why."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
-    not_built: ClassVar[dict[str, str]] = {}
-
-
-class Position(Table):
-    """Axis positions in mm; an axis that is not named is not known."""
-
-    X: float | None = Field(default=None, description="a position of axis X in mm")
-    Y: float | None = Field(default=None, description="a position of axis Y in mm")
-    Z: float | None = Field(default=None, description="a position of axis Z in mm")
-
-    @property
-    def values(self) -> tuple[float | None, float | None, float | None]:
-        return (self.X, self.Y, self.Z)
-
-    @property
-    def complete(self) -> tuple[float, float, float] | None:
-        """The three positions, None where one is missing."""
-        x, y, z = self.values
-        return None if x is None or y is None or z is None else (x, y, z)
 
 
 class AxisTable(Table):
@@ -107,7 +85,11 @@ class WorkOffsetTable(Table):
         default=None, description="the number of the tool that touched, one of [tools]"
     )
 
-    @field_validator("touched_at_mm", "touch_tool")
+    touched_payload_kg: NotNegative | None = Field(
+        default=None, description="the payload at the touch, in kg; payload_kg of the job if left out"
+    )
+
+    @field_validator("touched_at_mm", "touch_tool", "touched_payload_kg")
     @classmethod
     def _only_if_touched(cls, value: object, info: ValidationInfo) -> object:
         if info.data.get("set_by") == "true" and value is not None:
@@ -323,6 +305,12 @@ class CovarianceTable(Table):
     )
 
 
+class RepeatabilityTable(Table):
+    X_um: NotNegative = Field(default=0.0, description="the standard deviation of axis X, in um")
+    Y_um: NotNegative = Field(default=0.0, description="the standard deviation of axis Y, in um")
+    Z_um: NotNegative = Field(default=0.0, description="the standard deviation of axis Z, in um")
+
+
 class CyclicTable(Table):
     component: Literal[COMPONENTS] = Field(  # type: ignore[valid-type]
         description='the ISO 230-1 name of a component error, such as "EXX"'
@@ -355,6 +343,12 @@ class ThermalTable(Table):
     Y_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Y, in um/(m K)")
     Z_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Z, in um/(m K)")
     workpiece_um_m_K: float = Field(default=0.0, description="the expansion of the workpiece, in um/(m K)")
+    structure: Text | None = Field(
+        default=None,
+        description="the path of an olp-thermal-1 file, which `olp calibrate thermal` writes: how the "
+        "structure "
+        "distorts with the temperatures of sensors",
+    )
     fixed_at_mm: Triple = Field(
         default=(0.0, 0.0, 0.0), description="the axis positions where the scales are fixed, [X, Y, Z] in mm"
     )
@@ -367,10 +361,6 @@ class ThermalTable(Table):
 class CalibrationFile(Table):
     """olp-calibration-1: the measured errors of one machine, actual minus commanded."""
 
-    not_built: ClassVar[dict[str, str]] = {
-        "maps": "volumetric error maps",
-        "compliance": "load-dependent errors",
-    }
     schema_: Literal["olp-calibration-1"] = Field(
         alias="schema", description='the format, "olp-calibration-1"'
     )
@@ -390,10 +380,24 @@ class CalibrationFile(Table):
         default=frozenset(),
         description="the errors that the control corrected while measuring, a list of ISO 230-1 names",
     )
+    payload_kg: NotNegative = Field(
+        default=0.0, description="the payload on the machine while measuring, in kg; 0 if left out"
+    )
     curves: list[CurveTable] = Field(default=[], description="tables [[curves]]")
     squareness: SquarenessTable = Field(default_factory=SquarenessTable, description="the table [squareness]")
     backlash: BacklashTable = Field(default_factory=BacklashTable, description="the table [backlash]")
+    repeatability: RepeatabilityTable | None = Field(
+        default=None,
+        description="the table [repeatability]: the random part of each axis, which no correction removes",
+    )
     cyclic: list[CyclicTable] = Field(default=[], description="tables [[cyclic]]")
+    maps: list[MapTable] = Field(default=[], description="tables [[maps]], measured deviations of the tip")
+    compliance: list[ComplianceTable] = Field(
+        default=[], description="tables [[compliance]], errors per kg of payload"
+    )
+    compliance_beam: list[BeamTable] = Field(
+        default=[], description="tables [[compliance_beam]], beams that bend under the payload"
+    )
     thermal: ThermalTable | None = Field(default=None, description="the table [thermal]")
     covariance: CovarianceTable | None = Field(
         default=None, description="the table [covariance]: how well all this is known"
@@ -413,6 +417,29 @@ class TemperaturesTable(Table):
     Y_scale: float | None = Field(default=None, description="the temperature of the scale of Y, in degC")
     Z_scale: float | None = Field(default=None, description="the temperature of the scale of Z, in degC")
     workpiece: float | None = Field(default=None, description="the temperature of the workpiece, in degC")
+    sensors: dict[str, float] | None = Field(
+        default=None,
+        description="the table [temperatures_degC.sensors]: the temperature of each sensor of the thermal "
+        "structure, in degC, where all has settled",
+    )
+    sensor_log: Text | None = Field(
+        default=None,
+        description="the path of a log of the sensors instead (t_s, NAME_degC ...), relative to this file",
+    )
+    sensor_log_at_s: float | None = Field(
+        default=None,
+        validate_default=True,
+        description="the time in that log, in s; its last one if left out",
+    )
+
+    @field_validator("sensor_log_at_s")
+    @classmethod
+    def _one_way(cls, value: float | None, info: ValidationInfo) -> float | None:
+        if info.data.get("sensors") is not None and info.data.get("sensor_log") is not None:
+            raise refusal("or sensors: both sensors and sensor_log are given; expected one of the two")
+        if value is not None and info.data.get("sensor_log") is None:
+            raise refusal("is given without sensor_log; expected the path of the log, or leave this key out")
+        return value
 
 
 class MeshTable(Table):
@@ -429,6 +456,13 @@ class MeshTable(Table):
     )
 
 
+class PayloadTable(Table):
+    line: Annotated[int, Field(ge=1)] = Field(
+        description="the line of the program from which on it holds, counted from 1"
+    )
+    payload_kg: NotNegative = Field(description="the payload from there on, in kg")
+
+
 class JobFile(Table):
     """olp-job-1: what changes from job to job."""
 
@@ -441,7 +475,15 @@ class JobFile(Table):
         default_factory=Position,
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
     )
-    payload_kg: NotNegative = Field(default=0.0, description="the mass of workpiece and fixture, in kg")
+    payload_kg: NotNegative = Field(
+        default=0.0, description="what the machine carries at the start of the program, in kg"
+    )
+    payloads: list[PayloadTable] = Field(
+        default=[],
+        description="tables [[payloads]], the payload from a line of the program on; instead, the program "
+        "may "
+        "hold comments such as (OLP PAYLOAD 30 kg)",
+    )
     temperatures_degC: TemperaturesTable = Field(
         default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
     )
@@ -451,11 +493,16 @@ class JobFile(Table):
     tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
 
+    @field_validator("payloads")
+    @classmethod
+    def _ascending_lines(cls, value: list[PayloadTable]) -> list[PayloadTable]:
+        for before, after in pairwise(value):
+            if after.line <= before.line:
+                raise refusal(
+                    f"name line {after.line} after line {before.line}; expected ascending lines, each once"
+                )
+        return value
+
 
 #: File kind to its model, in the order in which a user meets them.
 FILES: dict[str, type[Table]] = {"machine": MachineFile, "calibration": CalibrationFile, "job": JobFile}
-
-
-def is_table(annotation: Any) -> bool:
-    """Whether an annotation is one of the table models."""
-    return isinstance(annotation, type) and issubclass(annotation, Table)

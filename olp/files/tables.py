@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 Row = tuple[int, list[float]]
 
 #: A unit of error columns as a power of ten of the base unit.
-_POWER = {"um": -3, "urad": -6}
+_POWER = {"um": -3, "urad": -6, "um/kg": -3, "urad/kg": -6}
 
 _COLUMN = re.compile(r"(sigma_)?(E[XYZABC][XYZ])_([A-Za-z]+)", re.IGNORECASE)
 
@@ -57,14 +57,9 @@ def read_curves(path: PathLike) -> CurveTable:
 
 def parse_curves(data: bytes, file: str) -> CurveTable:
     """As `read_curves`, from the bytes of the file."""
+    text = decoded(data, file)
     try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        sentence = f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
-        raise config_error([(line, sentence)], file) from None
-    try:
-        records = _records(text)
+        records = records_of(text)
     except csv.Error as error:
         raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
     if not records:
@@ -73,7 +68,7 @@ def parse_curves(data: bytes, file: str) -> CurveTable:
     found = _header_problems(line, header)
     if found:
         raise config_error(found, file)
-    rows, found = _rows(header, records[1:])
+    rows, found = rows_of(header, records[1:])
     # Order and repetition mean little while rows are missing from it.
     found = found or _order_problems(header, rows)
     if found:
@@ -81,7 +76,17 @@ def parse_curves(data: bytes, file: str) -> CurveTable:
     return _table(header, rows, file)
 
 
-def _records(text: str) -> list[tuple[int, list[str]]]:
+def decoded(data: bytes, file: str) -> str:
+    """The text of a file. Raises ConfigError with the line of the first byte that is not UTF-8."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        sentence = f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
+        raise config_error([(line, sentence)], file) from None
+
+
+def records_of(text: str) -> list[tuple[int, list[str]]]:
     """(line, stripped cells) of each line that holds data."""
     records = []
     for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
@@ -144,7 +149,10 @@ def _column_problem(name: str, axis: str) -> str | None:
     return f"expected {match[1] or ''}{wanted}"
 
 
-def _rows(header: Sequence[str], records: Sequence[tuple[int, list[str]]]) -> tuple[list[Row], list[Problem]]:
+def rows_of(
+    header: Sequence[str], records: Sequence[tuple[int, list[str]]]
+) -> tuple[list[Row], list[Problem]]:
+    """The numbers of each row, and what is wrong with them."""
     rows: list[Row] = []
     problems: list[Problem] = []
     for line, cells in records:
@@ -164,7 +172,7 @@ def _rows(header: Sequence[str], records: Sequence[tuple[int, list[str]]]) -> tu
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:
-    unit = name.rpartition("_")[2]
+    unit = "/".join(name.split("_")[-2:]) if name.endswith("_kg") else name.rpartition("_")[2]
     if not cell:
         return 0.0, f"is empty; expected a number in {unit}"
     try:

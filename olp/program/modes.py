@@ -1,5 +1,5 @@
-"""What is in force on each line of a chunk: modal codes, the end of the program, `(olp off)` sections; and
-which lines are events, to be read one by one.
+"""What is in force on each line of a chunk: modal codes, the end of the program; and which lines are events,
+to be read one by one.
 
 All of it is found for a whole chunk at once. Refused here are lines that hold more than words, two codes of
 one modal group, and block delete that later blocks depend on.
@@ -24,7 +24,6 @@ Modal = npt.NDArray[np.int16]
 #: plane code to index into `geometry.PLANES`
 PLANE_OF = {170: 0, 180: 1, 190: 2}
 
-_SWITCH = re.compile(rb"[(;][ \t]*olp (off|on)\b", re.IGNORECASE)
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
 #: Events whose axis words are not motion: G10 G52 G92 G43.1
 _CLAIMS = (100, 520, 920, 921, 922, 923, 431)
@@ -181,35 +180,6 @@ class Modes:
                 elif c < 330:
                     self._linear_motion = c
         return _in_force(chunk, at, code, self._state.motion)
-
-
-class Switches:
-    """The sections of a text that `(olp off)` exempts, as far as it has been read."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._text = np.frombuffer(data, np.uint8)
-        self._lines = np.zeros(0, np.int64)
-        # the first entry stands for the lines before any switch
-        self._off = np.zeros(1, bool)
-
-    def follow(self, chunk: WordChunk) -> None:
-        """Take in the comments of the next chunk."""
-        after = self._text[np.minimum(chunk.comments + 1, len(self._text) - 1)]
-        may_be = chunk.comments[((after | 32) == ord("o")) | (after <= 32)]
-        found = [m for m in (_SWITCH.match(self._data, at) for at in may_be.tolist()) if m]
-        if not found:
-            return
-        place = np.searchsorted(chunk.line_start, [m.start() for m in found], "right") - 1
-        self._lines = np.append(self._lines, chunk.first_line + place)
-        self._off = np.append(self._off, [m.group(1).lower() == b"off" for m in found])
-
-    def __bool__(self) -> bool:
-        return len(self._lines) > 0
-
-    def off(self, number: npt.ArrayLike) -> Mask:
-        """Whether lines of these numbers, counted from 1, are exempt."""
-        return np.asarray(self._off[np.searchsorted(self._lines, np.asarray(number) - 1, "right")])
 
 
 def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:

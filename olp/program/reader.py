@@ -16,8 +16,9 @@ import numpy.typing as npt
 from olp.exceptions import ProgramError
 from olp.machine import Setup
 from olp.program.collector import Collector
+from olp.program.directives import Directives, with_payloads
 from olp.program.lexer import WordChunk, chunks
-from olp.program.modes import PLANE_OF, Context, Modes, Switches, check_odd, scaled
+from olp.program.modes import PLANE_OF, Context, Modes, check_odd, scaled
 from olp.program.motion import Array, Blocks, arc_geometry, fill, gather
 from olp.program.profiles import CYCLES, PROBES, Profile
 from olp.program.program import Program
@@ -48,7 +49,8 @@ def read(
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     right.
 
-    Without `words` the columns that only writing needs are left out.
+    Without `words` the columns that only writing needs are left out. Payloads that the job gives by line
+    stand in the text of the result as comments (`directives`).
     """
     return _Reader(data, setup, profile, options or Options(), words).run()
 
@@ -67,13 +69,14 @@ class _Reader:
     """One reading of one program: takes its chunks in turn and shares them out."""
 
     def __init__(self, data: bytes, setup: Setup, profile: Profile, options: Options, words: bool) -> None:
-        self.data = data
+        self.data = data = with_payloads(data, setup.job.payloads, profile.comment)
         self.options = options
         self.state = State.at_start(setup, profile)
         x, y, z = self.state.position
         self.out = Collector(data, (x, y, z), keep_words=words)
         self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
-        self.switches = Switches(data)
+        self.switches = Directives(data)
+        self.payloads: dict[int, float] = {}
         self.singles = Singles(self.state, self.out, self.switches)
         self.end_line = 0
 
@@ -95,7 +98,7 @@ class _Reader:
     def _chunk(self, chunk: WordChunk) -> None:
         base = self.out.word_count
         self.out.put_words(chunk)
-        self.switches.follow(chunk)
+        self.payloads = self.switches.follow(chunk)
         last = self.modes.program_end(chunk)
         if not last:
             return
@@ -105,6 +108,8 @@ class _Reader:
             active &= ~chunk.deleted
         check_odd(self.data, chunk, active)
         context = self.modes.read(chunk, base, active)
+        # a payload makes a new frame, from the motion of its own line on
+        context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))
         self.modes.leave(context, last - 1)
 
@@ -129,6 +134,7 @@ class _Reader:
             if moved or any(c in _POSITION for c in codes):
                 self._resolve(context, rows, upto)
             state.distance = int(context.distance[at])
+            state.payload_kg = self.payloads.get(at, state.payload_kg)
             effect = state.run(number, words, codes, self.out.moves)
             if moved:
                 self.singles.control_move(number, deleted=deleted)

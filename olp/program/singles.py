@@ -15,7 +15,8 @@ from olp.exceptions import ProgramError
 from olp.geometry import PLANES
 from olp.program.collector import Collector
 from olp.program.cycles import Stroke, hole_moves, levels
-from olp.program.modes import PLANE_OF, Context, Switches, scaled
+from olp.program.directives import Directives
+from olp.program.modes import PLANE_OF, Context, scaled
 from olp.program.motion import Index, fill
 from olp.program.profiles import CUTTER_COMPENSATION, CYCLES, Act, Profile
 from olp.program.program import Hole
@@ -74,7 +75,7 @@ def _checked(
 class Singles:
     """Carries such blocks out: from the position in `state`, with their moves and holes put into `out`."""
 
-    def __init__(self, state: State, out: Collector, switches: Switches) -> None:
+    def __init__(self, state: State, out: Collector, switches: Directives) -> None:
         self._state = state
         self._out = out
         self._switches = switches

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from olp.exceptions import ProgramError
 from olp.machine import ZERO, Setup, Vector, WorkOffset
 from olp.program.profiles import Profile
-from olp.toolpath import Frame
+from olp.toolpath import Frame, Touch, carried
 from olp.units import MM_PER_INCH
 
 NAN = float("nan")
@@ -79,7 +79,7 @@ class State:
     unit_stated: bool = False
     offset_name: str = "G54"
     offsets: dict[str, list[float]] = field(default_factory=dict)
-    inherited: dict[str, tuple[Vector, Vector] | None] = field(default_factory=dict)
+    inherited: dict[str, Touch | None] = field(default_factory=dict)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     saved_shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     local: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -87,6 +87,7 @@ class State:
     length_tool: int | None = None
     selected: int | None = None
     spindle: int | None = None
+    payload_kg: float = 0.0
     frames: list[Frame] = field(default_factory=list)
     captures: list[Capture] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
@@ -100,6 +101,7 @@ class State:
         # LinuxCNC starts in G99, ISO controls in G98
         state.retract = 990 if profile.name == "linuxcnc" else 980
         state.spindle = setup.machine.default_tool
+        state.payload_kg = setup.job.payload_kg
         if state.spindle is not None and setup.machine.length_active:
             state.length_tool = state.spindle
             state.length = state._tool(state.spindle, 1, "the tool in the spindle at the start")
@@ -137,6 +139,7 @@ class State:
             work_offset=self.offset_name,
             touched=self._touch(self.offset_name, base, line),
             tool_touched=self._tool_touched(line),
+            payload_kg=self.payload_kg,
         )
         known = self._index.get(frame)
         if known is None:
@@ -167,7 +170,7 @@ class State:
             )
         return lever
 
-    def _touch(self, name: str, base: Sequence[float], line: int) -> tuple[Vector, Vector] | None:
+    def _touch(self, name: str, base: Sequence[float], line: int) -> Touch | None:
         """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's
         part; one that G10 L2 changed keeps its own."""
         if name in self.inherited:
@@ -190,15 +193,19 @@ class State:
             touch.offset_mm[i] + length[i] if stated is None else stated
             for i, stated in enumerate(touch.touched_at_mm)
         ]
-        return (at[0], at[1], at[2]), lever
+        payload = touch.touched_payload_kg
+        return (at[0], at[1], at[2]), carried(
+            lever, self.setup.job.payload_kg if payload is None else payload
+        )
 
-    def _tool_touched(self, line: int) -> tuple[Vector, Vector] | None:
+    def _tool_touched(self, line: int) -> Touch | None:
         if self.length_tool is None:
             return None
         tool = self.setup.tool(self.length_tool)
         if tool is None or tool.set_by != "touch" or tool.touched_at_mm is None:
             return None
-        return tool.touched_at_mm, tool.lever_mm or self._lever(line)
+        lever = tool.lever_mm or self._lever(line)
+        return tool.touched_at_mm, carried(lever, self.setup.job.payload_kg)
 
     def _tool(self, number: int, line: int, what: str) -> Vector:
         if number == 0:

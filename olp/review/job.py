@@ -98,7 +98,7 @@ def view(
     setup, options = loaded.setup, Options(contour=contour)
     if flatten or expand_cycles:
         with naming(name):
-            data = unrolled(data, name, loaded.profile, expand_cycles, peck_clearance_mm)
+            data = unrolled(data, name, setup, expand_cycles, peck_clearance_mm)
     if corrected is not None:
         other, corrected_name = source_of(corrected)
     else:

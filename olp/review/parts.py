@@ -91,7 +91,7 @@ def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, mo
     if not rows.size:
         return cut
     move = owner[rows]
-    tool = nominal.per_frame([f.tool_mm for f in nominal.frames])
+    tool = nominal.tool_mm()
     command = corrected.end_mm[rows]
     play = plays(model, corrected.end_mm)
     error = error_mm(model, command, tool, move, None if play is None else play[rows])

@@ -85,7 +85,7 @@ def sample(
     steps = _steps(path, model, step_mm)
     move, share, part, within = _merged(steps, parts, start=bool(np.isfinite(path.start_mm).all()))
     axis = ends.at(move, share)
-    tool = path.per_frame([f.tool_mm for f in path.frames])
+    tool = path.tool_mm()
     held = held_mm(path, shift, move, share)
     play = plays(model, axis)
     uncorrected = error_mm(model, axis, tool, move, play) - held
@@ -119,7 +119,7 @@ def by_source(
 ) -> Iterator[tuple[str, npt.NDArray[np.float32]]]:
     """(name, (n,) mm) of each source of error: the size of what it alone does to the tip of the nominal
     program."""
-    tool = path.per_frame([f.tool_mm for f in path.frames])
+    tool = path.tool_mm()
     found: dict[str, npt.NDArray[np.float32]] = {}
     for a in range(0, len(samples), BLOCK):
         rows = slice(a, a + BLOCK)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from olp.compensation.invert import invert
-from olp.errormodel import Calibration, Curve, build, play_states
+from olp.errormodel import Calibration, ComponentTable, Curve, DeviationMap, build, play_states
 
 BOX = np.array([[0.0, 2000.0], [0.0, 1000.0], [-600.0, 0.0]])
 
@@ -28,6 +28,20 @@ def full_calibration(spacing_mm: float = 50.0, jitter_mm: float = 0.0) -> Calibr
         curves.append(Curve(axis, at, columns, line_mm=(0.0, 0.0, 0.0)))
     square = {"C0Y": 20e-6, "B0Z": -8e-6, "A0Z": 12e-6}
     return Calibration("bench", BOX, curves=tuple(curves), squareness=square)
+
+
+def gridded(interpolation: str) -> dict[str, Calibration]:
+    """A map of 21 x 11 x 7 nodes, and the sag of a gantry over two arguments."""
+    rng = np.random.default_rng(3)
+    levels = [np.linspace(low, high, n) for (low, high), n in zip(BOX, (21, 11, 7), strict=True)]
+    values = rng.normal(size=(21, 11, 7, 3)) * 5e-3
+    described = DeviationMap(tuple(levels), values, interpolation=interpolation)
+    columns = {"EZY": rng.normal(size=(11, 7)) * 1e-3, "EAY": rng.normal(size=(11, 7)) * 1e-6}
+    load = ComponentTable("Y", ("Y", "Z"), tuple(levels[1:]), columns, interpolation=interpolation)
+    return {
+        "map": Calibration("bench", BOX, maps=(described,)),
+        "load": Calibration("bench", BOX, compliance=(load,)),
+    }
 
 
 def best(run: Callable[[], object], repeat: int = 5) -> float:
@@ -64,6 +78,12 @@ def main() -> None:
         report("command for a place of the tip", partial(invert, model, inner, tool), n)
         report("error with play", partial(model.error, walk, tool, play), n)
         report("chord_bound", partial(model.chord_bound, delta, tool), n)
+    loaded = np.append(tool, 30.0)
+    for interpolation in ("linear", "cubic"):
+        for name, calibration in gridded(interpolation).items():
+            model = build(calibration, "FXYZ")
+            report(f"{interpolation} {name}, error along a path", partial(model.error, walk, loaded), n)
+            report(f"{interpolation} {name}, chord_bound", partial(model.chord_bound, delta, loaded), n)
     for label, step_mm in (("moves of 1 mm", 1.0), ("moves of 1 um", 1e-3)):
         path = np.cumsum(rng.normal(size=(n, 3)) * step_mm, axis=0)
         report(f"play_states, {label}", partial(play_states, path, np.full(3, 4e-3)), n)

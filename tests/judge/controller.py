@@ -29,9 +29,9 @@ _NETS = {
     "joint.1.pos-cmd": "sampler.0.pin.1",
     "joint.2.pos-cmd": "sampler.0.pin.2",
     "motion.motion-type": "sampler.0.pin.3",
-    "joint.0.motor-pos-cmd": "joint.0.motor-pos-fb",
-    "joint.1.motor-pos-cmd": "joint.1.motor-pos-fb",
-    "joint.2.motor-pos-cmd": "joint.2.motor-pos-fb",
+    "joint.0.motor-pos-cmd": "joint.0.motor-pos-fb sampler.0.pin.4",
+    "joint.1.motor-pos-cmd": "joint.1.motor-pos-fb sampler.0.pin.5",
+    "joint.2.motor-pos-cmd": "joint.2.motor-pos-fb sampler.0.pin.6",
     "iocontrol.0.user-enable-out": "iocontrol.0.emc-enable-in",
     "iocontrol.0.tool-prepare": "iocontrol.0.tool-prepared",
     "iocontrol.0.tool-change": "iocontrol.0.tool-changed",
@@ -40,10 +40,12 @@ _NETS = {
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Commanded axis positions (n, 3) in mm, one row a servo cycle, and the kind of motion (n,)."""
+    """Commanded axis positions (n, 3) in mm, one row a servo cycle, and the kind of motion (n,); `motor`
+    (n, 3) is what the drives are told, tables of the control included."""
 
     axis: np.ndarray
     kind: np.ndarray
+    motor: np.ndarray
 
     @property
     def cutting(self) -> np.ndarray:
@@ -63,14 +65,17 @@ def require() -> None:
     pytest.skip("needs LinuxCNC: apt-get install --no-install-recommends linuxcnc-uspace")
 
 
-def run(program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0) -> Run:
-    """Execute a program from axis position 0 with the offsets and tools of a machine folder.
+def run(
+    program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0, tables: Path | None = None
+) -> Run:
+    """Execute a program from axis position 0 with the offsets and tools of a machine folder; `tables` is an
+    INI file whose keys of joints are taken over, its files lie beside it.
 
     Raises RuntimeError where the control reports an error or does not end in time.
     """
     folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    _configure(machine, folder)
+    _configure(machine, folder, tables)
     (folder / "p.ngc").write_bytes(program)
     env = {"HOME": str(folder), "PATH": "/usr/bin:/bin:/usr/sbin:/sbin", "CONTROLLER_LIMIT_S": str(limit_s)}
     env["CONTROLLER_FOLDER"] = str(folder)
@@ -99,8 +104,8 @@ def run(program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0) 
         texts = [p.read_text(errors="replace")[-2000:] for p in (said, debug) if p.exists()]
         detail = texts[0] if texts else "it did not start"
         raise RuntimeError(f"the control did not run the program to its end: {detail}")
-    rows = np.loadtxt(folder / "samples", comments=None, usecols=(1, 2, 3, 4))
-    return Run(rows[:, :3], rows[:, 3].astype(int))
+    rows = np.loadtxt(folder / "samples", comments=None, usecols=range(1, 8))
+    return Run(rows[:, :3], rows[:, 3].astype(int), rows[:, 4:])
 
 
 def _open(folder: Path) -> None:
@@ -124,7 +129,7 @@ def _end_realtime(folder: Path) -> None:
             continue
 
 
-def _configure(machine: Path, folder: Path) -> None:
+def _configure(machine: Path, folder: Path, tables: Path | None) -> None:
     setup = _setup(machine, {}, {}, None)
     sections: dict[str, dict[str, object]] = {
         "EMC": {"VERSION": "1.1", "MACHINE": "judge"},
@@ -147,6 +152,16 @@ def _configure(machine: Path, folder: Path) -> None:
     for joint, axis in enumerate("XYZ"):
         sections[f"AXIS_{axis}"] = dict(reach)
         sections[f"JOINT_{joint}"] = {"TYPE": "LINEAR", "FERROR": 1000, "MIN_FERROR": 1000, **home, **reach}
+    if tables is not None:
+        section = ""
+        for line in tables.read_text().splitlines():
+            key, mark, value = line.partition(" = ")
+            if line.startswith("[JOINT_"):
+                section = line.strip("[]")
+            elif mark and section:
+                sections[section][key] = folder / value if key == "COMP_FILE" else value
+        for file in tables.parent.glob("*.comp"):
+            (folder / file.name).write_bytes(file.read_bytes())
     # called with options of a screen, which it has no use for
     (folder / "display").write_text(f"#!/bin/sh\nexec {SYSTEM_PYTHON} -I {_DRIVER}\n")
     (folder / "display").chmod(0o755)
@@ -159,7 +174,7 @@ def _configure(machine: Path, folder: Path) -> None:
     (folder / "m.hal").write_text(
         "loadrt trivkins coordinates=XYZ\n"
         f"loadrt motmod servo_period_nsec={PERIOD_NS} num_joints=3\n"
-        "loadrt sampler depth=100000 cfg=fffs\n"
+        "loadrt sampler depth=100000 cfg=fffsfff\n"
         "addf motion-command-handler servo-thread\naddf motion-controller servo-thread\n"
         "addf sampler.0 servo-thread\nsetp sampler.0.enable 0\n"
         + "".join(f"net n{i} {a} => {b}\n" for i, (a, b) in enumerate(_NETS.items()))

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 AXES = "XYZ"
 CHUNK = 50_000
@@ -113,6 +113,63 @@ def _read_curve(folder: Path, entry: dict[str, Any], datum: np.ndarray) -> _Curv
     )
 
 
+@dataclass(frozen=True)
+class _LoadFile:
+    """Errors per kg of one axis over the positions of `arguments`, linear between nodes."""
+
+    axis: int
+    arguments: list[int]
+    tables: dict[str, RegularGridInterpolator]
+    line_mm: np.ndarray
+    tool_mm: np.ndarray
+    on_table: bool
+
+
+def _read_nodes(path: Path) -> tuple[list[int], list[np.ndarray], dict[str, np.ndarray]]:
+    """Arguments, their levels, and the other columns as arrays over the grid."""
+    with path.open(newline="") as stream:
+        rows = list(csv.DictReader(line for line in stream if not line.lstrip().startswith("#")))
+    arguments = [AXES.index(n[0]) for n in rows[0] if n in ("X_mm", "Y_mm", "Z_mm")]
+    levels = [np.array(sorted({float(row[f"{AXES[a]}_mm"]) for row in rows})) for a in arguments]
+    columns = {n: np.full([len(x) for x in levels], np.nan) for n in rows[0] if not n.endswith("_mm")}
+    for row in rows:
+        place = tuple(
+            int(np.searchsorted(x, float(row[f"{AXES[a]}_mm"]))) for a, x in zip(arguments, levels,
+            strict=True)
+        )
+        for name, values in columns.items():
+            values[place] = float(row[name])
+    return arguments, levels, columns
+
+
+def _read_load(folder: Path, entry: dict[str, Any], datum: np.ndarray) -> _LoadFile:
+    _only(entry, {"file", "line_mm", "tool_mm", "interpolation", "reference"}, "compliance")
+    if entry.get("interpolation") != "linear":
+        raise NotImplementedError("the judge knows linear tables of load")
+    arguments, levels, columns = _read_nodes(folder / entry["file"])
+    tables = {}
+    for name, values in columns.items():
+        scale = 1e-3 if name.endswith("_um_kg") else 1e-6
+        tables[name[:3]] = RegularGridInterpolator(levels, scale * values, bounds_error=False,
+        fill_value=None)
+    line = datum.copy()
+    for name, value in entry.get("line_mm", {}).items():
+        line[AXES.index(name)] = value
+    tool = np.array(entry.get("tool_mm", (0.0, 0.0, 0.0)), float)
+    axis = AXES.index(next(iter(tables))[2])
+    return _LoadFile(axis, arguments, tables, line - datum, tool, entry.get("reference") == "table")
+
+
+def _read_map(folder: Path, entry: dict[str, Any]) -> RegularGridInterpolator:
+    _only(entry, {"file", "kind", "tool_mm", "interpolation"}, "maps")
+    if entry.get("interpolation", "linear") != "linear":
+        raise NotImplementedError("the judge knows linear maps")
+    arguments, levels, columns = _read_nodes(folder / entry["file"])
+    assert arguments == [0, 1, 2]
+    values = np.stack([1e-3 * columns[f"D{a}_um"] for a in AXES], axis=-1)
+    return RegularGridInterpolator(levels, values)
+
+
 def _only(table: dict[str, Any], known: set[str], where: str) -> None:
     """Refuse what the judge does not model, so that it never passes a program it cannot judge."""
     unknown = set(table) - known
@@ -138,7 +195,16 @@ class JudgeModel:
         cal: dict[str, Any] = tomllib.loads(cal_path.read_text())
         described = {"schema", "machine", "measured", "valid_until", "temperature_degC", "sign", "box_mm"}
         modelled = {"model", "datum_mm", "curves", "squareness", "backlash", "cyclic"}
-        _only(cal, described | modelled | {"active_during_measurement"}, "calibration.toml")
+        _only(
+            cal,
+            described | modelled | {"active_during_measurement", "maps", "compliance", "payload_kg"},
+            "calibration.toml",
+        )
+        self.maps = [_read_map(cal_path.parent, entry) for entry in cal.get("maps", [])]
+        job_path = path.with_name("job.toml")
+        job: dict[str, Any] = tomllib.loads(job_path.read_text()) if job_path.exists() else {}
+        #: beyond what was on the machine while measuring
+        self.load_kg = float(job.get("payload_kg", 0.0)) - float(cal.get("payload_kg", 0.0))
         self.chain: str = self.machine["chain"]
         self.first_order = cal.get("model", "rigid-body") == "huddersfield"
         if self.first_order and self.chain != "FXYZ":
@@ -146,6 +212,7 @@ class JudgeModel:
         self.datum = np.array(cal.get("datum_mm", (0.0, 0.0, 0.0)), float)
         self.box = np.array(cal["box_mm"], float)
         self.curves = [_read_curve(cal_path.parent, entry, self.datum) for entry in cal.get("curves", [])]
+        self.loads = [_read_load(cal_path.parent, entry, self.datum) for entry in cal.get("compliance", [])]
         corrected_by_control = set(self.machine.get("compensated_by_controller", []))
         self.silent = corrected_by_control - set(cal.get("active_during_measurement", []))
         squareness = cal.get("squareness", {})
@@ -187,6 +254,8 @@ class JudgeModel:
                 if self.first_order
                 else self._exact(held, tools[part], states[part])
             )
+            for described in self.maps:
+                out[part] += described(held)
         return out
 
     def inside(self, axis_mm: np.ndarray) -> np.ndarray:
@@ -204,9 +273,10 @@ class JudgeModel:
         raise ValueError("no command found for a target")
 
     def _components(
-        self, axis: int, q: np.ndarray, play: np.ndarray
+        self, axis: int, points: np.ndarray, play: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Translation (n, 3), angles (n, 3) of one axis, and the translation due to its measuring lines."""
+        q = points[:, axis]
         shift, angle, lever = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 3))
         for curve in self.curves:
             if curve.axis != axis:
@@ -225,6 +295,16 @@ class JudgeModel:
                 lever -= np.cross(own, line)
             else:
                 lever -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), line)
+        for load in self.loads:
+            if load.axis != axis:
+                continue
+            own = np.zeros((len(q), 3))
+            for name, table in load.tables.items():
+                value = self.load_kg * table(points[:, load.arguments])
+                target, column = (shift, "XYZ") if name[1] in "XYZ" else (own, "ABC")
+                target[:, column.index(name[1])] += value
+            angle += own
+            lever -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_lever(load, q))
         for name, period, amplitude, phase in self.cyclic:
             if name[2] == AXES[axis]:
                 value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
@@ -232,7 +312,7 @@ class JudgeModel:
         shift[:, axis] -= 0.5 * self.backlash_mm[axis] * play
         return shift, angle, lever
 
-    def _line_lever(self, curve: _CurveFile, q: np.ndarray) -> np.ndarray:
+    def _line_lever(self, curve: _CurveFile | _LoadFile, q: np.ndarray) -> np.ndarray:
         """(n, 3) lever at which the curve was measured: tool vector + axes toward the tool (+ own axis)."""
         position = np.tile(curve.line_mm, (len(q), 1))
         position[:, curve.axis] = 0.0 if curve.on_table else q - self.datum[curve.axis]
@@ -262,7 +342,7 @@ class JudgeModel:
             if letter == "F":
                 continue
             axis = AXES.index(letter)
-            shift, angle, lever = self._components(axis, points[:, axis], play[:, axis])
+            shift, angle, lever = self._components(axis, points, play[:, axis])
             own = points[:, axis] - self.datum[axis]
             travel = np.zeros(points.shape)
             travel[:, axis] = own
@@ -280,7 +360,7 @@ class JudgeModel:
         """Equation (1) with ISO names: first order, no tool terms."""
         total = np.zeros(points.shape)
         for axis in range(3):
-            shift, angle, lever = self._components(axis, points[:, axis], play[:, axis])
+            shift, angle, lever = self._components(axis, points, play[:, axis])
             own = points[:, axis] - self.datum[axis]
             reach = (points - self.datum) * self._reach(axis)
             total += shift + lever + np.cross(angle, reach) + self._tilt(axis, own)

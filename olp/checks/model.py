@@ -1,0 +1,108 @@
+"""Checks of what the error model knows of this job: the tool of a map, payloads, temperatures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.checks.base import finding, lines_of
+from olp.errormodel import Calibration, ErrorModel
+from olp.findings import Finding
+from olp.machine import Sanity
+from olp.toolpath import Kind, Toolpath
+from olp.units import UM_PER_MM
+
+#: A total map is all that is known, so its tool has to be the one in use but for this.
+_SAME_TOOL_MM = 1.0
+
+
+def model_findings(
+    path: Toolpath, calibration: Calibration, model: ErrorModel, sanity: Sanity, tolerance_mm: float
+) -> list[Finding]:
+    """Tools that a map was not measured with, payloads that change before a cut or that nothing is known
+    of."""
+    return [
+        *_map_tools(path, calibration, sanity),
+        *_payloads(path, calibration),
+        *_jumps(path, model, tolerance_mm),
+        *_structure(calibration),
+    ]
+
+
+def _structure(calibration: Calibration) -> list[Finding]:
+    structure = calibration.structure
+    if structure is None:
+        return []
+    names = ", ".join(sensor.name for sensor in structure.sensors)
+    if structure.temperatures_degC is None:
+        return [finding("OLP423", f"the job states no temperatures of {names}; their distortion is left")]
+    far = [f"{name} {value:.2f} degC" for name, value in structure.outside().items()]
+    if not far:
+        return []
+    return [finding("OLP424", f"{', '.join(far)}: taken at the end of the identified range")]
+
+
+def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list[Finding]:
+    out = []
+    numbers = np.unique(path.frame).tolist() if calibration.maps else []
+    for described in calibration.maps:
+        within = _SAME_TOOL_MM if described.kind == "total" else sanity.tool_within_mm
+        away = {
+            number: float(np.linalg.norm(np.subtract(path.frames[number].tool_mm, described.tool_mm)))
+            for number in numbers
+        }
+        far = {number: lever for number, lever in away.items() if lever > within}
+        if not far:
+            continue
+        worst = max(far, key=far.__getitem__)
+        tool = path.frames[worst].tool
+        name = "no tool" if tool is None else f"tool {tool}"
+        what = (
+            f"the tip of {name} is {far[worst]:.4g} mm from where it was when {described.name} was measured; "
+            f"each 10 urad that the axes turn are {far[worst] * 1e-5 * UM_PER_MM:.3g} um there, which the "
+            f"map "
+            "does not know"
+        )
+        out.append(finding("OLP420", what, lines_of(path, np.isin(path.frame, list(far)))[:1]))
+    return out
+
+
+def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
+    if calibration.compliance or calibration.beams or not len(path):
+        return []
+    other = {
+        number: path.frames[number].payload_kg
+        for number in np.unique(path.frame).tolist()
+        if path.frames[number].payload_kg != calibration.payload_kg
+    }
+    if not any(other.values()):
+        return []
+    what = (
+        f"a payload of {max(other.values()):g} kg is stated, the calibration is for "
+        f"{calibration.payload_kg:g} kg "
+        "and knows no compliance"
+    )
+    return [finding("OLP422", what, lines_of(path, np.isin(path.frame, list(other)))[:1])]
+
+
+def _jumps(path: Toolpath, model: ErrorModel, tolerance_mm: float) -> list[Finding]:
+    payload = np.array([f.payload_kg for f in path.frames])
+    if len(path) < 2 or not payload.any():
+        return []
+    at = np.flatnonzero(np.diff(payload[path.frame]) != 0.0) + 1
+    at = at[(path.kind[at] != Kind.RAPID) & np.isfinite(path.end_mm[at - 1]).all(axis=1)]
+    if not at.size:
+        return []
+    place = path.end_mm[at - 1]
+    after = path.tools_mm()[path.frame[at]]
+    before = after.copy()
+    before[:, 3] = payload[path.frame[at - 1]]
+    jump = np.linalg.norm(model.error(place, after) - model.error(place, before), axis=1)
+    wide = jump > tolerance_mm
+    if not wide.any():
+        return []
+    what = (
+        f"the tip moves by up to {jump.max() * UM_PER_MM:.3g} um where the payload changes, and a feed "
+        f"move starts "
+        "there"
+    )
+    return [finding("OLP421", what, lines_of(path, at[wide]))]

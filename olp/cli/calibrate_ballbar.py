@@ -1,0 +1,77 @@
+"""`olp calibrate ballbar`."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import click
+
+from olp.cli.instruments import end, ending_options, numbered, plot_kind
+
+
+@click.command("ballbar")
+@click.argument("files", nargs=-1, required=True)
+@click.option("-o", "--output", metavar="OUT.toml", help="Write [[squareness]] for a plan of measurements.")
+@click.option(
+    "--skip-deg", type=click.FloatRange(0.0, 30.0), default=2.5, show_default=True,
+    help="Leave out readings this near to where an axis turns round.",
+)  # fmt: skip
+@click.option("--plot", metavar="FILE", help="Draw every circle, as FILE-<plane>.svg or .png.")
+@ending_options
+def command(
+    files: tuple[str, ...],
+    output: str | None,
+    skip_deg: float,
+    plot: str | None,
+    as_json: bool,
+    fail_on: str,
+    force: bool,
+) -> None:
+    """Squareness, scale and servo mismatch, and lost motion from circles of a ball-bar (ISO 230-4).
+
+    FILES are CSV: angle_deg,run,direction,deviation_um, below comments # plane = XY, # radius_mm,
+    # centre_mm, # tool_mm. Squareness needs both directions of rotation."""
+    from olp import plots_calibration
+    from olp.calibration.ballbar import readings_of
+    from olp.calibration.squareness import readings_toml
+    from olp.cli.outline import outline
+    from olp.metrology import fit_ballbar
+
+    kind = plot_kind(plot)
+    fits = fit_ballbar(files, skip_deg=skip_deg)
+    findings = [finding for found in fits for finding in found.findings]
+    result: dict[str, Any] = {
+        "schema": "olp-ballbar-1",
+        "circles": [found.as_dict() for found in fits],
+        "findings": [f.as_dict() for f in findings],
+    }
+    written: dict[str, bytes] = {}
+    if output is not None:
+        written[output] = readings_toml(readings_of(fits)).encode()
+    if plot is not None:
+        plots: dict[str, bytes] = {}
+        for found in fits:
+            name = found.circles.plane
+            name = name if name not in plots else f"{name}-{len(plots) + 1}"
+            plots[name] = plots_calibration.circle(found, cast(Any, kind))
+        written |= numbered(plot, plots)
+    text = "\n".join(outline(_shown(circle)) for circle in result["circles"])
+    text += outline({"findings": result["findings"]}) if findings else ""
+    end(result, text, written, files, findings, as_json=as_json, fail_on=fail_on, force=force)
+
+
+def _shown(circle: dict[str, Any]) -> dict[str, Any]:
+    """A circle as people read it: one column of values, with their units."""
+    rows = []
+    for row in circle["found"]:
+        key = next(k for k in row if k.startswith("value_"))
+        unit = key.removeprefix("value_")
+        rows.append(
+            {
+                "name": row["name"],
+                "value": row[key],
+                "sigma": row[f"sigma_{unit}"],
+                "unit": unit.replace("_", "/"),
+            }
+        )
+    return {k: v for k, v in circle.items() if v != []} | {"found": rows}

@@ -1,0 +1,61 @@
+"""`olp calibrate evaluate`."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Any, cast
+
+import click
+
+from olp.cli.common import STREAM, files_of, refuse_early, report_ending
+from olp.cli.instruments import end, ending_options, numbered, plot_kind
+
+
+@click.command("evaluate")
+@click.argument("data", nargs=-1, required=True)
+@click.option(
+    "-m", "--machine", metavar="machine.toml", help="Check what files say of tables with its chain."
+)
+@click.option(
+    "--zone", type=click.Choice(["least-squares", "minimum-zone"]), default="least-squares",
+    show_default=True, help="Reference line of straightness.",
+)  # fmt: skip
+@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
+@click.option("--plot", metavar="FILE", help="Draw every line, as FILE-<plot>.svg or .png.")
+@click.option(
+    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="The day of the report."
+)
+@ending_options
+def command(
+    data: tuple[str, ...],
+    machine: str | None,
+    zone: str,
+    report_file: str | None,
+    plot: str | None,
+    date: datetime.datetime | None,
+    as_json: bool,
+    fail_on: str,
+    force: bool,
+) -> None:
+    """ISO 230-2 figures, cyclic errors, reversal and squareness of measured lines.
+
+    DATA are plans (measurements.toml), folders and files as olp calibrate fit takes them."""
+    from olp import report_calibration, report_lines
+    from olp.files.measurements import files_of_measurements
+    from olp.metrology import evaluate_lines
+
+    kind = plot_kind(plot)
+    inputs = (*files_of_measurements(data), *files_of(machine))
+    for name in files_of(report_file):
+        report_ending(name)
+    refuse_early(files_of(report_file), inputs, force=force)
+    found = evaluate_lines(data, machine, zone=cast(Any, zone))
+    result = found.as_dict()
+    files: dict[str, bytes] = {}
+    if report_file is not None and report_file != STREAM:
+        files[report_file] = report_lines.evaluation(found, report_file, date.date() if date else None)
+    if plot is not None:
+        files |= numbered(plot, report_calibration.plots_of(found, cast(Any, kind)))
+    text = report_calibration.to_text(found)
+    as_json = as_json or report_file == STREAM
+    end(result, text, files, inputs, found.findings, as_json=as_json, fail_on=fail_on, force=force)

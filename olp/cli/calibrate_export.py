@@ -1,0 +1,107 @@
+"""`olp calibrate export`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from olp.cli.calibrate_import import table_options
+from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, setup_options, talk
+from olp.exceptions import UsageError
+
+if TYPE_CHECKING:
+    from olp.errormodel.calibration import Reference
+    from olp.files.exchange.base import Sense
+
+
+@click.command("export")
+@setup_options
+@click.option("-c", "--calibration", metavar="FILE", help="A calibration alone, without a machine.")
+@click.option("--format", "kind", metavar="FORMAT", help="One of: olp calibrate formats.")
+@click.option("-o", "--output", metavar="FILE", help="The table; further files stand beside it.")
+@click.option("--compare", is_flag=True, help="Write nothing: what every format would leave, side by side.")
+@click.option("--program", metavar="PROGRAM", help="Say what is left along this program as well.")
+@click.option("--most-rows", type=click.IntRange(min=2), help="Rows that the control takes in one table.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+@click.option(
+    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
+    help="Exit with 1 where a finding is at least this severe.",
+)  # fmt: skip
+@table_options
+def command(
+    machine: str | None,
+    job: str | None,
+    calibration: str | None,
+    kind: str | None,
+    output: str | None,
+    compare: bool,
+    program: str | None,
+    most_rows: int | None,
+    as_json: bool,
+    fail_on: str,
+    sense: Sense | None,
+    comp_type: int | None,
+    names: dict[str, str],
+    reference: Reference | None,
+    chain: str | None,
+    force: bool,
+) -> None:
+    """Write a calibration as the compensation table of a control, and say what the table would leave.
+
+    The figures stand next to those of a corrected program, so that either can be chosen.
+    """
+    from olp.exchanging import compare_tables, export_table
+    from olp.files.write import write_files
+
+    if compare == (kind is not None):
+        raise UsageError("give either --format with -o, or --compare")
+    described = machine_given(machine, job)[1] if machine or job else ()
+    inputs = (*files_of(calibration, program), *described)
+    common: dict[str, Any] = {
+        "calibration": calibration, "program": program, "reference": reference, "most_rows": most_rows,
+        "chain": chain,
+    }  # fmt: skip
+    if kind is None:
+        _put(compare_tables(machine, job, **common), as_json)
+        return
+    if output is None or output == STREAM:
+        raise UsageError("a table is written to files; name the first one with -o")
+    refuse_early([output], inputs, force=force)
+    found = export_table(
+        machine, kind, output, job, sense=sense, comp_type=comp_type, axis_names=names, **common
+    )
+    write_files(found.files, force=force, inputs=inputs)
+    _put(found.report, as_json)
+    for finding in found.findings:
+        talk(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
+    for note in found.notes:
+        talk(f"note: {note}")
+    for path in found.files:
+        talk(f"wrote {path}")
+    exit_for(found.findings, fail_on)
+
+
+def _put(report: dict[str, Any], as_json: bool) -> None:
+    from olp.exchanging import left_lines
+    from olp.report import table, to_json
+
+    if as_json:
+        put(to_json(report))
+        return
+    header = ["left by", "rms um", "max um", "in frame"]
+    if "program" in report:
+        header += ["path rms", "path max", "in frame"]
+    box = report["box"]
+    over = f"{box['points']} points over the box, {len(box['tools_mm'])} tool(s)"
+    lines = [f"{over}; in frame: rms after a best-fit frame"]
+    lines += table(header, left_lines(report))
+    if report.get("program", {}).get("refused"):
+        lines.append(f"olp correct refuses the program: {report['program']['refused']}")
+    for key, form in report.get("formats", {}).items():
+        for finding in form["findings"]:
+            lines.append(f"{key}: {finding['message']}")
+    if "compensated_by_controller" in report:
+        listed = ", ".join(f'"{name}"' for name in report["compensated_by_controller"])
+        lines += ["with this table active, in the machine file:", f"compensated_by_controller = [{listed}]"]
+    put("\n".join(lines) + "\n")

@@ -1,0 +1,24 @@
+"""`olp calibrate formats`."""
+
+from __future__ import annotations
+
+import click
+
+from olp.cli.common import put
+
+
+@click.command("formats")
+@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON.")
+def command(as_json: bool) -> None:
+    """List the tables of controls that can be read and written: sense, what each holds, how far verified."""
+    from olp.files.exchange.registry import FORMATS
+    from olp.report import to_json
+
+    if as_json:
+        keys = ("title", "ending", "sense", "status", "holds")
+        put(to_json({key: {k: getattr(form, k) for k in keys} for key, form in FORMATS.items()}))
+        return
+    for key, form in FORMATS.items():
+        put(f"{key} ({form.ending})  {form.title}\n")
+        put(f"  holds: {form.holds}\n  sense: {form.sense or 'to be stated with --sense'}\n")
+        put(f"  known from: {form.status}\n")

@@ -1,0 +1,96 @@
+"""`olp calibrate go-return`."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import click
+import numpy as np
+
+from olp.cli.common import Length, files_of
+from olp.cli.instruments import end, ending_options, numbered, plot_kind
+from olp.exceptions import UsageError
+
+
+@click.command("go-return")
+@click.argument("data", nargs=-1)
+@click.option("-m", "--machine", metavar="machine.toml", help="Chain, and travel for --program.")
+@click.option("-o", "--output", metavar="OUT.toml", help="Write [backlash] for calibration.toml.")
+@click.option(
+    "--plot", metavar="FILE", help="Draw the reversal along each axis, as FILE-reversal.svg or .png."
+)
+@click.option("--program", metavar="OUT.ngc", help="Write the program of the test instead (-m, --axis).")
+@click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="The axis of the program.")
+@click.option("--count", type=click.IntRange(min=1), default=10, show_default=True, help="Targets of it.")
+@click.option("--over-mm", type=Length(), default=2.0, show_default=True, help="Way past each target.")
+@click.option("--feed", type=Length(), default=1000.0, show_default=True, help="Feed in mm/min.")
+@click.option("--runs", type=click.IntRange(min=1), default=5, show_default=True, help="Runs there and back.")
+@ending_options
+def command(
+    data: tuple[str, ...],
+    machine: str | None,
+    output: str | None,
+    plot: str | None,
+    program: str | None,
+    axis: str | None,
+    count: int,
+    over_mm: float,
+    feed: float,
+    runs: int,
+    as_json: bool,
+    fail_on: str,
+    force: bool,
+) -> None:
+    """Test B: lost motion of each axis, from targets approached from both sides.
+
+    DATA are plans, folders and files as olp calibrate fit takes them; the lines of positioning count."""
+    if program is not None:
+        if data or machine is None or axis is None:
+            raise UsageError("--program writes the test: give -m and --axis, and no DATA")
+        text = _program(machine, axis, count, over_mm, feed, runs)
+        end({}, "", {program: text.encode()}, (machine,), (), as_json=False, fail_on=fail_on, force=force)
+        return
+    if not data:
+        raise UsageError("no DATA is given; name the readings, or write the test with --program")
+
+    from olp import plots_calibration
+    from olp.calibration.go_return import backlash_toml, findings_of
+    from olp.cli.outline import outline
+    from olp.files.measurements import files_of_measurements
+    from olp.metrology import go_return
+
+    kind = plot_kind(plot)
+    found = go_return(data, machine)
+    findings = [finding for reversal in found for finding in findings_of(reversal)]
+    result: dict[str, Any] = {
+        "schema": "olp-go-return-1",
+        "axes": [reversal.as_dict() for reversal in found],
+        "findings": [f.as_dict() for f in findings],
+    }
+    written = {} if output is None else {output: backlash_toml(found).encode()}
+    if plot is not None:
+        written |= numbered(plot, {"reversal": plots_calibration.reversals(found, cast(Any, kind))})
+    rows = [
+        {"name": a["component"]} | {k: v for k, v in a.items() if k not in ("component", "targets", "file")}
+        for a in result["axes"]
+    ]
+    text = outline({"reversal": rows, "findings": result["findings"]})
+    inputs = (*files_of_measurements(data), *files_of(machine))
+    end(result, text, written, inputs, findings, as_json=as_json, fail_on=fail_on, force=force)
+
+
+def _program(machine: str, axis: str, count: int, over_mm: float, feed: float, runs: int) -> str:
+    from olp.calibration.go_return import program
+    from olp.files.config import load_setup
+
+    described = load_setup(machine, None).machine
+    low, high = described.axes[axis].travel_mm
+    # a whole increment inside the travel, and no equal steps: a screw's pitch would hide in them
+    targets = np.linspace(low + 2.0 * over_mm, high - 2.0 * over_mm, count)
+    step = float(np.diff(targets).mean()) if count > 1 else 0.0
+    shift = 0.1 * step * np.sin(2.399963 * np.arange(count)) if count > 2 else np.zeros(count)
+    shift[[0, -1]] = 0.0
+    return program(
+        described, axis, [round(float(v), 3) for v in targets + shift], over_mm=over_mm, feed_mm_min=feed,
+        runs=runs,
+    )  # fmt: skip

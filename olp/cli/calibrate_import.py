@@ -1,0 +1,100 @@
+"""`olp calibrate import`."""
+
+from __future__ import annotations
+
+import datetime
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from olp.cli.common import files_of, refuse_early, talk
+from olp.exceptions import UsageError
+
+if TYPE_CHECKING:
+    from olp.errormodel.calibration import Reference
+    from olp.files.exchange.base import Sense
+
+
+def axis_names(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    """`X=AX1` as a mapping; an option's callback."""
+    out = {}
+    for value in values:
+        axis, mark, name = value.partition("=")
+        if not mark or axis not in ("X", "Y", "Z") or not name:
+            raise UsageError(f"--axis-name {value} is not understood; expected such as --axis-name X=AX1")
+        out[axis] = name
+    return out
+
+
+def table_options(function: Any) -> Any:
+    """What reading and writing of tables have in common."""
+    for option in (
+        click.option("--force", is_flag=True, help="Overwrite output files."),
+        click.option("--chain", metavar="FXYZ", help="Axes from workpiece to tool; without -m."),
+        click.option(
+            "--reference", type=click.Choice(["functional-point", "table"]),
+            help="Where errors of axes that carry the workpiece count: at the tool, or on the table.",
+        ),
+        click.option(
+            "--axis-name", "names", multiple=True, metavar="X=NAME", callback=axis_names,
+            help="What the control calls an axis, such as X=AX1.",
+        ),
+        click.option("--comp-type", type=click.IntRange(min=0), help="LinuxCNC's COMP_FILE_TYPE."),
+        click.option(
+            "--sense", type=click.Choice(["error", "correction"]),
+            help="error: the control takes values off (actual minus commanded); correction: adds them.",
+        ),
+    ):  # fmt: skip
+        function = option(function)
+    return function
+
+
+@click.command("import")
+@click.argument("table")
+@click.option("--format", "kind", required=True, metavar="FORMAT", help="One of: olp calibrate formats.")
+@click.option("-m", "--machine", metavar="machine.toml", help="The machine file: its name, chain and travel.")
+@click.option(
+    "-o", "--output", default="calibration.toml", show_default=True, metavar="FILE", help="The calibration."
+)
+@click.option(
+    "--measured",
+    type=click.DateTime(["%Y-%m-%d"]),
+    metavar="YYYY-MM-DD",
+    help="When the machine was measured.",
+)
+@click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="Axis of a file that names none.")
+@table_options
+def command(
+    table: str,
+    kind: str,
+    machine: str | None,
+    output: str,
+    measured: datetime.datetime | None,
+    axis: str | None,
+    sense: Sense | None,
+    comp_type: int | None,
+    names: dict[str, str],
+    reference: Reference | None,
+    chain: str | None,
+    force: bool,
+) -> None:
+    """Read TABLE, the compensation table of a control, as a calibration.
+
+    The calibration holds the errors that the table corrects, actual minus commanded.
+    """
+    from olp.exchanging import import_table
+    from olp.files.write import write_files
+
+    inputs = files_of(table, machine)
+    refuse_early([output], inputs, force=force)
+    found = import_table(
+        table, kind, output, machine, sense=sense, measured=measured.date() if measured else None, axis=axis,
+        comp_type=comp_type, axis_names=names, reference=reference, chain=chain,
+    )  # fmt: skip
+    write_files(found.files, force=force, inputs=inputs)
+    for finding in found.findings:
+        talk(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
+    for note in found.notes:
+        talk(f"note: {note}")
+    for path in found.files:
+        talk(f"wrote {path}")

@@ -1,0 +1,82 @@
+"""`olp calibrate postures`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from olp.cli.common import Length, files_of
+from olp.cli.instruments import end, ending_options
+from olp.exceptions import UsageError
+
+
+@click.command("postures")
+@click.argument("file", required=False)
+@click.option(
+    "-m", "--machine", metavar="machine.toml", help="Its tools, and its calibration, taken out first."
+)
+@click.option("--reference", metavar="TOOL", help="The tool whose vector is right.")
+@click.option(
+    "--program", metavar="OUT.ngc", help="Write the program of the test instead (--tools, --point)."
+)
+@click.option("--tools", metavar="1,2,3", help="Tool numbers of the program.")
+@click.option("--point", metavar="X,Y,Z", help="The point, in the active work offset, in mm.")
+@click.option("--clearance-mm", type=Length(), default=50.0, show_default=True, help="Way up between tools.")
+@click.option("--feed", type=Length(), default=300.0, show_default=True, help="mm/min down to the point.")
+@ending_options
+def command(
+    file: str | None,
+    machine: str | None,
+    reference: str | None,
+    program: str | None,
+    tools: str | None,
+    point: str | None,
+    clearance_mm: float,
+    feed: float,
+    as_json: bool,
+    fail_on: str,
+    force: bool,
+) -> None:
+    """Test A: errors of tool vectors, from one point that the tool holds in several postures.
+
+    FILE is CSV: X_mm,Y_mm,Z_mm,tool[,TX_mm,TY_mm,TZ_mm][,A_deg,B_deg,C_deg], axis positions with the tool
+    point on the one point, a row a posture."""
+    from olp.calibration import postures
+    from olp.cli.outline import outline
+    from olp.metrology import fit_postures
+
+    if program is not None:
+        if file is not None or tools is None or point is None:
+            raise UsageError("--program writes the test: give --tools and --point, and no FILE")
+        text = postures.program(
+            [int(v) for v in _numbers(tools, "--tools")], _point(point), clearance_mm=clearance_mm,
+            feed_mm_min=feed,
+        )  # fmt: skip
+        end({}, "", {program: text.encode()}, (), (), as_json=False, fail_on=fail_on, force=force)
+        return
+    if file is None:
+        raise UsageError("no FILE is given; name the readings, or write the test with --program")
+    found = fit_postures(file, machine, reference=reference)
+    findings = list(found.findings)
+    result: dict[str, Any] = {
+        "schema": "olp-postures-1",
+        **found.as_dict(),
+        "findings": [f.as_dict() for f in findings],
+    }
+    inputs = files_of(file, machine)
+    end(result, outline(result), {}, inputs, findings, as_json=as_json, fail_on=fail_on, force=force)
+
+
+def _numbers(text: str, name: str) -> list[float]:
+    try:
+        return [float(v) for v in text.split(",")]
+    except ValueError:
+        raise UsageError(f"{name} {text!r}; expected numbers between commas") from None
+
+
+def _point(text: str) -> tuple[float, float, float]:
+    values = _numbers(text, "--point")
+    if len(values) != 3:
+        raise UsageError(f"--point {text!r}; expected X,Y,Z in mm")
+    return values[0], values[1], values[2]

@@ -1,0 +1,66 @@
+"""`olp calibrate squareness`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from olp.cli.common import put
+from olp.exceptions import UsageError
+from olp.units import RAD_PER_URAD
+
+
+@click.command("squareness")
+@click.argument("values", nargs=-1)
+@click.option(
+    "--from", "convention", metavar="NAME", default="iso", show_default=True, help="Theirs, as listed."
+)
+@click.option(
+    "--frame", "frames", multiple=True, metavar="NAME=PP,NP,SIDE",
+    help="Diagonal that grows in both axes, the other one, and a side of a drawn frame, in mm.",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], as_json: bool) -> None:
+    """Squareness in the senses of controls and instruments.
+
+    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from; a frame that the machine drew or
+    printed gives its own. Without either, the conventions are listed."""
+    from olp.calibration.conventions import CONVENTIONS, angle_words, from_iso, to_iso
+    from olp.calibration.squareness import from_frame
+    from olp.cli.outline import outline
+    from olp.report import to_json
+
+    given: dict[str, float] = {}
+    for item in values:
+        name, (value,) = _numbers(item, 1, "C0Y=12.5")
+        given[name] = to_iso(name, value * RAD_PER_URAD, convention)
+    for item in frames:
+        name, (pp, other, side) = _numbers(item, 3, "C0Y=140.4,142.8,99.8")
+        to_iso(name, 0.0, "iso")
+        spans = ((0.0, side), (0.0, side))
+        given[name] = from_frame(name, pp, other, side, line_mm=(0, 0, 0), span_mm=spans).value_rad
+    rows: list[dict[str, Any]] = [
+        {
+            "name": key,
+            **{
+                f"{name}_urad": from_iso(name, value, key) / RAD_PER_URAD for name, value in given.items()
+            },
+            "positive": known.says,
+        }
+        for key, known in CONVENTIONS.items()
+    ]  # fmt: skip
+    angles = [{"name": name, "angle": angle_words(name, value)} for name, value in given.items()]
+    result = {"schema": "olp-squareness-1", "angles": angles, "conventions": rows}
+    put(to_json(result) if as_json else outline(result))
+
+
+def _numbers(item: str, count: int, example: str) -> tuple[str, list[float]]:
+    name, _, written = item.partition("=")
+    try:
+        numbers = [float(v) for v in written.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count:
+        raise UsageError(f"{item!r}; expected such as {example}")
+    return name.strip(), numbers

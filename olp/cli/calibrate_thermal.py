@@ -1,0 +1,102 @@
+"""`olp calibrate thermal`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
+from olp.exceptions import UsageError
+
+
+@click.command("thermal")
+@click.argument("logs", metavar="LOG.csv ...", nargs=-1, required=True)
+@click.option("-m", "--machine", metavar="machine.toml", required=True, help="The machine file.")
+@click.option("-o", "--output", metavar="thermal.toml", help="Where the structure goes. Default: stdout.")
+@click.option(
+    "--reference-degC", "reference", multiple=True, metavar="[SENSOR=]degC",
+    help="What the sensors said when the machine was calibrated: one for all, or one each. Default: "
+    "temperature_degC of the calibration.",
+)  # fmt: skip
+@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Take only these sensors.")
+@click.option(
+    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
+    help="Exit with 1 where a finding is at least this severe.",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+@click.option("--force", is_flag=True, help="Overwrite the output.")
+def command(
+    logs: tuple[str, ...], machine: str, output: str | None, reference: tuple[str, ...],
+    sensors: tuple[str, ...], fail_on: str, as_json: bool, force: bool,
+) -> None:  # fmt: skip
+    """Identify how the structure of a machine distorts with the temperatures of its sensors.
+
+    A LOG holds columns t_s, NAME_degC for each sensor, and EXX@500_um for each reading of drift (a component
+    at an axis position; empty where nothing was read). With several logs the last one is held out of a first
+    fit and tells what the model is worth; with one, its last quarter.
+
+    A LOG holds columns t_s, NAME_degC for each sensor, and EXX@500_um for each reading of drift (a component
+    at an axis position; empty where nothing was read). With several logs the last one is held out of a first
+    fit and
+    """
+    target = None if output in (None, STREAM) else output
+    if target is None and as_json:
+        raise UsageError("both the structure and --json would go to stdout; name a file for it with -o")
+    setup, inputs = machine_given(machine, None)
+    refuse_early(files_of(target), (*inputs, *logs), force=force)
+    from olp.files.write import write_bytes
+    from olp.thermal_fitting import fit_thermal
+
+    result = fit_thermal(logs, setup, reference_degC=_reference(reference), sensors=sensors)
+    if target is None:
+        put(result.data)
+    else:
+        write_bytes(target, result.data, force=force, inputs=(*inputs, *logs))
+    if as_json:
+        from olp.report import to_json
+
+        put(to_json(result.report))
+    for line in _shown(result.report):
+        talk(line)
+    for found in result.findings:
+        talk(f"{found.severity.name.lower()} {found.code}: {found.message}")
+    if target is not None:
+        talk(f"wrote {Path(target)}")
+    exit_for(result.findings, fail_on)
+
+
+def _reference(stated: tuple[str, ...]) -> float | dict[str, float] | None:
+    if not stated:
+        return None
+    try:
+        if len(stated) == 1 and "=" not in stated[0]:
+            return float(stated[0])
+        return {name: float(value) for name, _, value in (item.partition("=") for item in stated)}
+    except ValueError:
+        raise UsageError(
+            "--reference-degC takes a temperature for all sensors, or SENSOR=degC each"
+        ) from None
+
+
+def _shown(report: dict[str, Any]) -> list[str]:
+    """The report for people."""
+    out = []
+    for s in report["sensors"]:
+        low, high = s["range_degC"]
+        lag = f"lags by {s['lag_s']:.0f} s" if s["lag_s"] >= 0 else f"leads by {-s['lag_s']:.0f} s"
+        out.append(f"{s['name']}: the structure {lag}, identified from {low:.2f} to {high:.2f} degC")
+    for c in report["components"]:
+        unit = "urad" if "drift_rms_urad" in c else "um"
+        drift, left = c[f"drift_rms_{unit}"], c[f"left_rms_{unit}"]
+        text = f"{c['component']}: drift {drift:.2f} {unit} rms, left {left:.2f}"
+        if c[f"held_out_left_rms_{unit}"] is not None:
+            drift, left = c[f"held_out_drift_rms_{unit}"], c[f"held_out_left_rms_{unit}"]
+            text += f"; held out: {drift:.2f}, left {left:.2f}"
+        out.append(text)
+    out.append(f"condition of the sensors {report['condition']:.3g} (refused above 1000)")
+    removed = report["held_out_removed_share"]
+    if removed is not None:
+        out.append(f"removed where it was not fitted ({report['held_out']}): {removed:.1%}")
+    return out

@@ -1,0 +1,64 @@
+"""What the verbs of measurements share: options, plots in files, and the end of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from olp.cli.common import exit_for, files_of, put, refuse_early, refuse_twice, talk
+from olp.exceptions import UsageError
+from olp.findings import Finding
+
+F = TypeVar("F", bound=Callable[..., Any])
+PLOTS = (".svg", ".png")
+
+
+def ending_options(function: F) -> F:
+    """--json, --fail-on and --force."""
+    for option in (
+        click.option("--force", is_flag=True, help="Overwrite output files."),
+        click.option(
+            "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error",
+            show_default=True, help="Exit with 1 where a finding is at least this severe.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+    ):  # fmt: skip
+        function = option(function)
+    return function
+
+
+def plot_kind(name: str | None) -> str:
+    """svg or png by the ending of a plot's file. Raises UsageError."""
+    if name is None:
+        return "svg"
+    ending = Path(name).suffix.lower()
+    if ending not in PLOTS:
+        raise UsageError(f"the plot {name!r} ends in no known format; expected .svg or .png")
+    return ending[1:]
+
+
+def numbered(name: str, plots: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Plots as files beside each other: name-<plot>.svg."""
+    path = Path(name)
+    return {str(path.with_name(f"{path.stem}-{key}{path.suffix}")): data for key, data in plots.items()}
+
+
+def end(
+    result: Mapping[str, Any], text: str, files: Mapping[str, bytes], inputs: Iterable[str],
+    findings: Iterable[Finding], *, as_json: bool, fail_on: str, force: bool,
+) -> None:  # fmt: skip
+    """Write the files, print the result, and end with 1 where a finding says so."""
+    from olp.files.write import write_files
+    from olp.report import to_json
+
+    sources = list(inputs)
+    refuse_twice(files_of(*files))
+    refuse_early(files_of(*files), sources, force=force)
+    write_files({Path(name): files[name] for name in files_of(*files)}, force=force, inputs=sources)
+    put(to_json(result) if as_json else text)
+    for name in files_of(*files):
+        talk(f"wrote {name}")
+    exit_for(findings, fail_on)

@@ -1,0 +1,1 @@
+"""Compensation tables of controls, read and written; one module a format, `registry` lists them."""

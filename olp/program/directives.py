@@ -1,0 +1,160 @@
+"""Comments that tell `olp` something: `(olp off)`, `(olp on)`, and `(olp payload 30 kg)`.
+
+Any comment of the dialect serves, in any case of letters. A section between `olp off` and `olp on` stays as
+it is. A payload holds from its line on, motion of that line included. Payloads that the job file gives by
+line (`[[payloads]]`) are put into the text as such comments, marked with their line, before it is read: so
+they stay with their blocks when a program is unrolled or corrected, and a text that carries the marks is not
+marked again.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.exceptions import ProgramError
+from olp.program.lexer import WordChunk
+from olp.program.motion import Mask
+
+_DIRECTIVE = re.compile(rb"([(;])[ \t]*olp[ \t]+([^\r\n]*)", re.IGNORECASE)
+_SWITCH = re.compile(rb"(off|on)\b", re.IGNORECASE)
+_PAYLOAD = re.compile(
+    r"payload[ \t]+(\d+(?:\.\d*)?|\.\d+)(?:[ \t]*kg)?(?:[ \t]*,[ \t]*line[ \t]+(\d+))?", re.I
+)
+_MARKED = re.compile(
+    rb"[(;][ \t]*olp[ \t]+payload[ \t]+([\d.]+)[ \t]*(?:kg)?[ \t]*(?:,[ \t]*line[ \t]+(\d+))?", re.IGNORECASE
+)
+_LINE_END = re.compile(rb"\r\n|\n|\r")
+
+
+class Directives:
+    """What the comments of a text say, as far as it has been read."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._text = np.frombuffer(data, np.uint8)
+        self._lines = np.zeros(0, np.int64)
+        # the first entry stands for the lines before any switch
+        self._off = np.zeros(1, bool)
+
+    def follow(self, chunk: WordChunk) -> dict[int, float]:
+        """Take in the comments of the next chunk. Returns the payload in kg that holds from a line of the
+        chunk on, counted from 0. Raises ProgramError for a payload that cannot be read."""
+        after = self._text[np.minimum(chunk.comments + 1, len(self._text) - 1)]
+        may_be = chunk.comments[((after | 32) == ord("o")) | (after <= 32)]
+        found = [m for m in (_DIRECTIVE.match(self._data, at) for at in may_be.tolist()) if m]
+        payloads: dict[int, float] = {}
+        if not found:
+            return payloads
+        places = np.searchsorted(chunk.line_start, [m.start() for m in found], "right") - 1
+        for match, place in zip(found, places.tolist(), strict=True):
+            switch = _SWITCH.match(match[2])
+            if switch:
+                self._lines = np.append(self._lines, chunk.first_line + place)
+                self._off = np.append(self._off, switch[1].lower() == b"off")
+                continue
+            number = chunk.first_line + place + 1
+            content = match[2].partition(b")")[0] if match[1] == b"(" else match[2]
+            payload = _payload(content.decode("latin-1").strip(), number)
+            if payload is None:
+                continue
+            if place in payloads:
+                raise ProgramError("two payloads stand in this line; expected one", line=number)
+            if chunk.deleted[place]:
+                raise ProgramError(
+                    "a payload stands under block delete, so it is not known later whether it holds; "
+                    "expected it in a "
+                    "block without `/`",
+                    line=number,
+                )
+            payloads[place] = payload
+        return payloads
+
+    def __bool__(self) -> bool:
+        return len(self._lines) > 0
+
+    def off(self, number: npt.ArrayLike) -> Mask:
+        """Whether lines of these numbers, counted from 1, are exempt."""
+        return np.asarray(self._off[np.searchsorted(self._lines, np.asarray(number) - 1, "right")])
+
+
+def _payload(content: str, line: int) -> float | None:
+    """The payload that a comment states; None where it is about something else."""
+    word = content.split(maxsplit=1)[0].rstrip("=:,").lower() if content else ""
+    if not word.startswith("payload") and not difflib.get_close_matches(word, ["payload"], cutoff=0.7):
+        return None
+    match = _PAYLOAD.fullmatch(content)
+    if match is None or not math.isfinite(float(match[1])):
+        raise ProgramError(
+            f"the comment `olp {content[:40]}` is not understood; expected a mass in kg, such as (OLP "
+            f"PAYLOAD 30 kg)",
+            line=line,
+        )
+    return float(match[1])
+
+
+def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[bytes, bytes]) -> bytes:
+    """The text with a comment at the end of each line of `payloads` (line from 1, kg), where it has none yet;
+    no line is added. Raises ProgramError for a line that the text does not have, and where the text states
+    payloads of its own."""
+    if not payloads:
+        return data
+    marks = {}
+    for match in _MARKED.finditer(data):
+        if match[2] is None:
+            raise ProgramError(
+                "the program states a payload here, and the job file does in [[payloads]]; expected one "
+                "of the two",
+                line=len(_LINE_END.findall(data, 0, match.start())) + 1,
+            )
+        marks[int(match[2])] = float(match[1])
+    if marks:
+        if marks != dict(payloads):
+            raise ProgramError(
+                "the payloads in the comments of this program are not those of [[payloads]] in the job "
+                "file; it was "
+                "made with another job file"
+            )
+        return data
+    ends = [m.start() for m in _LINE_END.finditer(data)]
+    starts = [0, *(m.end() for m in _LINE_END.finditer(data))]
+    ends += [len(data)]
+    out, at = [], 0
+    for line, mass in sorted(payloads.items()):
+        if line > len(ends) or (line == len(ends) and starts[-1] == len(data)):
+            raise ProgramError(
+                f"[[payloads]] of the job file names line {line}, and the program has fewer; expected one "
+                f"of its "
+                "lines"
+            )
+        text = data[starts[line - 1] : ends[line - 1]]
+        semicolon = _outside_brackets(text)
+        place = ends[line - 1] if semicolon is None else starts[line - 1] + semicolon
+        stated = comment[0] + f"OLP PAYLOAD {_short(mass)} kg, line {line}".encode() + comment[1]
+        blank = b" " if text[: place - starts[line - 1]].strip() else b""
+        out += [data[at:place], blank, stated]
+        at = place
+    return b"".join([*out, data[at:]])
+
+
+def _outside_brackets(text: bytes) -> int | None:
+    """Where a comment to the end of the line opens; None where there is none."""
+    depth = False
+    for at, byte in enumerate(text):
+        if byte == 40:
+            depth = True
+        elif byte == 41:
+            depth = False
+        elif byte == 59 and not depth:
+            return at
+    return None
+
+
+def _short(mass: float) -> str:
+    """A decimal number without an exponent that reads back the same."""
+    return np.format_float_positional(mass, trim="-")
