@@ -12,6 +12,7 @@ import numpy as np
 from olp import checks
 from olp.compensation.plan import zero_shifts
 from olp.compensation.stamp import find_stamp
+from olp.confidence.spread import Confidence
 from olp.correction import correct_bytes, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import ConfigError, OlpError, naming
@@ -26,19 +27,22 @@ from olp.toolpath import Kind, carried
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correction:
-    """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings."""
+    """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
+    `confidence` has bands and probabilities by way-point where the calibration states uncertainties."""
 
     data: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verification:
-    """The proof of a corrected program from two texts alone."""
+    """The proof of a corrected program from two texts alone; `confidence` as in Correction."""
 
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +75,8 @@ def correct(
     peck_clearance_mm: float | None = None,
     contour: bool = False,
     split_rapids: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
 ) -> Correction:
@@ -79,17 +85,22 @@ def correct(
     `program` is a path or the bytes of the text, `machine` the machine file or a Setup. The corrected text is
     in the program's own dialect; only coordinate words differ, and inserted words and blocks. With `flatten`
     loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out;
-    on controls that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck. Raises
-    InputError (ProgramError with its line, ConfigError, OutsideBox) and CannotCompute.
+    on controls that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck.
+
+    Where the calibration states uncertainties, the report says how probable it is that the tip stays within
+    `within_um` (default: `tolerance_um`). With `only_sure_components` components within their own
+    uncertainty are not corrected. Raises InputError (ProgramError with its line, ConfigError, OutsideBox) and
+    CannotCompute.
     """
     data, name = source_of(program)
     with naming(name):
         run = correct_bytes(
-            data, name, load(machine, job, outside_box), tolerance_um=tolerance_um,
+            data, name, load(machine, job, outside_box, only_sure=only_sure_components),
+            tolerance_um=tolerance_um, within_um=within_um,
             hold=outside_box == "hold", unroll=flatten, expand=expand_cycles, clearance=peck_clearance_mm,
             contour=contour, rapids=split_rapids, date=date, tell=progress or silent,
         )  # fmt: skip
-    return Correction(run.text, run.report, run.findings)
+    return Correction(run.text, run.report, run.findings, run.confidence)
 
 
 def verify(
@@ -101,6 +112,8 @@ def verify(
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
 ) -> Verification:
@@ -108,7 +121,7 @@ def verify(
 
     Raises ProgramError where the second is no correction of the first.
     """
-    loaded = load(machine, job, outside_box)
+    loaded = load(machine, job, outside_box, only_sure=only_sure_components)
     tell = progress or silent
     options = Options(contour=contour)
     texts = [source_of(p) for p in (nominal, corrected)]
@@ -120,9 +133,10 @@ def verify(
         except OlpError as error:
             raise error.in_file(name or "<program>") from None
     run = verify_programs(
-        programs[0], programs[1], loaded, tolerance_um=tolerance_um, contour=contour, date=date
-    )
-    return Verification(run.report, run.findings)
+        programs[0], programs[1], loaded, tolerance_um=tolerance_um, contour=contour, date=date,
+        within_um=within_um,
+    )  # fmt: skip
+    return Verification(run.report, run.findings, run.confidence)
 
 
 def simulate(

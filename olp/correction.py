@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from olp import checks
+from olp.assessing import assess
 from olp.checks import state
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
@@ -18,6 +19,7 @@ from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
 from olp.compensation.writer import Writer
+from olp.confidence.spread import Confidence
 from olp.errormodel.base import Array
 from olp.exceptions import AlreadyCorrected, OlpError, ProgramError, naming
 from olp.findings import Finding
@@ -25,7 +27,7 @@ from olp.loading import Loaded, unrolled
 from olp.machine import Setup
 from olp.program.program import Program
 from olp.program.reader import Options, read
-from olp.progress import Progress
+from olp.progress import Progress, silent
 from olp.proof import ROUNDING_SHARE, Proof, prove
 from olp.toolpath import Flag, Index, Toolpath
 from olp.units import MM_PER_UM, UM_PER_MM
@@ -43,7 +45,7 @@ _DOES_NOT_PROVE = (
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
-    report ("olp-report-1") and the findings."""
+    report ("olp-report-1"), the findings, and how sure it is where the calibration states uncertainties."""
 
     text: bytes
     nominal: Program
@@ -52,6 +54,7 @@ class Run:
     passed: Index
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
 
 
 def correct_bytes(
@@ -69,8 +72,10 @@ def correct_bytes(
     date: datetime.date | None,
     tell: Progress,
     outside: str = "OLP403",
+    within_um: float | None = None,
 ) -> Run:
-    """Correct a program and prove it; `outside` is the code of what is held at the face of the box."""
+    """Correct a program and prove it; `outside` is the code of what is held at the face of the box,
+    `within_um` the tolerance whose probability is wanted (default: that of the proof)."""
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
@@ -115,6 +120,17 @@ def correct_bytes(
         parts=parts,
     )
     _prove_without_deleted(nominal, text, loaded, contour, limits, digit)
+    sure = assess(
+        loaded,
+        nominal,
+        corrected,
+        proof.groups,
+        passed,
+        within_um or tolerance_um,
+        date,
+        tell,
+        asked=within_um is not None,
+    )
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, passed),
@@ -122,6 +138,7 @@ def correct_bytes(
         *place_findings(proof, loaded, outside if hold else None),
         *checks.path_mode_findings(nominal, corrections),
         *checks.program_findings(nominal, loaded.setup, contour=contour),
+        *(sure[2] if sure else ()),
         *_model(path, loaded, limits.tolerance_mm),
     )
     report = report_of(nominal, (data, name), loaded, proof, findings, tolerance_um)
@@ -132,7 +149,9 @@ def correct_bytes(
     }
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     report["largest_correction_um"] = corrections * 1e3
-    return Run(text, nominal, corrected, proof, passed, report, findings)
+    if sure:
+        report["uncertainty"] = sure[1]
+    return Run(text, nominal, corrected, proof, passed, report, findings, sure[0] if sure else None)
 
 
 def verify_programs(
@@ -143,6 +162,7 @@ def verify_programs(
     tolerance_um: float,
     contour: bool,
     date: datetime.date | None,
+    within_um: float | None = None,
 ) -> Run:
     """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError
     where the second is no correction of the first."""
@@ -158,14 +178,28 @@ def verify_programs(
         )  # fmt: skip
     except OlpError as error:
         raise error.in_file(other or "<corrected>") from None
+    sure = assess(
+        loaded,
+        first,
+        second,
+        proof.groups,
+        rows.passed,
+        within_um or tolerance_um,
+        date,
+        silent,
+        asked=within_um is not None,
+    )
     findings = (
         *_calibration(loaded, date),
         *checks.proof_findings(proof, rows.passed),
         *checks.program_findings(first, loaded.setup, contour=contour),
+        *(sure[2] if sure else ()),
         *_model(first.toolpath, loaded, limits.tolerance_mm),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, tolerance_um)
-    return Run(second.data, first, second, proof, rows.passed, report, findings)
+    if sure:
+        report["uncertainty"] = sure[1]
+    return Run(second.data, first, second, proof, rows.passed, report, findings, sure[0] if sure else None)
 
 
 def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:

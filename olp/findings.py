@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from olp.calibration_rules import CALIBRATION
+from olp.confidence_rules import CONFIDENCE
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
 from olp.model_rules import MODEL
@@ -309,10 +310,13 @@ _TABLE = (
 RULES = {
     rule.code: rule
     for rule in sorted(
-        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *PLANNING), key=lambda rule: rule.code
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *CONFIDENCE, *PLANNING),
+        key=lambda rule: rule.code,
     )
 }
 
+#: findings of uncertainty
+CONFIDENCE_CODES = tuple(rule.code for rule in CONFIDENCE)
 #: what a gate looks for: all but those of measured paths and of measurements of a machine
 GATE_CODES = tuple(code for code in RULES if not code.startswith(("OLP6", "OLP8")))
 

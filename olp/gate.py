@@ -20,7 +20,7 @@ from olp.correction import Run, correct_bytes, last_digit_mm, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import OlpError, UsageError, naming
 from olp.files.meshes import read_mesh
-from olp.findings import GATE_CODES, Finding
+from olp.findings import CONFIDENCE_CODES, GATE_CODES, Finding
 from olp.geometry import PLANES
 from olp.loading import Loaded, PathLike, load, setup_of, source_of
 from olp.machine import Setup
@@ -81,6 +81,8 @@ def check(
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "refuse",
     contour: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
     date: datetime.date | None = None,
     select: Sequence[str] = (),
     ignore: Sequence[str] = (),
@@ -103,12 +105,12 @@ def check(
     everything = "all" in setup.machine.compensated_by_controller
     if everything:
         setup = replace(setup, machine=replace(setup.machine, compensated_by_controller=frozenset()))
-    loaded = load(setup, None, "hold")
+    loaded = load(setup, None, "hold", only_sure=only_sure_components)
     data, name = source_of(program)
     outside = "OLP405" if outside_box == "refuse" else "OLP403"
     options = Options(contour=contour)
     with naming(name):
-        case = _case(data, name, nominal, loaded, options, tolerance_um, date, outside, tell)
+        case = _case(data, name, nominal, loaded, options, tolerance_um, date, outside, tell, within_um)
         tell("check", 0.8)
         found = _findings(case, tolerance_um * MM_PER_UM, outside, date, contour)
         around = _clearances(case, codes, tell)
@@ -139,12 +141,14 @@ def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
 def _case(
     data: bytes, name: str, nominal: PathLike | bytes | None, loaded: Loaded, options: Options,
     tolerance_um: float, date: datetime.date | None, outside: str, tell: Progress,
+    within_um: float | None,
 ) -> _Case:  # fmt: skip
     tell("read", 0.0)
     if nominal is None and find_stamp(data) is None:
         run = correct_bytes(
             data, name, loaded, tolerance_um=tolerance_um, hold=True, unroll=False, expand=False,
             clearance=None, contour=options.contour, rapids=False, date=date, tell=tell, outside=outside,
+            within_um=within_um,
         )  # fmt: skip
         what = "what olp correct makes of the program"
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
@@ -160,8 +164,9 @@ def _case(
     except OlpError as error:
         raise error.in_file(other or "<nominal>") from None
     run = verify_programs(
-        (first, other), (written, name), loaded, tolerance_um=tolerance_um, contour=options.contour, date=date
-    )
+        (first, other), (written, name), loaded, tolerance_um=tolerance_um, contour=options.contour,
+        date=date, within_um=within_um,
+    )  # fmt: skip
     what = f"the corrected program against the nominal one ({Path(other).name if other else 'stdin'})"
     proof = replace(
         run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
@@ -194,6 +199,7 @@ def _findings(
         found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             found += checks.proof_findings(proof, run.passed)
+            found += _confidence(run)
     found += state.tool_findings(path, loaded.calibration, sanity)
     lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD
     found += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
@@ -213,6 +219,21 @@ def _findings(
             largest = float(np.sqrt((correction * correction).sum(axis=1)).max(initial=0.0))
             found += checks.path_mode_findings(case.written, largest)
     return found
+
+
+def _confidence(run: Run) -> list[Finding]:
+    """What a verification says of uncertainties, with the lines of the corrected program."""
+    proof = run.proof
+    there = dict(zip(proof.nominal.line.tolist(), proof.written.line[proof.groups].tolist(), strict=True))
+    return [
+        replace(
+            found,
+            line=None if found.line is None else there[found.line],
+            lines=tuple(there[line] for line in found.lines),
+        )
+        for found in run.findings
+        if found.code in CONFIDENCE_CODES
+    ]
 
 
 def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | None:

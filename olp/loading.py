@@ -7,10 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from olp.confidence.components import unsure
 from olp.errormodel import Calibration, ErrorModel, build
+from olp.errormodel.uncertainty import Uncertainty
 from olp.exceptions import ConfigError
 from olp.files.calibration import files_beside, load_calibration
 from olp.files.config import load_setup
+from olp.files.covariance import load_uncertainty
 from olp.files.structure import read_drift_log, sensors_of
 from olp.files.write import read_bytes
 from olp.machine import Job, Setup
@@ -21,17 +24,35 @@ PathLike = str | Path
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """Everything loaded that a run needs."""
+    """Everything loaded that a run needs. `skip` are components that the control corrects, `left_out` those
+    that are not corrected because they are within their own uncertainty; `model` has neither."""
 
     setup: Setup
     profile: Profile
     calibration: Calibration
     model: ErrorModel
     digest: str
+    uncertainty: Uncertainty | None
+    skip: frozenset[str]
+    left_out: frozenset[str] = frozenset()
+
+    @property
+    def full(self) -> ErrorModel:
+        """The model with the components that were left out for being within their own uncertainty."""
+        if not self.left_out:
+            return self.model
+        return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
 
 
-def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refuse", "hold"]) -> Loaded:
-    """Machine, calibration and job of a run, and the error model that they make."""
+def load(
+    machine: PathLike | Setup,
+    job: PathLike | None,
+    outside: Literal["refuse", "hold"],
+    *,
+    only_sure: bool = False,
+) -> Loaded:
+    """Machine, calibration and job of a run, and the error model that they make; `only_sure` leaves out
+    components within their own uncertainty. Raises InputError, ConfigError."""
     setup = setup_of(machine, job)
     described = setup.machine
     if described.calibration is None:
@@ -45,9 +66,20 @@ def load(machine: PathLike | Setup, job: PathLike | None, outside: Literal["refu
         )
     calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
     calibration = at_temperatures(calibration, setup.job)
-    skip = described.compensated_by_controller - calibration.active_during_measurement
-    model = build(calibration, described.chain, outside=outside, skip_components=frozenset(skip))
-    return Loaded(setup, profile_of(setup), calibration, model, _digest(described.calibration, described))
+    skip = frozenset(described.compensated_by_controller - calibration.active_during_measurement)
+    uncertainty = load_uncertainty(described.calibration, calibration)
+    left_out: frozenset[str] = frozenset()
+    if only_sure:
+        if uncertainty is None:
+            raise ConfigError(
+                "the calibration states no uncertainty, so nobody knows which components are sure; give the "
+                "file of [covariance] or sigma columns, or correct without --only-sure-components",
+                file=described.calibration,
+            )
+        left_out = unsure(calibration, uncertainty) - skip
+    model = build(calibration, described.chain, outside=outside, skip_components=skip | left_out)
+    digest = _digest(described.calibration, described, left_out)
+    return Loaded(setup, profile_of(setup), calibration, model, digest, uncertainty, skip, left_out)
 
 
 def at_temperatures(calibration: Calibration, job: Job) -> Calibration:
@@ -85,12 +117,14 @@ def profile_of(setup: Setup) -> Profile:
     return profile
 
 
-def _digest(calibration: str, machine: object) -> str:
+def _digest(calibration: str, machine: object, left_out: frozenset[str]) -> str:
     """Hash of the calibration file, the files that it names and the machine values that decide the model."""
     digest = hashlib.sha256(read_bytes(calibration))
     for file in files_beside(calibration):
         digest.update(read_bytes(file))
     digest.update(repr(getattr(machine, "chain", "")).encode())
+    if left_out:
+        digest.update(repr(sorted(left_out)).encode())
     return digest.hexdigest()
 
 

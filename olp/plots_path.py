@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from olp.confidence.spread import Confidence
 from olp.measured.figures import Run
 from olp.measured.path import Array, Path
 from olp.plots import drawn
@@ -144,6 +145,41 @@ def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
         plot.legend(frameon=False, loc="upper left")
 
     return drawn("histogram", (7.4, 2.2), draw)
+
+
+def bands(found: Confidence) -> bytes:
+    """Expected distance from the nominal place at way-points with its band, and the probability of being
+    within the tolerance, before and after, along the program; where points are many the least sure ones."""
+
+    def draw(figure: Figure) -> None:
+        plot, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        step = np.sqrt((np.diff(found.points.axis_mm, axis=0) ** 2).sum(axis=1))
+        way = np.concatenate(([0.0], np.cumsum(step))) / 1e3
+        column = np.unique(np.linspace(0, len(way), _COLUMNS + 1).astype(int)[:-1])
+        middle = way[column]
+        for name, deviation, inside in (
+            ("before", found.points.before_mm, found.within_before),
+            ("after", found.points.after_mm, found.within_after),
+        ):
+            size = np.sqrt((deviation**2).sum(axis=1))
+            high = np.maximum.reduceat(size + found.band_mm, column) * UM_PER_MM
+            low = np.minimum.reduceat(np.maximum(size - found.band_mm, 0.0), column) * UM_PER_MM
+            colour = COLOURS[name]
+            plot.fill_between(middle, low, high, color=colour, alpha=0.3, linewidth=0, step="mid")
+            expected = np.maximum.reduceat(size, column) * UM_PER_MM
+            plot.plot(middle, expected, color=colour, linewidth=0.8, label=name)
+            least = 100.0 * np.minimum.reduceat(inside, column)
+            below.plot(middle, least, color=colour, linewidth=0.8, drawstyle="steps-mid")
+        _tolerance(plot, found.within_mm * UM_PER_MM)
+        plot.set(ylabel="distance in um")
+        plot.set_ylim(bottom=0.0)
+        below.set(xlabel="along the way-points in m", ylabel="within, %", ylim=(-3, 103))
+        below.set_xlim(0.0, max(float(way[-1]), 1e-6))
+        for part in (plot, below):
+            part.grid(color="0.92", linewidth=0.5)
+        plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
+
+    return drawn("bands", (7.4, 3.4), draw)
 
 
 def components(path: Path, runs: Runs) -> bytes:

@@ -38,6 +38,7 @@ def to_text(report: Report) -> str:
         _moves(report),
         _sources(report),
         _worst(report),
+        uncertainty_text(report),
         findings_text(report.get("findings") or ()),
         _sentences("What this proves", report.get("proves") or ()),
         _sentences("What it does not prove", report.get("does_not_prove") or ()),
@@ -271,6 +272,49 @@ def _worst(report: Report) -> Iterator[str]:
     yield lines[0] + "  text"
     for line, block in zip(lines[1:], blocks, strict=False):
         yield f"{line}  {shortened(printable(str(block.get('text', ''))), room)}".rstrip()
+
+
+def percent(value: object) -> str:
+    """A probability for a table: 100 % only where no draw says otherwise."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "-"
+    text = f"{100.0 * value:.1f}"
+    return (
+        f"{'>99.9' if text == '100.0' and value < 1.0 else '<0.1' if text == '0.0' and value > 0 else text} %"
+    )
+
+
+def uncertainty_text(report: Report) -> Iterator[str]:
+    """How sure the corrected path is, where the calibration states uncertainties."""
+    part = _part(report, "uncertainty")
+    if not part:
+        return
+    band, within, expected = part["band_um"], part["within"], part["expected"]
+    yield f"Uncertainty of the tip at {part['waypoints']} way-points, from the calibration"
+    yield from pairs(
+        [
+            (
+                "  Band",
+                f"+-{number(band['median_um'])} um median, {number(band['max_um'])} um largest "
+                f"(expanded, k = {part['coverage_factor']:g}, in the worst direction)",
+            ),
+            (
+                "  Deviation",
+                f"{number(expected['before_rms_um'])} um rms expected before, "
+                f"{number(expected['after_rms_um'])} um after; better with probability "
+                f"{percent(expected['probability_better'])}",
+            ),
+            (
+                f"  Within {within['tolerance_um']:g} um",
+                f"all of the program with probability {percent(within['before']['program'])} before, "
+                f"{percent(within['after']['program'])} after; the worst way-point "
+                f"{percent(within['before']['least'])} before, {percent(within['after']['least'])} after",
+            ),
+            ("  From", str(part["source"])),
+            ("  Zero", str(part["zero_setting"])),
+            ("  Age", "" if part["growth_by_age"] == 1.0 else f"times {part['growth_by_age']:.3g}"),
+        ]
+    )
 
 
 def findings_text(findings: Sequence[Report]) -> Iterator[str]:

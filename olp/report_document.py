@@ -10,7 +10,7 @@ from typing import Any
 
 from olp.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section
 from olp.findings import RULES
-from olp.report import Report, by_severity, number
+from olp.report import Report, by_severity, number, percent
 from olp.report_compare import change, figure, table_rows, taken_by_fit
 
 Plots = Mapping[str, bytes]
@@ -41,6 +41,7 @@ def correction(report: Report, plots: Plots, version: str, date: datetime.date |
         Section("Compensation applied", list(_applied(report))),
         Section("Validation", list(_validation(report, plots))),
         *_tests(report, plots),
+        *_uncertainty(report, plots),
         Section("Findings and limits", list(_limits(report))),
         Section("Documentation", list(_documentation(report, version, date))),
     ]
@@ -188,6 +189,78 @@ def _validation(report: Report, plots: Plots) -> Iterator[Block]:
             [[str(w["line"]), number(w["before_um"]), number(w["after_um"]), w["text"]] for w in worst],
             code=3,
         )
+
+
+def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
+    """How sure it is, in the form of the GUM: expanded uncertainties with their coverage factor."""
+    part = report.get("uncertainty")
+    if not part:
+        return
+    band, within, expected = part["band_um"], part["within"], part["expected"]
+    axes = ", ".join(f"{axis} {number(value)}" for axis, value in band["by_axis_max_um"].items())
+    repeat = ", ".join(number(value) for value in part["repeatability_um"])
+    blocks: list[Block] = [
+        Paragraph(
+            "Expanded uncertainty of where the tip really is, from the covariance of the calibration "
+            f"propagated to {part['waypoints']} way-points (JCGM 100, coverage factor "
+            f"k = {part['coverage_factor']:g}, about 95 % for normal errors)."
+        ),
+        Pairs([
+            ("Band", f"median {number(band['median_um'])} um, largest {number(band['max_um'])} um in the "
+             "worst direction"),
+            ("Largest by axis, um", axes),
+            ("From", part["source"]),
+            ("Zero setting", part["zero_setting"]),
+            ("Scatter of the axes, um", repeat if any(part["repeatability_um"]) else "not stated"),
+            ("Growth by age", f"times {part['growth_by_age']:.3g}"),
+            ("Temperatures", f"known to {part['temperature_K']:g} K" if part["temperature_K"] else
+             "their uncertainty is not stated"),
+            ("Not included", "; ".join(part["not_included"])),
+        ]),
+        Grid(
+            ["", "before", "after"],
+            [
+                ["rms deviation expected, um", number(expected["before_rms_um"]),
+                 number(expected["after_rms_um"])],
+                [f"whole program within {within['tolerance_um']:g} um", percent(within["before"]["program"]),
+                 percent(within["after"]["program"])],
+                ["least sure way-point", percent(within["before"]["least"]),
+                 percent(within["after"]["least"])],
+            ],
+        ),
+        Paragraph(
+            f"The corrected program is better with a probability of "
+            f"{percent(expected['probability_better'])}. Probabilities of the whole program and of lines are "
+            f"from {within['draws']} draws of the calibration (seed {within['seed']})."
+        ),
+    ]  # fmt: skip
+    if "bands" in plots:
+        blocks.append(Plot(
+            plots["bands"], "Expected distance from the nominal place with its band, and the probability of "
+            "being within the tolerance.",
+        ))  # fmt: skip
+    if part["lines"]:
+        blocks.append(Paragraph("Lines that are least sure to be within it:"))
+        blocks.append(Grid(
+            ["line", "before, um", "band, um", "within before", "within after", "nearer after"],
+            [
+                [str(row["line"]), number(row["before_um"]), number(row["band_um"]),
+                 percent(row["within_before"]), percent(row["within_after"]), percent(row["nearer"])]
+                for row in part["lines"]
+            ],
+        ))  # fmt: skip
+    doubtful = [row for row in part["components"] if not row["sure"]]
+    if doubtful:
+        cells = []
+        for row in doubtful:
+            unit = "urad" if "value_urad" in row else "um"
+            cells.append([
+                row["name"], unit, number(row[f"value_{unit}"]),
+                number(row[f"expanded_uncertainty_{unit}"]), percent(row["probability_helps"]),
+            ])  # fmt: skip
+        blocks.append(Paragraph("Components within their own uncertainty (rms over the axis):"))
+        blocks.append(Grid(["component", "unit", "value", "2 sigma", "correcting helps"], cells, 2))
+    yield Section("Uncertainty", blocks)
 
 
 def _path_plots(plots: Plots) -> Iterator[Block]:

@@ -72,6 +72,10 @@ def correction(
     plots: dict[str, bytes] = {}
     if FilePath(name).suffix.lower() == ".html":
         plots = _predicted_plots(result, nominal, setup, contour)
+        if result.confidence is not None and len(result.confidence):
+            from olp import plots_path
+
+            plots = plots | {"bands": plots_path.bands(result.confidence)}
     return _written(
         report_document.correction(report, plots | _test_plots(report, name), __version__, date), name
     )

@@ -86,6 +86,17 @@ def scaled(um: float) -> dict[str, Any]:
     }
 
 
+def known(sigma_um: float, more: str = "") -> dict[str, Any]:
+    """An error of X of 10 um everywhere, known to so much."""
+    table = f'[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n{more}'
+    rows = "".join(f"{q},10,{sigma_um}\n" for q in (-1000, 2000))
+    return {"calibration": table, "curves": {"x.csv": f"X_mm,EXX_um,sigma_EXX_um\n{rows}"}}
+
+
+def growing(share: float) -> dict[str, Any]:
+    return known(0.01, f"[covariance]\ngrowth_per_year = {share}\n")
+
+
 def total_map() -> dict[str, Any]:
     nodes = [f"{x},{y},{z},0,0,0" for x in (-1000, 2000) for y in (-1000, 2000) for z in (-1000, 2000)]
     text = "\n".join(["X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um", *nodes])
@@ -252,6 +263,27 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(job=sensor(30.1), options={"outside_box": "hold"}, **structure()),
         Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
     ),
+    # one way-point: the gain of 10 um is sure up to a sigma of 5 um
+    "OLP431": (Call(**known(5.1)), Call(**known(4.9))),
+    "OLP432": (Call(**known(5.1)), Call(**known(4.9))),
+    # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer
+    "OLP433": (
+        Call(**known(11.2), options={"within_um": 20.0}),
+        Call(**known(9.2), options={"within_um": 20.0}),
+    ),
+    # 11.5 um/(m K) at 100 mm, half a um
+    "OLP434": (
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n"),
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n"),
+    ),
+    # the mean of a curve of two independent halves is known to sigma / sqrt(2)
+    "OLP435": (Call(**known(7.2)), Call(**known(6.9))),
+    "OLP436": (
+        Call(**known(7.2), options={"only_sure_components": True}),
+        Call(**known(6.9), options={"only_sure_components": True}),
+    ),
+    # 310 days after measuring
+    "OLP437": (Call(**growing(1.19)), Call(**growing(1.16))),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),
         Call(OVER, tables=tool(50.0), **clamp(9.999)),

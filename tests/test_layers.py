@@ -14,7 +14,10 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"calibration_rules", "gate_rules", "metrology_rules", "model_rules", "planning_rules", "table_rules"},
+    {
+        *("calibration_rules", "confidence_rules", "gate_rules", "metrology_rules"),
+        *("model_rules", "planning_rules", "table_rules"),
+    },
     {"findings"},
     {"geometry", "grids", "tables"},
     {"machine"},
@@ -23,7 +26,7 @@ LAYERS = (
     {"errormodel"},
     {"deviation", "clearance", "measured"},
     {"compensation", "trajectory", "calibration"},
-    {"proof", "residuals"},
+    {"proof", "residuals", "confidence"},
     {"checks", "nominal", "testpaths"},
     {"scene"},
     {"report", "plots"},
@@ -33,7 +36,7 @@ LAYERS = (
     {"files"},
     {"loading", "poses"},
     {"metrology"},
-    {"replanning"},
+    {"replanning", "assessing"},
     {"comparing_parts"},
     {"calibrating", "correction", "diagnosing", "planning", "retiming", "comparing", "thermal_fitting"},
     {"exchanging"},

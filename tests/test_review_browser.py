@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -267,6 +268,36 @@ def test_metrics_are_the_parts_of_the_deviation(page: Any, review: Review) -> No
             known = ~rapid & ~np.isnan(truth)
             # the direction of the shortest steps is known to their rounding only
             assert np.abs(found - 1e3 * truth)[known].max() < 0.01
+
+
+def test_the_path_is_coloured_by_band_and_by_probability(chromium: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "gantry"
+    shutil.copytree(GANTRY.parent, folder)
+    calibration = folder / "calibration.toml"
+    text = calibration.read_text("utf-8")
+    assert "[squareness]\n" in text
+    calibration.write_text(text.replace("[squareness]\n", "[squareness]\nsigma_C0Y_urad = 20.0\n"), "utf-8")
+    review = view(PROGRAM, folder / "machine.toml", within_um=8.0)
+    sure = review.scene.sureness
+    assert sure is not None
+    review.write(tmp_path / "sure.html")
+    with browser.opened(chromium, tmp_path / "sure.html") as page:
+        rapid = array(page, "rapid") != 0
+        for name, truth in (("band", 1e3 * sure.band_mm), ("beyond", 100.0 * sure.beyond["result"])):
+            page.select_option("#metric", name)
+            found = np.array(
+                page.evaluate(
+                    "Array.from(olp.app.metrics.values(olp.app.metrics.find(olp.state.metric), 'result'),"
+                    " v => Number.isNaN(v) ? null : v)"
+                ), float,
+            )  # fmt: skip
+            assert np.array_equal(np.isnan(found), rapid)
+            assert np.abs(found - truth)[~rapid].max() <= max(truth.max() / 200, 0.051)
+            still(page)
+            assert page.evaluate("document.getElementById('legend-title').textContent") == (
+                "uncertainty (k = 2), µm" if name == "band" else "probability beyond 8 µm, %"
+            )
+            assert colourful(browser.picture(page)) > 200
 
 
 def test_the_scale_is_round_symmetric_where_signed_and_takes_numbers(page: Any) -> None:

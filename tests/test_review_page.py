@@ -321,3 +321,29 @@ def test_without_meshcat_the_page_says_what_to_do(machine: Path, monkeypatch: py
 def test_a_file_that_is_not_there(machine: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         olp.view(tmp_path / "none.ngc", machine)
+
+
+def test_the_page_colours_by_band_and_by_probability(tmp_path: Path) -> None:
+    machine = random_machine(tmp_path, 3)
+    unknown = Page(olp.view(TEXT, machine, time=False).html())
+    assert {"band", "beyond"}.isdisjoint(m["name"] for m in unknown.manifest["metrics"])
+    calibration = machine.with_name("calibration.toml")
+    square = "[squareness]\nsigma_C0Y_urad = 20.0\n"
+    assert "[squareness]\n" in calibration.read_text()
+    calibration.write_text(calibration.read_text().replace("[squareness]\n", square))
+    review = olp.view(TEXT, machine, within_um=3.0, time=False)
+    sure, page = review.scene.sureness, Page(review.html())
+    assert sure is not None
+    metrics: dict[str, Any] = {m["name"]: m for m in page.manifest["metrics"]}
+    band = page.array(metrics["band"]["by_layer"]["result"])
+    assert sure.band_mm.max() > 1e-3
+    assert np.abs(band - sure.band_mm * 1e3).max() <= max(sure.band_mm.max() * 5.0, 0.001)
+    assert metrics["beyond"]["label"] == "probability beyond 3 µm"
+    for layer in ("uncorrected", "result"):
+        shown = page.array(metrics["beyond"]["by_layer"][layer])
+        assert np.abs(shown - 100.0 * sure.beyond[layer]).max() <= 0.051
+    # what is far off is surely beyond
+    away = np.linalg.norm(review.scene.samples.uncorrected, axis=1) > 3e-3 + 3.0 * sure.band_mm
+    assert away.any() and (sure.beyond["uncorrected"][away] > 0.99).all()
+    # at the touch-off, or where a sure path is right, nothing is beyond
+    assert (sure.beyond["result"][sure.band_mm < 1e-3] < 0.01).all()

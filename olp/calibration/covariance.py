@@ -63,8 +63,10 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
         at = own.stop
         variance = fit.between_targets(name, q) if kind == "mean" else np.zeros(len(table))
         entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))  # type: ignore[arg-type]
+    kinds = {"lines": fit.lines, "points": fit.points, "lengths": fit.lengths, "directions": fit.pods}
+    taken = ", ".join(f"{len(files)} of {kind}" for kind, files in kinds.items() if files)
     words = (
-        f"the adjustment of {len(fit.lines)} lines: {len(factor)} numbers, {factor.shape[1]} principal "
+        f"the adjustment of readings ({taken}): {len(factor)} numbers, {factor.shape[1]} principal "
         f"components, which drop at most {100.0 * dropped:.2f} % of a variance"
     )
     return Uncertainty(tuple(entries), fingerprint(calibration), words, dropped)

@@ -10,6 +10,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    confidence_options,
     contour_option,
     date_option,
     exit_for,
@@ -56,6 +57,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @date_option()
 @tolerance_option
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
+@confidence_options
 @click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
 @contour_option
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
@@ -72,6 +74,8 @@ def command(
     date: datetime.date | None,
     tolerance_um: float,
     outside_box: Literal["refuse", "hold"],
+    within_um: float | None,
+    only_sure_components: bool,
     clearances: str | None,
     contour: bool,
     force: bool,
@@ -103,6 +107,8 @@ def command(
             tolerance_um=tolerance_um,
             outside_box=outside_box,
             contour=contour,
+            within_um=within_um,
+            only_sure_components=only_sure_components,
             date=date,
             select=select,
             ignore=ignore,

@@ -116,6 +116,25 @@ def unroll_options(function: F) -> F:
     return function
 
 
+def confidence_options(function: F) -> F:
+    """What every verb that looks at uncertainties has in common."""
+    for option in (
+        click.option(
+            "--within-um",
+            type=Length(),
+            help="The tolerance of the part: how probable is it that the tip stays within? "
+            "Default: --tolerance-um.",
+        ),
+        click.option(
+            "--only-sure-components",
+            is_flag=True,
+            help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
 def proof_options(function: F) -> F:
     """What `correct` and `verify` have in common."""
     for option in (fail_on_option, json_option, date_option(), contour_option, tolerance_option):

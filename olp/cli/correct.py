@@ -11,6 +11,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    confidence_options,
     exit_for,
     files_of,
     given,
@@ -43,6 +44,7 @@ LAST_DIGITS_UM = 10.0
 @setup_options
 @click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
+@confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
 @unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
@@ -61,6 +63,8 @@ def command(
     tolerance_um: float,
     outside_box: Literal["refuse", "hold"],
     contour: bool,
+    within_um: float | None,
+    only_sure_components: bool,
     date: datetime.date | None,
     as_json: bool,
     fail_on: str,
@@ -110,6 +114,8 @@ def command(
                 peck_clearance_mm=peck_clearance_mm,
                 contour=contour,
                 split_rapids=split_rapids,
+                within_um=within_um,
+                only_sure_components=only_sure_components,
                 date=date,
                 progress=show,
             )
@@ -120,7 +126,8 @@ def command(
                 written[Path(review_file)] = view(
                     nominal, call.setup, correction=result, corrected_name="" if output == STREAM else output,
                     tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
-                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, progress=show,
+                    expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, within_um=within_um,
+                    only_sure_components=only_sure_components, date=date, progress=show,
                 ).parts()  # fmt: skip
         except ProgramError as error:
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None

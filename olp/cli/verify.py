@@ -8,6 +8,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    confidence_options,
     exit_for,
     given,
     proof_options,
@@ -23,6 +24,7 @@ from olp.exceptions import UsageError
 @click.argument("corrected")
 @setup_options
 @proof_options
+@confidence_options
 def command(
     nominal: str,
     corrected: str,
@@ -30,6 +32,8 @@ def command(
     job: str | None,
     tolerance_um: float,
     contour: bool,
+    within_um: float | None,
+    only_sure_components: bool,
     date: datetime.date | None,
     as_json: bool,
     fail_on: str,
@@ -51,6 +55,8 @@ def command(
         call.setup,
         tolerance_um=tolerance_um,
         contour=contour,
+        within_um=within_um,
+        only_sure_components=only_sure_components,
         date=date,
     )
     put(report.to_json(result.report) if as_json else report.to_text(result.report))

@@ -11,6 +11,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Length,
+    confidence_options,
     contour_option,
     files_of,
     given,
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 @outside_box_option("refuse the program", "take the error at the box's face")
 @contour_option
 @unroll_options
+@confidence_options
 @click.option(
     "--no-time", is_flag=True, help="Do not plan the motion; times are those of the programmed feed."
 )
@@ -71,6 +73,8 @@ def command(
     port: int,
     tolerance_um: float,
     outside_box: Literal["refuse", "hold"],
+    within_um: float | None,
+    only_sure_components: bool,
     contour: bool,
     flatten: bool,
     expand_cycles: bool,
@@ -110,7 +114,8 @@ def command(
                 source(call.program), setup, corrected=corrected, measured=measured,
                 tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
                 expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, time=not no_time,
-                step_mm=step_mm, progress=show,
+                step_mm=step_mm, within_um=within_um, only_sure_components=only_sure_components,
+                progress=show,
             )  # fmt: skip
 
     if live:

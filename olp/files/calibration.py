@@ -42,7 +42,8 @@ def files_beside(path: PathLike) -> list[FilePath]:
         names = [t["file"] for name in ("curves", "maps", "compliance") for t in values.get(name, ())]
         structure = values.get("thermal", {}).get("structure")
         covariance = values.get("covariance", {}).get("file")
-        return [FilePath(path).parent / name for name in (*names, structure, covariance) if name]
+        names += [name for name in (structure, covariance) if name]
+        return [FilePath(path).parent / name for name in names]
     except (ValueError, TypeError, KeyError, AttributeError):
         return []
 

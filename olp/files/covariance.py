@@ -20,10 +20,10 @@ from olp.errormodel.uncertainty import KINDS, Entry, Uncertainty, fingerprint, o
 from olp.exceptions import ConfigError
 from olp.files.problems import validate
 from olp.files.schemas import CalibrationFile, CovarianceTable
-from olp.files.tables import read_curves
+from olp.files.tables import parse_curves
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.machine import SQUARENESS
+from olp.machine import SQUARENESS, ZERO
 from olp.units import AXES, shifted
 
 SCHEMA = "olp-covariance-1"
@@ -54,15 +54,14 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
             )
     else:
         found = _of_sigmas(file, FilePath(path).parent, calibration)
-    repeatability = [shifted(getattr(stated, f"{axis}_repeatability_um"), -3) for axis in AXES]
+    repeatability = calibration.repeatability_mm or ZERO
     if found is None and (any(repeatability) or stated.temperature_K):
         found = Uncertainty((), fingerprint(calibration), "nothing is known of the calibration itself")
     if found is None:
         return None
-    x, y, z = repeatability
     return replace(
         found,
-        repeatability_mm=(x, y, z),
+        repeatability_mm=repeatability,
         growth_per_year=stated.growth_per_year,
         temperature_K=stated.temperature_K,
     )
@@ -71,7 +70,11 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
 def _of_sigmas(file: CalibrationFile, folder: FilePath, calibration: Calibration) -> Uncertainty | None:
     curves = {}
     for table in file.curves:
-        curves.update({k: v for k, v in read_curves(folder / table.file).sigma.items() if v.any()})
+        data = read_bytes(folder / table.file)
+        # most files have none, and need not be read twice
+        if b"sigma_" in data:
+            sigma = parse_curves(data, table.file).sigma
+            curves.update({name: values for name, values in sigma.items() if values.any()})
     square = {name: shifted(getattr(file.squareness, f"sigma_{name}_urad"), -6) for name in SQUARENESS}
     lost = {axis: shifted(getattr(file.backlash, f"sigma_{axis}_um"), -3) for axis in AXES}
     return of_sigmas(

@@ -285,15 +285,6 @@ class CovarianceTable(Table):
         description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
         "this file; the sigma columns and keys if left out",
     )
-    X_repeatability_um: NotNegative = Field(
-        default=0.0, description="the standard deviation of the scatter of axis X at one place, in um"
-    )
-    Y_repeatability_um: NotNegative = Field(
-        default=0.0, description="the standard deviation of the scatter of axis Y at one place, in um"
-    )
-    Z_repeatability_um: NotNegative = Field(
-        default=0.0, description="the standard deviation of the scatter of axis Z at one place, in um"
-    )
     growth_per_year: NotNegative = Field(
         default=0.0,
         description="the share of themselves by which standard uncertainties grow in a year after measured: "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from olp import api
+from olp.assessing import unknowns_of
 from olp.compensation.plan import targets, zero_shifts
+from olp.confidence.probability import within
+from olp.confidence.spread import Points, bands, covariances
 from olp.correction import last_digit_mm, verify_programs
 from olp.errormodel.base import Array
 from olp.exceptions import naming
@@ -32,7 +36,7 @@ from olp.review.motion import by_feed, retimed, table
 from olp.review.page import page
 from olp.review.parts import Index
 from olp.review.samples import Samples, by_source, sample
-from olp.review.scene import Frame, Scene
+from olp.review.scene import Frame, Scene, Sureness
 from olp.units import MM_PER_UM
 
 #: shorter stays at a sample are none
@@ -79,6 +83,9 @@ def view(
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
+    date: datetime.date | None = None,
     time: bool = True,
     step_mm: float | None = None,
     progress: Progress | None = None,
@@ -89,12 +96,15 @@ def view(
     corrected as `correct` does, or `correction` is what that gave, to be called `corrected_name`. `measured`
     are files of positions of the tip, read and placed on the path as `olp.compare` does; what that finds
     stands beside the other findings. Without `time` the motion is not planned: times are those of the
-    programmed feed. `step_mm` is the distance between samples. Raises InputError (ProgramError with its line,
+    programmed feed. `step_mm` is the distance between samples. `within_um`,
+    `only_sure_components` and `date` are those of `correct`. Raises InputError (ProgramError with its line,
     ConfigError) and CannotCompute.
     """
     tell = progress or silent
     data, name = source_of(program)
-    loaded = load(machine, job, "hold" if corrected is not None else outside_box)
+    loaded = load(
+        machine, job, "hold" if corrected is not None else outside_box, only_sure=only_sure_components
+    )
     setup, options = loaded.setup, Options(contour=contour)
     if flatten or expand_cycles:
         with naming(name):
@@ -106,7 +116,8 @@ def view(
             with naming(name):
                 correction = api.correct(
                     data, setup, tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
-                    progress=progress,
+                    progress=progress, within_um=within_um, only_sure_components=only_sure_components,
+                    date=date,
                 )  # fmt: skip
         other = correction.data
     tell("read", 0.0)
@@ -119,7 +130,7 @@ def view(
         else:
             report = verify_programs(
                 (nominal, name), (second, corrected_name), loaded, tolerance_um=tolerance_um,
-                contour=contour, date=None,
+                contour=contour, date=date, within_um=within_um,
             ).report  # fmt: skip
         groups = _groups(nominal, second, loaded, tolerance_um)
         tell("sample", 0.0)
@@ -157,8 +168,26 @@ def view(
         report=report,
         tolerance_um=tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
+        sureness=_sureness(loaded, nominal, samples, within_um or tolerance_um, date),
     )
     return Review(scene)
+
+
+def _sureness(
+    loaded: Loaded, nominal: Program, samples: Samples, within_um: float, date: datetime.date | None
+) -> Sureness | None:
+    """Of samples, as `olp.assessing` of way-points."""
+    if loaded.uncertainty is None:
+        return None
+    unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)
+    points = Points(samples.move, samples.axis_mm, samples.uncorrected, samples.result, samples.play)
+    covariance = covariances(unknowns, nominal.toolpath, points)
+    radius = within_um * MM_PER_UM
+    beyond = {
+        name: np.asarray(1.0 - within(covariance, deviation, radius), np.float32)
+        for name, deviation in (("uncorrected", points.before_mm), ("result", points.after_mm))
+    }
+    return Sureness(radius, bands(covariance).astype(np.float32), beyond)
 
 
 def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples, Array]:

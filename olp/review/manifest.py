@@ -36,6 +36,8 @@ _PARTS = (
 )
 #: steps of an error source over its range, at the least: colours show no more
 _SOURCE_LEVELS, _FINEST_UM = 200, 0.001
+#: step of a probability
+_PERCENT = 0.1
 #: bits of the largest error of a line that are kept: a part in a thousand, and far smaller than all of them
 _ERROR_BITS = 9
 #: of motion, relative to the largest value of the column
@@ -147,6 +149,7 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
         }
         for part, label, kind in _PARTS
     ]  # fmt: skip
+    out += _sureness(scene, arrays)
     for name, size in scene.sources:
         value = size * UM_PER_MM
         step = resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
@@ -158,6 +161,28 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
             }
         )  # fmt: skip
     return out
+
+
+def _sureness(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
+    """The band, and the probability of being beyond the tolerance: what is worse is larger in both."""
+    sure = scene.sureness
+    if sure is None:
+        return
+    band = sure.band_mm * UM_PER_MM
+    step = resolution(float(band.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
+    array = arrays.quantised("band", band, step)
+    yield {
+        "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
+        "by_layer": dict.fromkeys(sure.beyond, array), "limit": scene.tolerance_um,
+    }  # fmt: skip
+    by_layer = {
+        layer: arrays.quantised(f"beyond:{layer}", 100.0 * value, _PERCENT)
+        for layer, value in sure.beyond.items()
+    }
+    yield {
+        "name": "beyond", "label": f"probability beyond {sure.within_mm * UM_PER_MM:g} µm", "unit": "%",
+        "kind": "sequential", "by_layer": by_layer, "limit": None,
+    }  # fmt: skip
 
 
 def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:

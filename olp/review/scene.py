@@ -49,10 +49,21 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Sureness:
+    """How sure the samples are: (n,) `band_mm`, expanded uncertainty (k = 2) in the worst direction, and by
+    layer the probability (n,) that the tip is farther than `within_mm` from its place."""
+
+    within_mm: float
+    band_mm: Single
+    beyond: Mapping[str, Single]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) when they are passed, by the re-timed
     motion where there is one and else by the feed. `sources` are (name, (n,) mm) by size; `report` is that of
-    the correction or verification ("olp-report-1")."""
+    the correction or verification ("olp-report-1"); `sureness` is None where the
+    calibration states no uncertainty."""
 
     name: str
     corrected_name: str
@@ -72,3 +83,4 @@ class Scene:
     report: Mapping[str, Any]
     tolerance_um: float
     tool_radius_mm: float
+    sureness: Sureness | None = None

@@ -134,8 +134,8 @@ def _read_nodes(path: Path) -> tuple[list[int], list[np.ndarray], dict[str, np.n
     columns = {n: np.full([len(x) for x in levels], np.nan) for n in rows[0] if not n.endswith("_mm")}
     for row in rows:
         place = tuple(
-            int(np.searchsorted(x, float(row[f"{AXES[a]}_mm"]))) for a, x in zip(arguments, levels,
-            strict=True)
+            int(np.searchsorted(x, float(row[f"{AXES[a]}_mm"])))
+            for a, x in zip(arguments, levels, strict=True)
         )
         for name, values in columns.items():
             values[place] = float(row[name])
@@ -150,8 +150,9 @@ def _read_load(folder: Path, entry: dict[str, Any], datum: np.ndarray) -> _LoadF
     tables = {}
     for name, values in columns.items():
         scale = 1e-3 if name.endswith("_um_kg") else 1e-6
-        tables[name[:3]] = RegularGridInterpolator(levels, scale * values, bounds_error=False,
-        fill_value=None)
+        tables[name[:3]] = RegularGridInterpolator(
+            levels, scale * values, bounds_error=False, fill_value=None
+        )
     line = datum.copy()
     for name, value in entry.get("line_mm", {}).items():
         line[AXES.index(name)] = value
@@ -194,6 +195,8 @@ class JudgeModel:
         cal_path = path.parent / self.machine["calibration"]
         cal: dict[str, Any] = tomllib.loads(cal_path.read_text())
         described = {"schema", "machine", "measured", "valid_until", "temperature_degC", "sign", "box_mm"}
+        # how well it is known changes nothing of what it says
+        described |= {"covariance", "repeatability"}
         modelled = {"model", "datum_mm", "curves", "squareness", "backlash", "cyclic"}
         _only(
             cal,
@@ -216,7 +219,8 @@ class JudgeModel:
         corrected_by_control = set(self.machine.get("compensated_by_controller", []))
         self.silent = corrected_by_control - set(cal.get("active_during_measurement", []))
         squareness = cal.get("squareness", {})
-        _only(squareness, {"C0Y_urad", "B0Z_urad", "A0Z_urad"}, "squareness")
+        squares = {"C0Y_urad", "B0Z_urad", "A0Z_urad"}
+        _only(squareness, squares | {f"sigma_{name}" for name in squares}, "squareness")
         self.square = {
             name: 0.0 if name in self.silent else 1e-6 * squareness.get(f"{name}_urad", 0.0)
             for name in ("C0Y", "B0Z", "A0Z")

@@ -1,0 +1,1 @@
+"""How sure a corrected path is: bands, probabilities and advice from the uncertainty of the calibration."""
