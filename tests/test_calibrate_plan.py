@@ -140,7 +140,8 @@ def test_programs_stop_where_they_are_meant_to(control: str) -> None:
     places = np.array([[10.0, 20.0, -30.0], [10.0, 20.0, -200.125], [700.5, 3.25, -4.0]])
     text = positions_program(PROFILES[control], places, [0.0, 2.5, 4.0], 3, ["a (note) " * 12])
     path = read(text, setup, PROFILES[control]).toolpath
-    assert np.array_equal(path.end_mm, places)
+    assert np.array_equal(path.end_mm[0], [np.nan, np.nan, -30.0], equal_nan=True)
+    assert np.array_equal(path.end_mm[1:], places)
     words = text.decode().split()
     dwell = [float(w[1:]) for w in words if w.startswith("P")]
     pointed = ["." in w for w in words if w.startswith("P")]
@@ -180,6 +181,10 @@ def test_a_plan_of_points_can_be_filled_in(tmp_path: Path) -> None:
     assert len(taken.points[0].axis_mm) == plan.chosen.planned.measurements.points[0].axis_mm.shape[0]
     programs = [p for p in files if p.suffix == ".ngc"]
     assert len(programs) == 3
+    for program in programs:
+        lines = program.read_text("utf-8").splitlines()
+        # the ram goes up before anything else moves
+        assert next(line for line in lines if line.startswith("G53")) == "G53 G0 Z-4.500"
 
 
 def test_a_plan_of_lines_can_be_filled_in(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ def positions_program(
     """Rapids in machine coordinates (G53) through axis positions (n, 3), each with a dwell after it.
 
     A position is followed by no dwell where `dwell_s` (n,) is 0. `digits` are the decimals of words, `notes`
-    become comments. Z goes to its place first where it starts, so that the way there is clear. Raises
+    become comments. Z goes first to the height of the first position, alone: let that be a clear one. Raises
     CannotCompute for a control that is not of this family.
     """
     if 530 not in profile.codes:
@@ -36,12 +36,14 @@ def positions_program(
     before: list[str] = []
     for place, wait in zip(np.round(positions_mm, digits).tolist(), dwell_s, strict=True):
         words = [f"{axis}{value + 0.0:.{digits}f}" for axis, value in zip(AXES, place, strict=True)]
+        if not before:
+            lines.append(f"G53 G0 {words[2]}")
         if words != before:
             lines.append(f"G53 G0 {' '.join(words)}")
         before = words
         if wait > 0.0:
             count = profile.increments_without_point
-            lines.append(f"G4 P{round(1000.0 * wait)}" if count else f"G4 P{wait:.1f}")
+            lines.append(f"G4 P{round(1000.0 * wait)}" if count else f"G4 P{wait:.3f}")
     lines.append("M30" if 30 in profile.harmless_m else "M2")
     return ("\n".join(lines) + "\n").encode()
 
