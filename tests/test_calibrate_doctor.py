@@ -107,6 +107,7 @@ def test_one_straight_tool_leaves_what_it_cannot_see(chain: str) -> None:
     assert "ECZ" not in {v.name for v in found.verdicts}
 
 
+@pytest.mark.slow
 def test_proposed_points_decide() -> None:
     calibration, points = case(7, n=14, sigma=0.005)
     first = diagnose(calibration, "FXYZ", points)
@@ -120,6 +121,7 @@ def test_proposed_points_decide() -> None:
     assert second.wrong == ()
 
 
+@pytest.mark.slow
 @settings(max_examples=3, deadline=None)
 @given(st.integers(0, 1000), st.floats(-3.0, 3.0), st.tuples(*[st.floats(-4000, 4000)] * 3))
 def test_the_instrument_s_frame_does_not_matter(seed: int, turn: float, shift: tuple[float, ...]) -> None:

@@ -165,6 +165,7 @@ def test_the_command_and_a_second_turn_from_its_files(shop: Path, tmp_path: Path
     assert call("calibrate", "refine", *files, "-o", files[0], "--force").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_run_of_a_corrected_program(shop: Path, tmp_path: Path) -> None:
     """The plate, corrected by a calibration with a wrong squareness that it thinks uncertain, run on the true
     machine: the squareness comes back."""
