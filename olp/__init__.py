@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from olp.calibrating import fit_calibration as fit_calibration
     from olp.comparing import Comparison as Comparison
     from olp.comparing import compare as compare
+    from olp.diagnosing import CalibrationDiagnosis as CalibrationDiagnosis
+    from olp.diagnosing import diagnose_calibration as diagnose_calibration
     from olp.exceptions import CannotCompute as CannotCompute
     from olp.exceptions import ConfigError as ConfigError
     from olp.exceptions import InputError as InputError
@@ -49,6 +51,10 @@ if TYPE_CHECKING:
     from olp.metrology import go_return as go_return
     from olp.result_correction import ResultCorrection as ResultCorrection
     from olp.result_correction import correct_results as correct_results
+    from olp.planning import MeasurementPlan as MeasurementPlan
+    from olp.planning import plan_measurements as plan_measurements
+    from olp.refining import RefinedCalibration as RefinedCalibration
+    from olp.refining import refine_calibration as refine_calibration
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review
@@ -67,6 +73,12 @@ _HOME = {
     "Comparison": "olp.comparing",
     "FittedCalibration": "olp.calibrating",
     "fit_calibration": "olp.calibrating",
+    "CalibrationDiagnosis": "olp.diagnosing",
+    "diagnose_calibration": "olp.diagnosing",
+    "RefinedCalibration": "olp.refining",
+    "refine_calibration": "olp.refining",
+    "MeasurementPlan": "olp.planning",
+    "plan_measurements": "olp.planning",
     "correct": "olp.api",
     "compare_tables": "olp.exchanging",
     "export_table": "olp.exchanging",

@@ -13,6 +13,7 @@ from olp.confidence_rules import CONFIDENCE
 from olp.gate_rules import GATE
 from olp.metrology_rules import METROLOGY
 from olp.model_rules import MODEL
+from olp.planning_rules import PLANNING
 from olp.rule import Rule as Rule
 from olp.rule import Severity as Severity
 from olp.table_rules import TABLES
@@ -413,7 +414,8 @@ _TABLE = (
 RULES = {
     rule.code: rule
     for rule in sorted(
-        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *CONFIDENCE), key=lambda rule: rule.code
+        (*_TABLE, *GATE, *CALIBRATION, *METROLOGY, *TABLES, *MODEL, *CONFIDENCE, *PLANNING),
+        key=lambda rule: rule.code,
     )
 }
 

@@ -263,7 +263,6 @@ CALIBRATION = {
         "second_moment_mm4 = 1e8\n[squareness]",
         ["beam of axis X spans 0 to 20 mm", "all of the box"],
     ),
-    "covariance": ("[squareness]", '[covariance]\nfile = "m.csv"\n[squareness]', ["covariance", "not built"]),
 }
 JOB = {
     "payload negative": ("= 12.5", "= -1.0", ["payload_kg = -1.0", "0 or above", "kg"]),
@@ -367,7 +366,6 @@ ELSEWHERE = {
     "beam with two sections",
     "beam along its load",
     "beam shorter than the box",
-    "covariance",
     "box beyond the curve",
     "backlash and direction",
     "touch contradicts",

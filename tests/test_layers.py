@@ -14,7 +14,10 @@ PACKAGE = Path(olp.__file__).parent
 #: One row a layer, the lowest first. Later rows may use earlier ones, never the other way round.
 LAYERS = (
     {"exceptions", "progress", "rule", "units"},
-    {"calibration_rules", "confidence_rules", "gate_rules", "metrology_rules", "model_rules", "table_rules"},
+    {
+        *("calibration_rules", "confidence_rules", "gate_rules", "metrology_rules"),
+        *("model_rules", "planning_rules", "table_rules"),
+    },
     {"findings"},
     {"geometry", "grids", "tables"},
     {"machine"},
@@ -35,9 +38,10 @@ LAYERS = (
     {"metrology"},
     {"replanning", "assessing"},
     {"comparing_parts"},
-    {"calibrating", "correction", "retiming", "comparing", "thermal_fitting", "result_correction"},
+    {"calibrating", "correction", "retiming", "comparing", "thermal_fitting", "result_correction"}
+    | {"diagnosing", "planning"},
     {"exchanging"},
-    {"gate"},
+    {"gate", "refining"},
     {"api"},
     {"report_files", "report_lines"},
     {"review"},

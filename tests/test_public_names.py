@@ -17,6 +17,8 @@ PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
     *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
+    *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
+    *("refine_calibration", "RefinedCalibration"),
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
     *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),

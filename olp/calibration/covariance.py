@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from olp.calibration.basis import Kink
+from olp.calibration.curves import DIGITS
 from olp.calibration.estimator import Fit
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
@@ -54,7 +55,7 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
     for name in SQUARENESS:
         parts.append(("squareness", name, np.zeros(0), 0.0))
         rows.append(fit.squareness(name)[None, :])
-    factor, dropped = _factor(rows, fit.covariance)
+    factor, dropped = principal(rows, fit.covariance)
     entries = []
     at = 0
     for (kind, name, q, period), table in zip(parts, rows, strict=True):
@@ -92,8 +93,9 @@ def _positions(fit: Fit, name: str) -> Array:
     return np.concatenate([*parts, [high]])
 
 
-def _factor(rows: list[Array], covariance: Array) -> tuple[Array, float]:
-    """(m, k) factor, and the largest share of a variance that it drops."""
+def principal(rows: list[Array], covariance: Array) -> tuple[Array, float]:
+    """(m, k) factor of the covariance of numbers that are `rows` of unknowns, and the largest share of a
+    variance that it drops."""
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     full = [table @ root for table in rows]
@@ -111,3 +113,15 @@ def _factor(rows: list[Array], covariance: Array) -> tuple[Array, float]:
     worst = left.max(axis=0, initial=0.0)
     count = int(np.argmax(worst <= DROPPED)) + 1 if (worst <= DROPPED).any() else len(worst)
     return table @ turned[:, :count], float(worst[count - 1])
+
+
+def sigmas_at(calibration: Calibration, uncertainty: Uncertainty) -> dict[str, Array]:
+    """Standard uncertainties of components at the positions of their curves, mm or rad."""
+    found = {}
+    for curve in calibration.curves:
+        for name in curve.names:
+            entry = uncertainty.find("mean", name)
+            if entry is not None:
+                sigma = np.interp(curve.position_mm, entry.position_mm, entry.sigma)
+                found[name] = np.round(sigma, DIGITS[name[1] in "ABC"])
+    return found

@@ -318,8 +318,8 @@ def _fit(
     covariance = solved.covariance * max(1.0, chi_square / freedom)
     return Fit(
         measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
-        tuple(rays_left), tuple(pods_left), tuple(outliers), box, _slopes(parameters), chi_square, freedom,
-        unseen,
+        tuple(rays_left), tuple(pods_left), tuple(outliers), box, mean_slopes(parameters), chi_square,
+        freedom, unseen,
     )  # fmt: skip
 
 
@@ -504,7 +504,7 @@ def _squares(measurements: Measurements, parameters: Parameters) -> dict[str, tu
     return {name: known.get(name, (0.0, POSE)) for name in parameters.shared}
 
 
-def _slopes(parameters: Parameters) -> dict[str, Array]:
+def mean_slopes(parameters: Parameters) -> dict[str, Array]:
     """Mean slopes of the straightness curves on lines through the datum with no tool."""
     slopes: dict[str, Array] = {}
     for name in COMPONENTS:

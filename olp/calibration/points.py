@@ -25,9 +25,9 @@ LEVER_MM = 1000.0
 def points_block(points: Points, parameters: Unknowns) -> Block:
     """The readings of one set-up: three rows a point. Raises CannotCompute where they make no frame."""
     nominal = points.axis_mm + points.tool_mm
-    near = fit_frame(points.measured_mm, nominal)(points.measured_mm)
+    near = nominal + deviations(points)
     centre = nominal.mean(axis=0)
-    local = _frame(nominal - centre, scale=points.sigma_scale > 0.0)
+    local = frame_columns(nominal - centre, scale=points.sigma_scale > 0.0)
     precision = np.zeros(local.shape[2])
     if points.sigma_scale > 0.0:
         precision[6] = 1.0 / (points.sigma_scale * LEVER_MM) ** 2
@@ -48,7 +48,14 @@ def points_block(points: Points, parameters: Unknowns) -> Block:
     return Block(np.arange(size), precision, chunks, points.source or "points")
 
 
-def _frame(arm: Array, *, scale: bool) -> Array:
+def deviations(points: Points) -> Array:
+    """(n, 3) measured less commanded places of the reflector in mm, in the frame that fits best. Raises
+    CannotCompute where the points make no frame."""
+    nominal = points.axis_mm + points.tool_mm
+    return np.asarray(fit_frame(points.measured_mm, nominal)(points.measured_mm) - nominal)
+
+
+def frame_columns(arm: Array, *, scale: bool = False) -> Array:
     """(n, 3, 6 or 7) what shifts, turns and the scale of the frame do to points at `arm` from the centre."""
     out = np.zeros((len(arm), 3, 7 if scale else 6))
     for k in range(3):

@@ -7,6 +7,9 @@ from olp.cli.late import LateGroup
 #: Verb to what it does; each is a module `olp.cli.calibrate_VERB`.
 VERBS: dict[str, str] = {
     "fit": "Make a calibration from lines, points, lengths and directions.",
+    "doctor": "Judge sign, unit and place of every curve of a calibration by independent points.",
+    "plan": "Propose what to measure for a wanted uncertainty, with programs that go there.",
+    "refine": "Update a calibration within its covariance by a measured run.",
     "read": "Show what is understood of the file of an instrument.",
     "import": "Read the compensation table of a control as a calibration.",
     "export": "Write a calibration as the table of a control, and say what it would leave.",

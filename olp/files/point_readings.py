@@ -30,6 +30,8 @@ Array = npt.NDArray[np.float64]
 AXIS = tuple(f"{axis}_mm" for axis in AXES)
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
 LENGTH = ("length_mm",)
+#: Actual minus commanded, in place of measured places.
+DEVIATION = tuple(f"deviation_{axis}_um" for axis in AXES)
 TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)
 
 

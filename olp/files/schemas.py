@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -361,7 +361,6 @@ class ThermalTable(Table):
 class CalibrationFile(Table):
     """olp-calibration-1: the measured errors of one machine, actual minus commanded."""
 
-    not_built: ClassVar[dict[str, str]] = {}
     schema_: Literal["olp-calibration-1"] = Field(
         alias="schema", description='the format, "olp-calibration-1"'
     )

@@ -6,7 +6,7 @@ a shop would take them, simulated.
 The machine's errors are those of `gantry-plate/calibration.toml`. All lines pass through one place, the
 reflector hangs 85 mm below the gauge point. Noise: laser 0.5 um and a wavelength off by 0.5 um/m, of
 straightness 0.5 um + 0.5 um/m, levels and angles 1 urad, squares 5 urad; drift of some um or urad; five runs
-there and back.
+there and back. Tracker: 50 places of a Latin hypercube with three reflectors, 5 um, in a frame of its own.
 """
 
 from __future__ import annotations
@@ -105,6 +105,28 @@ def export(name: str, rows: Sequence[tuple[float, int, int, float]]) -> str:
     return "\r\n".join(text) + "\r\n"
 
 
+def tracker() -> str:
+    """Places of three reflectors as a tracker beside the machine saw them."""
+    rng, n = random.Random(30), 50
+    shares = [[(k + rng.random()) / n for k in rng.sample(range(n), n)] for _ in AXES]
+    text = [
+        "# Points after the calibration, for olp calibrate doctor.",
+        "# sigma_um = 5",
+        "X_mm,Y_mm,Z_mm,tool_X_mm,tool_Y_mm,tool_Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm",
+    ]
+    turn, tilt = math.radians(37.0), math.radians(1.5)
+    for k, share in enumerate(zip(*shares, strict=True)):
+        at = [round(low + s * (high - low), 1) for s, (low, high) in zip(share, SPAN, strict=True)]
+        tool = (REFLECTOR, (140.0, 0.0, -85.0), (-60.0, 120.0, -200.0))[k % 3]
+        off = error_um(at, tool, (0.0, 0.0, 0.0))
+        x, y, z = (a + t + 1e-3 * (e + rng.gauss(0.0, 5.0)) for a, t, e in zip(at, tool, off, strict=True))
+        x, z = x * math.cos(tilt) + z * math.sin(tilt), z * math.cos(tilt) - x * math.sin(tilt)
+        x, y = x * math.cos(turn) - y * math.sin(turn), x * math.sin(turn) + y * math.cos(turn)
+        row = (*at, *tool, *(f"{v:.4f}" for v in (x + 2311.0, y - 1874.0, z + 903.0)))
+        text.append(",".join(map(str, row)))
+    return "\n".join(text) + "\n"
+
+
 def main() -> None:
     rng = random.Random(2026)
     files: dict[str, str] = {}
@@ -127,6 +149,7 @@ def main() -> None:
             files[f"{name.lower()}.csv"] = native(name, rows)
     for label, aside in (("left", -130.0), ("right", 130.0)):
         files[f"eyz-{label}.csv"] = native("EYZ", line("EYZ", rng, slope=other, aside=aside))
+    files["tracker.csv"] = tracker()
     OUT.mkdir(exist_ok=True)
     for file, text in files.items():
         (OUT / file).write_bytes(text.encode())

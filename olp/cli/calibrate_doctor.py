@@ -1,0 +1,80 @@
+"""`olp calibrate doctor`."""
+
+from __future__ import annotations
+
+import click
+
+from olp.cli.common import (
+    STREAM,
+    Length,
+    exit_for,
+    fail_on_option,
+    files_of,
+    json_option,
+    put,
+    refuse_early,
+    talk,
+)
+from olp.exceptions import UsageError
+
+
+@click.command("doctor")
+@click.argument("calibration", metavar="CALIBRATION")
+@click.argument("points", metavar="POINTS.csv")
+@click.option("-m", "--machine", metavar="machine.toml", required=True, help="The machine file.")
+@click.option(
+    "-o", "--output", metavar="NEW.toml", help="Write the calibration with what is decided put right."
+)
+@click.option("--sigma-um", type=Length(), help="Standard uncertainty of a coordinate, if the file has none.")
+@click.option(
+    "--tool", type=(float, float, float), metavar="X Y Z",
+    help="Vector from the gauge point to the reflector in mm, if the file has none.",
+)  # fmt: skip
+@json_option
+@fail_on_option
+@click.option("-q", "--quiet", is_flag=True, help="No table; the exit code tells.")
+@click.option("--force", is_flag=True, help="Overwrite the new calibration and its curves.")
+def command(
+    calibration: str,
+    points: str,
+    machine: str,
+    output: str | None,
+    sigma_um: float | None,
+    tool: tuple[float, float, float] | None,
+    as_json: bool,
+    fail_on: str,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """Judge the curves of a calibration by independent points.
+
+    POINTS.csv holds commanded axis positions and measured places (or deviations) of points that had no part
+    in the calibration, in a frame that nobody needs to know. For every curve and squareness: sense right,
+    flipped or undecided; unit; columns in each other's place; and which points would decide what is open.
+    """
+    if STREAM in (output, calibration, points):
+        raise UsageError("a calibration is several files; name files, - is none")
+    from olp.files.calibration import files_beside
+    from olp.files.measurements import files_of_measurements
+
+    stated = map(str, (calibration, *files_beside(calibration)))
+    inputs = (*files_of(machine), *stated, *files_of_measurements([points]))
+    refuse_early(files_of(output), inputs, force=force)
+
+    from olp.diagnosing import diagnose_calibration
+    from olp.files.write import write_files
+    from olp.report import to_json
+
+    found = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=tool)
+    if output is not None:
+        files = found.files(output)
+        write_files(files, force=force, inputs=inputs)
+        talk(f"wrote {output} and {len(files) - 1} files beside it")
+    report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
+    if as_json:
+        put(to_json(report))
+    elif not quiet:
+        from olp.cli.outline import outline
+
+        put(outline(report))
+    exit_for(found.findings, fail_on)

@@ -1,0 +1,105 @@
+"""`olp calibrate plan`."""
+
+from __future__ import annotations
+
+import datetime
+
+import click
+
+from olp.cli.common import Length, exit_for, fail_on_option, files_of, json_option, put, refuse_early, talk
+from olp.exceptions import UsageError
+
+METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
+
+
+@click.command("plan")
+@click.option("-m", "--machine", metavar="machine.toml", required=True, help="The machine file.")
+@click.option(
+    "--uncertainty-um", type=Length(), default=5.0, show_default=True,
+    help="What a correction may leave: rms length over the box, best-fit frame.",
+)  # fmt: skip
+@click.option("--instrument", type=click.Choice(METHODS), help="Default: whatever gets there quickest.")
+@click.option("--points", type=click.IntRange(min=8), help="Number of points, in place of the least enough.")
+@click.option(
+    "--box", type=(float, float, float, float, float, float), metavar="X X Y Y Z Z",
+    help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
+)  # fmt: skip
+@click.option(
+    "--reflector", "reflectors", type=(float, float, float), multiple=True, metavar="X Y Z",
+    help="Vector from the gauge point to a reflector in mm; three that are not on one line see everything.",
+)  # fmt: skip
+@click.option(
+    "--sigma-um", type=Length(), help="Standard uncertainty of a tracker's coordinate.  [default: 8]"
+)
+@click.option("--period-x", type=Length(), multiple=True, help="Period of the screw or scale of X in mm.")
+@click.option("--period-y", type=Length(), multiple=True, help="The same of Y.")
+@click.option("--period-z", type=Length(), multiple=True, help="The same of Z.")
+@click.option("--dwell-s", type=Length(), help="Time of a reading; default by instrument.")
+@click.option("--settle-s", type=Length(), default=1.0, show_default=True, help="Time to settle before it.")
+@click.option("-o", "--output", metavar="FOLDER", help="Write the plan, CSV files to fill in, and programs.")
+@click.option(
+    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="Day of measuring, for the plan."
+)
+@json_option
+@fail_on_option
+@click.option("-q", "--quiet", is_flag=True, help="No table.")
+@click.option("--force", is_flag=True, help="Overwrite files in FOLDER.")
+def command(
+    machine: str,
+    uncertainty_um: float,
+    instrument: str | None,
+    points: int | None,
+    box: tuple[float, float, float, float, float, float] | None,
+    reflectors: tuple[tuple[float, float, float], ...],
+    sigma_um: float | None,
+    period_x: tuple[float, ...],
+    period_y: tuple[float, ...],
+    period_z: tuple[float, ...],
+    dwell_s: float | None,
+    settle_s: float,
+    output: str | None,
+    date: datetime.datetime | None,
+    as_json: bool,
+    fail_on: str,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """Propose what to measure, before anybody measures.
+
+    Compares methods by time against what a correction made from them would leave, by the covariance of the
+    adjustment for their geometry. FOLDER gets measurements.toml, CSV files whose readings are still empty,
+    and a program for each run of the machine: machine coordinates, a dwell at each place.
+    """
+    from pathlib import Path
+
+    from olp.files.write import write_files
+    from olp.planning import INSTRUMENTS, plan_measurements
+    from olp.report import to_json
+
+    if output is not None and not Path(output).is_dir():
+        raise UsageError("is no folder; create it first", file=output)
+    plan = plan_measurements(
+        machine,
+        uncertainty_um=uncertainty_um,
+        instrument=next((name for name in INSTRUMENTS if name == instrument), None),
+        box_mm=None if box is None else (box[0:2], box[2:4], box[4:6]),
+        tools=reflectors,
+        sigma_um=sigma_um,
+        periods_mm=(period_x, period_y, period_z),
+        dwell_s=dwell_s,
+        settle_s=settle_s,
+        points=points,
+    )
+    if output is not None:
+        files = plan.files(output, date.date() if date else None)
+        refuse_early([str(name) for name in files], files_of(machine), force=force)
+        write_files(files, force=force, inputs=files_of(machine))
+        talk(f"wrote {len(files)} files to {output}")
+    report = {**plan.report, "findings": [finding.as_dict() for finding in plan.findings]}
+    if as_json:
+        put(to_json(report))
+    elif not quiet:
+        from olp.cli.outline import outline
+
+        put(outline(report))
+    exit_for(plan.findings, fail_on)

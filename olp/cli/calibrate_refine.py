@@ -1,0 +1,98 @@
+"""`olp calibrate refine`."""
+
+from __future__ import annotations
+
+import datetime
+
+import click
+
+from olp.cli.common import (
+    STREAM,
+    Length,
+    exit_for,
+    fail_on_option,
+    files_of,
+    json_option,
+    put,
+    refuse_early,
+    setup_options,
+    talk,
+)
+from olp.exceptions import UsageError
+
+
+@click.command("refine")
+@click.argument("calibration", metavar="CALIBRATION")
+@click.argument("measured", metavar="MEASURED.csv")
+@setup_options
+@click.option("-o", "--output", metavar="NEW.toml", required=True, help="Where to write; never in place.")
+@click.option(
+    "--program", metavar="NOMINAL", help="MEASURED are tip positions along a corrected run of this program."
+)
+@click.option("--sigma-um", type=Length(), help="Standard uncertainty of a coordinate, if the file has none.")
+@click.option(
+    "--tool", type=(float, float, float), metavar="X Y Z",
+    help="Vector from the gauge point to the reflector in mm, if the file has none.",
+)  # fmt: skip
+@click.option(
+    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
+    help="Day of the run: the new calibration's date of measuring. Default: the old one's.",
+)  # fmt: skip
+@json_option
+@fail_on_option
+@click.option("-q", "--quiet", is_flag=True, help="No table; the exit code tells.")
+@click.option("--force", is_flag=True, help="Overwrite the new calibration and its files.")
+def command(
+    calibration: str,
+    measured: str,
+    machine: str | None,
+    job: str | None,
+    output: str,
+    program: str | None,
+    sigma_um: float | None,
+    tool: tuple[float, float, float] | None,
+    date: datetime.datetime | None,
+    as_json: bool,
+    fail_on: str,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """Update a calibration by a measured run, within its covariance.
+
+    MEASURED.csv holds commanded axis positions and where an instrument saw the reflector, in a frame of its
+    own. Every number of the calibration moves as far as its uncertainty lets it and the run asks for it; what
+    the run says nothing of stays.
+    """
+    if STREAM in (output, calibration, measured):
+        raise UsageError("a calibration is several files; name files, - is none")
+    if machine is None:
+        raise UsageError("no machine file is given; name it with -m")
+    from olp.files.calibration import files_beside
+    from olp.files.measurements import files_of_measurements
+
+    inputs = (
+        *files_of(machine, job, program),
+        *map(str, (calibration, *files_beside(calibration))),
+        *files_of_measurements([measured]),
+    )
+    refuse_early(files_of(output), inputs, force=force)
+
+    from olp.files.write import write_files
+    from olp.refining import refine_calibration
+    from olp.report import to_json
+
+    found = refine_calibration(
+        calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=tool,
+        date=date.date() if date else None,
+    )  # fmt: skip
+    files = found.files(output)
+    write_files(files, force=force, inputs=inputs)
+    talk(f"wrote {output} and {len(files) - 1} files beside it")
+    report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
+    if as_json:
+        put(to_json(report))
+    elif not quiet:
+        from olp.cli.outline import outline
+
+        put(outline(report))
+    exit_for(found.findings, fail_on)
