@@ -49,12 +49,12 @@ if TYPE_CHECKING:
     from olp.metrology import fit_diagonals as fit_diagonals
     from olp.metrology import fit_postures as fit_postures
     from olp.metrology import go_return as go_return
-    from olp.result_correction import ResultCorrection as ResultCorrection
-    from olp.result_correction import correct_results as correct_results
     from olp.planning import MeasurementPlan as MeasurementPlan
     from olp.planning import plan_measurements as plan_measurements
     from olp.refining import RefinedCalibration as RefinedCalibration
     from olp.refining import refine_calibration as refine_calibration
+    from olp.result_correction import ResultCorrection as ResultCorrection
+    from olp.result_correction import correct_results as correct_results
     from olp.retiming import Retiming as Retiming
     from olp.retiming import retime as retime
     from olp.review.job import Review as Review

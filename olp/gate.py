@@ -48,8 +48,8 @@ class Check:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
     """The program as it would run; `run` and `proof` where a nominal one is known. Lines of the proof are
-    those of `data`, the text that was given: the nominal program where that was given alone, else the
-    corrected one."""
+    those of `data`, the text that was given: the nominal program, `corrected_here`, where that was given
+    alone, else the corrected one."""
 
     name: str
     data: bytes
@@ -59,11 +59,7 @@ class _Case:
     loaded: Loaded
     options: Options
     checked: str
-
-    @property
-    def corrected_here(self) -> bool:
-        """The text that was given is the nominal program, and the run has found what it can."""
-        return self.run is not None and self.data is not self.run.text
+    corrected_here: bool = False
 
     def worded(self, program: Program) -> Program:
         """A program with its words, which a correction drops early."""
@@ -155,7 +151,7 @@ def _case(
         what = "what olp correct makes of the program"
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
-        return _Case(name, data, run.corrected, run, proof, loaded, options, what)
+        return _Case(name, data, run.corrected, run, proof, loaded, options, what, corrected_here=True)
     written = read(data, loaded.setup, loaded.dialect, options)
     if nominal is None:
         what = "the corrected program as it is; what needs the nominal one is left out (--nominal)"
@@ -201,6 +197,7 @@ def _findings(
         found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             found += checks.proof_findings(proof, run.passed)
+            found += checks.between_findings(run.nominal, proof, loaded.model)
             found += _confidence(run)
     found += state.tool_findings(path, loaded.calibration, sanity)
     lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD

@@ -21,10 +21,11 @@ from olp.errormodel.base import Array
 from olp.exceptions import CannotCompute, UsageError
 from olp.files.plan_files import Pass, plan_files
 from olp.findings import Finding
-from olp.loading import PathLike, profile_of, setup_of
+from olp.loading import PathLike, control_of, setup_of
 from olp.machine import Machine, Setup, Vector
+from olp.program.dialects import read
 from olp.program.positions import positions_program
-from olp.program.reader import read
+from olp.program.profiles import Profile
 from olp.units import AXES, MM_PER_UM, UM_PER_MM
 
 Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
@@ -301,7 +302,7 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
     machine, chosen = plan.setup.machine, plan.chosen
     for name, data in plan_files(machine, chosen.planned, chosen.passes, chosen.name, date):
         yield folder / name, data
-    profile = profile_of(plan.setup)
+    profile = _control(plan.setup)
     digits = max(0, math.ceil(-math.log10(min(machine.least_increment_mm)) - 1e-9))
     ending = "ngc" if machine.controller == "linuxcnc" else "nc"
     for run in chosen.passes:
@@ -317,9 +318,20 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
         yield folder / f"{run.name}.{ending}", text
 
 
+def _control(setup: Setup) -> Profile:
+    """What the control reads. Raises CannotCompute where no program of positions is written for it."""
+    control = control_of(setup)
+    if not isinstance(control, Profile):
+        raise CannotCompute(
+            f"no programs of positions are written for {control.title}; take the points from the CSV files, "
+            "or name an RS-274 control in the machine file"
+        )
+    return control
+
+
 def _proved(text: bytes, run: Pass, setup: Setup, digits: int) -> None:
     """Read a program back: it must stop where it is meant to. Its first block moves Z alone."""
-    path = read(text, setup, profile_of(setup)).toolpath
+    path = read(text, setup, _control(setup)).toolpath
     wanted = np.round(run.places_mm, digits)
     kept = np.concatenate([[True], (np.diff(wanted, axis=0) != 0.0).any(axis=1)])
     wanted = wanted[kept]

@@ -25,10 +25,10 @@ from olp.files.checkpoints import load_checkpoints
 from olp.files.covariance import load_uncertainty
 from olp.files.write import read_bytes
 from olp.findings import Finding
-from olp.loading import PathLike, profile_of, setup_of
+from olp.loading import PathLike, reading, setup_of
 from olp.machine import Setup, Vector
 from olp.nominal import nominal_of
-from olp.program.reader import read
+from olp.program.dialects import read
 from olp.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 
 #: A run whose chi-square a degree of freedom is beyond this was not foreseen by the covariance.
@@ -136,7 +136,9 @@ def _along(
     found = compare(program, [measured], setup)
     path, run = found.path, found.runs[0]
     assert path is not None
-    toolpath = read(read_bytes(program), setup, profile_of(setup)).toolpath
+    data = read_bytes(program)
+    setup, dialect = reading(setup, data, str(program))
+    toolpath = read(data, setup, dialect).toolpath
     axes = nominal_of(toolpath, model, "axes")
     if len(axes.path) != len(path):
         raise CannotCompute("the path has moves whose axis positions are not known; give start_mm in the job")

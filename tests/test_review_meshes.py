@@ -11,10 +11,9 @@ from judge.machines import CHAINS, Recipe, zero_machine
 from judge.unpacker import Page
 
 import olp
-from olp.checks.clearance import rotation
 from olp.exceptions import ConfigError, InputError
 from olp.files.meshes import read_mesh
-from olp.machine import WorkOffset
+from olp.geometry import rotation_matrix
 from olp.review import meshes
 from olp.review.meshes import coarser, nodes, of_machine
 
@@ -71,13 +70,13 @@ def test_a_mesh_in_a_rotated_frame_is_rotated(tmp_path: Path) -> None:
 def test_rotations_are_right_handed_and_in_order() -> None:
     """A point on X, turned by 90 degrees about Z, lies on Y; A comes before B, B before C."""
     about = {
-        axis: rotation(WorkOffset("v", rotation_deg=tuple(90.0 * (k == axis) for k in range(3))))
+        axis: rotation_matrix(tuple(90.0 * (k == axis) for k in range(3)))
         for axis in range(3)
     }
     np.testing.assert_allclose(about[2] @ [1, 0, 0], [0, 1, 0], atol=1e-15)
     np.testing.assert_allclose(about[0] @ [0, 1, 0], [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(about[1] @ [0, 0, 1], [1, 0, 0], atol=1e-15)
-    whole = rotation(WorkOffset("v", rotation_deg=(90.0, 90.0, 90.0)))
+    whole = rotation_matrix((90.0, 90.0, 90.0))
     np.testing.assert_allclose(whole, about[2] @ about[1] @ about[0], atol=1e-15)
 
 
