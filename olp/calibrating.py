@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,9 @@ from typing import Any
 from olp.calibration.covariance import covariance_of
 from olp.calibration.curves import calibration_of, sigmas_of
 from olp.calibration.estimator import Fit, fit
-from olp.calibration.observations import Measurements
+from olp.calibration.nonrigid import NonRigid, nonrigid
+from olp.calibration.observations import MapWish, Measurements
+from olp.calibration.residual_map import map_findings, map_summary, residual_map
 from olp.calibration.summary import findings_of, summary
 from olp.errormodel import Calibration
 from olp.exceptions import ConfigError
@@ -28,13 +31,16 @@ class FittedCalibration:
     """A calibration with what it was made from.
 
     `fit` holds all parameters with their covariance (`fit.sigma(axis_mm, tool_mm)` is the uncertainty of the
-    error anywhere), `report` what was found as a mapping ("olp-fit-1"), `findings` what to know about it.
+    error of the curves anywhere), `report` what was found as a mapping ("olp-fit-1"), `findings` what to know
+    about it. `nonrigid` is what was looked for beyond rigid bodies where a map was wanted;
+    `nonrigid.sigma(axis_mm, tool_mm)` is the uncertainty with the map.
     """
 
     calibration: Calibration
     fit: Fit
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    nonrigid: NonRigid | None = None
 
     def files(self, target: PathLike) -> dict[Path, bytes]:
         """The bytes of the calibration file `target` and of its curves beside it."""
@@ -52,13 +58,15 @@ def fit_calibration(
     *,
     datum_mm: Vector | None = None,
     valid_until: datetime.date | None = None,
+    map: bool | MapWish | None = None,
     progress: Progress | None = None,
 ) -> FittedCalibration:
     """The calibration of a machine from its measurements.
 
     `data` are plans (olp-measurements-1), folders or files of readings that describe themselves, or
     Measurements. Chain, travel and tools come from the machine file; without one the plan states the chain.
-    `datum_mm` is where the curves are zero, by default the place of the calibrated box nearest to zero.
+    `datum_mm` is where the curves are zero, by default the place of the calibrated box nearest to zero. `map`
+    asks for a map of what no rigid bodies make, or forbids it; without it the plan says.
     Raises InputError, ConfigError with every problem of the files, and CannotCompute.
     """
     described = None if machine is None else setup_of(machine, None).machine
@@ -86,12 +94,25 @@ def fit_calibration(
             )
     travel = None if described is None else [described.axes[axis].travel_mm for axis in "XYZ"]
     found = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
+    wish = measurements.map if map is None else (map or None)
+    beyond = None
+    if wish is not None:
+        wish = measurements.map or MapWish() if wish is True else wish
+        beyond = nonrigid(found, noise=wish.noise, progress=progress)
+        found = beyond.fit
     calibration = calibration_of(found, valid_until)
+    mapped = (
+        residual_map(beyond, calibration, wish.within_mm) if beyond and wish and beyond.processes else None
+    )
+    if mapped is not None:
+        calibration = dataclasses.replace(calibration, maps=(mapped,))
     tools = [] if described is None else [tool.lever_mm for tool in described.tools.values()]
     levers = [lever for lever in tools if lever is not None]
-    return FittedCalibration(
-        calibration, found, summary(found, calibration, levers), findings_of(found, levers, travel)
-    )
+    report, findings = summary(found, calibration, levers), findings_of(found, levers, travel)
+    if beyond is not None:
+        report["map"] = map_summary(beyond, mapped)
+        findings = (*findings, *map_findings(beyond, mapped))
+    return FittedCalibration(calibration, found, report, findings, beyond)
 
 
 __all__ = ["FittedCalibration", "fit_calibration"]

@@ -87,4 +87,33 @@ CALIBRATION = (
         "State a known distance between two pods, or add a line of a laser or lengths.",
         "Two theodolites, one offset of the reflector and no baseline.",
     ),
+    Rule(
+        "OLP841",
+        "errors that no rigid bodies make",
+        Severity.INFO,
+        "The points hold a smooth field of deviations that the 21 errors cannot describe, such as the sag of "
+        "a bridge that depends on where its carriage stands. It is strongly evident and foretells points "
+        "that it has not seen, so it stands in a map beside the curves, with its uncertainty.",
+        "Nothing; more points make its uncertainty smaller.",
+        "DZ sinks by 20 um in the middle of the table, and only with the ram down.",
+    ),
+    Rule(
+        "OLP842",
+        "no map written",
+        Severity.INFO,
+        "A map was asked for, and the readings do not show that there is anything to map beyond the 21 "
+        "errors: a map of noise would make programs worse.",
+        "Nothing where the residuals are of the size of the noise; else measure more points, all over the "
+        "box.",
+        "120 points of a rigid machine.",
+    ),
+    Rule(
+        "OLP843",
+        "map from too few offsets of the reflector",
+        Severity.WARNING,
+        "What turns and what bends look alike to a reflector that always stands at the same place of the "
+        "tool, so curves and map share it out by what is likely. Together they hold for that tool.",
+        "Measure with three offsets of the reflector that do not lie on one line.",
+        "A nest for the reflector in the spindle, and no other.",
+    ),
 )

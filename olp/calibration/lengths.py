@@ -13,7 +13,7 @@ import numpy as np
 
 from olp.calibration.normal import Block, Chunk
 from olp.calibration.observations import Lengths
-from olp.calibration.parameters import Parameters
+from olp.calibration.parameters import Unknowns
 from olp.errormodel.base import Array
 from olp.exceptions import CannotCompute
 
@@ -50,7 +50,7 @@ def first_station(lengths: Lengths) -> Station:
     return Station(1000.0 * found[:3] + centre, 1000.0 * float(found[3]))
 
 
-def lengths_block(lengths: Lengths, parameters: Parameters, theta: Array, station: Station) -> Block:
+def lengths_block(lengths: Lengths, parameters: Unknowns, theta: Array, station: Station) -> Block:
     """The readings of one station, linearised where the machine's errors are `theta`. Its unknowns are the
     shift of the station and of its dead length."""
     size = parameters.size

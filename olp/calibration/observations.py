@@ -269,9 +269,19 @@ class SquarenessReading:
 
 
 @dataclass(frozen=True, slots=True)
+class MapWish:
+    """That errors which no rigid bodies make are to be mapped: whether the readings scale the stated noise,
+    and what interpolation of the map may lose, in mm."""
+
+    noise: Literal["learnt", "stated"] = "learnt"
+    within_mm: float = 2e-4
+
+
+@dataclass(frozen=True, slots=True)
 class Measurements:
     """All readings of one calibration, as taken: what `fit` takes.
 
+    `map` asks for a map of what is not rigid.
     `periods_mm` are the periods of screws and scales by axis, where cyclic errors are looked for;
     `active_during_measurement` are the errors that the control corrected then.
     """
@@ -288,3 +298,4 @@ class Measurements:
     points: tuple[Points, ...] = ()
     lengths: tuple[Lengths, ...] = ()
     pods: tuple[Pods, ...] = ()
+    map: MapWish | None = None

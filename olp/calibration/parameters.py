@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -23,6 +24,15 @@ CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0
 SHEAR = {"C0Y": (0, 1, -1.0), "B0Z": (0, 2, 1.0), "A0Z": (1, 2, -1.0)}
 
 Part = tuple[slice, Array]
+
+
+class Unknowns(Protocol):
+    """What a block of points, lengths or directions needs: how its tips depend on theta, (n, 3, size)."""
+
+    @property
+    def size(self) -> int: ...
+
+    def design(self, position: Array, tool: Array, /) -> Array: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from olp.calibration.normal import Block, Chunk
 from olp.calibration.observations import Pods
-from olp.calibration.parameters import Parameters
+from olp.calibration.parameters import Unknowns
 from olp.errormodel.base import Array
 from olp.exceptions import CannotCompute
 from olp.measured.rigid import fit_points, rotation_of
@@ -48,7 +48,7 @@ def first_poses(pods: Pods) -> list[Pose]:
     return [_resected(tip, pods, k) for k in range(pods.count)]
 
 
-def pods_block(pods: Pods, parameters: Parameters, theta: Array, poses: list[Pose]) -> Block:
+def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: list[Pose]) -> Block:
     """The directions of all pods and the distances between them, linearised where the machine's errors are
     `theta`. Six unknowns a pod: shift, and turn times LEVER_MM."""
     size, unknowns = parameters.size, 6 * pods.count

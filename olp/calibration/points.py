@@ -12,7 +12,7 @@ import numpy as np
 
 from olp.calibration.normal import Block, Chunk
 from olp.calibration.observations import Points
-from olp.calibration.parameters import Parameters
+from olp.calibration.parameters import Unknowns
 from olp.errormodel.base import Array
 from olp.measured.rigid import fit_frame
 
@@ -22,7 +22,7 @@ CHUNK = 2000
 LEVER_MM = 1000.0
 
 
-def points_block(points: Points, parameters: Parameters) -> Block:
+def points_block(points: Points, parameters: Unknowns) -> Block:
     """The readings of one set-up: three rows a point. Raises CannotCompute where they make no frame."""
     nominal = points.axis_mm + points.tool_mm
     near = nominal + deviations(points)

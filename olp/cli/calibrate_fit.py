@@ -26,6 +26,10 @@ from olp.exceptions import UsageError
     "--valid-until", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
     help="The last day of the calibration's validity.",
 )  # fmt: skip
+@click.option(
+    "--map/--no-map", "map_", default=None,
+    help="Also map what no rigid bodies make, where points show it. Default: as the plan says ([map]).",
+)  # fmt: skip
 @click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
 @click.option(
@@ -40,6 +44,7 @@ def command(
     machine: str | None,
     datum: tuple[float, float, float] | None,
     valid_until: datetime.datetime | None,
+    map_: bool | None,
     report_file: str | None,
     as_json: bool,
     fail_on: str,
@@ -71,6 +76,7 @@ def command(
             machine,
             datum_mm=datum,
             valid_until=valid_until.date() if valid_until else None,
+            map=map_,
             progress=tell,
         )
     files: dict[Path, bytes] = {} if output is None else fitted.files(output)
@@ -81,7 +87,8 @@ def command(
         files[Path(report_file)] = fit_report(fitted, report_file, None)
     write_files(files, force=force, inputs=inputs)
     if output is not None:
-        talk(f"wrote {output} and {curves} files of curves and covariance beside it")
+        kinds = "curves, map and covariance" if fitted.calibration.maps else "curves and covariance"
+        talk(f"wrote {output} and {curves} files of {kinds} beside it")
     if report_file is not None:
         talk(f"wrote {report_file}")
     report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}

@@ -66,8 +66,9 @@ class DeviationMap:
     with the tool vector `tool_mm`.
 
     A "residual" map adds to the curves; a "total" one is all that was measured and stands in for them. An
-    axis in `holds_along` may have one level: the map is taken to be the same all along it. Raises
-    ConfigError.
+    axis in `holds_along` may have one level: the map is taken to be the same all along it. `sigma`, of the
+    shape of the values, are standard uncertainties in mm; of a residual map beside those of the curves.
+    Raises ConfigError.
     """
 
     knots_mm: tuple[Array, Array, Array]
@@ -77,11 +78,14 @@ class DeviationMap:
     interpolation: Interpolation = "linear"
     holds_along: tuple[str, ...] = ()
     name: str = "map"
+    sigma: Array | None = None
 
     def __post_init__(self) -> None:
         x, y, z = (frozen(k) for k in self.knots_mm)
         object.__setattr__(self, "knots_mm", (x, y, z))
         object.__setattr__(self, "values", frozen(self.values))
+        if self.sigma is not None:
+            object.__setattr__(self, "sigma", frozen(self.sigma))
         refuse(self._problems())
 
     def _problems(self) -> list[str]:
@@ -89,6 +93,11 @@ class DeviationMap:
         shape = tuple(len(k) for k in self.knots_mm)
         if self.values.shape != (*shape, 3) or not np.all(np.isfinite(self.values)):
             problems.append(f"{self.name}: expected three finite deviations at each of {shape} nodes")
+        sigma = np.zeros((*shape, 3)) if self.sigma is None else self.sigma
+        if sigma.shape != (*shape, 3) or not np.all(np.isfinite(sigma)) or np.any(sigma < 0.0):
+            problems.append(
+                f"{self.name}: expected three uncertainties of 0 or above at each of {shape} nodes"
+            )
         if self.kind not in ("residual", "total"):
             problems.append(f"{self.name}: kind '{self.kind}'; expected residual or total")
         if self.interpolation not in KINDS:

@@ -175,6 +175,9 @@ def _map(path: FilePath, table: MapTable, datum_mm: Vector) -> DeviationMap:
     grid = read_map(path)
     order = [grid.arguments.index(axis) for axis in AXES]
     values = np.stack([grid.columns[f"D{axis}"].transpose(order) for axis in AXES], axis=-1)
+    sigma = None
+    if "sigma_DX" in grid.columns:
+        sigma = np.stack([grid.columns[f"sigma_D{axis}"].transpose(order) for axis in AXES], axis=-1)
     x, y, z = (grid.knots_mm[k] for k in order)
     try:
         return DeviationMap(
@@ -185,6 +188,7 @@ def _map(path: FilePath, table: MapTable, datum_mm: Vector) -> DeviationMap:
             interpolation=table.interpolation,
             holds_along=tuple(table.holds_along),
             name=f"map {table.file}",
+            sigma=sigma,
         )
     except ConfigError as error:
         raise error.in_file(str(path)) from None

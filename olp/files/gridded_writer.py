@@ -32,8 +32,10 @@ def map_lines(described: DeviationMap, name: str) -> Iterator[str]:
 
 
 def map_csv(described: DeviationMap, in_unit: InUnit) -> str:
-    """X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um."""
+    """X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um, and the sigma columns where there are some."""
     columns = {f"D{axis}_um": described.values[..., i] for i, axis in enumerate(AXES)}
+    if described.sigma is not None:
+        columns |= {f"sigma_D{axis}_um": described.sigma[..., i] for i, axis in enumerate(AXES)}
     return _csv(AXES, described.knots_mm, columns, -3, in_unit)
 
 

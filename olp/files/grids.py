@@ -18,6 +18,7 @@ from olp.units import AXES
 Index = npt.NDArray[np.int64]
 
 MAP_COLUMNS = ("DX_um", "DY_um", "DZ_um")
+SIGMA_COLUMNS = tuple(f"sigma_{name}" for name in MAP_COLUMNS)
 #: Positions this close are one level.
 LEVEL_MM = 1e-6
 #: So many missing nodes are named one by one.
@@ -35,13 +36,16 @@ class GridTable:
 
 
 def read_map(path: PathLike) -> GridTable:
-    """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, a row a node in any order; the columns
-    DX, DY, DZ of the result are in mm.
+    """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, a row a node in any order, and standard
+    uncertainties `sigma_DX_um, sigma_DY_um, sigma_DZ_um` where they are stated; the columns DX, sigma_DX ..
+    of the result are in mm.
 
     Raises InputError where the file cannot be read, ConfigError with every problem and its line.
     """
     table = _parse(read_bytes(path), str(path), _map_problems)
-    return GridTable(table.arguments, table.knots_mm, {n[:2]: v for n, v in table.columns.items()})
+    return GridTable(
+        table.arguments, table.knots_mm, {n.removesuffix("_um"): v for n, v in table.columns.items()}
+    )
 
 
 def read_component_grid(path: PathLike) -> GridTable:
@@ -90,8 +94,12 @@ _POSITIONS = tuple(f"{axis}_mm" for axis in AXES)
 
 def _map_problems(line: int, header: Sequence[str]) -> list[Problem]:
     known = (*_POSITIONS, *MAP_COLUMNS)
-    problems = _header_problems(line, header, known)
+    problems = _header_problems(line, header, (*known, *SIGMA_COLUMNS))
     missing = [name for name in known if name not in header]
+    sigmas = [name for name in SIGMA_COLUMNS if name in header]
+    if sigmas and len(sigmas) < 3:
+        missing += [name for name in SIGMA_COLUMNS if name not in header]
+        known = (*known, *SIGMA_COLUMNS)
     if not problems and missing:
         problems.append(
             (line, f"there is no column {', '.join(missing)}; expected {', '.join(known)}, a row a node")

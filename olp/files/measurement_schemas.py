@@ -194,6 +194,16 @@ class PodsTable(Table):
     )
 
 
+class MapKeys(Table):
+    noise: Literal["learnt", "stated"] = Field(
+        default="learnt",
+        description='"learnt" (the readings scale the stated uncertainties) or "stated" (they are as stated)',
+    )
+    within_um: Positive = Field(
+        default=0.2, description="what interpolation between the nodes of the map may lose at most, in um"
+    )
+
+
 class PeriodsTable(Table):
     X: list[Positive] = Field(default=[], description="the periods of screw and scale of X, [..] in mm")
     Y: list[Positive] = Field(default=[], description="the periods of screw and scale of Y, [..] in mm")
@@ -239,4 +249,7 @@ class MeasurementsFile(Table):
     )
     pods: list[PodsTable] = Field(
         default=[], description="tables [[pods]]: directions from places that nobody knows"
+    )
+    map: MapKeys | None = Field(
+        default=None, description="the table [map]: errors that no rigid bodies make are to be mapped"
     )

@@ -17,7 +17,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points, Square, SquarenessReading
+from olp.calibration.observations import (
+    Lengths,
+    Line,
+    MapWish,
+    Measurements,
+    Pods,
+    Points,
+    Square,
+    SquarenessReading,
+)
 from olp.exceptions import ConfigError, InputError
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
@@ -62,6 +71,7 @@ class _Gathered:
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
     whole: dict[str, tuple[Any, str]] = field(default_factory=dict)
     errors: list[ConfigError] = field(default_factory=list)
+    map: MapWish | None = None
 
     def state(self, key: str, value: Any, file: str, line: int | None) -> None:
         """Take what holds for the whole calibration; two files must not contradict each other."""
@@ -115,6 +125,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         points=tuple(found.points),
         lengths=tuple(found.lengths),
         pods=tuple(found.pods),
+        map=found.map,
     )
 
 
@@ -160,6 +171,8 @@ def _plan(path: FilePath, found: _Gathered) -> None:
             sentence = f'chain = "{plan.chain}", but the machine file says "{found.chain}"'
             found.errors.append(config_error([(line_of(("chain",), places), sentence)], str(path)))
         found.chain = found.chain or plan.chain
+    if plan.map is not None:
+        found.map = MapWish(plan.map.noise, plan.map.within_um * MM_PER_UM)
     for axis in AXES:
         found.periods[axis].update(getattr(plan.periods_mm, axis))
     problems: list[Problem] = []

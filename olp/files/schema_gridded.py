@@ -13,7 +13,7 @@ from olp.files.schema_base import Position, Table
 class MapTable(Table):
     file: Text = Field(
         description="the path of a CSV file with the columns X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um, a row "
-        "a node"
+        "a node; and sigma_DX_um, sigma_DY_um, sigma_DZ_um where uncertainties are stated"
     )
     kind: Literal["residual", "total"] = Field(
         description='"residual" (what the curves leave; adds to them) or "total" (all that was measured; no '

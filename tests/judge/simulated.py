@@ -345,3 +345,19 @@ def directions(
 
 #: two pods in front of the machine, 4 m apart
 PODS = ((-500.0, -1500.0, -300.0), (3500.0, -1500.0, -100.0))
+
+
+def bent(m: Machine, sag_mm: float = 0.030, twist_mm: float = 0.015) -> Machine:
+    """The same machine, and what no rigid bodies make: a sag of Z in the middle of X and Y that depends on
+    the ram, and X that twists with all three axes."""
+
+    @dataclass
+    class Bent(Machine):
+        def error(self, at: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
+            out = Machine.error(self, at, tool, play)
+            u = (at - self.box[:, 0]) / np.ptp(self.box, axis=1)
+            out[:, 2] -= sag_mm * np.sin(np.pi * u[:, 0]) * np.sin(np.pi * u[:, 1]) * (0.5 + u[:, 2])
+            out[:, 0] += twist_mm * np.prod(2.0 * u - 1.0, axis=1)
+            return out
+
+    return Bent(m.chain, m.box, m.datum, m.curves, m.square, m.half)

@@ -1,0 +1,72 @@
+"""Maps of what no rigid bodies make: what they leave of machines that bend, and whether rigid ones get any.
+
+    python tests/benchmarks/bench_nonrigid.py [SEEDS]
+
+Machines of 3 x 2 x 1 m and six chains; bending ones sag by 30 um in the middle of X and Y, more with the ram
+up, and twist by 15 um. Points of 5 um in a Latin hypercube with three offsets of the reflector; judged at
+fresh places with a tool of none of them, after the rigid frame that fits best.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from calibration_cases import CHAINS, FRESH, cloud
+from judge import simulated
+
+from olp.calibration.estimator import fit
+from olp.calibration.nonrigid import nonrigid
+from olp.calibration.observations import Measurements
+
+SEEDS = 12
+
+
+def spread(values: list[float]) -> str:
+    low, middle, high = np.percentile(values, [10, 50, 90])
+    return f"{middle:.1f} ({low:.1f} to {high:.1f})"
+
+
+def run(family: str, bends: bool, n: int, seeds: int) -> None:
+    rows: dict[str, list[float]] = {name: [] for name in ("rigid", "both", "z", "inside", "best")}
+    maps, spent = 0, 0.0
+    for seed in range(seeds):
+        m = simulated.machine(seed, family, CHAINS[seed % len(CHAINS)])
+        m = simulated.bent(m) if bends else m
+        before = fit(Measurements("simulated", points=(cloud(m, seed, n, 5.0),)), m.chain)
+        begin = time.process_time()
+        found = nonrigid(before)
+        spent += time.process_time() - begin
+        maps += bool(found.processes)
+        at, tool = np.random.default_rng(99).uniform(m.box[:, 0], m.box[:, 1], (800, 3)), np.array(FRESH[1])
+        true = m.error(at, tool)
+        left = true - found.fit.error(at, tool) - found.value(at)
+        rows["rigid"].append(simulated.rms_um(simulated.off_frame(at, true - before.error(at, tool))))
+        rows["both"].append(simulated.rms_um(simulated.off_frame(at, left)))
+        z = left[:200] / found.sigma(at[:200], tool)
+        rows["z"].append(float(np.sqrt(np.mean(z**2))))
+        rows["inside"].append(float(np.mean(np.abs(z) < 2.0)))
+        rows["best"].append(found.best.evidence if found.best else 0.0)
+    print(
+        f"{family}{', bends' if bends else ''}, {n} points: 21 errors {spread(rows['rigid'])} um, with map "
+        f"{spread(rows['both'])} um; {maps} maps of {seeds}, log evidence {spread(rows['best'])} (largest "
+        f"{max(rows['best']):.1f}); error over stated {np.sqrt(np.mean(np.square(rows['z']))):.2f}, within 2 "
+        f"sigma {np.mean(rows['inside']):.0%}; {spent / seeds:.1f} s of CPU",
+        flush=True,
+    )
+
+
+def main(seeds: int) -> None:
+    for n in (120, 315):
+        run("smooth", True, n, seeds)
+        run("rough", True, n, seeds)
+        run("smooth", False, n, seeds)
+        run("rough", False, n, seeds)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else SEEDS)
