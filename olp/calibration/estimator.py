@@ -23,7 +23,7 @@ from olp.calibration.lines import (
 )
 from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
 from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points
-from olp.calibration.parameters import CROSS, Parameters, Place
+from olp.calibration.parameters import CROSS, LEVER_MM, Parameters, Place, frame_columns
 from olp.calibration.pods import STILL_MM as POD_STILL_MM
 from olp.calibration.pods import Pose, first_poses, pods_block
 from olp.calibration.points import points_block
@@ -119,10 +119,13 @@ class Fit:
     cyclic_unseen: Mapping[tuple[str, float], str]
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-        """(n, 3, size) dependence of the error on theta, in the gauge of the datum: on lines through it X has
-        no mean slope, nor has Y towards Z."""
+        """(n, 3, size) dependence of the error on theta, in the frame of the machine where some points were
+        seen in it, else in the gauge of the datum: on lines through it X has no mean slope, nor has Y towards
+        Z."""
         position = np.atleast_2d(np.asarray(axis_mm, float))
         out = self.parameters.design(position, np.asarray(tool_mm, float), play)
+        if self.parameters.framed:
+            return out
         turn = self.turn
         arm = position - np.array(self.parameters.datum_mm)
         for row in range(3):
@@ -177,6 +180,33 @@ class Fit:
         if name in self.slopes:
             axis = AXES.index(name[2])
             out -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+        if self.parameters.framed:
+            out += self._of_frame(name, q)
+        return out
+
+    def _of_frame(self, name: str, q: Array) -> Array:
+        """(n, size) what the frame adds to a component: its shift to X, its turn to straightness, and that
+        of the tool to the angles of the axis that bears it."""
+        out = np.zeros((len(q), self.parameters.size))
+        start, axis = self.parameters.slices["frame"].start, AXES.index(name[2])
+        if name[1] not in AXES:
+            if not self.parameters.after(axis):
+                out[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_MM
+            return out
+        row = AXES.index(name[1])
+        if not self.parameters.after(axis):
+            # its angles count from the tool of its line
+            tool = np.array([self.parameters.places[name].tool_mm])
+            out[:, start + 6 : start + 9] = frame_columns(tool)[0, row, 3:]
+        if axis == 0:
+            out[:, start + row] = 1.0
+        if row != axis:
+            # the turn that the gauge took out comes back
+            k = 3 - row - axis
+            sign = 1.0 if (axis - k) % 3 == 1 else -1.0
+            turn = -self.turn[k]
+            turn[start + 3 + k] += 1.0 / LEVER_MM
+            out += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
         return out
 
     def squareness(self, name: str) -> Array:
@@ -245,10 +275,11 @@ def _fit(
     lengths = list(measurements.lengths)
     stations = [first_station(rays) for rays in lengths]
     poses = [first_poses(pods) for pods in measurements.pods]
+    framed = any(cloud.known_frame for cloud in clouds)
     theta = np.zeros(0)
     learnt: dict[str, tuple[float, float]] | None = None
     for _ in range(PASSES):
-        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
+        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves, framed)
         prior = Prior(parameters, shapes, _squares(measurements, parameters))
         if learnt is not None:
             prior.classes = learnt
@@ -477,6 +508,7 @@ def _parameters(
     splines: Sequence[Spline],
     shapes: Mapping[str, Shape],
     waves: Mapping[str, tuple[Wave, ...]],
+    framed: bool,
 ) -> Parameters:
     spaces, halves, places = {}, {}, {}
     for name in COMPONENTS:
@@ -496,7 +528,7 @@ def _parameters(
             at[axis] = datum[axis]
             places[name] = Place((at[0], at[1], at[2]), place.tool_mm)
     shared = sorted({n for line in lines if line.square is not None for n in square_names(line)})
-    return Parameters(chain, datum, spaces, places, halves, dict(waves), tuple(shared))
+    return Parameters(chain, datum, spaces, places, halves, dict(waves), tuple(shared), framed)
 
 
 def _squares(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
 from olp.calibration.estimator import MISFIT, Fit, LengthsResult, LineResult, PointsResult, misfit
-from olp.calibration.parameters import SHEAR
+from olp.calibration.parameters import LEVER_MM, SHEAR
 from olp.calibration.prior import class_of
 from olp.calibration.screening import LENGTH, POINT
 from olp.errormodel.base import Array
@@ -135,6 +135,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         ],
         "lines_of_lengths": [_line_row(r) for r in fit.lines if r.line.quantity != "angle"],
         "lines_of_angles": [_line_row(r) for r in fit.lines if r.line.quantity == "angle"],
+        **({"frame": _frame_row(fit)} if fit.parameters.framed else {}),
         "sets_of_points": [_points_row(result) for result in fit.points],
         "stations": [_station_row(result) for result in fit.lengths],
         "sets_of_pods": [
@@ -207,6 +208,21 @@ def _points_row(result: PointsResult) -> dict[str, Any]:
         "sigma_coordinate_um": result.points.sigma * UM_PER_MM,
         "residual_um": float(np.sqrt(np.mean(result.residual**2))) * UM_PER_MM,
         "chi_square_per_coordinate": result.chi_square / (3 * n),
+    }
+
+
+def _frame_row(fit: Fit) -> dict[str, Any]:
+    """The axes as a whole in the machine's frame, at the datum."""
+    part = fit.parameters.slices["frame"]
+    value, sigma = fit.theta[part], np.sqrt(np.diag(fit.covariance)[part])
+    per_urad = 1.0 / LEVER_MM / RAD_PER_URAD
+    return {
+        "shift_um": (value[:3] * UM_PER_MM).tolist(),
+        "sigma_shift_um": (sigma[:3] * UM_PER_MM).tolist(),
+        "turn_urad": (value[3:6] * per_urad).tolist(),
+        "sigma_turn_urad": (sigma[3:6] * per_urad).tolist(),
+        "tool_turn_urad": (value[6:] * per_urad).tolist(),
+        "sigma_tool_turn_urad": (sigma[6:] * per_urad).tolist(),
     }
 
 

@@ -55,7 +55,7 @@ def straight(parameters: Parameters, position: Array) -> Array:
     out = parameters.design(position, np.zeros(3))
     keep = np.zeros(parameters.size, bool)
     for name, part in parameters.slices.items():
-        keep[part] = name in SQUARENESS or (name in parameters.spaces and name[1] in AXES)
+        keep[part] = name in (*SQUARENESS, "frame") or (name in parameters.spaces and name[1] in AXES)
     out[:, :, ~keep] = 0.0
     return out
 

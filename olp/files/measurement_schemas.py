@@ -141,6 +141,11 @@ class PointsTable(Table):
         "measured_X_mm, measured_Y_mm, measured_Z_mm (in the instrument's frame), relative to this file"
     )
     sigma_um: Positive = Field(description="the standard uncertainty of a coordinate, in um")
+    frame: Literal["unknown", "known"] = Field(
+        default="unknown",
+        description='"unknown" (the instrument\'s own), or "known": measured_ columns are in the frame of '
+        "the machine, as TCP points are against a simulation model",
+    )
     tool_mm: Triple | None = Field(
         default=None,
         description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
@@ -148,6 +153,24 @@ class PointsTable(Table):
     )
     sigma_scale_um_m: NotNegative = Field(
         default=0.0, description="the standard uncertainty of the instrument's scale, in um/m"
+    )
+
+
+class PolarTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and distance_mm, "
+        "azimuth_deg, elevation_deg, relative to this file"
+    )
+    sigma_distance_um: Positive = Field(description="the standard uncertainty of a distance, in um")
+    sigma_um_m: NotNegative = Field(default=0.0, description="what it grows by with the distance, in um/m")
+    sigma_angle_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
+    sigma_scale_um_m: NotNegative = Field(
+        default=0.0, description="the standard uncertainty of the scale of all distances, in um/m"
+    )
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
     )
 
 
@@ -242,6 +265,10 @@ class MeasurementsFile(Table):
     lines: list[LineTable] = Field(default=[], description="tables [[lines]]")
     points: list[PointsTable] = Field(
         default=[], description="tables [[points]]: each one set-up of a tracker"
+    )
+    polar: list[PolarTable] = Field(
+        default=[],
+        description="tables [[polar]]: distances and two angles from one place that nobody knows",
     )
     stations: list[StationTable] = Field(
         default=[],

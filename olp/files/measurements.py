@@ -27,6 +27,7 @@ from olp.calibration.observations import (
     Square,
     SquarenessReading,
 )
+from olp.calibration.points import polar_points
 from olp.exceptions import ConfigError, InputError
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
@@ -35,12 +36,13 @@ from olp.files.measurement_schemas import (
     MeasurementsFile,
     PodsTable,
     PointsTable,
+    PolarTable,
     SquarenessReadingTable,
     SquareTable,
     Stated,
     StationTable,
 )
-from olp.files.point_readings import LENGTH, PointReadings, directions, read_point_readings
+from olp.files.point_readings import LENGTH, POLAR, PointReadings, directions, read_point_readings
 from olp.files.problems import Problem, config_error, validate
 from olp.files.readings import Readings, check_component, decoded, parse_readings, stated_keys
 from olp.files.schema_base import Position
@@ -53,6 +55,7 @@ PLAN = "measurements.toml"
 #: um/m to 1
 PER_UNIT = 1e-6
 
+_Scattered = PointsTable | PolarTable | StationTable | PodsTable
 _LINE_KEYS = tuple(LineKeys.model_fields)
 _PLANES = {"C0Y": "XY", "B0Z": "XZ", "A0Z": "YZ"}
 
@@ -144,7 +147,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
         try:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
             for table in (
-                t for kind in ("lines", "points", "stations", "pods") for t in stated.get(kind, ())
+                t for kind in ("lines", "points", "polar", "stations", "pods") for t in stated.get(kind, ())
             ):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
@@ -185,9 +188,10 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    tables: list[tuple[Path, LineTable | PointsTable | StationTable | PodsTable]] = [
+    tables: list[tuple[Path, LineTable | _Scattered]] = [
         *((("lines", k), table) for k, table in enumerate(plan.lines)),
         *((("points", k), table) for k, table in enumerate(plan.points)),
+        *((("polar", k), table) for k, table in enumerate(plan.polar)),
         *((("stations", k), table) for k, table in enumerate(plan.stations)),
         *((("pods", k), table) for k, table in enumerate(plan.pods)),
     ]
@@ -197,6 +201,8 @@ def _plan(path: FilePath, found: _Gathered) -> None:
                 _line(path, item, plan.defaults, plan.vertical, found)
             elif isinstance(item, PointsTable):
                 found.points.append(_points(path, item, plan.defaults))
+            elif isinstance(item, PolarTable):
+                found.points.append(_polar(path, item, plan.defaults))
             elif isinstance(item, StationTable):
                 found.lengths.append(_lengths(path, item, plan.defaults))
             else:
@@ -243,6 +249,31 @@ def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
         sigma_scale=table.sigma_scale_um_m * PER_UNIT,
         source=readings.file,
         row=readings.row,
+        known_frame=table.frame == "known",
+    )
+
+
+def _polar(plan: FilePath, table: PolarTable, defaults: LineKeys) -> Points:
+    readings = read_point_readings(plan.parent / table.file, POLAR)
+    distance = readings.measured[:, 0]
+    short = np.flatnonzero(distance <= 0.0)
+    if len(short):
+        raise config_error(
+            [(int(readings.row[k]), f"distance_mm = {distance[k]:g}; expected one above 0") for k in short],
+            readings.file,
+        )
+    angles = np.radians(readings.measured[:, 1:])
+    return polar_points(
+        readings.axis_mm,
+        _tools(readings, table, defaults),
+        distance,
+        angles[:, 0],
+        angles[:, 1],
+        sigma_mm=table.sigma_distance_um * MM_PER_UM + table.sigma_um_m * PER_UNIT * distance,
+        sigma_rad=table.sigma_angle_urad * RAD_PER_URAD,
+        sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+        source=readings.file,
+        row=readings.row,
     )
 
 
@@ -279,9 +310,7 @@ def _pods(plan: FilePath, table: PodsTable, defaults: LineKeys) -> Pods:
     )
 
 
-def _tools(
-    readings: PointReadings, table: PointsTable | StationTable | PodsTable, defaults: LineKeys
-) -> npt.NDArray[np.float64]:
+def _tools(readings: PointReadings, table: _Scattered, defaults: LineKeys) -> npt.NDArray[np.float64]:
     """The vector of each point, from the file or from the plan."""
     tool = table.tool_mm or defaults.tool_mm
     if readings.tool_mm is not None:

@@ -39,11 +39,11 @@ class Machine:
         return np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in "ABC"], axis=-1)
 
     def error(self, at: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
-        """(n, 3) at axis positions (n, 3) with one tool vector (3,), directions `play` (n, 3)."""
+        """(n, 3) at axis positions (n, 3) with tool vectors (3,) or (n, 3), directions `play` (n, 3)."""
         out = np.zeros(at.shape)
         for axis in range(3):
             q = at[:, axis]
-            lever = np.tile(np.asarray(tool, float), (len(at), 1))
+            lever = np.array(np.broadcast_to(np.asarray(tool, float), at.shape))
             for k in self.after(axis):
                 lever[:, k] += at[:, k] - self.datum[k]
             out += np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in AXES], axis=-1)
@@ -281,6 +281,20 @@ def points(
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     return at, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
+
+
+def polar(
+    m: Machine, seed: int, n: int, station: Any, tools: Any = OFFSETS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axis positions, tool vectors, distances, azimuths and elevations without noise, as a station at a place
+    sees the tips; it stands upright and looks along +Y where its azimuth is 25 degrees."""
+    rng = np.random.default_rng([seed, n, 19])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    x, y, z = (at + tool + m.error(at, tool) - np.array(station, float)).T
+    azimuth = np.arctan2(-x, y) + np.radians(25.0)
+    return at, tool, np.sqrt(x * x + y * y + z * z), azimuth, np.arctan2(z, np.hypot(x, y))
 
 
 def stations(m: Machine, seed: int, count: int) -> np.ndarray:
