@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.calibration.ballbar import Circles
 from olp.calibration.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
+from olp.calibration.diagonals import Diagonal
 from olp.calibration.lengths import STILL_MM, Station, first_station, lengths_block
 from olp.calibration.lines import (
     Noise,
@@ -28,6 +30,7 @@ from olp.calibration.pods import STILL_MM as POD_STILL_MM
 from olp.calibration.pods import Pose, first_poses, pods_block
 from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
+from olp.calibration.radial import circle_places, diagonal_places, noise_of_diagonal, radial_block
 from olp.calibration.screening import Outlier, screened, slips_of, without
 from olp.calibration.separation import aliased
 from olp.calibration.smoothing import Shape, shape_of
@@ -94,6 +97,17 @@ class PodsResult:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RadialResult:
+    """A diagonal or circles after the fit: residuals (n,) in mm of the readings used, noise, sum of squares
+    of standardised residuals."""
+
+    taken: Diagonal | Circles
+    noise: Noise
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """theta with its covariance and layout; see `error`, `sigma`, `design`.
 
@@ -117,6 +131,7 @@ class Fit:
     chi_square: float
     freedom: float
     cyclic_unseen: Mapping[tuple[str, float], str]
+    radial: tuple[RadialResult, ...] = ()
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         """(n, 3, size) dependence of the error on theta, in the frame of the machine where some points were
@@ -266,10 +281,14 @@ def _fit(
     tell("noise", 0.0)
     lines, noises, outliers = screened(measurements.lines)
     clouds = list(measurements.points)
-    ranges, box = _ranges(lines, [*clouds, *measurements.lengths, *measurements.pods], travel_mm)
+    radial: list[Diagonal | Circles] = [*measurements.diagonals, *measurements.circles]
+    scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
+    reached = [cloud.axis_mm for cloud in scattered]
+    reached += [diagonal_places(d) for d in measurements.diagonals]
+    reached += [circle_places(c) for c in measurements.circles]
+    ranges, box = _ranges(lines, reached, travel_mm)
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
     splines = [_spline(lines, axis, ranges[axis], cells) for axis in range(3)]
-    scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
     waves, unseen = _waves(measurements, lines, scattered)
     shapes = _shapes(lines, noises, splines, waves, tell)
     lengths = list(measurements.lengths)
@@ -295,9 +314,17 @@ def _fit(
             for pods, own in zip(measurements.pods, poses, strict=True)
         ]
         others = [squareness_block(reading, parameters) for reading in measurements.squareness]
+        noises_of_radial = [
+            noise_of_diagonal(taken) if isinstance(taken, Diagonal) else Noise(taken.sigma, 0.0, None)
+            for taken in radial
+        ]
+        of_radial = [
+            radial_block(taken, parameters, noise)
+            for taken, noise in zip(radial, noises_of_radial, strict=True)
+        ]
         tell("adjustment", 0.5)
         normal, solved = _adjusted(
-            [*of_lines, *of_points, *of_lengths, *of_pods, *others], prior, learnt is None
+            [*of_lines, *of_points, *of_lengths, *of_pods, *of_radial, *others], prior, learnt is None
         )
         learnt = prior.classes
         theta = solved.theta
@@ -341,8 +368,16 @@ def _fit(
         for pods, own, block in zip(measurements.pods, poses, of_pods, strict=True)
     ]
     chi_square = sum(
-        (_left(block, theta)[1] for block in (*of_lines, *of_points, *of_lengths, *of_pods, *others)), 0.0
+        (
+            _left(block, theta)[1]
+            for block in (*of_lines, *of_points, *of_lengths, *of_pods, *of_radial, *others)
+        ),
+        0.0,
     )
+    radial_left = [
+        RadialResult(taken, noise, *_left(block, theta))
+        for taken, noise, block in zip(radial, noises_of_radial, of_radial, strict=True)
+    ]
     # readings less what the fit used up of their freedom
     freedom = max(normal.count - float(np.trace(solved.covariance @ normal.H)) - normal.free, 1.0)
     # readings that fit worse than their noise say that the model is not all there is
@@ -350,7 +385,7 @@ def _fit(
     return Fit(
         measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
         tuple(rays_left), tuple(pods_left), tuple(outliers), box, mean_slopes(parameters), chi_square,
-        freedom, unseen,
+        freedom, unseen, tuple(radial_left),
     )  # fmt: skip
 
 
@@ -389,7 +424,7 @@ def _left(block: Block, theta: Array) -> tuple[Array, float]:
 
 def _ranges(
     lines: Sequence[Line],
-    clouds: Sequence[Points | Lengths | Pods],
+    places: Sequence[Array],
     travel_mm: Sequence[tuple[float, float]] | None,
 ) -> tuple[list[tuple[float, float]], Array]:
     """What the readings of each axis reach together, and the box: what every component with lines covers, or
@@ -397,7 +432,7 @@ def _ranges(
     ranges, box = [], np.zeros((3, 2))
     for axis in range(3):
         own = [line for line in lines if line.axis == axis]
-        reached = [line.target_mm for line in own] + [cloud.axis_mm[:, axis] for cloud in clouds]
+        reached = [line.target_mm for line in own] + [place[:, axis] for place in places]
         if not reached:
             raise CannotCompute(
                 f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,10 @@ import numpy.typing as npt
 from olp.exceptions import ConfigError
 from olp.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.units import AXES
+
+if TYPE_CHECKING:
+    from olp.calibration.ballbar import Circles
+    from olp.calibration.diagonals import Diagonal
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -319,3 +323,5 @@ class Measurements:
     lengths: tuple[Lengths, ...] = ()
     pods: tuple[Pods, ...] = ()
     map: MapWish | None = None
+    diagonals: tuple[Diagonal, ...] = ()
+    circles: tuple[Circles, ...] = ()

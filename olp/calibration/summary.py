@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import MISFIT, Fit, LengthsResult, LineResult, PointsResult, misfit
+from olp.calibration.diagonals import Diagonal
+from olp.calibration.estimator import (
+    MISFIT,
+    Fit,
+    LengthsResult,
+    LineResult,
+    PointsResult,
+    RadialResult,
+    misfit,
+)
 from olp.calibration.parameters import LEVER_MM, SHEAR
 from olp.calibration.prior import class_of
 from olp.calibration.screening import LENGTH, POINT
@@ -147,6 +156,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
             }
             for result in fit.pods
         ],
+        "diagonals_and_circles": [_radial_row(result) for result in fit.radial],
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
             for name, sigma in {**hidden, **squareness_unseen(fit)}.items()
@@ -208,6 +218,19 @@ def _points_row(result: PointsResult) -> dict[str, Any]:
         "sigma_coordinate_um": result.points.sigma * UM_PER_MM,
         "residual_um": float(np.sqrt(np.mean(result.residual**2))) * UM_PER_MM,
         "chi_square_per_coordinate": result.chi_square / (3 * n),
+    }
+
+
+def _radial_row(result: RadialResult) -> dict[str, Any]:
+    taken = result.taken
+    words = f"diagonal {taken.name}" if isinstance(taken, Diagonal) else f"circle {taken.plane}"
+    return {
+        "name": words,
+        "file": taken.source,
+        "readings": len(result.residual),
+        "sigma_reading_um": result.noise.sigma * UM_PER_MM,
+        "residual_um": _rms([result.residual]) * UM_PER_MM,
+        "chi_square_per_reading": result.chi_square / len(result.residual),
     }
 
 
@@ -328,6 +351,13 @@ def _scatter_findings(fit: Fit) -> Iterator[Finding]:
                 f"{line.source or line.component}: runs spread by {noise.spread * scale:.2g} {unit}, sigma "
                 f"is stated as {line.sigma * scale:.2g} {unit}",
             )
+    for taken, noise in ((r.taken, r.noise) for r in fit.radial):
+        if noise.spread is not None and taken.sigma > 0.0 and noise.spread > SCATTER * taken.sigma:
+            yield Finding(
+                "OLP803",
+                f"{taken.source or 'diagonal'}: runs spread by {noise.spread * UM_PER_MM:.2g} um, sigma is "
+                f"stated as {taken.sigma * UM_PER_MM:.2g} um",
+            )
 
 
 def _step_findings(fit: Fit) -> Iterator[Finding]:
@@ -380,6 +410,7 @@ def _misfit_findings(fit: Fit) -> Iterator[Finding]:
         parts += [(r.chi_square / r.residual.size, r.points.source or "points") for r in fit.points]
         parts += [(r.chi_square / len(r.residual), r.lengths.source or "lengths") for r in fit.lengths]
         parts += [(r.chi_square / len(r.residual), r.pods.source or "pods") for r in fit.pods]
+        parts += [(r.chi_square / len(r.residual), r.taken.source or "diagonals") for r in fit.radial]
         value, source = max(parts)
         yield Finding(
             "OLP808",

@@ -217,6 +217,13 @@ class PodsTable(Table):
     )
 
 
+class InstrumentTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file that says in comments how it was taken, as "
+        "`olp calibrate diagonals` and `olp calibrate ballbar` read it, relative to this file"
+    )
+
+
 class MapKeys(Table):
     noise: Literal["learnt", "stated"] = Field(
         default="learnt",
@@ -276,6 +283,12 @@ class MeasurementsFile(Table):
     )
     pods: list[PodsTable] = Field(
         default=[], description="tables [[pods]]: directions from places that nobody knows"
+    )
+    diagonals: list[InstrumentTable] = Field(
+        default=[], description="tables [[diagonals]]: each a laser along a face or body diagonal"
+    )
+    ballbars: list[InstrumentTable] = Field(
+        default=[], description="tables [[ballbars]]: each the circles of a ball-bar about one centre"
     )
     map: MapKeys | None = Field(
         default=None, description="the table [map]: errors that no rigid bodies make are to be mapped"

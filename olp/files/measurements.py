@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.calibration.ballbar import Circles
+from olp.calibration.diagonals import Diagonal
 from olp.calibration.observations import (
     Lengths,
     Line,
@@ -29,8 +31,10 @@ from olp.calibration.observations import (
 )
 from olp.calibration.points import polar_points
 from olp.exceptions import ConfigError, InputError
+from olp.files.instruments import read_circles, read_diagonal
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
+    InstrumentTable,
     LineKeys,
     LineTable,
     MeasurementsFile,
@@ -56,6 +60,7 @@ PLAN = "measurements.toml"
 PER_UNIT = 1e-6
 
 _Scattered = PointsTable | PolarTable | StationTable | PodsTable
+_KINDS = ("lines", "points", "polar", "stations", "pods", "diagonals", "ballbars")
 _LINE_KEYS = tuple(LineKeys.model_fields)
 _PLANES = {"C0Y": "XY", "B0Z": "XZ", "A0Z": "YZ"}
 
@@ -74,6 +79,8 @@ class _Gathered:
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
     whole: dict[str, tuple[Any, str]] = field(default_factory=dict)
     errors: list[ConfigError] = field(default_factory=list)
+    diagonals: list[Diagonal] = field(default_factory=list)
+    circles: list[Circles] = field(default_factory=list)
     map: MapWish | None = None
 
     def state(self, key: str, value: Any, file: str, line: int | None) -> None:
@@ -129,6 +136,8 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         lengths=tuple(found.lengths),
         pods=tuple(found.pods),
         map=found.map,
+        diagonals=tuple(found.diagonals),
+        circles=tuple(found.circles),
     )
 
 
@@ -146,9 +155,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             continue
         try:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
-            for table in (
-                t for kind in ("lines", "points", "polar", "stations", "pods") for t in stated.get(kind, ())
-            ):
+            for table in (t for kind in _KINDS for t in stated.get(kind, ())):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader says what is wrong with it.
@@ -188,12 +195,14 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    tables: list[tuple[Path, LineTable | _Scattered]] = [
+    tables: list[tuple[Path, LineTable | _Scattered | InstrumentTable]] = [
         *((("lines", k), table) for k, table in enumerate(plan.lines)),
         *((("points", k), table) for k, table in enumerate(plan.points)),
         *((("polar", k), table) for k, table in enumerate(plan.polar)),
         *((("stations", k), table) for k, table in enumerate(plan.stations)),
         *((("pods", k), table) for k, table in enumerate(plan.pods)),
+        *((("diagonals", k), table) for k, table in enumerate(plan.diagonals)),
+        *((("ballbars", k), table) for k, table in enumerate(plan.ballbars)),
     ]
     for key, item in tables:
         try:
@@ -201,6 +210,11 @@ def _plan(path: FilePath, found: _Gathered) -> None:
                 _line(path, item, plan.defaults, plan.vertical, found)
             elif isinstance(item, PointsTable):
                 found.points.append(_points(path, item, plan.defaults))
+            elif isinstance(item, InstrumentTable):
+                if key[0] == "diagonals":
+                    found.diagonals.append(read_diagonal(path.parent / item.file))
+                else:
+                    found.circles.append(read_circles(path.parent / item.file))
             elif isinstance(item, PolarTable):
                 found.points.append(_polar(path, item, plan.defaults))
             elif isinstance(item, StationTable):
