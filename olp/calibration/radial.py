@@ -1,8 +1,8 @@
 """Diagonals and circles as rows of the adjustment: displacements along one known direction at every reading.
 
 A laser along a diagonal has an unknown zero, drift and scale, and the lost motion of the diagonal as a whole.
-A ball-bar has an unknown centre and radius, servo mismatch and lost motion of both axes: in one direction servo
-mismatch and squareness are one column, so squareness stays unseen then.
+A ball-bar has an unknown centre and radius, servo mismatch and lost motion of both axes: in one direction
+servo mismatch and squareness are one column, so squareness stays unseen then.
 """
 
 from __future__ import annotations

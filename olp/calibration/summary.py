@@ -35,6 +35,8 @@ UNSEEN = 0.7
 STRONG, MOST_PAIRS = 0.9, 8
 #: The runs may spread by so much more than stated.
 SCATTER = 1.5
+#: A square is as stated up to so many standard deviations.
+SQUARE_OFF = 4.0
 #: Offsets of the reflector that differ by less than this are one.
 ONE_OFFSET_MM = 1.0
 _POINTS = 41
@@ -78,6 +80,28 @@ def scale_unseen(fit: Fit) -> float | None:
         row += (ends[1] - ends[0]) / float(np.ptp(fit.box_mm, axis=1).sum())
     before, after = float(row @ prior @ row), float(row @ fit.covariance @ row)
     return math.sqrt(after) if after > UNSEEN**2 * before else None
+
+
+def scales_open(fit: Fit) -> tuple[Array, Array]:
+    """(k, 3) changes of the scales of X, Y, Z that no reading tells of, and (3 - k, 3) the combinations of
+    them that are known, each with a largest part of 1: what the readings left of the prior covariance."""
+    prior = np.linalg.inv(fit.prior.precision()[0])
+    rows = np.zeros((3, fit.parameters.size))
+    for axis, letter in enumerate(AXES):
+        ends = fit.curve(f"E{letter}{letter}", fit.box_mm[axis])
+        rows[axis] = (ends[1] - ends[0]) / float(np.ptp(fit.box_mm[axis]))
+    values, vectors = np.linalg.eigh(rows @ prior @ rows.T)
+    root = (vectors * np.sqrt(values)) @ vectors.T
+    back = np.linalg.inv(root)
+    share, parts = np.linalg.eigh(back @ rows @ fit.covariance @ rows.T @ back)
+    unknown = share > UNSEEN**2
+    changes, known = (root @ parts[:, unknown]).T, (back @ parts[:, ~unknown]).T
+    return _largest_one(changes), _largest_one(known)
+
+
+def _largest_one(rows: Array) -> Array:
+    at = np.argmax(np.abs(rows), axis=1)
+    return np.asarray(rows / rows[np.arange(len(rows)), at][:, None])
 
 
 def squareness_unseen(fit: Fit) -> dict[str, float]:
@@ -310,6 +334,17 @@ def _scale_findings(fit: Fit) -> Iterator[Finding]:
     scale = scale_unseen(fit)
     if scale is not None:
         yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
+        return
+    changes, known = scales_open(fit)
+    if len(changes) == 1:
+        yield Finding("OLP809", f"scales that change by {_of_scales(changes[0])} change no reading")
+    elif len(changes) == 2:
+        words = _of_scales(known[0])
+        yield Finding("OLP809", f"of the scales of X, Y and Z one combination is known alone: {words}")
+
+
+def _of_scales(row: Array) -> str:
+    return ", ".join(f"{part:+.2f} {axis}" for axis, part in zip(AXES, row.tolist(), strict=True))
 
 
 def _why(fit: Fit, name: str) -> str:
@@ -405,6 +440,19 @@ def _box_findings(fit: Fit, travel_mm: Sequence[tuple[float, float]] | None) -> 
 
 
 def _misfit_findings(fit: Fit) -> Iterator[Finding]:
+    # one square among thousands of readings is nothing to chi-square as a whole
+    for square in fit.measurements.squares:
+        part = fit.parameters.slices.get(f"error of square {square.name}")
+        if part is None:
+            continue
+        value, variance = float(fit.theta[part][0]), float(fit.covariance[part, part][0, 0])
+        off = abs(value - square.error_rad)
+        if off > SQUARE_OFF * math.sqrt(max(square.sigma_rad**2 - variance, 0.01 * square.sigma_rad**2)):
+            yield Finding(
+                "OLP808",
+                f"the error of square {square.name} comes out as {value / RAD_PER_URAD:.1f} urad, "
+                f"{square.error_rad / RAD_PER_URAD:.1f} is stated within {square.sigma_rad / RAD_PER_URAD:.2g}",
+            )
     if misfit(fit) > MISFIT:
         parts = [(r.chi_square / len(r.line.value), r.line.source or r.line.component) for r in fit.lines]
         parts += [(r.chi_square / r.residual.size, r.points.source or "points") for r in fit.points]
