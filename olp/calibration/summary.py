@@ -451,7 +451,7 @@ def _misfit_findings(fit: Fit) -> Iterator[Finding]:
             yield Finding(
                 "OLP808",
                 f"the error of square {square.name} comes out as {value / RAD_PER_URAD:.1f} urad, "
-                f"{square.error_rad / RAD_PER_URAD:.1f} is stated within {square.sigma_rad / RAD_PER_URAD:.2g}",
+                f"{square.error_rad / RAD_PER_URAD:.1f} +- {square.sigma_rad / RAD_PER_URAD:.2g} is stated",
             )
     if misfit(fit) > MISFIT:
         parts = [(r.chi_square / len(r.line.value), r.line.source or r.line.component) for r in fit.lines]
