@@ -56,7 +56,8 @@ def check(route: Route, limits: AxisLimits = LIMITS, *, differences: bool = True
     for share in (0.0, 0.3, 0.7, 1.0):
         v = rates[:, 1] + share * u * (2 * rates[:, 2] + 3 * share * u * rates[:, 3])
         assert v.min(initial=0.0) >= -2e-9 * speed - 2 * late * rate
-    near = np.full(len(motion), np.max(route.tolerance_mm) * (1 + 1e-6) + 2e-9 + 1e-14 * size)
+    near = np.max(route.tolerance_mm) * (1 + 1e-6) + 2e-9 + 1e-14 * size + late * speed
+    near = np.full(len(motion), near)
     assert np.all(deviation_bound(motion, route, parts.segment, near) <= near)
     corners(route, parts)
     assert np.abs(motion.at(np.array([0.0]))[0][0] - route.point_mm[0]).max() <= 1e-9

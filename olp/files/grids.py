@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.files.problems import Problem, config_error, nearest
-from olp.files.tables import Array, Row, decoded, records_of, rows_of
+from olp.files.tables import Array, Row, headed, rows_of
 from olp.files.write import PathLike, read_bytes
 from olp.machine import COMPONENTS
 from olp.units import AXES
@@ -59,18 +58,8 @@ def read_component_grid(path: PathLike) -> GridTable:
 
 
 def _parse(data: bytes, file: str, problems_of: Callable[[int, Sequence[str]], list[Problem]]) -> GridTable:
-    text = decoded(data, file)
-    try:
-        records = records_of(text)
-    except csv.Error as error:
-        raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
-    if not records:
-        raise config_error([(None, "holds no header; expected columns such as X_mm")], file)
-    line, header = records[0]
-    found = problems_of(line, header)
-    if found:
-        raise config_error(found, file)
-    rows, found = rows_of(header, records[1:])
+    line, header, records = headed(data, file, "columns such as X_mm", problems_of)
+    rows, found = rows_of(header, records)
     if found or not rows:
         raise config_error(found or [(line, "no rows follow the header; expected one a node")], file)
     arguments = tuple(name[0] for name in header if name in _POSITIONS)

@@ -30,9 +30,10 @@ from olp.exceptions import InputError
 from olp.files.fields import Text, refusal
 from olp.files.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.problems import Problem, config_error, nearest, validate
-from olp.files.readings import ANGULAR, SENSES, UNITS, Readings, decoded, parse_readings
+from olp.files.readings import ANGULAR, SENSES, UNITS, Readings, parse_readings
 from olp.files.renishaw import MARK, RTX, RecordingTable, line_of_recording, parse_rtx, read_rtx
 from olp.files.schema_base import Table
+from olp.files.tables import decoded
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
 from olp.machine import COMPONENTS

@@ -48,8 +48,9 @@ from olp.files.measurement_schemas import (
 )
 from olp.files.point_readings import LENGTH, POLAR, PointReadings, directions, read_point_readings
 from olp.files.problems import Problem, config_error, validate
-from olp.files.readings import Readings, check_component, decoded, parse_readings, stated_keys
+from olp.files.readings import Readings, check_component, parse_readings, stated_keys
 from olp.files.schema_base import Position
+from olp.files.tables import decoded
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 from olp.machine import Vector

@@ -22,7 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.files.problems import Problem, config_error, nearest
-from olp.files.readings import decoded, stated_keys
+from olp.files.readings import stated_keys
+from olp.files.tables import decoded
 from olp.files.write import PathLike, read_bytes
 from olp.units import AXES
 

@@ -27,6 +27,7 @@ import numpy.typing as npt
 
 from olp.exceptions import ConfigError
 from olp.files.problems import Problem, config_error, nearest
+from olp.files.tables import decoded
 from olp.files.write import PathLike, read_bytes
 from olp.units import MM_PER_UM, RAD_PER_URAD
 
@@ -140,16 +141,6 @@ def parse_readings(data: bytes, file: str) -> Readings:
         unit in ANGULAR,
         MappingProxyType(keys),
     )
-
-
-def decoded(data: bytes, file: str) -> str:
-    """The text of a file; raises ConfigError with the line where it is not UTF-8."""
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        sentence = f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
-        raise config_error([(line, sentence)], file) from None
 
 
 def stated_keys(text: str) -> Iterator[tuple[str, tuple[str, int]]]:

@@ -3,7 +3,6 @@ drift."""
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 import tomllib
@@ -17,7 +16,7 @@ from olp.exceptions import ConfigError
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schema_base import Position
 from olp.files.schema_thermal import DistortionTable, ThermalFile
-from olp.files.tables import Array, decoded, records_of
+from olp.files.tables import Array, decoded, headed
 from olp.files.toml_text import comment, line_of, read_toml, toml_lines
 from olp.files.write import PathLike, read_bytes
 from olp.machine import COMPONENTS, ZERO, Vector
@@ -120,19 +119,10 @@ def read_drift_log(path: PathLike) -> DriftLog:
 
 def parse_drift_log(data: bytes, file: str) -> DriftLog:
     """As `read_drift_log`, from the bytes of the file."""
-    text = decoded(data, file)
-    try:
-        records = records_of(text)
-    except csv.Error as error:
-        raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
-    if not records:
-        raise config_error([(None, "holds no header; expected t_s, NAME_degC ..., EXX@500_um ...")], file)
-    line, header = records[0]
-    found = _header_problems(line, header)
-    if found:
-        raise config_error(found, file)
-    rows, found = _rows(header, records[1:])
-    placed, wrong = _placed(text)
+    expected = "t_s, NAME_degC ..., EXX@500_um ..."
+    line, header, records = headed(data, file, expected, _header_problems)
+    rows, found = _rows(header, records)
+    placed, wrong = _placed(decoded(data, file))
     found += wrong
     if len(rows) < 2 and not found:
         found.append((line, f"{len(rows)} rows follow the header; expected at least 2"))

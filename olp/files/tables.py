@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -57,18 +57,8 @@ def read_curves(path: PathLike) -> CurveTable:
 
 def parse_curves(data: bytes, file: str) -> CurveTable:
     """As `read_curves`, from the bytes of the file."""
-    text = decoded(data, file)
-    try:
-        records = records_of(text)
-    except csv.Error as error:
-        raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
-    if not records:
-        raise config_error([(None, "holds no header; expected columns such as X_mm, EXX_um, EYX_um")], file)
-    line, header = records[0]
-    found = _header_problems(line, header)
-    if found:
-        raise config_error(found, file)
-    rows, found = rows_of(header, records[1:])
+    _, header, records = headed(data, file, "columns such as X_mm, EXX_um, EYX_um", _header_problems)
+    rows, found = rows_of(header, records)
     # Order and repetition mean little while rows are missing from it.
     found = found or _order_problems(header, rows)
     if found:
@@ -86,7 +76,28 @@ def decoded(data: bytes, file: str) -> str:
         raise config_error([(line, sentence)], file) from None
 
 
-def records_of(text: str) -> list[tuple[int, list[str]]]:
+def headed(
+    data: bytes,
+    file: str,
+    expected: str,
+    problems_of: Callable[[int, Sequence[str]], list[Problem]],
+) -> tuple[int, list[str], list[tuple[int, list[str]]]]:
+    """The line of the header of a table, its names, and (line, cells) of the rows below it. Raises
+    ConfigError where there is none (`expected` says of what), or with the problems of it."""
+    try:
+        records = _records(decoded(data, file))
+    except csv.Error as error:
+        raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
+    if not records:
+        raise config_error([(None, f"holds no header; expected {expected}")], file)
+    line, header = records[0]
+    found = problems_of(line, header)
+    if found:
+        raise config_error(found, file)
+    return line, header, records[1:]
+
+
+def _records(text: str) -> list[tuple[int, list[str]]]:
     """(line, stripped cells) of each line that holds data."""
     records = []
     for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
