@@ -83,7 +83,7 @@ CALIBRATION = (
         "scale not observed",
         Severity.WARNING,
         "Angles alone show the shape of the errors, not their size: a machine that is larger by as much as "
-        "it is farther away looks the same.",
+        "it is farther away looks the same. Diagonals see a mean of the scales of their axes only.",
         "State a known distance between two pods, or add a line of a laser or lengths.",
         "Two theodolites, one offset of the reflector and no baseline.",
     ),

@@ -454,11 +454,13 @@ def _component_tables(report: Mapping[str, Any]) -> Iterator[Block]:
         angle = angle_words(row["name"], row["value_urad"] * RAD_PER_URAD)
         rows.append([row["name"], angle, number(row["value_urad"]), number(2.0 * row["sigma_urad"])])
     yield Grid(["squareness", "", "urad", "+-"], rows, left=2)
-    sets = report.get("sets_of_points") or ()
-    if sets:
-        keys = [key for key in sets[0] if key != "name"]
+    for name, title in (("sets_of_points", "points"), ("diagonals_and_circles", "diagonals and circles")):
+        sets = report.get(name) or ()
+        if not sets:
+            continue
+        keys = [key for key in sets[0] if key not in ("name", "file")]
         yield Grid(
-            ["points of a tracker", *(key.replace("_", " ") for key in keys)],
+            [title, *(key.replace("_", " ") for key in keys)],
             [[FilePath(row["name"]).name, *(number(row[key]) for key in keys)] for row in sets],
         )
     if report["cyclic"]:

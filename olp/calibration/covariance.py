@@ -63,7 +63,13 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
         at = own.stop
         variance = fit.between_targets(name, q) if kind == "mean" else np.zeros(len(table))
         entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))  # type: ignore[arg-type]
-    kinds = {"lines": fit.lines, "points": fit.points, "lengths": fit.lengths, "directions": fit.pods}
+    kinds = {
+        "lines": fit.lines,
+        "points": fit.points,
+        "lengths": fit.lengths,
+        "directions": fit.pods,
+        "diagonals and circles": fit.radial,
+    }
     taken = ", ".join(f"{len(files)} of {kind}" for kind, files in kinds.items() if files)
     words = (
         f"the adjustment of readings ({taken}): {len(factor)} numbers, {factor.shape[1]} principal "

@@ -100,7 +100,7 @@ def _groups(fit: Fit, letter: str, directed: bool) -> Mapping[tuple[Place, bool]
     own = fit.parameters.places[f"E{letter}{letter}"]
     for kind in "XYZABC":
         name = f"E{kind}{letter}"
-        if kind in "ABC" and not np.any(fit.theta[fit.parameters.slices[name]]):
+        if kind in "ABC" and not fit.parameters.framed and not np.any(fit.theta[fit.parameters.slices[name]]):
             continue
         two_way = directed and name in fit.parameters.halves
         groups.setdefault((fit.parameters.places.get(name, own), two_way), []).append(name)

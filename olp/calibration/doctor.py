@@ -21,7 +21,7 @@ from olp.calibration.factors import (
     factors_of,
 )
 from olp.calibration.observations import Points
-from olp.calibration.points import frame_columns
+from olp.calibration.parameters import frame_columns
 from olp.errormodel import build
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.calibration.ballbar import Circles
 from olp.calibration.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
+from olp.calibration.diagonals import Diagonal
 from olp.calibration.lengths import STILL_MM, Station, first_station, lengths_block
 from olp.calibration.lines import (
     Noise,
@@ -23,11 +25,12 @@ from olp.calibration.lines import (
 )
 from olp.calibration.normal import Block, Normal, Solved, residuals_of, solve
 from olp.calibration.observations import Lengths, Line, Measurements, Pods, Points
-from olp.calibration.parameters import CROSS, Parameters, Place
+from olp.calibration.parameters import CROSS, LEVER_MM, Parameters, Place, frame_columns
 from olp.calibration.pods import STILL_MM as POD_STILL_MM
 from olp.calibration.pods import Pose, first_poses, pods_block
 from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
+from olp.calibration.radial import circle_places, diagonal_places, noise_of_diagonal, radial_block
 from olp.calibration.screening import Outlier, screened, slips_of, without
 from olp.calibration.separation import aliased
 from olp.calibration.smoothing import Shape, shape_of
@@ -94,6 +97,17 @@ class PodsResult:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RadialResult:
+    """A diagonal or circles after the fit: residuals (n,) in mm of the readings used, noise, sum of squares
+    of standardised residuals."""
+
+    taken: Diagonal | Circles
+    noise: Noise
+    residual: Array
+    chi_square: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """theta with its covariance and layout; see `error`, `sigma`, `design`.
 
@@ -117,12 +131,16 @@ class Fit:
     chi_square: float
     freedom: float
     cyclic_unseen: Mapping[tuple[str, float], str]
+    radial: tuple[RadialResult, ...] = ()
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-        """(n, 3, size) dependence of the error on theta, in the gauge of the datum: on lines through it X has
-        no mean slope, nor has Y towards Z."""
+        """(n, 3, size) dependence of the error on theta, in the frame of the machine where some points were
+        seen in it, else in the gauge of the datum: on lines through it X has no mean slope, nor has Y towards
+        Z."""
         position = np.atleast_2d(np.asarray(axis_mm, float))
         out = self.parameters.design(position, np.asarray(tool_mm, float), play)
+        if self.parameters.framed:
+            return out
         turn = self.turn
         arm = position - np.array(self.parameters.datum_mm)
         for row in range(3):
@@ -177,6 +195,33 @@ class Fit:
         if name in self.slopes:
             axis = AXES.index(name[2])
             out -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+        if self.parameters.framed:
+            out += self._of_frame(name, q)
+        return out
+
+    def _of_frame(self, name: str, q: Array) -> Array:
+        """(n, size) what the frame adds to a component: its shift to X, its turn to straightness, and that
+        of the tool to the angles of the axis that bears it."""
+        out = np.zeros((len(q), self.parameters.size))
+        start, axis = self.parameters.slices["frame"].start, AXES.index(name[2])
+        if name[1] not in AXES:
+            if not self.parameters.after(axis):
+                out[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_MM
+            return out
+        row = AXES.index(name[1])
+        if not self.parameters.after(axis):
+            # its angles count from the tool of its line
+            tool = np.array([self.parameters.places[name].tool_mm])
+            out[:, start + 6 : start + 9] = frame_columns(tool)[0, row, 3:]
+        if axis == 0:
+            out[:, start + row] = 1.0
+        if row != axis:
+            # the turn that the gauge took out comes back
+            k = 3 - row - axis
+            sign = 1.0 if (axis - k) % 3 == 1 else -1.0
+            turn = -self.turn[k]
+            turn[start + 3 + k] += 1.0 / LEVER_MM
+            out += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
         return out
 
     def squareness(self, name: str) -> Array:
@@ -236,19 +281,24 @@ def _fit(
     tell("noise", 0.0)
     lines, noises, outliers = screened(measurements.lines)
     clouds = list(measurements.points)
-    ranges, box = _ranges(lines, [*clouds, *measurements.lengths, *measurements.pods], travel_mm)
+    radial: list[Diagonal | Circles] = [*measurements.diagonals, *measurements.circles]
+    scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
+    reached = [cloud.axis_mm for cloud in scattered]
+    reached += [diagonal_places(d) for d in measurements.diagonals]
+    reached += [circle_places(c) for c in measurements.circles]
+    ranges, box = _ranges(lines, reached, travel_mm)
     datum = datum_mm or tuple(float(np.clip(0.0, *side)) for side in box)
     splines = [_spline(lines, axis, ranges[axis], cells) for axis in range(3)]
-    scattered: list[Points | Lengths | Pods] = [*clouds, *measurements.lengths, *measurements.pods]
     waves, unseen = _waves(measurements, lines, scattered)
     shapes = _shapes(lines, noises, splines, waves, tell)
     lengths = list(measurements.lengths)
     stations = [first_station(rays) for rays in lengths]
     poses = [first_poses(pods) for pods in measurements.pods]
+    framed = any(cloud.known_frame for cloud in clouds)
     theta = np.zeros(0)
     learnt: dict[str, tuple[float, float]] | None = None
     for _ in range(PASSES):
-        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves)
+        parameters = _parameters(chain, (datum[0], datum[1], datum[2]), lines, splines, shapes, waves, framed)
         prior = Prior(parameters, shapes, _squares(measurements, parameters))
         if learnt is not None:
             prior.classes = learnt
@@ -264,9 +314,17 @@ def _fit(
             for pods, own in zip(measurements.pods, poses, strict=True)
         ]
         others = [squareness_block(reading, parameters) for reading in measurements.squareness]
+        noises_of_radial = [
+            noise_of_diagonal(taken) if isinstance(taken, Diagonal) else Noise(taken.sigma, 0.0, None)
+            for taken in radial
+        ]
+        of_radial = [
+            radial_block(taken, parameters, noise)
+            for taken, noise in zip(radial, noises_of_radial, strict=True)
+        ]
         tell("adjustment", 0.5)
         normal, solved = _adjusted(
-            [*of_lines, *of_points, *of_lengths, *of_pods, *others], prior, learnt is None
+            [*of_lines, *of_points, *of_lengths, *of_pods, *of_radial, *others], prior, learnt is None
         )
         learnt = prior.classes
         theta = solved.theta
@@ -310,8 +368,16 @@ def _fit(
         for pods, own, block in zip(measurements.pods, poses, of_pods, strict=True)
     ]
     chi_square = sum(
-        (_left(block, theta)[1] for block in (*of_lines, *of_points, *of_lengths, *of_pods, *others)), 0.0
+        (
+            _left(block, theta)[1]
+            for block in (*of_lines, *of_points, *of_lengths, *of_pods, *of_radial, *others)
+        ),
+        0.0,
     )
+    radial_left = [
+        RadialResult(taken, noise, *_left(block, theta))
+        for taken, noise, block in zip(radial, noises_of_radial, of_radial, strict=True)
+    ]
     # readings less what the fit used up of their freedom
     freedom = max(normal.count - float(np.trace(solved.covariance @ normal.H)) - normal.free, 1.0)
     # readings that fit worse than their noise say that the model is not all there is
@@ -319,7 +385,7 @@ def _fit(
     return Fit(
         measurements, parameters, theta, covariance, prior, tuple(results), tuple(points),
         tuple(rays_left), tuple(pods_left), tuple(outliers), box, mean_slopes(parameters), chi_square,
-        freedom, unseen,
+        freedom, unseen, tuple(radial_left),
     )  # fmt: skip
 
 
@@ -358,7 +424,7 @@ def _left(block: Block, theta: Array) -> tuple[Array, float]:
 
 def _ranges(
     lines: Sequence[Line],
-    clouds: Sequence[Points | Lengths | Pods],
+    places: Sequence[Array],
     travel_mm: Sequence[tuple[float, float]] | None,
 ) -> tuple[list[tuple[float, float]], Array]:
     """What the readings of each axis reach together, and the box: what every component with lines covers, or
@@ -366,7 +432,7 @@ def _ranges(
     ranges, box = [], np.zeros((3, 2))
     for axis in range(3):
         own = [line for line in lines if line.axis == axis]
-        reached = [line.target_mm for line in own] + [cloud.axis_mm[:, axis] for cloud in clouds]
+        reached = [line.target_mm for line in own] + [place[:, axis] for place in places]
         if not reached:
             raise CannotCompute(
                 f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
@@ -477,6 +543,7 @@ def _parameters(
     splines: Sequence[Spline],
     shapes: Mapping[str, Shape],
     waves: Mapping[str, tuple[Wave, ...]],
+    framed: bool,
 ) -> Parameters:
     spaces, halves, places = {}, {}, {}
     for name in COMPONENTS:
@@ -496,7 +563,7 @@ def _parameters(
             at[axis] = datum[axis]
             places[name] = Place((at[0], at[1], at[2]), place.tool_mm)
     shared = sorted({n for line in lines if line.square is not None for n in square_names(line)})
-    return Parameters(chain, datum, spaces, places, halves, dict(waves), tuple(shared))
+    return Parameters(chain, datum, spaces, places, halves, dict(waves), tuple(shared), framed)
 
 
 def _squares(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:

@@ -15,7 +15,8 @@ import numpy as np
 
 from olp.calibration.normal import Block, Chunk, Normal, evidence, solve
 from olp.calibration.observations import Points
-from olp.calibration.points import LEVER_MM, deviations, frame_columns
+from olp.calibration.parameters import LEVER_MM, frame_columns
+from olp.calibration.points import deviations
 from olp.errormodel.base import Array, ErrorModel
 from olp.machine import COMPONENTS, SQUARENESS
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,15 @@ from olp.exceptions import ConfigError
 from olp.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.units import AXES
 
+if TYPE_CHECKING:
+    from olp.calibration.ballbar import Circles
+    from olp.calibration.diagonals import Diagonal
+
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Reference = Literal["functional-point", "table"]
+#: Points in the frame of the machine are nearer than this to where they were commanded.
+FRAME_MM = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +104,11 @@ class Points:
 
     `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
     point to the reflector, `measured_mm` (n, 3) its places in the instrument's frame, which nobody knows, but
-    which is the same for all of these points. `sigma` is the standard uncertainty of a coordinate in mm,
-    `sigma_scale` that of the instrument's scale (mm/mm). Raises ConfigError.
+    which is the same for all of these points; with `known_frame` they are in the frame of the machine, that
+    of the axis positions and tool vectors, as TCP points are against a simulation model. `sigma` is the
+    standard uncertainty of a coordinate in mm, or `covariance_mm2` (n, 3, 3) that of the coordinates of each
+    point, and `sigma` their root mean square; `sigma_scale` that of the instrument's scale (mm/mm). Raises
+    ConfigError.
     """
 
     axis_mm: Array
@@ -109,6 +118,8 @@ class Points:
     sigma_scale: float = 0.0
     source: str = ""
     row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    known_frame: bool = False
+    covariance_mm2: Array | None = None
 
     def __post_init__(self) -> None:
         axis = np.atleast_2d(np.array(self.axis_mm, float))
@@ -130,6 +141,19 @@ class Points:
             raise ConfigError(
                 "the uncertainty of the points is not stated; expected sigma_um", file=self.source or None
             )
+        if self.covariance_mm2 is not None:
+            columns["covariance_mm2"] = np.array(self.covariance_mm2, float)
+            if columns["covariance_mm2"].shape != (len(axis), 3, 3):
+                raise ConfigError("expected a 3 by 3 covariance of each point", file=self.source or None)
+        if self.known_frame:
+            off = np.linalg.norm(columns["measured_mm"] - axis - columns["tool_mm"], axis=1)
+            if off.max() > FRAME_MM:
+                raise ConfigError(
+                    f"a point is {off.max():.4g} mm off where it was commanded, row "
+                    f"{columns['row'][int(off.argmax())]}; expected places in the machine's frame within "
+                    f'{FRAME_MM:g} mm, or no frame = "known"',
+                    file=self.source or None,
+                )
         for name, column in columns.items():
             column.flags.writeable = False
             object.__setattr__(self, name, column)
@@ -299,3 +323,5 @@ class Measurements:
     lengths: tuple[Lengths, ...] = ()
     pods: tuple[Pods, ...] = ()
     map: MapWish | None = None
+    diagonals: tuple[Diagonal, ...] = ()
+    circles: tuple[Circles, ...] = ()

@@ -22,6 +22,8 @@ from olp.units import AXES
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 #: Row, axis and sign of what a squareness adds, times the distance of that axis from the datum.
 SHEAR = {"C0Y": (0, 1, -1.0), "B0Z": (0, 2, 1.0), "A0Z": (1, 2, -1.0)}
+#: Turns of the frame count per metre of lever, so that all unknowns are of one size.
+LEVER_MM = 1000.0
 
 Part = tuple[slice, Array]
 
@@ -49,7 +51,9 @@ class Parameters:
     directions is estimated, `waves` of cyclic terms, the three squareness errors, and `shared` nuisances.
 
     `places` holds the place of each displacement curve. `slices` says where each stands: "EXX", "half EXX",
-    "wave EXX", "C0Y" and the names of shared nuisances.
+    "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were seen in the machine's
+    frame: "frame" is by how much the axes as a whole are shifted (mm) and turned about the datum (rad times
+    LEVER_MM), and the tool vectors turned (the same), in it.
     """
 
     chain: str
@@ -59,6 +63,7 @@ class Parameters:
     halves: Mapping[str, CurveSpace] = field(default_factory=dict)
     waves: Mapping[str, tuple[Wave, ...]] = field(default_factory=dict)
     shared: tuple[str, ...] = ()
+    framed: bool = False
     slices: Mapping[str, slice] = field(init=False)
     size: int = field(init=False)
 
@@ -69,6 +74,7 @@ class Parameters:
         sizes += [(f"half {name}", space.size) for name, space in self.halves.items()]
         sizes += [(f"wave {name}", 2 * len(terms)) for name, terms in self.waves.items()]
         sizes += [(name, 1) for name in (*SQUARENESS, *self.shared)]
+        sizes += [("frame", 9)] if self.framed else []
         for name, size in sizes:
             slices[name] = slice(at, at + size)
             at += size
@@ -135,7 +141,25 @@ class Parameters:
                     out[:, row, part] += values
             for part, values in self.shear(row, position):
                 out[:, row, part] += values
+        if self.framed:
+            start = self.slices["frame"].start
+            out[:, :, start : start + 6] = frame_columns(position - np.array(self.datum_mm))
+            turned = frame_columns(np.broadcast_to(tool, position.shape))[:, :, 3:]
+            out[:, :, start + 6 : start + 9] = turned
         return out
+
+
+def frame_columns(arm: Array, *, scale: bool = False) -> Array:
+    """(n, 3, 6 or 7) what shifts, turns and the scale of the frame do to points at `arm` from the centre."""
+    out = np.zeros((len(arm), 3, 7 if scale else 6))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[:, k, k] = 1.0
+        out[:, i, 3 + k] = -arm[:, j] / LEVER_MM
+        out[:, j, 3 + k] = arm[:, i] / LEVER_MM
+    if scale:
+        out[:, :, 6] = arm / LEVER_MM
+    return out
 
 
 def gathered(parts: Sequence[Part], n: int) -> tuple[Array, np.ndarray]:

@@ -14,9 +14,9 @@ from olp.calibration.lengths import Station, lengths_block
 from olp.calibration.lines import Noise, line_block, square_names
 from olp.calibration.normal import Normal, solve
 from olp.calibration.observations import Measurements
-from olp.calibration.parameters import Parameters, Place
+from olp.calibration.parameters import Parameters, Place, frame_columns
 from olp.calibration.pods import Pose, pods_block
-from olp.calibration.points import frame_columns, points_block
+from olp.calibration.points import points_block
 from olp.calibration.prior import POSE, Prior
 from olp.calibration.summary import squareness_unseen, unseen
 from olp.errormodel.base import Array

@@ -10,6 +10,7 @@ import numpy as np
 
 from olp.calibration.basis import slope_grid
 from olp.calibration.normal import Normal, evidence
+from olp.calibration.observations import FRAME_MM
 from olp.calibration.parameters import Parameters
 from olp.calibration.smoothing import AMPLITUDE, FEATURE, HALF, Shape
 from olp.errormodel.base import Array
@@ -74,6 +75,8 @@ class Prior:
             out[p.slices[name], p.slices[name]] = 1.0 / SQUARE**2
         for name in p.shared:
             out[p.slices[name], p.slices[name]] = 1.0 / self.squares[name][1] ** 2
+        if p.framed:
+            out[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
         return out, logdet
 
     def push(self, normal: Normal) -> None:

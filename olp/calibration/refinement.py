@@ -13,7 +13,7 @@ from olp.calibration.covariance import principal
 from olp.calibration.curves import DIGITS
 from olp.calibration.normal import Block, Chunk, Normal, residuals_of, solve
 from olp.calibration.observations import Points
-from olp.calibration.points import LEVER_MM, frame_columns
+from olp.calibration.parameters import LEVER_MM, frame_columns
 from olp.calibration.screening import OUTLIER, SHARE
 from olp.errormodel import build
 from olp.errormodel.base import Array

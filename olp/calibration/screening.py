@@ -74,8 +74,9 @@ def slips_of(block: Block, cloud: Points | Lengths, solved: Solved) -> list[Outl
 
 def without(cloud: T, slips: Sequence[Outlier]) -> T:
     use = ~np.isin(cloud.row, [slip.row for slip in slips])
-    names = {"axis_mm", "tool_mm", "measured_mm", "length_mm", "sigma_mm", "row"}
-    kept = {f.name: getattr(cloud, f.name)[use] for f in dataclasses.fields(cloud) if f.name in names}
+    names = {"axis_mm", "tool_mm", "measured_mm", "covariance_mm2", "length_mm", "sigma_mm", "row"}
+    columns = {f.name: getattr(cloud, f.name) for f in dataclasses.fields(cloud) if f.name in names}
+    kept = {name: column[use] for name, column in columns.items() if column is not None}
     return dataclasses.replace(cloud, **kept)
 
 

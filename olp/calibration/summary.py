@@ -10,8 +10,17 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.curves import half_of, joints_of, sigma_of
-from olp.calibration.estimator import MISFIT, Fit, LengthsResult, LineResult, PointsResult, misfit
-from olp.calibration.parameters import SHEAR
+from olp.calibration.diagonals import Diagonal
+from olp.calibration.estimator import (
+    MISFIT,
+    Fit,
+    LengthsResult,
+    LineResult,
+    PointsResult,
+    RadialResult,
+    misfit,
+)
+from olp.calibration.parameters import LEVER_MM, SHEAR
 from olp.calibration.prior import class_of
 from olp.calibration.screening import LENGTH, POINT
 from olp.errormodel.base import Array
@@ -26,6 +35,8 @@ UNSEEN = 0.7
 STRONG, MOST_PAIRS = 0.9, 8
 #: The runs may spread by so much more than stated.
 SCATTER = 1.5
+#: A square is as stated up to so many standard deviations.
+SQUARE_OFF = 4.0
 #: Offsets of the reflector that differ by less than this are one.
 ONE_OFFSET_MM = 1.0
 _POINTS = 41
@@ -69,6 +80,28 @@ def scale_unseen(fit: Fit) -> float | None:
         row += (ends[1] - ends[0]) / float(np.ptp(fit.box_mm, axis=1).sum())
     before, after = float(row @ prior @ row), float(row @ fit.covariance @ row)
     return math.sqrt(after) if after > UNSEEN**2 * before else None
+
+
+def scales_open(fit: Fit) -> tuple[Array, Array]:
+    """(k, 3) changes of the scales of X, Y, Z that no reading tells of, and (3 - k, 3) the combinations of
+    them that are known, each with a largest part of 1: what the readings left of the prior covariance."""
+    prior = np.linalg.inv(fit.prior.precision()[0])
+    rows = np.zeros((3, fit.parameters.size))
+    for axis, letter in enumerate(AXES):
+        ends = fit.curve(f"E{letter}{letter}", fit.box_mm[axis])
+        rows[axis] = (ends[1] - ends[0]) / float(np.ptp(fit.box_mm[axis]))
+    values, vectors = np.linalg.eigh(rows @ prior @ rows.T)
+    root = (vectors * np.sqrt(values)) @ vectors.T
+    back = np.linalg.inv(root)
+    share, parts = np.linalg.eigh(back @ rows @ fit.covariance @ rows.T @ back)
+    unknown = share > UNSEEN**2
+    changes, known = (root @ parts[:, unknown]).T, (back @ parts[:, ~unknown]).T
+    return _largest_one(changes), _largest_one(known)
+
+
+def _largest_one(rows: Array) -> Array:
+    at = np.argmax(np.abs(rows), axis=1)
+    return np.asarray(rows / rows[np.arange(len(rows)), at][:, None])
 
 
 def squareness_unseen(fit: Fit) -> dict[str, float]:
@@ -135,6 +168,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         ],
         "lines_of_lengths": [_line_row(r) for r in fit.lines if r.line.quantity != "angle"],
         "lines_of_angles": [_line_row(r) for r in fit.lines if r.line.quantity == "angle"],
+        **({"frame": _frame_row(fit)} if fit.parameters.framed else {}),
         "sets_of_points": [_points_row(result) for result in fit.points],
         "stations": [_station_row(result) for result in fit.lengths],
         "sets_of_pods": [
@@ -146,6 +180,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
             }
             for result in fit.pods
         ],
+        "diagonals_and_circles": [_radial_row(result) for result in fit.radial],
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
             for name, sigma in {**hidden, **squareness_unseen(fit)}.items()
@@ -210,6 +245,34 @@ def _points_row(result: PointsResult) -> dict[str, Any]:
     }
 
 
+def _radial_row(result: RadialResult) -> dict[str, Any]:
+    taken = result.taken
+    words = f"diagonal {taken.name}" if isinstance(taken, Diagonal) else f"circle {taken.plane}"
+    return {
+        "name": words,
+        "file": taken.source,
+        "readings": len(result.residual),
+        "sigma_reading_um": result.noise.sigma * UM_PER_MM,
+        "residual_um": _rms([result.residual]) * UM_PER_MM,
+        "chi_square_per_reading": result.chi_square / len(result.residual),
+    }
+
+
+def _frame_row(fit: Fit) -> dict[str, Any]:
+    """The axes as a whole in the machine's frame, at the datum."""
+    part = fit.parameters.slices["frame"]
+    value, sigma = fit.theta[part], np.sqrt(np.diag(fit.covariance)[part])
+    per_urad = 1.0 / LEVER_MM / RAD_PER_URAD
+    return {
+        "shift_um": (value[:3] * UM_PER_MM).tolist(),
+        "sigma_shift_um": (sigma[:3] * UM_PER_MM).tolist(),
+        "turn_urad": (value[3:6] * per_urad).tolist(),
+        "sigma_turn_urad": (sigma[3:6] * per_urad).tolist(),
+        "tool_turn_urad": (value[6:] * per_urad).tolist(),
+        "sigma_tool_turn_urad": (sigma[6:] * per_urad).tolist(),
+    }
+
+
 def _station_row(result: LengthsResult) -> dict[str, Any]:
     return {
         "name": result.lengths.source or "station",
@@ -271,6 +334,17 @@ def _scale_findings(fit: Fit) -> Iterator[Finding]:
     scale = scale_unseen(fit)
     if scale is not None:
         yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
+        return
+    changes, known = scales_open(fit)
+    if len(changes) == 1:
+        yield Finding("OLP809", f"scales that change by {_of_scales(changes[0])} change no reading")
+    elif len(changes) == 2:
+        words = _of_scales(known[0])
+        yield Finding("OLP809", f"of the scales of X, Y and Z one combination is known alone: {words}")
+
+
+def _of_scales(row: Array) -> str:
+    return ", ".join(f"{part:+.2f} {axis}" for axis, part in zip(AXES, row.tolist(), strict=True))
 
 
 def _why(fit: Fit, name: str) -> str:
@@ -311,6 +385,13 @@ def _scatter_findings(fit: Fit) -> Iterator[Finding]:
                 "OLP803",
                 f"{line.source or line.component}: runs spread by {noise.spread * scale:.2g} {unit}, sigma "
                 f"is stated as {line.sigma * scale:.2g} {unit}",
+            )
+    for taken, noise in ((r.taken, r.noise) for r in fit.radial):
+        if noise.spread is not None and taken.sigma > 0.0 and noise.spread > SCATTER * taken.sigma:
+            yield Finding(
+                "OLP803",
+                f"{taken.source or 'diagonal'}: runs spread by {noise.spread * UM_PER_MM:.2g} um, sigma is "
+                f"stated as {taken.sigma * UM_PER_MM:.2g} um",
             )
 
 
@@ -359,11 +440,25 @@ def _box_findings(fit: Fit, travel_mm: Sequence[tuple[float, float]] | None) -> 
 
 
 def _misfit_findings(fit: Fit) -> Iterator[Finding]:
+    # one square among thousands of readings is nothing to chi-square as a whole
+    for square in fit.measurements.squares:
+        part = fit.parameters.slices.get(f"error of square {square.name}")
+        if part is None:
+            continue
+        value, variance = float(fit.theta[part][0]), float(fit.covariance[part, part][0, 0])
+        off = abs(value - square.error_rad)
+        if off > SQUARE_OFF * math.sqrt(max(square.sigma_rad**2 - variance, 0.01 * square.sigma_rad**2)):
+            yield Finding(
+                "OLP808",
+                f"the error of square {square.name} comes out as {value / RAD_PER_URAD:.1f} urad, "
+                f"{square.error_rad / RAD_PER_URAD:.1f} +- {square.sigma_rad / RAD_PER_URAD:.2g} is stated",
+            )
     if misfit(fit) > MISFIT:
         parts = [(r.chi_square / len(r.line.value), r.line.source or r.line.component) for r in fit.lines]
         parts += [(r.chi_square / r.residual.size, r.points.source or "points") for r in fit.points]
         parts += [(r.chi_square / len(r.residual), r.lengths.source or "lengths") for r in fit.lengths]
         parts += [(r.chi_square / len(r.residual), r.pods.source or "pods") for r in fit.pods]
+        parts += [(r.chi_square / len(r.residual), r.taken.source or "diagonals") for r in fit.radial]
         value, source = max(parts)
         yield Finding(
             "OLP808",

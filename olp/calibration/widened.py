@@ -18,6 +18,7 @@ from olp.calibration.observations import Index, Lengths, Pods, Points
 from olp.calibration.parameters import Parameters
 from olp.calibration.pods import CHUNK, pods_block
 from olp.calibration.points import points_block
+from olp.calibration.radial import radial_block
 from olp.errormodel.base import Array
 from olp.machine import SQUARENESS
 from olp.units import AXES
@@ -55,7 +56,7 @@ def straight(parameters: Parameters, position: Array) -> Array:
     out = parameters.design(position, np.zeros(3))
     keep = np.zeros(parameters.size, bool)
     for name, part in parameters.slices.items():
-        keep[part] = name in SQUARENESS or (name in parameters.spaces and name[1] in AXES)
+        keep[part] = name in (*SQUARENESS, "frame") or (name in parameters.spaces and name[1] in AXES)
     out[:, :, ~keep] = 0.0
     return out
 
@@ -121,6 +122,8 @@ class Adjustment:
             other.add(line_block(result.line, fit.parameters, result.noise))
         for reading in fit.measurements.squareness:
             other.add(squareness_block(reading, fit.parameters))
+        for radial in fit.radial:
+            other.add(radial_block(radial.taken, fit.parameters, radial.noise))
         fit.prior.push(other)
         self.lines = other.H
         self.prior = np.diag(nuisance)
@@ -198,6 +201,7 @@ class Adjustment:
             results.append(dataclasses.replace(old, residual=residual, chi_square=square))
         others = [line_block(r.line, fit.parameters, r.noise) for r in fit.lines]
         others += [squareness_block(r, fit.parameters) for r in fit.measurements.squareness]
+        others += [radial_block(r.taken, fit.parameters, r.noise) for r in fit.radial]
         for block in others:
             _, residual, sigma = residuals_of(block, x)
             chi_square += float(np.sum((residual / sigma) ** 2))

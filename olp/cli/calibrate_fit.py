@@ -106,7 +106,7 @@ def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
     shown = dict(report)
     for key in ("sets_of_points", "stations", "sets_of_pods"):
         shown[key] = [{**row, "name": Path(row["name"]).name} for row in report[key]]
-    for key in ("lines_of_lengths", "lines_of_angles"):
+    for key in ("lines_of_lengths", "lines_of_angles", "diagonals_and_circles"):
         shown[key] = [
             {"name": f"{row['name']} {Path(row['file']).name}"}
             | {k: value for k, value in row.items() if k not in ("name", "file")}

@@ -141,6 +141,11 @@ class PointsTable(Table):
         "measured_X_mm, measured_Y_mm, measured_Z_mm (in the instrument's frame), relative to this file"
     )
     sigma_um: Positive = Field(description="the standard uncertainty of a coordinate, in um")
+    frame: Literal["unknown", "known"] = Field(
+        default="unknown",
+        description='"unknown" (the instrument\'s own), or "known": measured_ columns are in the frame of '
+        "the machine, as TCP points are against a simulation model",
+    )
     tool_mm: Triple | None = Field(
         default=None,
         description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
@@ -148,6 +153,24 @@ class PointsTable(Table):
     )
     sigma_scale_um_m: NotNegative = Field(
         default=0.0, description="the standard uncertainty of the instrument's scale, in um/m"
+    )
+
+
+class PolarTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and distance_mm, "
+        "azimuth_deg, elevation_deg, relative to this file"
+    )
+    sigma_distance_um: Positive = Field(description="the standard uncertainty of a distance, in um")
+    sigma_um_m: NotNegative = Field(default=0.0, description="what it grows by with the distance, in um/m")
+    sigma_angle_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
+    sigma_scale_um_m: NotNegative = Field(
+        default=0.0, description="the standard uncertainty of the scale of all distances, in um/m"
+    )
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
     )
 
 
@@ -191,6 +214,13 @@ class PodsTable(Table):
         default=None,
         description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
         "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
+    )
+
+
+class InstrumentTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file that says in comments how it was taken, as "
+        "`olp calibrate diagonals` and `olp calibrate ballbar` read it, relative to this file"
     )
 
 
@@ -243,12 +273,22 @@ class MeasurementsFile(Table):
     points: list[PointsTable] = Field(
         default=[], description="tables [[points]]: each one set-up of a tracker"
     )
+    polar: list[PolarTable] = Field(
+        default=[],
+        description="tables [[polar]]: distances and two angles from one place that nobody knows",
+    )
     stations: list[StationTable] = Field(
         default=[],
         description="tables [[stations]]: lengths from places that nobody knows (multilateration)",
     )
     pods: list[PodsTable] = Field(
         default=[], description="tables [[pods]]: directions from places that nobody knows"
+    )
+    diagonals: list[InstrumentTable] = Field(
+        default=[], description="tables [[diagonals]]: each a laser along a face or body diagonal"
+    )
+    ballbars: list[InstrumentTable] = Field(
+        default=[], description="tables [[ballbars]]: each the circles of a ball-bar about one centre"
     )
     map: MapKeys | None = Field(
         default=None, description="the table [map]: errors that no rigid bodies make are to be mapped"

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.calibration.ballbar import Circles
+from olp.calibration.diagonals import Diagonal
 from olp.calibration.observations import (
     Lengths,
     Line,
@@ -27,20 +29,24 @@ from olp.calibration.observations import (
     Square,
     SquarenessReading,
 )
+from olp.calibration.points import polar_points
 from olp.exceptions import ConfigError, InputError
+from olp.files.instruments import read_circles, read_diagonal
 from olp.files.line_profile import load_line_profile, read_line
 from olp.files.measurement_schemas import (
+    InstrumentTable,
     LineKeys,
     LineTable,
     MeasurementsFile,
     PodsTable,
     PointsTable,
+    PolarTable,
     SquarenessReadingTable,
     SquareTable,
     Stated,
     StationTable,
 )
-from olp.files.point_readings import LENGTH, PointReadings, directions, read_point_readings
+from olp.files.point_readings import LENGTH, POLAR, PointReadings, directions, read_point_readings
 from olp.files.problems import Problem, config_error, validate
 from olp.files.readings import Readings, check_component, parse_readings, stated_keys
 from olp.files.schema_base import Position
@@ -54,6 +60,8 @@ PLAN = "measurements.toml"
 #: um/m to 1
 PER_UNIT = 1e-6
 
+_Scattered = PointsTable | PolarTable | StationTable | PodsTable
+_KINDS = ("lines", "points", "polar", "stations", "pods", "diagonals", "ballbars")
 _LINE_KEYS = tuple(LineKeys.model_fields)
 _PLANES = {"C0Y": "XY", "B0Z": "XZ", "A0Z": "YZ"}
 
@@ -72,6 +80,8 @@ class _Gathered:
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
     whole: dict[str, tuple[Any, str]] = field(default_factory=dict)
     errors: list[ConfigError] = field(default_factory=list)
+    diagonals: list[Diagonal] = field(default_factory=list)
+    circles: list[Circles] = field(default_factory=list)
     map: MapWish | None = None
 
     def state(self, key: str, value: Any, file: str, line: int | None) -> None:
@@ -127,6 +137,8 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         lengths=tuple(found.lengths),
         pods=tuple(found.pods),
         map=found.map,
+        diagonals=tuple(found.diagonals),
+        circles=tuple(found.circles),
     )
 
 
@@ -144,9 +156,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             continue
         try:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
-            for table in (
-                t for kind in ("lines", "points", "stations", "pods") for t in stated.get(kind, ())
-            ):
+            for table in (t for kind in _KINDS for t in stated.get(kind, ())):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader says what is wrong with it.
@@ -186,11 +196,14 @@ def _plan(path: FilePath, found: _Gathered) -> None:
         key = ("squareness", index)
         wrong = _squareness(table, plan.defaults, str(path), found)
         problems += [(line_of(key, places), f"{dotted(key)}: {sentence}") for sentence in wrong]
-    tables: list[tuple[Path, LineTable | PointsTable | StationTable | PodsTable]] = [
+    tables: list[tuple[Path, LineTable | _Scattered | InstrumentTable]] = [
         *((("lines", k), table) for k, table in enumerate(plan.lines)),
         *((("points", k), table) for k, table in enumerate(plan.points)),
+        *((("polar", k), table) for k, table in enumerate(plan.polar)),
         *((("stations", k), table) for k, table in enumerate(plan.stations)),
         *((("pods", k), table) for k, table in enumerate(plan.pods)),
+        *((("diagonals", k), table) for k, table in enumerate(plan.diagonals)),
+        *((("ballbars", k), table) for k, table in enumerate(plan.ballbars)),
     ]
     for key, item in tables:
         try:
@@ -198,6 +211,13 @@ def _plan(path: FilePath, found: _Gathered) -> None:
                 _line(path, item, plan.defaults, plan.vertical, found)
             elif isinstance(item, PointsTable):
                 found.points.append(_points(path, item, plan.defaults))
+            elif isinstance(item, InstrumentTable):
+                if key[0] == "diagonals":
+                    found.diagonals.append(read_diagonal(path.parent / item.file))
+                else:
+                    found.circles.append(read_circles(path.parent / item.file))
+            elif isinstance(item, PolarTable):
+                found.points.append(_polar(path, item, plan.defaults))
             elif isinstance(item, StationTable):
                 found.lengths.append(_lengths(path, item, plan.defaults))
             else:
@@ -244,6 +264,31 @@ def _points(plan: FilePath, table: PointsTable, defaults: LineKeys) -> Points:
         sigma_scale=table.sigma_scale_um_m * PER_UNIT,
         source=readings.file,
         row=readings.row,
+        known_frame=table.frame == "known",
+    )
+
+
+def _polar(plan: FilePath, table: PolarTable, defaults: LineKeys) -> Points:
+    readings = read_point_readings(plan.parent / table.file, POLAR)
+    distance = readings.measured[:, 0]
+    short = np.flatnonzero(distance <= 0.0)
+    if len(short):
+        raise config_error(
+            [(int(readings.row[k]), f"distance_mm = {distance[k]:g}; expected one above 0") for k in short],
+            readings.file,
+        )
+    angles = np.radians(readings.measured[:, 1:])
+    return polar_points(
+        readings.axis_mm,
+        _tools(readings, table, defaults),
+        distance,
+        angles[:, 0],
+        angles[:, 1],
+        sigma_mm=table.sigma_distance_um * MM_PER_UM + table.sigma_um_m * PER_UNIT * distance,
+        sigma_rad=table.sigma_angle_urad * RAD_PER_URAD,
+        sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+        source=readings.file,
+        row=readings.row,
     )
 
 
@@ -280,9 +325,7 @@ def _pods(plan: FilePath, table: PodsTable, defaults: LineKeys) -> Pods:
     )
 
 
-def _tools(
-    readings: PointReadings, table: PointsTable | StationTable | PodsTable, defaults: LineKeys
-) -> npt.NDArray[np.float64]:
+def _tools(readings: PointReadings, table: _Scattered, defaults: LineKeys) -> npt.NDArray[np.float64]:
     """The vector of each point, from the file or from the plan."""
     tool = table.tool_mm or defaults.tool_mm
     if readings.tool_mm is not None:

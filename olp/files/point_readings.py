@@ -6,7 +6,8 @@
 
 The instrument's frame is its own. Columns tool_X_mm, tool_Y_mm, tool_Z_mm hold the vector from the gauge
 point to the reflector where it differs from point to point. Lengths from a station have one column length_mm
-in place of the measured ones, directions from pods azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
+in place of the measured ones, a polar station distance_mm, azimuth_deg and elevation_deg, directions from
+pods azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ Array = npt.NDArray[np.float64]
 AXIS = tuple(f"{axis}_mm" for axis in AXES)
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
 LENGTH = ("length_mm",)
+POLAR = ("distance_mm", "azimuth_deg", "elevation_deg")
 #: Actual minus commanded, in place of measured places.
 DEVIATION = tuple(f"deviation_{axis}_um" for axis in AXES)
 TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)

@@ -39,11 +39,11 @@ class Machine:
         return np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in "ABC"], axis=-1)
 
     def error(self, at: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
-        """(n, 3) at axis positions (n, 3) with one tool vector (3,), directions `play` (n, 3)."""
+        """(n, 3) at axis positions (n, 3) with tool vectors (3,) or (n, 3), directions `play` (n, 3)."""
         out = np.zeros(at.shape)
         for axis in range(3):
             q = at[:, axis]
-            lever = np.tile(np.asarray(tool, float), (len(at), 1))
+            lever = np.array(np.broadcast_to(np.asarray(tool, float), at.shape))
             for k in self.after(axis):
                 lever[:, k] += at[:, k] - self.datum[k]
             out += np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in AXES], axis=-1)
@@ -283,6 +283,20 @@ def points(
     return at, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
 
 
+def polar(
+    m: Machine, seed: int, n: int, station: Any, tools: Any = OFFSETS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axis positions, tool vectors, distances, azimuths and elevations without noise, as a station at a place
+    sees the tips; it stands upright and looks along +Y where its azimuth is 25 degrees."""
+    rng = np.random.default_rng([seed, n, 19])
+    share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
+    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    tool = np.array(tools)[np.arange(n) % len(tools)]
+    x, y, z = (at + tool + m.error(at, tool) - np.array(station, float)).T
+    azimuth = np.arctan2(-x, y) + np.radians(25.0)
+    return at, tool, np.sqrt(x * x + y * y + z * z), azimuth, np.arctan2(z, np.hypot(x, y))
+
+
 def stations(m: Machine, seed: int, count: int) -> np.ndarray:
     """(count, 3) places of a tracking interferometer about the machine."""
     rng = np.random.default_rng([seed, count, 5])
@@ -361,3 +375,41 @@ def bent(m: Machine, sag_mm: float = 0.030, twist_mm: float = 0.015) -> Machine:
             return out
 
     return Bent(m.chain, m.box, m.datum, m.curves, m.square, m.half)
+
+
+def diagonal(
+    m: Machine, seed: int, start: Any, end: Any, tool: Any, *, count: int = 21, runs: int = 3
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Distances from the start, deviations along the diagonal, runs and directions there and back: 0.5 um, a
+    zero of its own, 8 um of lost motion as a whole."""
+    rng = np.random.default_rng([seed, 23, *np.abs(np.array(end, int))])
+    a, b = np.array(start, float), np.array(end, float)
+    length = float(np.linalg.norm(b - a))
+    one = np.linspace(0.0, length, count)
+    distance = np.tile(np.concatenate([one, one[::-1]]), runs)
+    direction = np.tile(np.repeat([1, -1], count), runs)
+    unit = (b - a) / length
+    value = m.error(a + distance[:, None] * unit, np.array(tool, float)) @ unit
+    value = value - 4e-3 * direction + rng.normal(0.0, 0.5e-3, len(value)) + rng.normal(0.0, 0.05)
+    return distance, value, np.repeat(np.arange(1, runs + 1), 2 * count), direction
+
+
+def circles(
+    m: Machine, seed: int, plane: str, centre: Any, radius: float, tool: Any, *, both: bool = True
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Angles, radius deviations, runs and directions of circles: 0.2 um, a bar and a centre that are off, a
+    servo mismatch of 9 um and lost motions of 6 and 3 um."""
+    rng = np.random.default_rng([seed, 29, AXES.index(plane[0])])
+    one = np.linspace(0.0, 2 * np.pi, 180, endpoint=False) + 0.01
+    angle = np.concatenate([one, one[::-1]]) if both else one
+    direction = np.repeat([1, -1], 180)[: len(angle)]
+    i, j = AXES.index(plane[0]), AXES.index(plane[1])
+    out = np.zeros((len(angle), 3))
+    out[:, i], out[:, j] = np.cos(angle), np.sin(angle)
+    error = m.error(np.array(centre, float) + radius * out, np.array(tool, float))
+    # an axis that moves toward + lags behind by half its lost motion
+    for axis, lost, speed in ((i, 6e-3, -np.sin(angle)), (j, 3e-3, np.cos(angle))):
+        error[:, axis] -= 0.5 * lost * direction * np.sign(speed)
+    value = (error * out).sum(axis=1) + 9e-3 * direction * np.sin(2 * angle)
+    value = value + 0.03 + 0.02 * np.cos(angle) - 0.01 * np.sin(angle) + rng.normal(0.0, 0.2e-3, len(angle))
+    return angle, value, np.repeat([1, 2], 180)[: len(angle)], direction
