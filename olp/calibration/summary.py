@@ -146,7 +146,9 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         "temperature_degC": fit.measurements.temperature_degC,
         "datum_mm": list(fit.parameters.datum_mm),
         "box_mm": {axis: fit.box_mm[k].tolist() for k, axis in enumerate(AXES)},
-        "readings": sum(len(result.line.value) for result in fit.lines) + len(fit.measurements.squareness),
+        "readings": sum(len(result.line.value) for result in fit.lines)
+        + len(fit.measurements.squareness)
+        + sum(len(result.residual) for result in fit.radial),
         "points": sum(len(result.points.axis_mm) for result in fit.points),
         "lengths": sum(len(result.residual) for result in fit.lengths),
         "left_out": len(fit.outliers),
