@@ -210,7 +210,7 @@ def run(*arguments: object) -> tuple[int, str]:
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("example") / "gantry-lines"
-    shutil.copytree(PROGRAMS / "gantry-lines", folder)
+    shutil.copytree(PROGRAMS / "gantry-lines", folder, ignore=shutil.ignore_patterns("calibration*"))
     code, output = run(
         "calibrate", "fit", folder, "-m", folder / "machine.toml", "-o", folder / "calibration.toml"
     )

@@ -137,7 +137,7 @@ def call(*words: str):
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("refine") / "gantry-lines"
-    shutil.copytree(PROGRAMS / "gantry-lines", folder)
+    shutil.copytree(PROGRAMS / "gantry-lines", folder, ignore=shutil.ignore_patterns("calibration*"))
     machine = ["-m", str(folder / "machine.toml")]
     done = call("calibrate", "fit", str(folder), *machine, "-q", "-o", str(folder / "calibration.toml"))
     assert done.exit_code == 0, done.output

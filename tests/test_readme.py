@@ -77,6 +77,9 @@ def masked(text: str) -> str:
 def copy(tmp_path: Path) -> Path:
     """The parts of the repository that commands name, and the files that the README shows."""
     shutil.copytree(ROOT / "programs", tmp_path / "programs")
+    # what a reader of the how-to has left beside its measurements
+    for made in (tmp_path / "programs" / "gantry-lines").glob("calibration*"):
+        made.unlink()
     for block in FILES:
         target = tmp_path / block.body.splitlines()[0].removeprefix("# ")
         target.parent.mkdir(exist_ok=True)

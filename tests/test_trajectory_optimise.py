@@ -129,7 +129,8 @@ def laws_hold(given_route: Route, limits: AxisLimits) -> None:
     span = np.diff(motion.start_s)
     assert (span >= 0.0).all()
     result = audit(motion, limits, path.feed_mm_s[motion.shape])
-    assert slowing(result) < 1.02
+    # what is left between rows is taken off by slowing the run, which must stay cheap
+    assert slowing(result) < 1.05
     assert motion.duration_s * slowing(result) < 1.25 * seconds(path, profile)
     assert motion.duration_s > 0.97 * bound_s(path, limits)
     # joined, from rest to rest, and never back
