@@ -30,7 +30,6 @@ FRAMES = {
     "G55": {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -260.0, "C_deg": 30.0, "A_deg": -4.0, "set_by": "true"},
 }
 OFFSET = np.array([210.0, 180.0, -260.0])
-CORPUS = Path("/work/shared/corpus/robodk_csv")
 _NUMBER = re.compile(rb"[-+]?\d*[.,]?\d+")
 
 
@@ -330,8 +329,7 @@ def test_the_command_line(machine: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.corpus
-@pytest.mark.skipif(not CORPUS.is_dir(), reason="the survey of real programs is not at hand")
-def test_lists_of_another_package_are_carried(tmp_path: Path) -> None:
+def test_lists_of_another_package_are_carried(tmp_path: Path, corpus: Path) -> None:
     """RoboDK's examples: no header, no unit, fifteen decimals, and empty cells."""
     wide = Recipe(
         work_offsets={"G54": {"X_mm": 1000.0, "Y_mm": 500.0, "Z_mm": 0.0, "set_by": "true"}},
@@ -339,7 +337,9 @@ def test_lists_of_another_package_are_carried(tmp_path: Path) -> None:
     )  # fmt: skip
     machine = random_machine(tmp_path / "m", 3, wide)
     model = JudgeModel(machine)
-    for name in sorted(CORPUS.iterdir()):
+    lists = sorted((corpus / "robodk_csv").iterdir())
+    assert lists
+    for name in lists:
         data = name.read_bytes()
         with pytest.raises(OlpError, match=r"unit|columns"):
             olp.correct(data, setup_of(machine))
