@@ -129,8 +129,7 @@ def laws_hold(given_route: Route, limits: AxisLimits) -> None:
     span = np.diff(motion.start_s)
     assert (span >= 0.0).all()
     result = audit(motion, limits, path.feed_mm_s[motion.shape])
-    # what is left between rows is taken off by slowing the run, which must stay cheap
-    assert slowing(result) < 1.05
+    assert slowing(result) < 1.02
     assert motion.duration_s * slowing(result) < 1.25 * seconds(path, profile)
     assert motion.duration_s > 0.97 * bound_s(path, limits)
     # joined, from rest to rest, and never back
@@ -153,6 +152,7 @@ def laws_hold(given_route: Route, limits: AxisLimits) -> None:
 @example(16)
 @example(50)
 @example(54)
+@example(12437837)
 def test_random_routes_keep_the_laws(seed: int) -> None:
     given_route, limits = random_route(seed)
     path = smooth(given_route, limits)

@@ -39,8 +39,8 @@ _ROWS, _LOOKED = 3, 9
 _GAUSS = 12
 #: b may change by this in one quintic, or its cell is halved, so often at most
 _STEEP, _HALVES = 1.5, 8
-#: usage that is let be, how often rows are tightened, and the starts that are tried then
-_OVER, _TURNS, _AGAIN = 1.002, 2, (0.95, 0.85, 0.7, 0.5)
+#: usage that is let be in each turn of tightening rows, and the starts that are tried then
+_LET_BE, _AGAIN = (1.002, 1.002, 1.01, 1.01), (0.95, 0.85, 0.7, 0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,9 +205,9 @@ class _Window:
 def _tightened(rows_at: _Rows, rows: Rows, spline: Spline, start: Array) -> Array:
     """The coefficients of least time, with rows tightened beside places that exceed a bound."""
     beta = least_time(rows, spline, start)
-    for _ in range(_TURNS):
+    for let_be in _LET_BE:
         worst = rows_at.worst(spline.cells(beta))
-        over = worst > _OVER
+        over = worst > let_be
         if not over.any():
             break
         rows_at.share[over] /= worst[over]
