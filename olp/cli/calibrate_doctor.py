@@ -11,7 +11,7 @@ from olp.cli.common import (
     fail_on_option,
     files_of,
     json_option,
-    put,
+    put_report,
     refuse_early,
     talk,
 )
@@ -63,7 +63,6 @@ def command(
 
     from olp.diagnosing import diagnose_calibration
     from olp.files.write import write_files
-    from olp.report import to_json
 
     found = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=tool)
     if output is not None:
@@ -71,10 +70,5 @@ def command(
         write_files(files, force=force, inputs=inputs)
         talk(f"wrote {output} and {len(files) - 1} files beside it")
     report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
-    if as_json:
-        put(to_json(report))
-    elif not quiet:
-        from olp.cli.outline import outline
-
-        put(outline(report))
+    put_report(report, as_json=as_json, quiet=quiet)
     exit_for(found.findings, fail_on)

@@ -6,7 +6,16 @@ import datetime
 
 import click
 
-from olp.cli.common import Length, exit_for, fail_on_option, files_of, json_option, put, refuse_early, talk
+from olp.cli.common import (
+    Length,
+    exit_for,
+    fail_on_option,
+    files_of,
+    json_option,
+    put_report,
+    refuse_early,
+    talk,
+)
 from olp.exceptions import UsageError
 
 METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
@@ -74,7 +83,6 @@ def command(
 
     from olp.files.write import write_files
     from olp.planning import INSTRUMENTS, plan_measurements
-    from olp.report import to_json
 
     if output is not None and not Path(output).is_dir():
         raise UsageError("is no folder; create it first", file=output)
@@ -96,10 +104,5 @@ def command(
         write_files(files, force=force, inputs=files_of(machine))
         talk(f"wrote {len(files)} files to {output}")
     report = {**plan.report, "findings": [finding.as_dict() for finding in plan.findings]}
-    if as_json:
-        put(to_json(report))
-    elif not quiet:
-        from olp.cli.outline import outline
-
-        put(outline(report))
+    put_report(report, as_json=as_json, quiet=quiet)
     exit_for(plan.findings, fail_on)

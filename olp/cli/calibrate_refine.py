@@ -13,7 +13,7 @@ from olp.cli.common import (
     fail_on_option,
     files_of,
     json_option,
-    put,
+    put_report,
     refuse_early,
     setup_options,
     talk,
@@ -79,7 +79,6 @@ def command(
 
     from olp.files.write import write_files
     from olp.refining import refine_calibration
-    from olp.report import to_json
 
     found = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=tool,
@@ -89,10 +88,5 @@ def command(
     write_files(files, force=force, inputs=inputs)
     talk(f"wrote {output} and {len(files) - 1} files beside it")
     report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
-    if as_json:
-        put(to_json(report))
-    elif not quiet:
-        from olp.cli.outline import outline
-
-        put(outline(report))
+    put_report(report, as_json=as_json, quiet=quiet)
     exit_for(found.findings, fail_on)

@@ -6,7 +6,7 @@ import datetime
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -274,6 +274,18 @@ def silence_stdout() -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
+
+
+def put_report(report: Mapping[str, Any], *, as_json: bool, quiet: bool) -> None:
+    """A report on stdout: as JSON, or in words unless they are not wanted."""
+    if as_json:
+        from olp.report import to_json
+
+        put(to_json(report))
+    elif not quiet:
+        from olp.cli.outline import outline
+
+        put(outline(report))
 
 
 def exit_for(findings: Iterable[Finding], fail_on: str) -> None:

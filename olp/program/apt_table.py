@@ -5,10 +5,9 @@ Forms after ISO 4343 and ISO 3592, and the habits of Creo, NX, CATIA, SolidWorks
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
-from olp.program.dialect import Dialect, Row, Support, statement_rows
+from olp.program.dialect import StatementDialect, Support
 
 _C, _R, _X = Support.CORRECTED, Support.READ, Support.CARRIED
 _NO = Support.REFUSED
@@ -91,18 +90,10 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
 FREE = (b"PARTNO", b"PPRINT", b"INSERT", b"REMARK", b"REM", b"TITLE", b"TPRINT", b"DISPLY", b"CATPROCESS")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Apt(Dialect):
-    """APT and CLDATA."""
-
-    family: str = "apt"
-
-    def rows(self) -> Sequence[Row]:
-        return statement_rows(TABLE)
-
-
-APT = Apt(
+APT = StatementDialect(
     name="apt",
+    family="apt",
+    table=TABLE,
     title="APT and cutter-location data (ISO 4343, ISO 3592)",
     path_mode="the post-processor's",
     comment=(b"$$ ", b""),

@@ -71,6 +71,11 @@ class Dialect:
         return [row.as_dict() for row in self.rows()]
 
 
-def statement_rows(table: Mapping[bytes, tuple[Support, str]]) -> list[Row]:
-    """The rows of a table of statements by name."""
-    return [Row(name.decode(), support, why) for name, (support, why) in table.items()]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatementDialect(Dialect):
+    """A dialect of whole statements: `table` says what becomes of each by its name, and why."""
+
+    table: Mapping[bytes, tuple[Support, str]]
+
+    def rows(self) -> Sequence[Row]:
+        return [Row(name.decode(), support, why) for name, (support, why) in self.table.items()]

@@ -5,10 +5,9 @@ Forms after ISO 22093, and the habits of WinWerth and MODUS.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
-from olp.program.dialect import Dialect, Row, Support, statement_rows
+from olp.program.dialect import StatementDialect, Support
 
 _C, _R, _X, _NO = Support.CORRECTED, Support.READ, Support.CARRIED, Support.REFUSED
 
@@ -82,18 +81,10 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
 FREE = (b"TEXT", b"DISPLAY", b"PSTHRU")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dmis(Dialect):
-    """DMIS."""
-
-    family: str = "dmis"
-
-    def rows(self) -> Sequence[Row]:
-        return statement_rows(TABLE)
-
-
-DMIS = Dmis(
+DMIS = StatementDialect(
     name="dmis",
+    family="dmis",
+    table=TABLE,
     title="DMIS part programs of coordinate measuring machines (ISO 22093)",
     path_mode="the control's own approach and retract",
     comment=(b"$$ ", b""),
