@@ -15,102 +15,102 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from olp.api import Correction as Correction
-    from olp.api import Simulation as Simulation
-    from olp.api import Verification as Verification
-    from olp.api import correct as correct
-    from olp.api import error_at as error_at
-    from olp.api import flatten as flatten
-    from olp.api import inspect as inspect
-    from olp.api import simulate as simulate
-    from olp.api import verify as verify
-    from olp.calibrating import FittedCalibration as FittedCalibration
-    from olp.calibrating import fit_calibration as fit_calibration
-    from olp.comparing import Comparison as Comparison
-    from olp.comparing import compare as compare
-    from olp.diagnosing import CalibrationDiagnosis as CalibrationDiagnosis
-    from olp.diagnosing import diagnose_calibration as diagnose_calibration
-    from olp.exceptions import CannotCompute as CannotCompute
-    from olp.exceptions import ConfigError as ConfigError
-    from olp.exceptions import InputError as InputError
-    from olp.exceptions import OlpError as OlpError
-    from olp.exceptions import ProgramError as ProgramError
-    from olp.exchanging import TableExport as TableExport
-    from olp.exchanging import TableImport as TableImport
-    from olp.exchanging import compare_tables as compare_tables
-    from olp.exchanging import export_table as export_table
-    from olp.exchanging import import_table as import_table
+    from olp.core.errors import CannotCompute as CannotCompute
+    from olp.core.errors import ConfigError as ConfigError
+    from olp.core.errors import InputError as InputError
+    from olp.core.errors import OlpError as OlpError
+    from olp.core.errors import ProgramError as ProgramError
     from olp.files.config import load_setup as load_setup
-    from olp.findings import Finding as Finding
-    from olp.gate import Check as Check
-    from olp.gate import check as check
-    from olp.metrology import evaluate_lines as evaluate_lines
-    from olp.metrology import fit_ballbar as fit_ballbar
-    from olp.metrology import fit_diagonals as fit_diagonals
-    from olp.metrology import fit_postures as fit_postures
-    from olp.metrology import go_return as go_return
-    from olp.planning import MeasurementPlan as MeasurementPlan
-    from olp.planning import plan_measurements as plan_measurements
-    from olp.refining import RefinedCalibration as RefinedCalibration
-    from olp.refining import refine_calibration as refine_calibration
-    from olp.result_correction import ResultCorrection as ResultCorrection
-    from olp.result_correction import correct_results as correct_results
-    from olp.retiming import Retiming as Retiming
-    from olp.retiming import retime as retime
+    from olp.findings.catalogue import Finding as Finding
     from olp.review.job import Review as Review
     from olp.review.job import view as view
     from olp.review.notebook import add_layers as add_layers
-    from olp.thermal_fitting import ThermalFitting as ThermalFitting
-    from olp.thermal_fitting import fit_thermal as fit_thermal
+    from olp.workflows.api import Correction as Correction
+    from olp.workflows.api import Simulation as Simulation
+    from olp.workflows.api import Verification as Verification
+    from olp.workflows.api import correct as correct
+    from olp.workflows.api import error_at as error_at
+    from olp.workflows.api import flatten as flatten
+    from olp.workflows.api import inspect as inspect
+    from olp.workflows.api import simulate as simulate
+    from olp.workflows.api import verify as verify
+    from olp.workflows.calibrate_doctor import CalibrationDiagnosis as CalibrationDiagnosis
+    from olp.workflows.calibrate_doctor import diagnose_calibration as diagnose_calibration
+    from olp.workflows.calibrate_evaluate import evaluate_lines as evaluate_lines
+    from olp.workflows.calibrate_evaluate import fit_ballbar as fit_ballbar
+    from olp.workflows.calibrate_evaluate import fit_diagonals as fit_diagonals
+    from olp.workflows.calibrate_evaluate import fit_postures as fit_postures
+    from olp.workflows.calibrate_evaluate import go_return as go_return
+    from olp.workflows.calibrate_fit import FittedCalibration as FittedCalibration
+    from olp.workflows.calibrate_fit import fit_calibration as fit_calibration
+    from olp.workflows.calibrate_plan import MeasurementPlan as MeasurementPlan
+    from olp.workflows.calibrate_plan import plan_measurements as plan_measurements
+    from olp.workflows.calibrate_refine import RefinedCalibration as RefinedCalibration
+    from olp.workflows.calibrate_refine import refine_calibration as refine_calibration
+    from olp.workflows.calibrate_tables import TableExport as TableExport
+    from olp.workflows.calibrate_tables import TableImport as TableImport
+    from olp.workflows.calibrate_tables import compare_tables as compare_tables
+    from olp.workflows.calibrate_tables import export_table as export_table
+    from olp.workflows.calibrate_tables import import_table as import_table
+    from olp.workflows.calibrate_thermal import ThermalFitting as ThermalFitting
+    from olp.workflows.calibrate_thermal import fit_thermal as fit_thermal
+    from olp.workflows.check import Check as Check
+    from olp.workflows.check import check as check
+    from olp.workflows.compare import Comparison as Comparison
+    from olp.workflows.compare import compare as compare
+    from olp.workflows.results import ResultCorrection as ResultCorrection
+    from olp.workflows.results import correct_results as correct_results
+    from olp.workflows.retime import Retiming as Retiming
+    from olp.workflows.retime import retime as retime
 
 _HOME = {
-    "Check": "olp.gate",
-    "Correction": "olp.api",
-    "check": "olp.gate",
-    "Simulation": "olp.api",
-    "Verification": "olp.api",
-    "compare": "olp.comparing",
-    "Comparison": "olp.comparing",
-    "FittedCalibration": "olp.calibrating",
-    "fit_calibration": "olp.calibrating",
-    "CalibrationDiagnosis": "olp.diagnosing",
-    "diagnose_calibration": "olp.diagnosing",
-    "RefinedCalibration": "olp.refining",
-    "refine_calibration": "olp.refining",
-    "MeasurementPlan": "olp.planning",
-    "plan_measurements": "olp.planning",
-    "correct": "olp.api",
-    "compare_tables": "olp.exchanging",
-    "export_table": "olp.exchanging",
-    "import_table": "olp.exchanging",
-    "TableExport": "olp.exchanging",
-    "TableImport": "olp.exchanging",
-    "error_at": "olp.api",
-    "flatten": "olp.api",
-    "inspect": "olp.api",
-    "retime": "olp.retiming",
+    "Check": "olp.workflows.check",
+    "Correction": "olp.workflows.api",
+    "check": "olp.workflows.check",
+    "Simulation": "olp.workflows.api",
+    "Verification": "olp.workflows.api",
+    "compare": "olp.workflows.compare",
+    "Comparison": "olp.workflows.compare",
+    "FittedCalibration": "olp.workflows.calibrate_fit",
+    "fit_calibration": "olp.workflows.calibrate_fit",
+    "CalibrationDiagnosis": "olp.workflows.calibrate_doctor",
+    "diagnose_calibration": "olp.workflows.calibrate_doctor",
+    "RefinedCalibration": "olp.workflows.calibrate_refine",
+    "refine_calibration": "olp.workflows.calibrate_refine",
+    "MeasurementPlan": "olp.workflows.calibrate_plan",
+    "plan_measurements": "olp.workflows.calibrate_plan",
+    "correct": "olp.workflows.api",
+    "compare_tables": "olp.workflows.calibrate_tables",
+    "export_table": "olp.workflows.calibrate_tables",
+    "import_table": "olp.workflows.calibrate_tables",
+    "TableExport": "olp.workflows.calibrate_tables",
+    "TableImport": "olp.workflows.calibrate_tables",
+    "error_at": "olp.workflows.api",
+    "flatten": "olp.workflows.api",
+    "inspect": "olp.workflows.api",
+    "retime": "olp.workflows.retime",
     "Review": "olp.review.job",
     "view": "olp.review.job",
     "add_layers": "olp.review.notebook",
-    "Retiming": "olp.retiming",
-    "ResultCorrection": "olp.result_correction",
-    "correct_results": "olp.result_correction",
-    "simulate": "olp.api",
-    "verify": "olp.api",
-    "fit_thermal": "olp.thermal_fitting",
-    "ThermalFitting": "olp.thermal_fitting",
-    "CannotCompute": "olp.exceptions",
-    "ConfigError": "olp.exceptions",
-    "InputError": "olp.exceptions",
-    "OlpError": "olp.exceptions",
-    "ProgramError": "olp.exceptions",
+    "Retiming": "olp.workflows.retime",
+    "ResultCorrection": "olp.workflows.results",
+    "correct_results": "olp.workflows.results",
+    "simulate": "olp.workflows.api",
+    "verify": "olp.workflows.api",
+    "fit_thermal": "olp.workflows.calibrate_thermal",
+    "ThermalFitting": "olp.workflows.calibrate_thermal",
+    "CannotCompute": "olp.core.errors",
+    "ConfigError": "olp.core.errors",
+    "InputError": "olp.core.errors",
+    "OlpError": "olp.core.errors",
+    "ProgramError": "olp.core.errors",
     "Finding": "olp.findings",
     "load_setup": "olp.files.config",
-    "evaluate_lines": "olp.metrology",
-    "fit_ballbar": "olp.metrology",
-    "fit_diagonals": "olp.metrology",
-    "fit_postures": "olp.metrology",
-    "go_return": "olp.metrology",
+    "evaluate_lines": "olp.workflows.calibrate_evaluate",
+    "fit_ballbar": "olp.workflows.calibrate_evaluate",
+    "fit_diagonals": "olp.workflows.calibrate_evaluate",
+    "fit_postures": "olp.workflows.calibrate_evaluate",
+    "go_return": "olp.workflows.calibrate_evaluate",
 }
 
 __all__ = sorted(_HOME)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from olp.core.toolpath import Index, Toolpath
 from olp.errormodel.base import Array, Mask
-from olp.findings import Finding
-from olp.toolpath import Index, Toolpath
+from olp.findings.catalogue import Finding
 
 _LISTED = 20
 

@@ -21,12 +21,12 @@ from olp.clearance.search import CONTACT_MM, Best, search
 from olp.clearance.sweep import CHORD_MM, Ways, ways_of
 from olp.clearance.tree import Tree
 from olp.compensation.plan import zero_shifts
-from olp.errormodel import ErrorModel, plays
-from olp.errormodel.base import Array, Mask
-from olp.findings import Finding
-from olp.geometry import rotation_matrix
-from olp.machine import Mesh, Setup, WorkOffset
-from olp.toolpath import Flag, Index, Kind, Toolpath
+from olp.core.geometry import rotation_matrix
+from olp.core.machine import Mesh, Setup, WorkOffset
+from olp.core.toolpath import Flag, Index, Kind, Toolpath
+from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.reversal import plays
+from olp.findings.catalogue import Finding
 
 #: what a mesh of the workpiece and the path that cuts it may differ by (chords of both, allowances)
 SLACK_MM = 0.1

@@ -6,11 +6,11 @@ import numpy as np
 
 from olp.checks.base import finding, lines_of
 from olp.compensation.plan import targets, zero_shifts
-from olp.errormodel import ErrorModel
-from olp.findings import Finding
-from olp.geometry import segment_distance
+from olp.core.geometry import segment_distance
+from olp.errormodel.base import ErrorModel
+from olp.findings.catalogue import Finding
 from olp.program.program import Program
-from olp.proof import Proof
+from olp.proof.proof import Proof
 
 #: Where the way between two places is looked at.
 _SHARES = np.linspace(0.0, 1.0, 18)[1:-1]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from olp.checks.base import finding, lines_of
-from olp.errormodel import Calibration, ErrorModel
-from olp.findings import Finding
-from olp.machine import Sanity
-from olp.toolpath import Kind, Toolpath
-from olp.units import UM_PER_MM
+from olp.core.machine import Sanity
+from olp.core.toolpath import Kind, Toolpath
+from olp.core.units import UM_PER_MM
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.calibration import Calibration
+from olp.findings.catalogue import Finding
 
 #: A total map is all that is known, so its tool has to be the one in use but for this.
 _SAME_TOOL_MM = 1.0

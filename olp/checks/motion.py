@@ -9,18 +9,17 @@ import numpy as np
 
 from olp.checks.base import finding, lines_of
 from olp.compensation.plan import targets, zero_shifts
-from olp.deviation import cutting_moves
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array, Mask
-from olp.exceptions import ProgramError
-from olp.findings import Finding
-from olp.geometry import PLANES, quarter_shares
-from olp.machine import Machine
-from olp.program.feeds import Scan, lengths_mm
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES, quarter_shares
+from olp.core.machine import Machine
+from olp.core.toolpath import Flag, Index, Kind, Toolpath
+from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.findings.catalogue import Finding
+from olp.program.feeds.moves import Scan, lengths_mm
+from olp.program.feeds.stated import programmed
 from olp.program.program import Program
-from olp.program.stated_feeds import programmed
-from olp.proof import Proof
-from olp.toolpath import Flag, Index, Kind, Toolpath
+from olp.proof.deviation import cutting_moves
+from olp.proof.proof import Proof
 
 #: a corner is sharper than this: every control slows down there, and nobody asks it not to
 _SMOOTH_RAD = 0.35
@@ -39,7 +38,7 @@ _INVERSE, _PER_TURN = 930, 950
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feeds:
-    """(n,) feed of each move in mm/s as of `olp.program.feeds`, or the finding that there is none."""
+    """(n,) feed of each move in mm/s as of `olp.program.feeds.moves`, or the finding that there is none."""
 
     mm_s: Array | None
     modes: dict[int, list[int]]

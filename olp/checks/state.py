@@ -7,12 +7,12 @@ import datetime
 import numpy as np
 
 from olp.checks.base import finding, lines_of
-from olp.errormodel import Calibration
+from olp.core.machine import Job, Machine, Sanity, Setup
+from olp.core.toolpath import Flag, Toolpath
 from olp.errormodel.base import Array
-from olp.findings import Finding
-from olp.machine import Job, Machine, Sanity, Setup
-from olp.proof import ROUNDING_SHARE
-from olp.toolpath import Flag, Toolpath
+from olp.errormodel.calibration import Calibration
+from olp.findings.catalogue import Finding
+from olp.proof.proof import ROUNDING_SHARE
 
 #: what rounding may make of a place on a limit
 _ON_LIMIT_MM = 1e-6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from olp.machine import Tool
+from olp.core.machine import Tool
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ import numpy as np
 
 from olp.clearance.distance import Array, Index, Mask, Swept
 from olp.clearance.parts import Part
-from olp.geometry import PLANES, arc_points
-from olp.toolpath import Toolpath
+from olp.core.geometry import PLANES, arc_points
+from olp.core.toolpath import Toolpath
 
 #: how far a chord may leave its arc, in mm
 CHORD_MM = 5e-4

@@ -12,7 +12,7 @@ import click
 from olp import __version__
 from olp.cli.common import silence_stdout, talk
 from olp.cli.late import LateGroup
-from olp.exceptions import OlpError
+from olp.core.errors import OlpError
 
 #: Verb to what it does. Kept here so that `olp --help` imports no verb.
 VERBS = {

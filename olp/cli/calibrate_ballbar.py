@@ -31,11 +31,11 @@ def command(
 
     FILES are CSV: angle_deg,run,direction,deviation_um, below comments # plane = XY, # radius_mm,
     # centre_mm, # tool_mm. Squareness needs both directions of rotation."""
-    from olp import plots_calibration
-    from olp.calibration.ballbar import readings_of
-    from olp.calibration.squareness import readings_toml
+    from olp.calibration.iso230.ballbar import readings_of
+    from olp.calibration.iso230.squareness import readings_toml
     from olp.cli.outline import outline
-    from olp.metrology import fit_ballbar
+    from olp.reports.plots import calibration as plots_calibration
+    from olp.workflows.calibrate_evaluate import fit_ballbar
 
     kind = plot_kind(plot)
     fits = fit_ballbar(files, skip_deg=skip_deg)

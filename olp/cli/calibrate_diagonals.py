@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 from olp.cli.instruments import end, ending_options
-from olp.exceptions import UsageError
-from olp.units import RAD_PER_URAD
+from olp.core.errors import UsageError
+from olp.core.units import RAD_PER_URAD
 
 
 @click.command("diagonals")
@@ -31,9 +31,9 @@ def command(
 
     FILES are CSV: target_mm,run,direction,value_um (the distance from the start), below comments
     # start_mm, # end_mm, # tool_mm, # sense."""
-    from olp.calibration.squareness import readings_toml
+    from olp.calibration.iso230.squareness import readings_toml
     from olp.cli.outline import outline
-    from olp.metrology import fit_diagonals
+    from olp.workflows.calibrate_evaluate import fit_diagonals
 
     found = fit_diagonals(files, dict(_known(item) for item in known))
     findings = list(found.findings)

@@ -15,7 +15,7 @@ from olp.cli.common import (
     refuse_early,
     talk,
 )
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("doctor")
@@ -54,15 +54,15 @@ def command(
     """
     if STREAM in (output, calibration, points):
         raise UsageError("a calibration is several files; name files, - is none")
-    from olp.files.calibration import files_beside
-    from olp.files.measurements import files_of_measurements
+    from olp.files.calibration.reader import files_beside
+    from olp.files.measurements.reader import files_of_measurements
 
     stated = map(str, (calibration, *files_beside(calibration)))
     inputs = (*files_of(machine), *stated, *files_of_measurements([points]))
     refuse_early(files_of(output), inputs, force=force)
 
-    from olp.diagnosing import diagnose_calibration
     from olp.files.write import write_files
+    from olp.workflows.calibrate_doctor import diagnose_calibration
 
     found = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=tool)
     if output is not None:

@@ -40,9 +40,10 @@ def command(
     """ISO 230-2 figures, cyclic errors, reversal and squareness of measured lines.
 
     DATA are plans (measurements.toml), folders and files as olp calibrate fit takes them."""
-    from olp import report_calibration, report_lines
-    from olp.files.measurements import files_of_measurements
-    from olp.metrology import evaluate_lines
+    from olp.files.measurements.reader import files_of_measurements
+    from olp.reports import calibration as report_calibration
+    from olp.workflows import report_lines
+    from olp.workflows.calibrate_evaluate import evaluate_lines
 
     kind = plot_kind(plot)
     inputs = (*files_of_measurements(data), *files_of(machine))

@@ -8,11 +8,11 @@ import click
 
 from olp.cli.calibrate_import import table_options
 from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, setup_options, talk
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
     from olp.errormodel.calibration import Reference
-    from olp.files.exchange.base import Sense
+    from olp.files.control_tables.base import Sense
 
 
 @click.command("export")
@@ -51,8 +51,8 @@ def command(
 
     The figures stand next to those of a corrected program, so that either can be chosen.
     """
-    from olp.exchanging import compare_tables, export_table
     from olp.files.write import write_files
+    from olp.workflows.calibrate_tables import compare_tables, export_table
 
     if compare == (kind is not None):
         raise UsageError("give either --format with -o, or --compare")
@@ -83,8 +83,8 @@ def command(
 
 
 def _put(report: dict[str, Any], as_json: bool) -> None:
-    from olp.exchanging import left_lines
-    from olp.report import table, to_json
+    from olp.reports.report import table, to_json
+    from olp.workflows.calibrate_tables import left_lines
 
     if as_json:
         put(to_json(report))

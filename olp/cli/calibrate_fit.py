@@ -11,7 +11,7 @@ import click
 
 from olp.cli.common import STREAM, exit_for, files_of, put, refuse_early, report_ending, talk
 from olp.cli.progress import progress
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("fit")
@@ -59,16 +59,16 @@ def command(
     """
     if STREAM in (output, report_file, *data):
         raise UsageError("a calibration is several files; name files, - is none")
-    from olp.files.measurements import files_of_measurements
+    from olp.files.measurements.reader import files_of_measurements
 
     inputs = (*files_of_measurements(data), *files_of(machine))
     for name in files_of(report_file):
         report_ending(name)
     refuse_early(files_of(output, report_file), inputs, force=force)
 
-    from olp.calibrating import fit_calibration
     from olp.files.write import write_files
-    from olp.report import to_json
+    from olp.reports.report import to_json
+    from olp.workflows.calibrate_fit import fit_calibration
 
     with progress(quiet) as tell:
         fitted = fit_calibration(
@@ -82,7 +82,7 @@ def command(
     files: dict[Path, bytes] = {} if output is None else fitted.files(output)
     curves = len(files) - 1
     if report_file is not None:
-        from olp.report_lines import fit as fit_report
+        from olp.workflows.report_lines import fit as fit_report
 
         files[Path(report_file)] = fit_report(fitted, report_file, None)
     write_files(files, force=force, inputs=inputs)

@@ -11,8 +11,8 @@ from olp.cli.common import put
 @click.option("--json", "as_json", is_flag=True, help="Print the list as JSON.")
 def command(as_json: bool) -> None:
     """List the tables of controls that can be read and written: sense, what each holds, how far verified."""
-    from olp.files.exchange.registry import FORMATS
-    from olp.report import to_json
+    from olp.files.control_tables.registry import FORMATS
+    from olp.reports.report import to_json
 
     if as_json:
         keys = ("title", "ending", "sense", "status", "holds")

@@ -9,7 +9,7 @@ import numpy as np
 
 from olp.cli.common import Length, files_of
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("go-return")
@@ -53,11 +53,11 @@ def command(
     if not data:
         raise UsageError("no DATA is given; name the readings, or write the test with --program")
 
-    from olp import plots_calibration
-    from olp.calibration.go_return import backlash_toml, findings_of
+    from olp.calibration.iso230.go_return import backlash_toml, findings_of
     from olp.cli.outline import outline
-    from olp.files.measurements import files_of_measurements
-    from olp.metrology import go_return
+    from olp.files.measurements.reader import files_of_measurements
+    from olp.reports.plots import calibration as plots_calibration
+    from olp.workflows.calibrate_evaluate import go_return
 
     kind = plot_kind(plot)
     found = go_return(data, machine)
@@ -80,7 +80,7 @@ def command(
 
 
 def _program(machine: str, axis: str, count: int, over_mm: float, feed: float, runs: int) -> str:
-    from olp.calibration.go_return import program
+    from olp.calibration.iso230.go_return import program
     from olp.files.config import load_setup
 
     described = load_setup(machine, None).machine

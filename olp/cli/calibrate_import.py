@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.common import files_of, refuse_early, talk
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
     from olp.errormodel.calibration import Reference
-    from olp.files.exchange.base import Sense
+    from olp.files.control_tables.base import Sense
 
 
 def axis_names(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
@@ -82,8 +82,8 @@ def command(
 
     The calibration holds the errors that the table corrects, actual minus commanded.
     """
-    from olp.exchanging import import_table
     from olp.files.write import write_files
+    from olp.workflows.calibrate_tables import import_table
 
     inputs = files_of(table, machine)
     refuse_early([output], inputs, force=force)

@@ -16,7 +16,7 @@ from olp.cli.common import (
     refuse_early,
     talk,
 )
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 
@@ -82,7 +82,7 @@ def command(
     from pathlib import Path
 
     from olp.files.write import write_files
-    from olp.planning import INSTRUMENTS, plan_measurements
+    from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
 
     if output is not None and not Path(output).is_dir():
         raise UsageError("is no folder; create it first", file=output)

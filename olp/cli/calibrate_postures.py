@@ -8,7 +8,7 @@ import click
 
 from olp.cli.common import Length, files_of
 from olp.cli.instruments import end, ending_options
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("postures")
@@ -42,9 +42,9 @@ def command(
 
     FILE is CSV: X_mm,Y_mm,Z_mm,tool[,TX_mm,TY_mm,TZ_mm][,A_deg,B_deg,C_deg], axis positions with the tool
     point on the one point, a row a posture."""
-    from olp.calibration import postures
+    from olp.calibration.iso230 import postures
     from olp.cli.outline import outline
-    from olp.metrology import fit_postures
+    from olp.workflows.calibrate_evaluate import fit_postures
 
     if program is not None:
         if file is not None or tools is None or point is None:

@@ -16,7 +16,7 @@ def command(file: str, profile: str | None, as_json: bool) -> None:
 
     Without --profile the file is native CSV: target_mm,run,direction,value_um or value_urad.
     """
-    from olp.files.line_profile import load_line_profile, read_line
+    from olp.files.measurements.line_profile import load_line_profile, read_line
 
     found = read_line(file, None if profile is None else load_line_profile(profile))
     unit, scale = ("urad", 1e6) if found.angular else ("um", 1e3)

@@ -18,7 +18,7 @@ from olp.cli.common import (
     setup_options,
     talk,
 )
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("refine")
@@ -67,8 +67,8 @@ def command(
         raise UsageError("a calibration is several files; name files, - is none")
     if machine is None:
         raise UsageError("no machine file is given; name it with -m")
-    from olp.files.calibration import files_beside
-    from olp.files.measurements import files_of_measurements
+    from olp.files.calibration.reader import files_beside
+    from olp.files.measurements.reader import files_of_measurements
 
     inputs = (
         *files_of(machine, job, program),
@@ -78,7 +78,7 @@ def command(
     refuse_early(files_of(output), inputs, force=force)
 
     from olp.files.write import write_files
-    from olp.refining import refine_calibration
+    from olp.workflows.calibrate_refine import refine_calibration
 
     found = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=tool,

@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 from olp.cli.common import put
-from olp.exceptions import UsageError
-from olp.units import RAD_PER_URAD
+from olp.core.errors import UsageError
+from olp.core.units import RAD_PER_URAD
 
 
 @click.command("squareness")
@@ -26,10 +26,10 @@ def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], a
 
     VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from; a frame that the machine drew or
     printed gives its own. Without either, the conventions are listed."""
-    from olp.calibration.conventions import CONVENTIONS, angle_words, from_iso, to_iso
-    from olp.calibration.squareness import from_frame
+    from olp.calibration.iso230.conventions import CONVENTIONS, angle_words, from_iso, to_iso
+    from olp.calibration.iso230.squareness import from_frame
     from olp.cli.outline import outline
-    from olp.report import to_json
+    from olp.reports.report import to_json
 
     given: dict[str, float] = {}
     for item in values:

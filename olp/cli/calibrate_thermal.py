@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("thermal")
@@ -47,7 +47,7 @@ def command(
     setup, inputs = machine_given(machine, None)
     refuse_early(files_of(target), (*inputs, *logs), force=force)
     from olp.files.write import write_bytes
-    from olp.thermal_fitting import fit_thermal
+    from olp.workflows.calibrate_thermal import fit_thermal
 
     result = fit_thermal(logs, setup, reference_degC=_reference(reference), sensors=sensors)
     if target is None:
@@ -55,7 +55,7 @@ def command(
     else:
         write_bytes(target, result.data, force=force, inputs=(*inputs, *logs))
     if as_json:
-        from olp.report import to_json
+        from olp.reports.report import to_json
 
         put(to_json(result.report))
     for line in _shown(result.report):

@@ -27,7 +27,7 @@ from olp.cli.common import (
     tolerance_option,
 )
 from olp.cli.progress import progress
-from olp.exceptions import UsageError, naming
+from olp.core.errors import UsageError, naming
 
 
 def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
@@ -96,8 +96,8 @@ def command(
     refuse_twice(files_of(output, clearances))
 
     from olp.files.write import write_files
-    from olp.gate import check
-    from olp.report_check import FORMATS, to_csv
+    from olp.reports.check import FORMATS, to_csv
+    from olp.workflows.check import check
 
     with progress(form != "text") as show, naming("<stdin>" if call.program == STREAM else ""):
         result = check(

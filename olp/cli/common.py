@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from olp.exceptions import OlpError, UsageError
-from olp.findings import Finding, Severity, worst
+from olp.core.errors import OlpError, UsageError
+from olp.findings.catalogue import Finding, worst
+from olp.findings.rule import Severity
 
 if TYPE_CHECKING:
-    from olp.machine import Setup
+    from olp.core.machine import Setup
 
 STREAM = "-"
 FINDINGS_EXIT = 1
@@ -176,7 +177,7 @@ def given(program: str | None, machine: str | None, job: str | None) -> Given:
 
 def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
     """Machine and job, and the files that describe them. Raises UsageError, InputError."""
-    from olp.files.calibration import files_beside
+    from olp.files.calibration.reader import files_beside
     from olp.files.config import load_setup
 
     setup = load_setup(machine, job)
@@ -279,7 +280,7 @@ def silence_stdout() -> None:
 def put_report(report: Mapping[str, Any], *, as_json: bool, quiet: bool) -> None:
     """A report on stdout: as JSON, or in words unless they are not wanted."""
     if as_json:
-        from olp.report import to_json
+        from olp.reports.report import to_json
 
         put(to_json(report))
     elif not quiet:

@@ -29,12 +29,12 @@ from olp.cli.common import (
     talk,
 )
 from olp.cli.progress import progress
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
+    from olp.comparison.pairing import Order
+    from olp.comparison.runs import Align
     from olp.files.point_profile import PointProfile
-    from olp.measured.pairing import Order
-    from olp.measured.runs import Align
 
 
 @click.command("compare")
@@ -127,10 +127,11 @@ def command(
     if output and poses:
         raise UsageError("-o writes deviations along a path; poses are in the report")
 
-    from olp import report_compare, report_files
-    from olp.comparing import compare
     from olp.files.write import Content, write_files
-    from olp.report import to_json
+    from olp.reports import compare as report_compare
+    from olp.reports.report import to_json
+    from olp.workflows import report_files
+    from olp.workflows.compare import compare
 
     layout = _layout(profile, columns, measured[0], unit=unit, delimiter=delimiter, positions=positions)
     with progress(quiet) as show:

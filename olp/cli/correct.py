@@ -31,12 +31,12 @@ from olp.cli.layouts import with_layout_of
 from olp.cli.progress import progress
 from olp.cli.results import Asked, default_output
 from olp.cli.results import run as run_results
-from olp.exceptions import ProgramError, UsageError
+from olp.core.errors import ProgramError, UsageError
 
 if TYPE_CHECKING:
-    from olp.api import Correction
+    from olp.core.machine import Machine
     from olp.files.write import Content
-    from olp.machine import Machine
+    from olp.workflows.api import Correction
 
 #: What rounding adds to a correction, at most.
 LAST_DIGITS_UM = 10.0
@@ -141,8 +141,9 @@ def command(
     refuse_early(outputs, call.inputs, force=force)
     refuse_twice(outputs)
 
-    from olp import api, report
     from olp.files.write import write_files
+    from olp.reports import report
+    from olp.workflows import api
 
     nominal = source(call.program)
     with progress(quiet) as show:
@@ -176,8 +177,8 @@ def command(
             raise error.in_file("<stdin>" if call.program == STREAM else call.program) from None
 
     for name in files_of(report_file):
-        from olp import report_files
-        from olp.loading import reading, source_of, unrolled
+        from olp.workflows import report_files
+        from olp.workflows.session import reading, source_of, unrolled
 
         text, origin = source_of(nominal)
         if flatten or expand_cycles:
@@ -204,7 +205,7 @@ def command(
 def _diff(nominal: str | bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:
     from olp.cli.diff import render
     from olp.files.write import read_bytes
-    from olp.program.profiles import PROFILES
+    from olp.program.rs274.profiles import PROFILES
 
     profile = PROFILES.get(result.report["program"]["dialect"])
     largest_um = float(result.report.get("largest_correction_um", 0.0))

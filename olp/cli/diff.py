@@ -12,8 +12,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from olp.report import printable, shortened
-from olp.units import AXES
+from olp.core.units import AXES
+from olp.reports.report import printable, shortened
 
 #: Insertions looked through for the partner of a line, and how far apart both texts may drift otherwise.
 AHEAD = 1000

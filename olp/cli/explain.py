@@ -9,8 +9,9 @@ import textwrap
 import click
 
 from olp.cli.common import put
-from olp.exceptions import UsageError
-from olp.findings import RULES, Rule
+from olp.core.errors import UsageError
+from olp.findings.catalogue import RULES
+from olp.findings.rule import Rule
 
 
 @click.command("explain")

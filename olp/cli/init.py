@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from olp.cli.common import talk
-from olp.exceptions import OlpError, UsageError
+from olp.core.errors import OlpError, UsageError
 
 #: A small machine, to be replaced by the travel of the real one.
 TRAVEL_MM = {"X": (0.0, 500.0), "Y": (0.0, 400.0), "Z": (-300.0, 0.0)}

@@ -18,11 +18,11 @@ from olp.cli.common import (
     source,
     talk,
 )
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from olp.errormodel import Calibration
-    from olp.machine import Setup
+    from olp.core.machine import Setup
+    from olp.errormodel.calibration import Calibration
 
 
 @click.command("inspect")
@@ -68,7 +68,7 @@ def command(
     if plot is not None:
         _plot(setup, plot, inputs, force)
     if at is not None:
-        from olp import api
+        from olp.workflows import api
 
         values = shown = api.error_at(setup, at, tool)
     elif plot is not None:
@@ -76,19 +76,19 @@ def command(
     elif file is None:
         values = shown = machine_summary(setup)
     else:
-        from olp import api
+        from olp.workflows import api
 
         values = api.inspect(source(file), setup)
         shown = values | {"support": _by_support(values.get("support") or ())}
     from olp.cli.outline import outline
-    from olp.report import to_json
+    from olp.reports.report import to_json
 
     put(to_json(values) if as_json else outline(shown))
 
 
 def _plot(setup: Setup, name: str, inputs: Sequence[str], force: bool) -> None:
     from olp.files.write import write_bytes
-    from olp.plots import calibration_curves
+    from olp.reports.plots.base import calibration_curves
 
     data = calibration_curves(_calibration(setup), "png" if Path(name).suffix.lower() == ".png" else "svg")
     write_bytes(name, data, force=force, inputs=inputs)
@@ -102,7 +102,7 @@ def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:
 
 
 def _calibration(setup: Setup) -> Calibration:
-    from olp.files.calibration import load_calibration
+    from olp.files.calibration.reader import load_calibration
 
     path = setup.machine.calibration
     if path is None:
@@ -115,8 +115,8 @@ def _calibration(setup: Setup) -> Calibration:
 def machine_summary(setup: Setup) -> dict[str, Any]:
     """Axes, chain, calibration and the size of each of the 21 errors, with units in the keys."""
     from olp.cli.inspect_parts import grid_summary
-    from olp.machine import COMPONENTS, SQUARENESS
-    from olp.units import AXES, RAD_PER_URAD, UM_PER_MM
+    from olp.core.machine import COMPONENTS, SQUARENESS
+    from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 
     calibration, described = _calibration(setup), setup.machine
     position, angular = (

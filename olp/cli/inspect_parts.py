@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from olp.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.units import RAD_PER_URAD, UM_PER_MM
 
 if TYPE_CHECKING:
-    from olp.errormodel import Calibration
+    from olp.errormodel.calibration import Calibration
     from olp.errormodel.structure import Structure
 
 

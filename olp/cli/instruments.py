@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 import click
 
 from olp.cli.common import exit_for, files_of, put, refuse_early, refuse_twice, talk
-from olp.exceptions import UsageError
-from olp.findings import Finding
+from olp.core.errors import UsageError
+from olp.findings.catalogue import Finding
 
 F = TypeVar("F", bound=Callable[..., Any])
 PLOTS = (".svg", ".png")
@@ -52,7 +52,7 @@ def end(
 ) -> None:  # fmt: skip
     """Write the files, print the result, and end with 1 where a finding says so."""
     from olp.files.write import write_files
-    from olp.report import to_json
+    from olp.reports.report import to_json
 
     sources = list(inputs)
     refuse_twice(files_of(*files))

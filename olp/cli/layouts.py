@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from olp.cli.common import STREAM, Given, files_of
-from olp.exceptions import InputError, UsageError
+from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from olp.program.delimited import Layout
+    from olp.program.text.delimited import Layout
 
 
 def layout_of(
@@ -18,7 +18,7 @@ def layout_of(
     """The layout that a call asks for, None where the table tells its own."""
     from olp.files.point_profile import BUILT_IN, from_layout, load_profile, with_options
     from olp.files.write import read_bytes
-    from olp.program.delimited import first_lines, told
+    from olp.program.text.delimited import first_lines, told
 
     if profile is None and not columns and unit is None:
         return None
@@ -41,7 +41,7 @@ def layout_of(
 
 def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], unit: str | None) -> Given:
     """A call about a list of positions that is laid out as it says; the same call where it says nothing."""
-    from olp.program.pointlist import with_layout
+    from olp.program.pointlist.reader import with_layout
 
     if profile is None and not columns and unit is None:
         return call

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from olp.report import findings_text, pairs, printable, table
-from olp.units import AXES
+from olp.core.units import AXES
+from olp.reports.report import findings_text, pairs, printable, table
 
 Summary = Mapping[str, Any]
 

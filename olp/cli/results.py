@@ -8,7 +8,7 @@ from pathlib import Path
 
 from olp.cli.common import STREAM, exit_for, files_of, given, put, refuse_early, refuse_twice, source, talk
 from olp.cli.layouts import layout_of
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +44,10 @@ def run(results: str | None, machine: str | None, job: str | None, asked: Asked)
     refuse_early(outputs, inputs, force=asked.force)
     refuse_twice(outputs)
 
-    from olp import report, report_results
     from olp.files.write import Content, write_files
-    from olp.result_correction import correct_results
+    from olp.reports import report
+    from olp.reports import results as report_results
+    from olp.workflows.results import correct_results
 
     text = source(call.program)
     result = correct_results(
@@ -57,7 +58,7 @@ def run(results: str | None, machine: str | None, job: str | None, asked: Asked)
     )  # fmt: skip
     written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
     for name in files_of(asked.report_file):
-        from olp import report_files
+        from olp.workflows import report_files
 
         written[Path(name)] = report_files.results(result, name, asked.date)
     write_files(written, force=asked.force, inputs=inputs)

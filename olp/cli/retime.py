@@ -29,12 +29,12 @@ from olp.cli.common import (
     talk,
 )
 from olp.cli.progress import progress
-from olp.exceptions import InputError, OlpError, UsageError, naming
+from olp.core.errors import InputError, OlpError, UsageError, naming
 
 if TYPE_CHECKING:
     from olp.files.write import Content
-    from olp.program.feed_words import Shared
-    from olp.retiming import Format, Retiming
+    from olp.program.feeds.words import Shared
+    from olp.workflows.retime import Format, Retiming
 
 FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 
@@ -136,10 +136,11 @@ def command(
     refuse_early(outputs, inputs, force=force)
     refuse_twice(outputs)
 
-    from olp import report, report_time
     from olp.files import trajectory as tables
     from olp.files.write import write_files
-    from olp.retiming import retime
+    from olp.reports import report
+    from olp.reports import retime as report_time
+    from olp.workflows.retime import retime
 
     with progress(quiet) as show, naming("<stdin>" if STREAM in (call.program, nominal) else ""):
         result = retime(

@@ -43,8 +43,8 @@ def command(
     call = given(program, machine, job)
     refuse_early(files_of(output), call.inputs, force=force)
 
-    from olp import api
     from olp.files.write import write_bytes
+    from olp.workflows import api
 
     result = api.simulate(source(call.program), call.setup, step_mm=step_mm, contour=contour)
     data = result.to_csv()

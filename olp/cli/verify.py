@@ -16,7 +16,7 @@ from olp.cli.common import (
     setup_options,
     source,
 )
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 
 
 @click.command("verify")
@@ -47,7 +47,8 @@ def command(
         raise UsageError("NOMINAL and CORRECTED cannot both come from stdin; name one of the files")
     call = given(nominal, machine, job)
 
-    from olp import api, report
+    from olp.reports import report
+    from olp.workflows import api
 
     result = api.verify(
         source(nominal),

@@ -25,7 +25,7 @@ from olp.cli.common import (
     unroll_options,
 )
 from olp.cli.progress import progress
-from olp.exceptions import UsageError, naming
+from olp.core.errors import UsageError, naming
 
 if TYPE_CHECKING:
     from olp.review.job import Review

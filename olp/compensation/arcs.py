@@ -15,12 +15,11 @@ import numpy.typing as npt
 
 from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array, Mask
+from olp.core.errors import CannotCompute
+from olp.core.geometry import PLANES, arc_directions, arc_points
+from olp.core.toolpath import Arcs, Flag, Toolpath
+from olp.errormodel.base import Array, ErrorModel, Mask
 from olp.errormodel.sampling import steps_needed
-from olp.exceptions import CannotCompute
-from olp.geometry import PLANES, arc_directions, arc_points
-from olp.toolpath import Arcs, Flag, Toolpath
 
 Index = npt.NDArray[np.int64]
 

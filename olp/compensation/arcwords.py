@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag, Kind
 from olp.errormodel.base import Array, Mask
-from olp.exceptions import ProgramError
-from olp.geometry import PLANES
-from olp.program.edits import EditList, Edits
-from olp.toolpath import Flag, Kind
+from olp.program.text.edits import EditList, Edits
 
 if TYPE_CHECKING:
     from olp.compensation.rows import Rows

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.rows import Rows
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Flag, Kind
 from olp.errormodel.base import Mask
-from olp.exceptions import ProgramError
-from olp.program.edits import BARE, Edits
-from olp.toolpath import Flag, Kind
+from olp.program.text.edits import BARE, Edits
 
 if TYPE_CHECKING:
     from olp.compensation.writer import Writer

@@ -13,12 +13,11 @@ import numpy as np
 
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array
-from olp.geometry import PLANES
-from olp.program.edits import EditList, Edits
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag
+from olp.errormodel.base import Array, ErrorModel
 from olp.program.program import Hole, Program
-from olp.toolpath import Flag
+from olp.program.text.edits import EditList, Edits
 
 if TYPE_CHECKING:
     from olp.compensation.rows import Rows

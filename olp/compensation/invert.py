@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array
-from olp.exceptions import NotInvertible
+from olp.core.errors import NotInvertible
+from olp.errormodel.base import Array, ErrorModel
 
 #: A command is good when its error differs from the one it was made with by less than this.
 TOLERANCE_MM = 1e-9

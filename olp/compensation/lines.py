@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.invert import bent
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array, Mask
+from olp.core.toolpath import Toolpath
+from olp.errormodel.base import Array, ErrorModel, Mask
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
-from olp.toolpath import Toolpath
 
 Index = npt.NDArray[np.int64]
 Cuts = tuple[Index, Array, Array]

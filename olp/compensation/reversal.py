@@ -14,9 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.invert import invert
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array, Mask
-from olp.toolpath import Flag, Kind, Toolpath
+from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.errormodel.base import Array, ErrorModel, Mask
 
 if TYPE_CHECKING:
     from olp.compensation.plan import Plan

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.digits import Digits
+from olp.core.toolpath import Flag
 from olp.errormodel.base import Array, Mask
-from olp.toolpath import Flag
 
 if TYPE_CHECKING:
     from olp.compensation.writer import Writer

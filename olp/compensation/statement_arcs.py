@@ -10,10 +10,10 @@ import numpy as np
 
 from olp.compensation.arcwords import Arc, solve
 from olp.compensation.rows import Rows
-from olp.geometry import PLANES
-from olp.program.edits import BARE, EditList, Edits
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag, Kind
 from olp.program.program import ArcText
-from olp.toolpath import Flag, Kind
+from olp.program.text.edits import BARE, EditList, Edits
 
 if TYPE_CHECKING:
     from olp.compensation.statements import StatementWriter

@@ -20,12 +20,11 @@ from olp.compensation.statement_arcs import FINE_DECIMALS, MOST_DECIMALS, ROW, a
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
 from olp.compensation.wrapping import carded, wrapped
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array, Mask
-from olp.machine import Vector
-from olp.program.edits import BARE, EditList, Edits, Prefixes, splice
+from olp.core.machine import Vector
+from olp.core.toolpath import Flag, Kind
+from olp.errormodel.base import Array, ErrorModel, Mask
 from olp.program.program import Program
-from olp.toolpath import Flag, Kind
+from olp.program.text.edits import BARE, EditList, Edits, Prefixes, splice
 
 Index = npt.NDArray[np.int64]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.machine import Vector
+from olp.core.machine import Vector
+from olp.core.toolpath import Flag
+from olp.core.units import MM_PER_INCH
 from olp.program.program import Program
-from olp.toolpath import Flag
-from olp.units import MM_PER_INCH
 
 _MOST_DECIMALS = 9
 _SPACE = (b"", b" ", b"\t")

@@ -20,12 +20,11 @@ from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Mask
-from olp.machine import Vector
-from olp.program.edits import Edits, Prefixes, splice
+from olp.core.machine import Vector
+from olp.core.toolpath import Flag, Frame, Kind
+from olp.errormodel.base import ErrorModel, Mask
 from olp.program.program import Program
-from olp.toolpath import Flag, Frame, Kind
+from olp.program.text.edits import Edits, Prefixes, splice
 
 Index = npt.NDArray[np.int64]
 

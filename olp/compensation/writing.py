@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.holes import HolePlan
-from olp.compensation.lettered import LetteredWriter
 from olp.compensation.plan import Plan
 from olp.compensation.statements import StatementWriter
 from olp.compensation.tally import Tally
+from olp.compensation.verbatim import LetteredWriter
 from olp.compensation.writer import Writer
-from olp.errormodel import ErrorModel
-from olp.machine import Vector
-from olp.program.numbertext import Placing
+from olp.core.machine import Vector
+from olp.core.units import MM_PER_INCH
+from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
-from olp.units import MM_PER_INCH
+from olp.program.text.numbers import Placing
 
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
 

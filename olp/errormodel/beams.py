@@ -16,11 +16,11 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.errors import ConfigError
+from olp.core.machine import ZERO, Vector
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.gridded import COVER_MM, ComponentTable
-from olp.exceptions import ConfigError
-from olp.machine import ZERO, Vector
-from olp.units import AXES
 
 #: Standard gravity (CGPM 1901), in N per kg.
 GRAVITY_N_KG = 9.80665

@@ -13,13 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
+from olp.core.errors import ConfigError
+from olp.core.interpolation import Column
+from olp.core.machine import CHAINS, ZERO, Vector
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.components import AxisComponents
-from olp.exceptions import ConfigError
-from olp.machine import CHAINS, ZERO, Vector
-from olp.tables import Column
-from olp.units import AXES
 
 #: Short forms of sine and cosine may miss this much, over the box and with this much tool.
 TRIGONOMETRY_MM = 2e-11

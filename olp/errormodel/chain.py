@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from olp.core.interpolation import Column
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.bodies import CROSS, Body
 from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
-from olp.tables import Column
 
 #: A block's columns stay near the second-level cache (1 MB); measured best of 2k to 32k.
 BLOCK = 16384

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.interpolation import ON_GRID_MM, Column, DenseTable, Interpolant, dense_table
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Cyclic
 from olp.errormodel.chord import Variation
 from olp.errormodel.cyclic import cyclic_value
-from olp.tables import ON_GRID_MM, Column, DenseTable, Interpolant, dense_table
-from olp.units import AXES
 
 DIRECTIONS = "XYZABC"
 #: Resampling stays this close to the interpolated curve: a ten-thousandth of a micrometre, at 1 m too.

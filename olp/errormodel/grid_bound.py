@@ -14,10 +14,10 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from olp.core.grid_interpolation import Grid
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.chord import UPPER_MM, bins
-from olp.grids import Grid
-from olp.units import AXES
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,10 +11,10 @@ squareness XY = -C0Y, XZ = B0Z, YZ = -A0Z; an importer turns them, nothing here 
 
 from __future__ import annotations
 
+from olp.core.errors import ConfigError
 from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.chain import RigidBody
-from olp.exceptions import ConfigError
 
 CHAIN = "FXYZ"
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.grid_interpolation import Grid
+from olp.core.units import AXES
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import DeviationMap
-from olp.grids import Grid
-from olp.units import AXES
 
 
 @dataclass(frozen=True, slots=True, eq=False)

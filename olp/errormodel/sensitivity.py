@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.interpolation import Column
+from olp.core.machine import Vector
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.bodies import Body, build_bodies
 from olp.errormodel.boxed import as_points
 from olp.errormodel.calibration import Calibration, Thermal
 from olp.errormodel.thermal import REFERENCE_DEGC
 from olp.errormodel.uncertainty import EXPANSION_PER_K, Entry, Uncertainty
-from olp.machine import Vector
-from olp.tables import Column
-from olp.units import AXES
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

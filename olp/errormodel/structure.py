@@ -3,7 +3,7 @@
 Each sensor stands for a part of the structure that follows it with a first-order lag: theta' = (T - theta) /
 lag. A component error grows with each structure temperature in three shapes along its axis: an offset, linear
 growth, and a bow. (Indirect compensation: see J. Mayr et al., Thermal issues in machine tools, CIRP Annals
-61, 2012.) Its coefficients are identified from logs of sensors and drift (`olp.calibration.drift`).
+61, 2012.) Its coefficients are identified from logs of sensors and drift (`olp.calibration.thermal.drift`).
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from olp.core.errors import ConfigError
+from olp.core.machine import COMPONENTS, ZERO, Vector
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.gridded import COVER_MM, ComponentTable, refuse
-from olp.exceptions import ConfigError
-from olp.machine import COMPONENTS, ZERO, Vector
-from olp.units import AXES
 
 SHAPES = ("offset", "growth", "bow")
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.units import AXES
 from olp.errormodel.base import Array, Mask
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.calibration import Thermal
-from olp.units import AXES
 
 #: ISO 1: geometrical product specifications hold at this temperature.
 REFERENCE_DEGC = 20.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.errors import UsageError
 from olp.errormodel.base import Array, ErrorModel, Mask
 from olp.errormodel.boxed import as_points
-from olp.exceptions import UsageError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,11 +15,11 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.errors import ConfigError
+from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
-from olp.exceptions import ConfigError
-from olp.machine import COMPONENTS, SQUARENESS, ZERO, Vector
-from olp.units import AXES
 
 Kind = Literal["mean", "half", "wave", "squareness", "backlash"]
 KINDS: tuple[Kind, ...] = ("mean", "half", "wave", "squareness", "backlash")

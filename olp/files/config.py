@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 
-from olp.exceptions import UsageError
-from olp.files.calibration import load_calibration
+from olp.core.errors import UsageError
+from olp.core.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
+from olp.core.units import AXES, MM_PER_UM
+from olp.files.calibration.reader import load_calibration
 from olp.files.described import described
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
-from olp.units import AXES, MM_PER_UM
 
 __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
 

@@ -9,19 +9,19 @@ from typing import Literal
 
 from pydantic import Field
 
-from olp.exceptions import ConfigError
+from olp.core.errors import ConfigError
 from olp.files.fields import SHIPPED, Text
 from olp.files.point_profile import PointProfile
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schema_base import Table
 from olp.files.toml_text import line_of, read_toml
 from olp.files.write import PathLike, read_bytes
-from olp.program.described import DOES, Rule, UserDialect
+from olp.program.described.forms import Form, form
+from olp.program.described.language import DOES, Rule, UserDialect
 from olp.program.dialect import Dialect
-from olp.program.forms import Form, form
-from olp.program.pointlist import with_layout
+from olp.program.pointlist.reader import with_layout
 
-FOLDER = Path(__file__).parents[1] / "program" / "dialects_described"
+FOLDER = Path(__file__).parents[1] / "program" / "described" / "shipped"
 
 Does = Literal[
     "line", "rapid", "point", "away", "tool", "frame", "unit", "speed", "section", "carry", "refuse"

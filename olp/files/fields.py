@@ -11,7 +11,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from olp.machine import CHAINS, COMPONENTS, SQUARENESS
+from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
 
 #: Dialect profiles that can be read and written today.
 CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list")

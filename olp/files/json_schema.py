@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 from olp.files.described import DialectFile
-from olp.files.measurement_schemas import MeasurementsFile
+from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
 from olp.files.schema_base import Table
 from olp.files.schemas import FILES

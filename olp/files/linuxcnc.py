@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from olp.exceptions import InputError
+from olp.core.errors import InputError
+from olp.core.machine import Axis, Machine, Tool, Vector, WorkOffset
+from olp.core.units import AXES, MM_PER_INCH
 from olp.files.write import PathLike, read_bytes
-from olp.machine import Axis, Machine, Tool, Vector, WorkOffset
-from olp.units import AXES, MM_PER_INCH
 
 #: Jerk where the configuration states none: full acceleration is reached within this time in s.
 JERK_TIME_S = 0.05

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import InputError
+from olp.core.errors import InputError
 from olp.files.write import PathLike, read_bytes
 
 Array = npt.NDArray[np.float64]

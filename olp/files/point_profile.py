@@ -8,13 +8,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 from olp.files.fields import NotNegative, Positive, Text
 from olp.files.problems import nearest, validate
 from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, read_bytes
-from olp.program.delimited import ROLES, Layout, mapping, told
+from olp.program.text.delimited import ROLES, Layout, mapping, told
 
 #: the columns of measured points that are compared
 MEASURED = ("X", "Y", "Z", "t", "name", "line")

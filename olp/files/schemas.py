@@ -12,6 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from olp.core.machine import COMPONENTS
+from olp.files.calibration.gridded_schema import BeamTable, ComplianceTable, MapTable
 from olp.files.fields import (
     CONTROLLERS,
     SIGN,
@@ -31,8 +33,6 @@ from olp.files.fields import (
     refusal,
 )
 from olp.files.schema_base import Position, Table
-from olp.files.schema_gridded import BeamTable, ComplianceTable, MapTable
-from olp.machine import COMPONENTS
 
 
 class AxisTable(Table):

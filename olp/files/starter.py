@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
+from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
+from olp.core.units import AXES
 from olp.files.linuxcnc import Imported, from_linuxcnc
 from olp.files.toml_text import comment, toml_key, toml_lines, toml_value
 from olp.files.write import PathLike, write_files
-from olp.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
-from olp.units import AXES
 
 __all__ = ["Imported", "from_linuxcnc", "machine_toml", "starter_machine", "starter_set", "write_starter"]
 

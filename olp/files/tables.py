@@ -13,11 +13,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import ConfigError
+from olp.core.errors import ConfigError
+from olp.core.machine import COMPONENTS
+from olp.core.units import AXES, shifted
 from olp.files.problems import Problem, config_error, nearest
 from olp.files.write import PathLike, read_bytes
-from olp.machine import COMPONENTS
-from olp.units import AXES, shifted
 
 Array = npt.NDArray[np.float64]
 #: A data row: its line in the file and the number in each column.

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 
-from olp.exceptions import ConfigError
+from olp.core.errors import ConfigError
 
 #: A key path, such as ("axes", "X", "travel_mm") or ("curves", 0, "file").
 Path = tuple[str | int, ...]

@@ -15,10 +15,10 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import ConfigError, UsageError
+from olp.core.errors import ConfigError, UsageError
+from olp.core.units import AXES
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
-from olp.units import AXES
 
 COLUMNS = (
     "t_s",

@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from olp.exceptions import InputError, OlpError, UsageError
+from olp.core.errors import InputError, OlpError, UsageError
 
 PathLike = str | os.PathLike[str]
 #: a whole file, or its parts in order

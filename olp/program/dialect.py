@@ -1,6 +1,6 @@
 """What every dialect of programs gives: its names, its marks, its table of statements.
 
-A dialect is a value; what reads its text stands in `olp.program.dialects`, by `family`. A reading gives a
+A dialect is a value; what reads its text stands in `olp.program.registry`, by `family`. A reading gives a
 `Program`: immutable bytes, words, nominal moves, and which word holds which coordinate of which move.
 Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) are written by
 `olp.compensation.writing`, which needs nothing of the dialect but what is stated here and in the program.

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import ProgramError
-from olp.machine import ZERO, Setup, Vector, WorkOffset
-from olp.toolpath import Frame, Touch, carried
+from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Setup, Vector, WorkOffset
+from olp.core.toolpath import Frame, Touch, carried
 
 Array = npt.NDArray[np.float64]
 Turn = tuple[Vector, Vector, Vector]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from olp.machine import ZERO, Setup
+from olp.core.machine import ZERO, Setup
 from olp.program.frames import FrameTable, lever_of
 
 

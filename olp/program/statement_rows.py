@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.program.columns import Columns
+from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 from olp.program.dialect import Dialect
 from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
-from olp.program.statement_lexer import Chunk, Field, Statement, is_cards
-from olp.toolpath import Arcs, Flag, Frame, Kind, Toolpath
+from olp.program.text.columns import Columns
+from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

@@ -12,10 +12,10 @@ from typing import NoReturn, TypeVar
 
 import numpy as np
 
-from olp.exceptions import InputError
-from olp.program.dmis_events import MACHINE_FRAME
-from olp.program.numbertext import Number, number
-from olp.program.statement_lexer import Comment, Statement, chunks
+from olp.core.errors import InputError
+from olp.program.dmis.events import MACHINE_FRAME
+from olp.program.text.numbers import Number, number
+from olp.program.text.statements import Comment, Statement, chunks
 from olp.results.reported import Carried, Reported, Stated
 from olp.results.table import stated_in
 

@@ -13,11 +13,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel import ErrorModel
-from olp.exceptions import OutsideBox
-from olp.machine import Vector
+from olp.core.errors import OutsideBox
+from olp.core.machine import Vector
+from olp.core.toolpath import Touch
+from olp.errormodel.base import ErrorModel
 from olp.results.reported import Reported
-from olp.toolpath import Touch
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.exceptions import ConfigError, InputError
-from olp.geometry import rotation_matrix
-from olp.machine import ZERO, Setup, Tool
+from olp.core.errors import ConfigError, InputError
+from olp.core.geometry import rotation_matrix
+from olp.core.machine import ZERO, Setup, Tool
 from olp.program.frames import touch_of
 from olp.results.forward import Place, Stylus
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from olp.program.numbertext import Number
+from olp.program.text.numbers import Number
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

@@ -6,9 +6,9 @@ import re
 
 import numpy as np
 
-from olp.exceptions import InputError
-from olp.program.delimited import AXES, Cells, Layout, Span, first_lines, stated_frame
-from olp.program.numbertext import Number, number
+from olp.core.errors import InputError
+from olp.program.text.delimited import AXES, Cells, Layout, Span, first_lines, stated_frame
+from olp.program.text.numbers import Number, number
 from olp.results.reported import Reported, Stated
 
 _DIRECTION = ("I", "J", "K")

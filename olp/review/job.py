@@ -11,23 +11,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from olp import api
-from olp.assessing import unknowns_of
 from olp.compensation.plan import targets, zero_shifts
-from olp.confidence.probability import within
-from olp.confidence.spread import Points, bands, covariances
-from olp.correction import last_digit_mm, verify_programs
+from olp.core.errors import naming
+from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
+from olp.core.units import MM_PER_UM
 from olp.errormodel.base import Array
-from olp.exceptions import naming
 from olp.files.points import read_points
 from olp.files.write import read_bytes, write_bytes
-from olp.loading import Loaded, PathLike, load, source_of, unrolled
-from olp.machine import Setup
-from olp.program.dialects import Options, read
 from olp.program.program import Program
-from olp.progress import Progress, silent
+from olp.program.registry import Options, read
 from olp.proof.matching import match as match_moves
-from olp.retiming import retime
 from olp.review.listing import aligned
 from olp.review.manifest import manifest_of
 from olp.review.measured import Matched, Matcher
@@ -37,7 +31,13 @@ from olp.review.page import page
 from olp.review.parts import Index
 from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene, Sureness
-from olp.units import MM_PER_UM
+from olp.uncertainty.probability import within
+from olp.uncertainty.spread import Points, bands, covariances
+from olp.workflows import api
+from olp.workflows.correct import last_digit_mm, verify_programs
+from olp.workflows.retime import retime
+from olp.workflows.session import Loaded, PathLike, load, source_of, unrolled
+from olp.workflows.uncertainty import unknowns_of
 
 #: shorter stays at a sample are none
 _REST_S = 1e-3
@@ -176,7 +176,7 @@ def view(
 def _sureness(
     loaded: Loaded, nominal: Program, samples: Samples, within_um: float, date: datetime.date | None
 ) -> Sureness | None:
-    """Of samples, as `olp.assessing` of way-points."""
+    """Of samples, as `olp.workflows.uncertainty` of way-points."""
     if loaded.uncertainty is None:
         return None
     unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)

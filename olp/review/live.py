@@ -8,7 +8,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-from olp.exceptions import OlpError
+from olp.core.errors import OlpError
 from olp.review.job import Review
 
 #: never another address: a page holds the job

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.deviation import cutting_moves
+from olp.core.toolpath import Kind
+from olp.core.units import AXES, UM_PER_MM
 from olp.errormodel.base import Array
-from olp.findings import RULES
+from olp.findings.catalogue import RULES
+from olp.proof.deviation import cutting_moves
 from olp.review.listing import largest
 from olp.review.meshes import nodes
 from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, WAY_MM, Arrays, resolution
 from olp.review.scene import Scene
-from olp.toolpath import Kind
-from olp.units import AXES, UM_PER_MM
 
 #: colours that stay apart for eyes that take red for green, on dark and on light
 LAYERS = (

@@ -7,19 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
+from olp.comparison import runs
+from olp.comparison.figures import Run
+from olp.comparison.nominal import Nominal, nominal_of
 from olp.compensation.plan import zero_shifts
-from olp.errormodel import ErrorModel
-from olp.errormodel.base import Array
-from olp.exceptions import ConfigError, InputError
+from olp.core.errors import ConfigError, InputError
+from olp.core.machine import Setup
+from olp.core.toolpath import Toolpath
+from olp.errormodel.base import Array, ErrorModel
 from olp.files.points import Points, row_line
-from olp.findings import Finding
-from olp.machine import Setup
-from olp.measured import runs
-from olp.measured.figures import Run
-from olp.nominal import Nominal, nominal_of
+from olp.findings.catalogue import Finding
 from olp.review.parts import Index
 from olp.review.samples import Samples
-from olp.toolpath import Toolpath
 
 #: points farther from their place are left out
 REACH_MM = 1.0

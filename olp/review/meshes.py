@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.geometry import rotation_matrix
+from olp.core.machine import Machine, Mesh, Setup
+from olp.core.units import AXES
 from olp.errormodel.base import Array
 from olp.files.meshes import read_mesh
-from olp.geometry import rotation_matrix
-from olp.machine import Machine, Mesh, Setup
-from olp.units import AXES
 
 #: more faces than this are drawn coarser
 MOST_FACES = 150_000

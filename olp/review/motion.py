@@ -9,15 +9,15 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.errors import ProgramError
+from olp.core.machine import Machine
+from olp.core.toolpath import Toolpath
 from olp.errormodel.base import Array
-from olp.exceptions import ProgramError
-from olp.machine import Machine
-from olp.program.feeds import lengths_mm
+from olp.program.feeds.moves import lengths_mm
+from olp.program.feeds.timing import timing
 from olp.program.program import Program
-from olp.program.timing import timing
 from olp.review.parts import Index
 from olp.review.samples import Samples
-from olp.toolpath import Toolpath
 from olp.trajectory.from_program import SHORTEST_MM, axis_limits
 from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory

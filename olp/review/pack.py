@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import CannotCompute
+from olp.core.errors import CannotCompute
 
 #: steps of what is stored, in mm and s
 POSITION_MM, DEVIATION_MM, TIME_S, WAY_MM = 1e-4, 1e-6, 1e-6, 1e-3

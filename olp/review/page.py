@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any
 
-from olp.exceptions import CannotCompute
+from olp.core.errors import CannotCompute
 from olp.files.write import read_bytes
 
 _MARK = re.compile(r"@@([A-Z]+)@@")

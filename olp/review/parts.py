@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel import ErrorModel, plays
-from olp.errormodel.base import Array
-from olp.geometry import PLANES, arc_points
-from olp.program.feeds import lengths_mm
+from olp.core.geometry import PLANES, arc_points
+from olp.core.toolpath import Kind, Toolpath
+from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.reversal import plays
+from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
-from olp.toolpath import Kind, Toolpath
 
 Index = npt.NDArray[np.int64]
 

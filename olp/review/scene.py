@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.machine import Machine
+from olp.core.toolpath import Toolpath
 from olp.errormodel.base import Array
-from olp.machine import Machine
 from olp.program.program import Program
 from olp.review.listing import Listing
 from olp.review.measured import Matched
 from olp.review.meshes import Body
 from olp.review.motion import MotionTable
 from olp.review.samples import Samples
-from olp.toolpath import Toolpath
 
 Single = npt.NDArray[np.float32]
 

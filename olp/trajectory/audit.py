@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 from olp.trajectory.extremes import largest as extreme
 from olp.trajectory.extremes import nodes
 from olp.trajectory.motion import Array, Motion

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from olp.exceptions import CannotCompute
+from olp.core.errors import CannotCompute
 from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound

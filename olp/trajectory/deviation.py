@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 from olp.trajectory.motion import Array, Index, Motion
 from olp.trajectory.pieces import Pieces, blocks, dot
 from olp.trajectory.route import Route

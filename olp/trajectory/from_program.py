@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.geometry import PLANES, arc_points
-from olp.machine import Machine
-from olp.program.feeds import lengths_mm
+from olp.core.geometry import PLANES, arc_points
+from olp.core.machine import Machine
+from olp.core.toolpath import Toolpath
+from olp.program.feeds.moves import lengths_mm
+from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
 from olp.program.program import Program
-from olp.program.timing import BLEND_MM, PathControl, Timing, timing
-from olp.toolpath import Toolpath
 from olp.trajectory.route import Array, AxisLimits, Index, Route
 
 Mask = npt.NDArray[np.bool_]
@@ -50,7 +50,7 @@ def routes(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
 
     A new route begins wherever the position is not known (tool changes, G28, after a probe). Dwells at such
     places count at the start of the next route. `blend_mm` is the tolerance of a path mode that states none.
-    Raises as `olp.program.timing.timing`.
+    Raises as `olp.program.feeds.timing.timing`.
     """
     path = program.toolpath
     clock = timing(program, blend_mm=blend_mm, block_delete=block_delete)

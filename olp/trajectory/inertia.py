@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from olp.machine import Machine
+from olp.core.machine import Machine
 from olp.trajectory.motion import Array, Index, Motion
 from olp.trajectory.route import AxisLimits
 

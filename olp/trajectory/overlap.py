@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import UsageError
+from olp.core.errors import UsageError
 from olp.trajectory.growing import Growing
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route

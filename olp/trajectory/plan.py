@@ -14,8 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from olp.exceptions import CannotCompute
-from olp.progress import Progress
+from olp.core.errors import CannotCompute
+from olp.core.progress import Progress
 from olp.trajectory.audit import Audit, Ratios, with_jumps
 from olp.trajectory.contest import contest, fastest, stops_of
 from olp.trajectory.motion import Array, Index, Motion

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import ruckig
 
-from olp.exceptions import CannotCompute, UsageError
+from olp.core.errors import CannotCompute, UsageError
 from olp.trajectory.scurve import PHASES, rest_to_rest_s, states, through_peak
 
 Array = npt.NDArray[np.float64]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.exceptions import CannotCompute
+from olp.core.errors import CannotCompute
 from olp.trajectory.kernels import deviations, least_over
 from olp.trajectory.route import Array, AxisLimits, Index, Route
 

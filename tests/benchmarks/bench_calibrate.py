@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from calibration_cases import FRESH, TOOLS, case, cloud, left, rays, two_pods
+from cases.calibration import FRESH, TOOLS, case, cloud, left, rays, two_pods
 from judge.simulated import OFFSETS
 
-from olp.calibration.estimator import fit
+from olp.calibration.estimator.adjustment import fit
 
 SEEDS = 20
 

@@ -16,7 +16,7 @@ from olp.clearance.parts import parts_of
 from olp.clearance.search import Best, search
 from olp.clearance.sweep import Ways
 from olp.clearance.tree import Tree
-from olp.machine import HolderPart, Tool
+from olp.core.machine import HolderPart, Tool
 
 BLOCKS = 100_000
 TOOL = Tool(1, (0.0, 0.0, 120.0), 5.0, holder=(HolderPart(30.0, 12.0, 20.0), HolderPart(40.0, 25.0, 25.0)))

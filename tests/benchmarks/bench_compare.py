@@ -10,8 +10,8 @@ import time
 
 import numpy as np
 
-from olp.measured.pairing import pair
-from olp.measured.path import Path
+from olp.comparison.pairing import pair
+from olp.comparison.path import Path
 
 COUNT, LAPS, NOISE_MM = 1_000_000, 3, 0.005
 

@@ -17,7 +17,7 @@ from collections import Counter
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from doctor_cases import trial
+from cases.doctor import trial
 
 TRIALS = 500
 PLANS = ((24, 0.005), (50, 0.005), (24, 0.010), (50, 0.015))

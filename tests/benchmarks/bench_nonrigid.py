@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from calibration_cases import CHAINS, FRESH, cloud
+from cases.calibration import CHAINS, FRESH, cloud
 from judge import simulated
 
-from olp.calibration.estimator import fit
-from olp.calibration.nonrigid import nonrigid
-from olp.calibration.observations import Measurements
+from olp.calibration.estimator.adjustment import fit
+from olp.calibration.estimator.nonrigid import nonrigid
+from olp.calibration.observations.readings import Measurements
 
 SEEDS = 12
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from refine_cases import turns
+from cases.refine import turns
 
 SEEDS = 20
 

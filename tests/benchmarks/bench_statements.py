@@ -21,12 +21,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench_correct import ENVIRONMENT, ROOT, machine, stages, user_seconds
-from posts import FLAVOURS, Step, apt, gcode
+from cases.posts import FLAVOURS, Step, apt, gcode
 
 import olp
+from olp.core.toolpath import Kind
 from olp.files.config import load_setup
-from olp.program.dialects import DIALECTS, read
-from olp.toolpath import Kind
+from olp.program.registry import DIALECTS, read
 
 
 def posted(points: np.ndarray, rapid: np.ndarray, dialect: str) -> bytes:

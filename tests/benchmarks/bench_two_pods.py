@@ -28,14 +28,14 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from calibration_cases import measurements_of, two_pods
+from cases.calibration import measurements_of, two_pods
 from judge import simulated
 
-from olp.calibration.estimator import fit
-from olp.calibration.nonrigid import NonRigid, nonrigid
-from olp.calibration.observations import Measurements
-from olp.errormodel import Calibration, build
-from olp.errormodel.calibration import Curve
+from olp.calibration.estimator.adjustment import fit
+from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
+from olp.calibration.observations.readings import Measurements
+from olp.errormodel.build import build
+from olp.errormodel.calibration import Calibration, Curve
 from olp.errormodel.gridded import DeviationMap
 
 SEEDS = 6

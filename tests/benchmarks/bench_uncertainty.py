@@ -21,18 +21,18 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration_cases import measurements_of
+from cases.calibration import measurements_of
 from judge import simulated
 
-from olp.calibration.covariance import covariance_of
-from olp.calibration.curves import calibration_of
-from olp.calibration.estimator import fit
-from olp.calibration.observations import Measurements
-from olp.confidence.spread import Points, Unknowns, confidence
-from olp.errormodel import build
+from olp.calibration.estimator.adjustment import fit
+from olp.calibration.estimator.covariance import covariance_of
+from olp.calibration.estimator.curves import calibration_of
+from olp.calibration.observations.readings import Measurements
+from olp.core.progress import silent
+from olp.core.toolpath import Frame, Toolpath
+from olp.errormodel.build import build
 from olp.errormodel.sensitivity import Sensitivity
-from olp.progress import silent
-from olp.toolpath import Frame, Toolpath
+from olp.uncertainty.spread import Points, Unknowns, confidence
 
 POSES = 60
 

@@ -1,0 +1,112 @@
+"""What a machine does with compensation tables in its control, next to what a corrected program leaves.
+
+Points of a Latin hypercube over the calibrated box, each approached from a random side, with every tool in
+turn; and points along a program, where the directions are those of its motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.control_tables.controls import Control, Uncompensated
+from olp.compensation.invert import invert
+from olp.core.rigid_fit import fit_points
+from olp.core.toolpath import Kind, Toolpath
+from olp.core.units import UM_PER_MM
+from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.build import build
+from olp.errormodel.calibration import Calibration
+from olp.errormodel.reversal import play_states, plays
+from olp.proof.deviation import Tracer
+
+#: What stands for the machine without tables, and for a corrected program.
+AS_IS, CORRECT = "as it is", "olp correct"
+#: More points along a program than this say no more.
+_MOST_POINTS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """Distances from where the tip should be, in um: root mean square and maximum, and the root mean square
+    once a best-fit rigid frame has been taken out, as a work offset does in practice."""
+
+    rms_um: float
+    max_um: float
+    rms_in_frame_um: float
+
+    def as_dict(self) -> dict[str, float]:
+        return {"rms_um": self.rms_um, "max_um": self.max_um, "rms_in_frame_um": self.rms_in_frame_um}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Axis positions (n, 3) that are asked for, tool vectors (3,) or (n, 3), and directions of the last
+    motion (n, 3); `path` says that the points follow each other, `counted` (n,) which of them count."""
+
+    points_mm: Array
+    tool_mm: Array
+    direction: Array
+    path: bool = False
+    counted: np.ndarray | None = None
+
+
+def in_box(box_mm: Array, tools_mm: Array, count: int, seed: int) -> Places:
+    """A Latin hypercube over a box (3, 2), the tools (k, 3) in turn, the sides at random."""
+    random = np.random.default_rng(seed)
+    cells = np.array([random.permutation(count) for _ in range(3)]).T
+    share = (cells + random.random((count, 3))) / count
+    points = box_mm[:, 0] + share * (box_mm[:, 1] - box_mm[:, 0])
+    direction = random.choice([-1.0, 1.0], (count, 3))
+    return Places(points, np.resize(tools_mm, (count, 3)), direction)
+
+
+def along(path: Toolpath, box_mm: Array, chain: str, step_mm: float = 1.0) -> Places:
+    """Points along the moves of a program whose axes are all known; cutting moves count."""
+    still = build(Calibration(machine="", box_mm=box_mm), chain, outside="hold")
+    length = float(np.nansum(np.sqrt(((path.end_mm - path.starts_mm()) ** 2).sum(axis=1))))
+    points, move = Tracer.trace(path, still, max(step_mm, length / _MOST_POINTS))
+    known = np.isfinite(points).all(axis=1)
+    points, move = points[known], move[known]
+    tool = path.tool_mm()
+    direction = play_states(points, np.zeros(3))
+    counted = np.isin(path.kind[move], (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW))
+    return Places(points, tool if tool.ndim == 1 else tool[move], direction, True, counted)
+
+
+def left_by(
+    model: ErrorModel, controls: Mapping[str, Control], places: Places, increment_mm: Array | None = None
+) -> dict[str, Left]:
+    """What is left by name: the machine as it is, with each control's tables and, where `increment_mm` (3,)
+    is given, by corrected commands that are rounded to it."""
+    out = {}
+    for name, control in {AS_IS: Uncompensated(), **controls}.items():
+        command = places.points_mm + control.offset(places.points_mm, places.tool_mm, places.direction)
+        out[name] = _left(model, command, places)
+    if increment_mm is not None:
+        play = _play(model, places.points_mm, places)
+        command = invert(model, places.points_mm, places.tool_mm, play)
+        out[CORRECT] = _left(model, np.round(command / increment_mm) * increment_mm, places)
+    return out
+
+
+def _play(model: ErrorModel, command: Array, places: Places) -> Array | None:
+    return plays(model, command) if places.path else places.direction
+
+
+def _left(model: ErrorModel, command: Array, places: Places) -> Left:
+    actual = command + model.error(command, places.tool_mm, _play(model, command, places))
+    wanted = places.points_mm
+    if places.counted is not None:
+        actual, wanted = actual[places.counted], wanted[places.counted]
+    if not len(wanted):
+        return Left(0.0, 0.0, 0.0)
+    distance = np.sqrt(((actual - wanted) ** 2).sum(axis=1)) * UM_PER_MM
+    framed = fit_points(actual, wanted)(actual) - wanted
+    return Left(_rms(distance), float(distance.max()), _rms(np.sqrt((framed**2).sum(axis=1)) * UM_PER_MM))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

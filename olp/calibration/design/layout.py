@@ -1,0 +1,182 @@
+"""Where to measure: targets of lines, places of points, stations; as measurements with nominal readings."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from olp.calibration.design.prediction import Planned
+from olp.calibration.iso230.separation import aliased
+from olp.calibration.observations.lengths import Station
+from olp.calibration.observations.pods import Pose
+from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points, Square
+from olp.core.errors import CannotCompute
+from olp.core.machine import Vector
+from olp.core.units import AXES
+from olp.errormodel.base import Array
+
+Scattered = Points | Lengths | Pods
+#: Lines: mm between targets, targets at least, runs there and back.
+STEP_MM, FEWEST, RUNS = 100.0, 11, 5
+#: Targets leave equal steps by a random part of this where no period is stated.
+PITCH_MM = 10.0
+#: Noise of readings: laser in mm and growing with the distance (mm/mm), angles and squares in rad.
+LASER, LASER_SCALE, ANGLE, SQUARE = 0.5e-3, 0.5e-6, 1e-6, 5e-6
+#: Second offset of the reflector for roll of the vertical axis.
+ASIDE_MM = 150.0
+#: Interferometer: mm, mm/mm. Pods: rad; their known distance, mm.
+LENGTH, LENGTH_SCALE, POD, BASELINE = 0.2e-3, 0.3e-6, 10e-6, 0.01
+#: Stations stand so far off the box, as a share of its longest side.
+_OFF = 0.4
+_TRIES = 40
+
+
+def hypercube(box_mm: Array, n: int, seed: int) -> Array:
+    """(n, 3) axis positions of a Latin hypercube in a box (3, 2), to a tenth of a millimetre: as many levels
+    of each axis as points, which a lattice has not (M. D. McKay, R. J. Beckman, W. J. Conover, 1979)."""
+    from scipy.stats import qmc
+
+    share = qmc.LatinHypercube(3, seed=seed).random(n)
+    inside = np.clip(np.round(box_mm[:, 0] + share * np.ptp(box_mm, axis=1), 1), box_mm[:, 0], box_mm[:, 1])
+    return np.asarray(inside)
+
+
+def points(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
+    """Points of a tracker with each tool vector in turn."""
+    at, tool = _scattered(box_mm, tools, n, seed)
+    return Planned(Measurements(machine, points=(Points(at, tool, at + tool, sigma, source="points"),)))
+
+
+def lengths(
+    machine: str, box_mm: Array, tools: Sequence[Vector], n: int, stations: int, sigma: float, seed: int
+) -> Planned:
+    """Lengths from stations about the box, one after the other, with n points each."""
+    at, tool = _scattered(box_mm, tools, n, seed)
+    rays, known = [], []
+    for k, place in enumerate(_around(box_mm, stations)):
+        far = np.linalg.norm(at + tool - place, axis=1)
+        rays.append(Lengths(at, tool, far, sigma + LENGTH_SCALE * far, source=f"station {k + 1}"))
+        known.append(Station(place, 0.0))
+    return Planned(Measurements(machine, lengths=tuple(rays)), stations=tuple(known))
+
+
+def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
+    """Directions from two pods before the longest side of the box, with their distance known."""
+    at, tool = _scattered(box_mm, tools, n, seed)
+    long = int(np.argmax(np.ptp(box_mm[:2], axis=1)))
+    across = 1 - long
+    size = float(np.ptp(box_mm, axis=1).max())
+    middle = box_mm.mean(axis=1)
+    poses, azimuth, elevation = [], [], []
+    for side in (-0.5, 0.5):
+        place = middle.copy()
+        place[long] += side * size
+        place[across] = box_mm[across, 0] - _OFF * size
+        ray = at + tool - place
+        poses.append(Pose(place, np.eye(3)))
+        azimuth.append(np.arctan2(ray[:, 1], ray[:, 0]))
+        elevation.append(np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1])))
+    directions = Pods(
+        at, tool, np.stack(azimuth, axis=1), np.stack(elevation, axis=1), sigma,
+        ((0, 1, size, BASELINE),), "pods",
+    )  # fmt: skip
+    return Planned(Measurements(machine, pods=(directions,)), poses=(tuple(poses),))
+
+
+def lines(
+    machine: str, box_mm: Array, tool: Vector, periods_mm: Sequence[Sequence[float]], seed: int
+) -> Planned:
+    """A full set along the middle of the box: positioning, angles (no roll of Z, which a level cannot read),
+    straightness pairs that share a square, and straightness of Z with the reflector at a second offset."""
+    middle = np.round(box_mm.mean(axis=1), 1)
+    place = (float(middle[0]), float(middle[1]), float(middle[2]))
+    targets = [_targets(box_mm[k], periods_mm[k], seed + k) for k in range(3)]
+    found: list[Line] = []
+
+    def add(name: str, square: str | None = None, reflector: Vector = tool) -> None:
+        axis = AXES.index(name[2])
+        there = np.concatenate([targets[axis], targets[axis][::-1]])
+        side = np.repeat([1, -1], len(targets[axis]))
+        n = len(there)
+        half = 0.5 * float(np.ptp(targets[axis]))
+        sigma = ANGLE if name[1] in "ABC" else LASER if name[1] == name[2] else LASER + LASER_SCALE * half
+        found.append(
+            Line(
+                name,
+                np.tile(there, RUNS),
+                np.zeros(n * RUNS),
+                np.repeat(np.arange(1, RUNS + 1), n),
+                np.tile(side, RUNS),
+                place,
+                reflector,
+                square=square,
+                sigma=sigma,
+                sigma_scale=LASER_SCALE if name[1] == name[2] else 0.0,
+                source=f"{name.lower()}.csv",
+            )
+        )
+
+    for a in AXES:
+        add(f"E{a}{a}")
+        for d in "ABC":
+            if (d, a) != ("C", "Z"):
+                add(f"E{d}{a}")
+    for a, b in itertools.combinations(AXES, 2):
+        add(f"E{b}{a}", f"square {a}{b}")
+        add(f"E{a}{b}", f"square {a}{b}")
+    add("EYZ", "square YZ", (tool[0] + ASIDE_MM, tool[1], tool[2]))
+    squares = tuple(Square(f"square {a}{b}", 0.0, SQUARE) for a, b in itertools.combinations(AXES, 2))
+    x, y, z = (tuple(map(float, p)) for p in periods_mm)
+    return Planned(Measurements(machine, tuple(found), squares, (), (x, y, z)))
+
+
+def together(first: Planned, second: Planned) -> Planned:
+    """Lines of the one with the points of the other."""
+    a, b = first.measurements, second.measurements
+    both = Measurements(a.machine, a.lines, a.squares, (), a.periods_mm, points=(*a.points, *b.points))
+    return Planned(both)
+
+
+def scattered(taken: Measurements) -> tuple[Scattered, ...]:
+    """All that measurements hold beside lines."""
+    return (*taken.points, *taken.lengths, *taken.pods)
+
+
+def _scattered(box_mm: Array, tools: Sequence[Vector], n: int, seed: int) -> tuple[Array, Array]:
+    return hypercube(box_mm, n, seed), np.array(tools, float)[np.arange(n) % len(tools)]
+
+
+def _around(box_mm: Array, stations: int) -> Array:
+    """(stations, 3) places about the box, at several heights: a golden spiral about its middle."""
+    middle, side = box_mm.mean(axis=1), np.ptp(box_mm, axis=1)
+    k = np.arange(stations)
+    angle = 2.399963 * k + 0.4
+    height = ((k * 0.618034) % 1.0) - 0.5
+    reach = (0.5 + _OFF) * float(side.max())
+    return np.stack(
+        [middle[0] + reach * np.cos(angle), middle[1] + reach * np.sin(angle), middle[2] + height * side[2]],
+        axis=1,
+    )
+
+
+def _targets(side: Array, periods_mm: Sequence[float], seed: int) -> Array:
+    """Targets off equal steps by random parts of a period, as ISO 230-2 asks, at which no period hides.
+    Raises CannotCompute where there are none."""
+    low, high = side.tolist()
+    count = max(FEWEST, int((high - low) / STEP_MM) + 1)
+    step = (high - low) / (count - 1)
+    stray = min(0.4 * step, max([*periods_mm, 0.0]) or PITCH_MM)
+    for attempt in range(_TRIES):
+        rng = np.random.default_rng([seed, attempt])
+        q = np.linspace(low, high, count)
+        q[1:-1] += rng.uniform(-0.5, 0.5, count - 2) * stray
+        q = np.round(q, 2)
+        if all(aliased(q, period) is None for period in periods_mm):
+            return np.asarray(q, float)
+    raise CannotCompute(
+        f"no targets between {low:g} and {high:g} mm tell errors of "
+        f"{', '.join(f'{p:g}' for p in periods_mm)} mm from smooth "
+        "ones; add a fine sweep over two periods instead, and leave the period out here"
+    )

@@ -1,0 +1,121 @@
+"""What a set of measurements would know of a machine, before anybody has measured: the covariance of the
+adjustment for its geometry, with curves of the size and smoothness that machines have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.estimator.adjustment import POINT_CELLS, Fit, mean_slopes
+from olp.calibration.estimator.basis import CurveSpace, Spline
+from olp.calibration.estimator.normal import Normal, solve
+from olp.calibration.estimator.parameters import Parameters, Place, frame_columns
+from olp.calibration.estimator.prior import POSE, Prior
+from olp.calibration.estimator.summary import squareness_unseen, unseen
+from olp.calibration.observations.lengths import Station, lengths_block
+from olp.calibration.observations.lines import Noise, line_block, square_names
+from olp.calibration.observations.pods import Pose, pods_block
+from olp.calibration.observations.points import points_block
+from olp.calibration.observations.readings import Measurements
+from olp.core.machine import COMPONENTS, Vector
+from olp.core.units import AXES
+from olp.errormodel.base import Array
+
+#: Places in the box where the uncertainty is judged, by tool.
+_PLACES = 150
+#: Size and second differences of curves of machines that are off by 0.1 mm or so (mm, rad).
+TYPICAL = {"positioning": (0.03, 6e-3), "straightness": (0.012, 2.5e-3), "angle": (2e-5, 5e-6)}
+#: Drift of a line over one run, as a share of the noise of a reading.
+_DRIFT = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Planned:
+    """Measurements with nominal readings; where stations and pods would stand."""
+
+    measurements: Measurements
+    stations: tuple[Station, ...] = ()
+    poses: tuple[tuple[Pose, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """`rms_mm` is the predicted rms length of what a correction leaves at fresh places with the tools judged,
+    in the frame that fits best, `worst_mm` its largest value at one place. `hidden` are errors that nothing
+    would tell of."""
+
+    rms_mm: float
+    worst_mm: float
+    hidden: tuple[str, ...]
+
+
+def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]) -> Prediction:
+    """The prediction for a box (3, 2) and tool vectors."""
+    taken = planned.measurements
+    parameters = _parameters(taken, chain, box_mm)
+    squares = {f"error of square {s.name}": (s.error_rad, s.sigma_rad) for s in taken.squares}
+    prior = Prior(
+        parameters, {}, {name: squares.get(name, (0.0, POSE)) for name in parameters.shared}, dict(TYPICAL)
+    )
+    theta = np.zeros(parameters.size)
+    blocks = [
+        line_block(line, parameters, Noise(line.sigma, _DRIFT * line.sigma, None)) for line in taken.lines
+    ]
+    blocks += [points_block(cloud, parameters) for cloud in taken.points]
+    blocks += [
+        lengths_block(rays, parameters, theta, station)
+        for rays, station in zip(taken.lengths, planned.stations, strict=True)
+    ]
+    blocks += [
+        pods_block(pods, parameters, theta, list(poses))
+        for pods, poses in zip(taken.pods, planned.poses, strict=True)
+    ]
+    normal = Normal.of(parameters.size)
+    for block in blocks:
+        normal.add(block)
+    precision, logdet = prior.precision()
+    solved = solve(normal, precision, logdet)
+    found = Fit(
+        taken, parameters, theta, solved.covariance, prior, (), (), (), (), (), box_mm,
+        mean_slopes(parameters), 0.0, 1.0, {},
+    )  # fmt: skip
+    after, worst = _spread(parameters, solved.covariance, box_mm, tools)
+    return Prediction(after, worst, (*unseen(found), *squareness_unseen(found)))
+
+
+def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
+    x, y, z = (float(np.clip(0.0, *side)) for side in box_mm)
+    datum = (x, y, z)
+    spaces, places = {}, {}
+    for name in COMPONENTS:
+        axis = AXES.index(name[2])
+        spline = Spline(float(box_mm[axis, 0]), float(box_mm[axis, 1]), POINT_CELLS)
+        kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
+        spaces[name] = CurveSpace.of(spline, (), datum[axis], kind)
+        if name[1] in AXES:
+            own = [line for line in taken.lines if line.component == name]
+            at = list(own[0].line_mm if own else datum)
+            at[axis] = datum[axis]
+            tool = own[0].tool_mm if own else (0.0, 0.0, 0.0)
+            places[name] = Place((at[0], at[1], at[2]), tool)
+    shared = sorted({n for line in taken.lines if line.square is not None for n in square_names(line)})
+    return Parameters(chain, datum, spaces, places, shared=tuple(shared))
+
+
+def _spread(
+    parameters: Parameters, covariance: Array, box_mm: Array, tools: Sequence[Vector]
+) -> tuple[float, float]:
+    """rms and largest expected length of the error at places in the box, less the best-fit frame."""
+    rng = np.random.default_rng(1)
+    at = rng.uniform(box_mm[:, 0], box_mm[:, 1], (_PLACES, 3))
+    square = np.zeros((len(tools), _PLACES))
+    for k, tool in enumerate(tools):
+        vector = np.asarray(tool, float)
+        rows = parameters.design(at, vector).reshape(3 * _PLACES, -1)
+        frame = frame_columns(at + vector - (at + vector).mean(axis=0)).reshape(3 * _PLACES, -1)
+        basis, _ = np.linalg.qr(frame)
+        rows = rows - basis @ (basis.T @ rows)
+        square[k] = np.einsum("nk,nk->n", rows @ covariance, rows).reshape(_PLACES, 3).sum(axis=1)
+    return float(np.sqrt(square.mean())), float(np.sqrt(square.max()))

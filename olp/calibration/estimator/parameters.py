@@ -1,0 +1,174 @@
+"""What an adjustment estimates, and how the error of a pose depends on it: linear, to first order.
+
+A displacement curve is parametrised as it was measured, at the functional point on its own line and with its
+own reflector; so an angle that nobody measured changes nothing there. The contribution of axis j at axis
+positions P with tool t is E_j(q) + eps_j(q) x [L_j(P, t) - L_j(line)], see `olp.errormodel.bodies`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from olp.calibration.estimator.basis import CurveSpace, Wave
+from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
+from olp.core.units import AXES
+from olp.errormodel.base import Array
+
+#: An angle about a adds sign * angle * lever_k to row i: (i, a, k, sign).
+CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
+#: Row, axis and sign of what a squareness adds, times the distance of that axis from the datum.
+SHEAR = {"C0Y": (0, 1, -1.0), "B0Z": (0, 2, 1.0), "A0Z": (1, 2, -1.0)}
+#: Turns of the frame count per metre of lever, so that all unknowns are of one size.
+LEVER_MM = 1000.0
+
+Part = tuple[slice, Array]
+
+
+class Unknowns(Protocol):
+    """What a block of points, lengths or directions needs: how its tips depend on theta, (n, 3, size)."""
+
+    @property
+    def size(self) -> int: ...
+
+    def design(self, position: Array, tool: Array, /) -> Array: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a displacement was measured: the other axes' positions and the vector to the reflector."""
+
+    line_mm: Vector
+    tool_mm: Vector = ZERO
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parameters:
+    """The layout of theta: `spaces` of the means of all 18 curves, `halves` of those whose half difference of
+    directions is estimated, `waves` of cyclic terms, the three squareness errors, and `shared` nuisances.
+
+    `places` holds the place of each displacement curve. `slices` says where each stands: "EXX", "half EXX",
+    "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were seen in the machine's
+    frame: "frame" is by how much the axes as a whole are shifted (mm) and turned about the datum (rad times
+    LEVER_MM), and the tool vectors turned (the same), in it.
+    """
+
+    chain: str
+    datum_mm: Vector
+    spaces: Mapping[str, CurveSpace]
+    places: Mapping[str, Place]
+    halves: Mapping[str, CurveSpace] = field(default_factory=dict)
+    waves: Mapping[str, tuple[Wave, ...]] = field(default_factory=dict)
+    shared: tuple[str, ...] = ()
+    framed: bool = False
+    slices: Mapping[str, slice] = field(init=False)
+    size: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        slices: dict[str, slice] = {}
+        at = 0
+        sizes = [(name, self.spaces[name].size) for name in COMPONENTS]
+        sizes += [(f"half {name}", space.size) for name, space in self.halves.items()]
+        sizes += [(f"wave {name}", 2 * len(terms)) for name, terms in self.waves.items()]
+        sizes += [(name, 1) for name in (*SQUARENESS, *self.shared)]
+        sizes += [("frame", 9)] if self.framed else []
+        for name, size in sizes:
+            slices[name] = slice(at, at + size)
+            at += size
+        object.__setattr__(self, "slices", slices)
+        object.__setattr__(self, "size", at)
+
+    def after(self, axis: int) -> tuple[int, ...]:
+        """The axes that `axis` carries toward the tool."""
+        order = self.chain.replace("F", "")
+        return tuple(AXES.index(name) for name in order[order.index(AXES[axis]) + 1 :])
+
+    def curve(self, name: str, q: Array, direction: Array | None = None) -> list[Part]:
+        """The parts of theta that a component depends on at q (n,), and their (n, k) coefficients.
+
+        `direction` (n,) is +1 or -1; without it the mean of both holds.
+        """
+        parts = [(self.slices[name], self.spaces[name].values(q))]
+        if direction is not None and name in self.halves:
+            parts.append((self.slices[f"half {name}"], direction[:, None] * self.halves[name].values(q)))
+        if name in self.waves:
+            values = np.concatenate([wave.values(q) for wave in self.waves[name]], axis=1)
+            parts.append((self.slices[f"wave {name}"], values))
+        return parts
+
+    def displacement(
+        self, row: int, axis: int, position: Array, tool: Array, direction: Array | None = None,
+        *, on_table: bool = False,
+    ) -> Iterator[Part]:  # fmt: skip
+        """The parts of what `axis` adds to displacement `row` at axis positions (n, 3) with tool vectors (3,)
+        or (n, 3); `on_table`: as seen from a reflector that stays on the table. `direction` is (n,)."""
+        q = position[:, axis]
+        yield from self.curve(f"E{AXES[row]}{AXES[axis]}", q, direction)
+        for i, a, k, sign in CROSS:
+            if i != row:
+                continue
+            lever = self.lever(row, axis, k, position, tool)
+            if on_table and k == axis:
+                lever = lever - (q - self.datum_mm[axis])
+            if np.any(lever != 0.0):
+                for part, values in self.curve(f"E{'ABC'[a]}{AXES[axis]}", q, direction):
+                    yield part, sign * lever[:, None] * values
+
+    def lever(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
+        """(n,) coordinate `k` of the lever by which angles of `axis` act on displacement `row`."""
+        place = self.places[f"E{AXES[row]}{AXES[axis]}"]
+        lever = np.broadcast_to(tool[..., k] - place.tool_mm[k], (len(position),))
+        return lever + (position[:, k] - place.line_mm[k]) if k in self.after(axis) else lever
+
+    def shear(self, row: int, position: Array) -> Iterator[Part]:
+        """The parts of what squareness adds to displacement `row` at axis positions (n, 3)."""
+        for name, (i, axis, sign) in SHEAR.items():
+            if i == row:
+                yield self.slices[name], sign * (position[:, axis, None] - self.datum_mm[axis])
+
+    def design(self, position: Array, tool: Array, play: Array | None = None) -> Array:
+        """(n, 3, size) dependence of the error on theta at axis positions (n, 3), tool vectors (3,) or
+        (n, 3) and directions `play` (n, 3) in [-1, 1]."""
+        out = np.zeros((len(position), 3, self.size))
+        tool = np.asarray(tool, float)
+        for row in range(3):
+            for axis in range(3):
+                side = None if play is None else play[:, axis]
+                for part, values in self.displacement(row, axis, position, tool, side):
+                    out[:, row, part] += values
+            for part, values in self.shear(row, position):
+                out[:, row, part] += values
+        if self.framed:
+            start = self.slices["frame"].start
+            out[:, :, start : start + 6] = frame_columns(position - np.array(self.datum_mm))
+            turned = frame_columns(np.broadcast_to(tool, position.shape))[:, :, 3:]
+            out[:, :, start + 6 : start + 9] = turned
+        return out
+
+
+def frame_columns(arm: Array, *, scale: bool = False) -> Array:
+    """(n, 3, 6 or 7) what shifts, turns and the scale of the frame do to points at `arm` from the centre."""
+    out = np.zeros((len(arm), 3, 7 if scale else 6))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[:, k, k] = 1.0
+        out[:, i, 3 + k] = -arm[:, j] / LEVER_MM
+        out[:, j, 3 + k] = arm[:, i] / LEVER_MM
+    if scale:
+        out[:, :, 6] = arm / LEVER_MM
+    return out
+
+
+def gathered(parts: Sequence[Part], n: int) -> tuple[Array, np.ndarray]:
+    """Parts as one (n, k) matrix and the (k,) columns of theta that it stands on."""
+    used = sorted({(part.start, part.stop) for part, _ in parts})
+    columns = np.concatenate([np.arange(*span) for span in used])
+    start = dict(zip([span[0] for span in used], np.cumsum([0, *(b - a for a, b in used)]), strict=False))
+    rows = np.zeros((n, len(columns)))
+    for part, values in parts:
+        at = int(start[part.start])
+        rows[:, at : at + values.shape[1]] += values
+    return rows, columns

@@ -1,0 +1,149 @@
+"""What is believed before any reading: smooth curves of a size that machines have, from their own lines where
+there are some, by class where there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from olp.calibration.estimator.basis import slope_grid
+from olp.calibration.estimator.normal import Normal, evidence
+from olp.calibration.estimator.parameters import Parameters
+from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
+from olp.calibration.observations.readings import FRAME_MM
+from olp.core.machine import COMPONENTS, SQUARENESS
+from olp.errormodel.base import Array
+
+#: Standard deviation of a squareness and of the pose of a square that nobody knows, rad.
+SQUARE = 1e-3
+POSE = 0.1
+#: Of a curve that no line reads, where no other curve of the machine tells: size and second differences.
+UNKNOWN = {"positioning": (0.1, 2e-3), "straightness": (0.03, 1e-3), "angle": (6e-5, 2e-6)}
+#: No curve is smaller than this.
+LEAST_SIZE = 1e-4, 1e-7
+#: How far the roughness of a class may leave its start, as a standard deviation of its logarithm.
+LOOSE = 1.5
+
+
+def class_of(name: str) -> str:
+    """positioning, straightness or angle."""
+    if name[1] in "ABC":
+        return "angle"
+    return "positioning" if name[1] == name[2] else "straightness"
+
+
+def known_to(shapes: Mapping[str, Shape], kind: str) -> bool:
+    """Whether some curve of a class has lines of its own."""
+    return any(class_of(name) == kind for name in shapes)
+
+
+@dataclass(slots=True)
+class Prior:
+    """Roughness and amplitude of every curve. `shapes` are those that lines gave; `squares` the prior mean
+    and standard deviation of shared nuisances; `classes` (amplitude, roughness) for the other curves."""
+
+    parameters: Parameters
+    shapes: Mapping[str, Shape]
+    squares: Mapping[str, tuple[float, float]]
+    classes: dict[str, tuple[float, float]] = field(default_factory=lambda: dict(UNKNOWN))
+
+    def precision(self, classes: Mapping[str, tuple[float, float]] | None = None) -> tuple[Array, float]:
+        """(n, n) prior precision and its log determinant; the prior mean of all but squares is zero."""
+        p = self.parameters
+        out = np.zeros((p.size, p.size))
+        logdet = 0.0
+        classes = self.classes if classes is None else classes
+        for name in COMPONENTS:
+            shape = self.shapes.get(name)
+            size, roughness = classes[class_of(name)]
+            # coefficients that move together share one size
+            amplitude = size * np.sqrt(p.spaces[name].size)
+            if shape is not None:
+                amplitude, roughness = AMPLITUDE[name[1] in "ABC"], shape.roughness
+            block = p.spaces[name].prior(roughness, amplitude)
+            out[p.slices[name], p.slices[name]] = block
+            logdet += float(np.linalg.slogdet(block)[1])
+        for name, space in p.halves.items():
+            at = p.slices[f"half {name}"]
+            out[at, at] = space.prior(self.shapes[name].half_roughness or 1.0, HALF[name[1] in "ABC"])
+        for name in p.waves:
+            at = p.slices[f"wave {name}"]
+            out[at, at] = np.eye(at.stop - at.start) / FEATURE[name[1] in "ABC"] ** 2
+        for name in SQUARENESS:
+            out[p.slices[name], p.slices[name]] = 1.0 / SQUARE**2
+        for name in p.shared:
+            out[p.slices[name], p.slices[name]] = 1.0 / self.squares[name][1] ** 2
+        if p.framed:
+            out[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
+        return out, logdet
+
+    def push(self, normal: Normal) -> None:
+        """Add the prior means to the right side."""
+        for name in self.parameters.shared:
+            mean, sigma = self.squares[name]
+            normal.g[self.parameters.slices[name]] += mean / sigma**2
+
+    def learn(self, normal: Normal) -> None:
+        """Amplitude of classes from the curves that lines gave, then roughness by evidence, for the curves
+        without lines of their own that some reading depends on."""
+        p = self.parameters
+        for kind in self.classes:
+            known = [s for name, s in self.shapes.items() if class_of(name) == kind]
+            if known:
+                rough = float(np.exp(np.median([np.log(shape.roughness) for shape in known])))
+                self.classes[kind] = (self.classes[kind][0], rough)
+        for kind in self.classes:
+            seen = [
+                name
+                for name in COMPONENTS
+                if class_of(name) == kind
+                and name not in self.shapes
+                and normal.H[p.slices[name], p.slices[name]].any()
+            ]
+            if seen:
+                self._choose(kind, normal, 1)
+                if not known_to(self.shapes, kind):
+                    # nothing but these readings tells the size of such curves
+                    for _ in range(2):
+                        self._choose(kind, normal, 0)
+                        self._choose(kind, normal, 1)
+
+    def size_from(self, theta: Array) -> bool:
+        """Take the size of curves without lines of their own to be that of the largest of their class with
+        lines; says whether there are such curves."""
+        found = False
+        for kind, (_, roughness) in self.classes.items():
+            own = [name for name in self.shapes if class_of(name) == kind]
+            if own and any(class_of(name) == kind and name not in self.shapes for name in COMPONENTS):
+                self.classes[kind] = (max(self.rms(name, theta) for name in own), roughness)
+                found = True
+        return found
+
+    def rms(self, name: str, theta: Array) -> float:
+        """Root mean square of a curve over its length."""
+        space = self.parameters.spaces[name]
+        q = slope_grid(space.spline)
+        values = space.values(q) @ theta[self.parameters.slices[name]]
+        return max(float(np.sqrt(np.mean(values**2))), LEAST_SIZE[class_of(name) == "angle"])
+
+    def _choose(self, kind: str, normal: Normal, which: int) -> None:
+        """Take the size (0) or roughness (1) of a class that the evidence prefers."""
+        start = self.classes[kind]
+        steps = np.linspace(-3.0, 3.0, 7)
+
+        def moved(step: float) -> dict[str, tuple[float, float]]:
+            pair = [*start]
+            pair[which] *= float(np.exp(step))
+            return {**self.classes, kind: (pair[0], pair[1])}
+
+        values = [
+            evidence(normal, *self.precision(moved(step))) - 0.5 * (step / LOOSE) ** 2
+            for step in steps.tolist()
+        ]
+        k = int(np.clip(np.argmax(values), 1, len(steps) - 2))
+        a, b, c = values[k - 1 : k + 2]
+        bend = a - 2.0 * b + c
+        shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
+        self.classes = moved(float(steps[k] + np.clip(shift, -1.0, 1.0) * (steps[1] - steps[0])))

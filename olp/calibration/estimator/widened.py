@@ -1,0 +1,240 @@
+"""The adjustment of a fit with a smooth field beside the curves: what each set of volumetric readings says of
+curves, field, and the unknowns that it has for itself, kept apart by folds so that any may be held out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.estimator.adjustment import Fit, LengthsResult, PodsResult, PointsResult
+from olp.calibration.estimator.field import Modes
+from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of
+from olp.calibration.estimator.parameters import Parameters
+from olp.calibration.observations.lengths import lengths_block
+from olp.calibration.observations.lines import line_block, squareness_block
+from olp.calibration.observations.pods import CHUNK, pods_block
+from olp.calibration.observations.points import points_block
+from olp.calibration.observations.radial import radial_block
+from olp.calibration.observations.readings import Index, Lengths, Pods, Points
+from olp.core.machine import SQUARENESS
+from olp.core.units import AXES
+from olp.errormodel.base import Array
+
+#: Parts into which the points fall for the held-out figure.
+FOLDS = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Both:
+    """Curves and field together, as the blocks see them."""
+
+    parameters: Parameters
+    modes: Modes
+
+    @property
+    def size(self) -> int:
+        return self.parameters.size + 3 * self.modes.size
+
+    def design(self, position: Array, tool: Array, /) -> Array:
+        return np.concatenate([self.parameters.design(position, tool), wide(self.modes, position)], axis=2)
+
+
+def wide(modes: Modes, position: Array) -> Array:
+    """(n, 3, 3 m) the field's dependence on its coefficients at axis positions (n, 3)."""
+    values, m = modes.values(position), modes.size
+    out = np.zeros((len(position), 3, 3 * m))
+    for i in range(3):
+        out[:, i, i * m : (i + 1) * m] = values
+    return out
+
+
+def straight(parameters: Parameters, position: Array) -> Array:
+    """The design of what moves every tool alike: displacement curves and squareness, no angles."""
+    out = parameters.design(position, np.zeros(3))
+    keep = np.zeros(parameters.size, bool)
+    for name, part in parameters.slices.items():
+        keep[part] = name in (*SQUARENESS, "frame") or (name in parameters.spaces and name[1] in AXES)
+    out[:, :, ~keep] = 0.0
+    return out
+
+
+@dataclass(slots=True, eq=False)
+class _Sums:
+    """Gram matrices of [curves, field, nuisances, y] of standardised readings: of what is never held out
+    (first) and of each fold; `counts` the readings of each."""
+
+    gram: Array
+    counts: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduced:
+    """What the readings say of the field alone: precision G and right side v with all else free, the weighted
+    square that the curves leave, and the readings behind it."""
+
+    G: Array
+    v: Array
+    square: float
+    freedom: float
+
+
+class Adjustment:
+    """The normal equations; `other` are lines and priors, which the field is no part of."""
+
+    def __init__(self, fit: Fit, modes: Modes) -> None:
+        self.fit, self.modes = fit, modes
+        self.size, self.own = fit.parameters.size, 3 * modes.size
+        both = Both(fit.parameters, modes)
+        theta = np.concatenate([fit.theta, np.zeros(self.own)])
+        sets: list[tuple[Points | Lengths | Pods, Block]] = [
+            *((r.points, points_block(r.points, both)) for r in fit.points),
+            *((r.lengths, lengths_block(r.lengths, both, theta, r.station)) for r in fit.lengths),
+            *((r.pods, pods_block(r.pods, both, theta, list(r.poses))) for r in fit.pods),
+        ]
+        self.sets = sets
+        local = [len(block.precision) for _, block in sets]
+        self.total = both.size + sum(local)
+        gram = np.zeros((FOLDS + 1, self.total + 1, self.total + 1))
+        counts = np.zeros(FOLDS + 1)
+        nuisance = np.zeros(self.total)
+        at = both.size
+        for (taken, block), count in zip(sets, local, strict=True):
+            nuisance[at : at + count] = block.precision
+            columns = [*range(both.size), *range(at, at + count), self.total]
+            folds = _folds(taken)
+            start = 0
+            for chunk in block.chunks():
+                part = folds[start : start + len(chunk.y)]
+                start += len(chunk.y)
+                for k in np.unique(part).tolist():
+                    table = _table(chunk, part == k)
+                    gram[k][np.ix_(columns, columns)] += table.T @ table
+                    counts[k] += len(table)
+            at += count
+        self.sums = _Sums(gram, counts)
+        self.count = float(counts.sum())
+        self.free = int(np.sum(nuisance[both.size :] == 0.0))
+        other = Normal.of(self.size)
+        for result in fit.lines:
+            other.add(line_block(result.line, fit.parameters, result.noise))
+        for reading in fit.measurements.squareness:
+            other.add(squareness_block(reading, fit.parameters))
+        for radial in fit.radial:
+            other.add(radial_block(radial.taken, fit.parameters, radial.noise))
+        fit.prior.push(other)
+        self.lines = other.H
+        self.prior = np.diag(nuisance)
+        self.prior[: self.size, : self.size] = other.H + fit.prior.precision()[0]
+        self.right = np.zeros(self.total)
+        self.right[: self.size] = other.g
+        known = self.prior[: self.size, : self.size]
+        self.constant = float(other.g @ np.linalg.solve(known, other.g))
+
+    def normal(self, without: int | None = None) -> tuple[Array, Array, float, float]:
+        """(H, g, weighted square, readings) of everything but one fold, without the field's prior."""
+        use = [k for k in range(FOLDS + 1) if k != without]
+        gram = self.sums.gram[use].sum(axis=0)
+        n = self.total
+        square = float(gram[n, n]) + self.constant
+        return gram[:n, :n] + self.prior, gram[:n, n] + self.right, square, float(self.sums.counts[use].sum())
+
+    def reduced(self) -> Reduced:
+        H, g, square, count = self.normal()
+        field = self.columns((0, 1, 2))
+        rest = np.setdiff1d(np.arange(self.total), field)
+        factor = solver_of(H[np.ix_(rest, rest)])
+        across = H[np.ix_(field, rest)]
+        solved = factor(np.column_stack([across.T, g[rest]]))
+        G = H[np.ix_(field, field)] - across @ solved[:, :-1]
+        v = g[field] - across @ solved[:, -1]
+        left = square - float(g[rest] @ solved[:, -1])
+        return Reduced(0.5 * (G + G.T), v, left, count - self.free)
+
+    def columns(self, coordinates: Sequence[int]) -> Index:
+        m = self.modes.size
+        parts = [np.arange(self.size + i * m, self.size + (i + 1) * m) for i in coordinates]
+        return np.concatenate([np.zeros(0, np.int64), *parts])
+
+    def solve(
+        self, coordinates: Sequence[int], log_variance: Array, noise: float, without: int | None = None
+    ) -> tuple[Array, Array, Index]:
+        """(x, covariance, columns) of curves, the field's `coordinates` and nuisances."""
+        H, g, _, _ = self.normal(without)
+        field = self.columns(coordinates)
+        keep = np.concatenate([np.arange(self.size), field, np.arange(self.size + self.own, self.total)])
+        A, b = H[np.ix_(keep, keep)] / noise**2, g[keep] / noise**2
+        inner = np.arange(self.size, self.size + len(field))
+        A[inner, inner] += np.exp(-log_variance)
+        inverse = solver_of(A)(np.column_stack([np.eye(len(A)), b]))
+        return inverse[:, -1], inverse[:, :-1], keep
+
+    def misses(self, x: Array, keep: Index, folds: Sequence[int]) -> tuple[float, float]:
+        """Weighted square of what x leaves of the readings of folds, and how many these are."""
+        whole = np.zeros(self.total + 1)
+        whole[keep], whole[-1] = x, -1.0
+        gram = self.sums.gram[list(folds)].sum(axis=0)
+        return max(float(whole @ gram @ whole), 0.0), float(self.sums.counts[list(folds)].sum())
+
+    def believed(self, coordinates: Sequence[int], log_variance: Array, noise: float) -> Array:
+        """The prior precision alone of what `solve` solves for."""
+        field = self.columns(coordinates)
+        rest = np.arange(self.size + self.own, self.total)
+        keep = np.concatenate([np.arange(self.size), field, rest])
+        out = self.prior[np.ix_(keep, keep)] / noise**2
+        out[: self.size, : self.size] -= self.lines / noise**2
+        inner = np.arange(self.size, self.size + len(field))
+        out[inner, inner] += np.exp(-log_variance)
+        return np.asarray(out)
+
+    def left(self, x: Array) -> tuple[list[PointsResult | LengthsResult | PodsResult], float]:
+        """The sets of readings with what curves and field x leave of them, and chi-square of all readings."""
+        fit, chi_square = self.fit, 0.0
+        results: list[PointsResult | LengthsResult | PodsResult] = []
+        sets: list[PointsResult | LengthsResult | PodsResult] = [*fit.points, *fit.lengths, *fit.pods]
+        for old, (_, block) in zip(sets, self.sets, strict=True):
+            _, residual, sigma = residuals_of(block, x)
+            square = float(np.sum((residual / sigma) ** 2))
+            chi_square += square
+            results.append(dataclasses.replace(old, residual=residual, chi_square=square))
+        others = [line_block(r.line, fit.parameters, r.noise) for r in fit.lines]
+        others += [squareness_block(r, fit.parameters) for r in fit.measurements.squareness]
+        others += [radial_block(r.taken, fit.parameters, r.noise) for r in fit.radial]
+        for block in others:
+            _, residual, sigma = residuals_of(block, x)
+            chi_square += float(np.sum((residual / sigma) ** 2))
+        return results, chi_square
+
+
+def _table(chunk: Chunk, use: np.ndarray) -> Array:
+    table = np.concatenate([chunk.rows, chunk.local, chunk.y[:, None]], axis=1)[use]
+    return np.asarray(table / chunk.sigma[use, None])
+
+
+def _folds(taken: Points | Lengths | Pods) -> Index:
+    """The fold from 1 of every reading, in the order of its block; 0 is never held out. All readings of a
+    point are in one fold."""
+    n = len(taken.axis_mm)
+    fold = 1 + np.random.default_rng(n).permutation(n) % FOLDS
+    if isinstance(taken, Points):
+        return np.repeat(fold, 3)
+    if isinstance(taken, Lengths):
+        return fold
+    parts = [np.repeat(fold[start : start + CHUNK], 2) for start in range(0, n, CHUNK)]
+    whole = [np.tile(part, taken.count) for part in parts]
+    return np.concatenate([*whole, np.zeros(len(taken.baselines), np.int64)])
+
+
+def solver_of(matrix: Array) -> Callable[[Array], Array]:
+    """Solves matrix x = right, scaled to a unit diagonal."""
+    from scipy.linalg import cho_solve
+
+    scale = np.sqrt(np.diag(matrix))
+    factor = np.linalg.cholesky(matrix / np.outer(scale, scale) + 1e-13 * np.eye(len(scale)))
+
+    def solved(right: Array) -> Array:
+        return np.asarray(cho_solve((factor, True), right / scale[:, None]) / scale[:, None])
+
+    return solved

@@ -1,0 +1,274 @@
+"""Circles measured with a ball-bar (ISO 230-4): circular deviation and hysteresis, and squareness, scale
+mismatch, servo mismatch and lost motion out of them.
+
+At angle t from the first axis of the plane toward the second, with d = +1 counter-clockwise and -1 clockwise:
+
+    dr = r0 + x cos t + y sin t + R (S_1 - S_2) / 2 cos 2t + R g / 2 sin 2t + d v (T_1 - T_2) / 2 sin 2t
+         + b_1 / 2 d sgn(sin t) cos t - b_2 / 2 d sgn(cos t) sin t
+
+with g the lean of the second axis toward + of the first one, T the servo lags in time and b the lost motions.
+In one direction alone g and the servo mismatch are one column: such a circle gives no squareness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from olp.calibration.iso230.conventions import LEAN
+from olp.calibration.observations.readings import Array, Index, SquarenessReading
+from olp.core.errors import ConfigError
+from olp.core.machine import ZERO, Vector
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.findings.catalogue import Finding
+
+#: First and second axis of each plane, counter-clockwise seen from + of the third, and its squareness.
+PLANES = {"XY": (0, 1, "C0Y"), "YZ": (1, 2, "A0Z"), "ZX": (2, 0, "B0Z")}
+UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "lost_1", "lost_2")
+#: Readings this near to where an axis turns round are left out of the fit: there friction makes spikes.
+SKIP_DEG = 2.5
+_PLACES, _FEWEST = 720, 8
+#: A circle of radius R sees the slope R^2 / 2 of x^3, a mean line over +-s the slope 3 s^2 / 5.
+_MEAN_LINE = float(np.sqrt(5.0 / 6.0))
+_SHARE, _RANK, _TOO_MUCH = 1e-6, 1e-9, 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Circles:
+    """Radial readings of circles about one centre, in one set-up.
+
+    `angle_rad` (n,) from the first axis of `plane` toward the second, `value` (n,) radius less `radius_mm`
+    in mm, `direction` (n,) +1 counter-clockwise or -1, `run` (n,). `centre_mm` are axis positions, `tool_mm`
+    the tool vector; `feed_mm_s` along the circle, 0 where not known; `sigma` of one reading in mm. Raises
+    ConfigError.
+    """
+
+    plane: str
+    radius_mm: float
+    centre_mm: Vector
+    angle_rad: Array
+    value: Array
+    run: Index
+    direction: Index
+    tool_mm: Vector = ZERO
+    feed_mm_s: float = 0.0
+    sigma: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.plane not in PLANES:
+            raise ConfigError(f"plane {self.plane!r}; expected XY, YZ or ZX", file=self.source)
+        n = len(self.angle_rad)
+        if (
+            not self.radius_mm > 0.0
+            or n < _FEWEST
+            or any(len(c) != n for c in (self.value, self.run, self.direction))
+        ):
+            raise ConfigError(
+                f"circle of radius {self.radius_mm:g} mm with {n} readings; expected a radius above 0 and at "
+                f"least {_FEWEST} readings",
+                file=self.source,
+            )
+        if not np.isin(self.direction, (-1, 1)).all():
+            raise ConfigError("a direction is neither +1 (counter-clockwise) nor -1", file=self.source)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        first, second, _ = PLANES[self.plane]
+        return AXES[first], AXES[second]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CircleFit:
+    """(8,) `value` and `sigma` of UNKNOWNS, all in mm at the circle: scale R (S_1 - S_2) / 2, square R g / 2,
+    servo v (T_1 - T_2) / 2, lost motions b; what is determined in `determined`. `residual` (n,) in mm of
+    all readings, also those beside the fit (`used` False). G by direction and H in mm."""
+
+    circles: Circles
+    value: Array
+    sigma: Array
+    determined: frozenset[str]
+    residual: Array
+    used: Array
+    noise: float
+    circular: dict[int, float]
+    hysteresis: float | None
+
+    @property
+    def one_way(self) -> bool:
+        return len(np.unique(self.circles.direction)) == 1
+
+    @property
+    def component(self) -> str:
+        return PLANES[self.circles.plane][2]
+
+    def reading(self) -> SquarenessReading | None:
+        """The squareness as at the centre; None where it is not determined. Its span is that whose mean lines
+        have the slopes that the circle sees, for straightness up to the third order."""
+        if "square" not in self.determined:
+            return None
+        c, r = self.circles, self.circles.radius_mm
+        lean = 2.0 * self.value[4] / r
+        first, second, name = PLANES[c.plane]
+        low, high = sorted((first, second))
+        half = _MEAN_LINE * r
+        spans = [(c.centre_mm[i] - half, c.centre_mm[i] + half) for i in (low, high)]
+        return SquarenessReading(
+            name, float(LEAN[name] * lean), c.centre_mm, (spans[0], spans[1]), c.tool_mm,
+            float(2.0 * self.sigma[4] / r), c.source,
+        )  # fmt: skip
+
+    @property
+    def findings(self) -> Iterator[Finding]:
+        missing = [name for name in UNKNOWNS if name not in self.determined]
+        if self.one_way:
+            yield Finding(
+                "OLP856",
+                f"circle {self.circles.plane}: squareness and servo mismatch not determined, as it was run "
+                "in one direction only; run it clockwise and counter-clockwise in one set-up",
+            )
+        elif missing:
+            yield Finding(
+                "OLP856",
+                f"circle {self.circles.plane}: {', '.join(missing)} not determined; run a larger part of the "
+                "circle",
+            )
+        if self.circles.sigma > 0.0 and self.noise > _TOO_MUCH * self.circles.sigma:
+            yield Finding(
+                "OLP857",
+                f"circle {self.circles.plane}: {self.noise * UM_PER_MM:.2f} um rms left, "
+                f"{self.circles.sigma * UM_PER_MM:.2f} um stated",
+            )
+        for k, axis in zip((6, 7), self.circles.names, strict=True):
+            if UNKNOWNS[k] in self.determined and self.value[k] < -3.0 * self.sigma[k]:
+                yield Finding(
+                    "OLP855", f"{axis}: lost motion {self.value[k] * UM_PER_MM:.2f} um on the circle"
+                )
+
+    def as_dict(self) -> dict[str, Any]:
+        c = self.circles
+        first, second = c.names
+        out: dict[str, Any] = {
+            "plane": c.plane, "file": c.source, "radius_mm": c.radius_mm, "centre_mm": list(c.centre_mm),
+            "noise_um": self.noise * UM_PER_MM,
+        }  # fmt: skip
+        for d, name in ((1, "G_ccw_um"), (-1, "G_cw_um")):
+            if d in self.circular:
+                out[name] = self.circular[d] * UM_PER_MM
+        if self.hysteresis is not None:
+            out["H_um"] = self.hysteresis * UM_PER_MM
+        found = []
+
+        def add(name: str, key: str, unit: str, factor: float) -> None:
+            k = UNKNOWNS.index(key)
+            if key in self.determined:
+                found.append({
+                    "name": name, f"value_{unit}": self.value[k] * factor,
+                    f"sigma_{unit}": self.sigma[k] * abs(factor),
+                })  # fmt: skip
+
+        per_radius = 2.0 / c.radius_mm / RAD_PER_URAD
+        add(self.component, "square", "urad", LEAN[self.component] * per_radius)
+        add(f"scale {first} less scale {second}", "scale", "um_m", per_radius)
+        if c.feed_mm_s > 0.0:
+            add(f"servo lag {first} less {second}", "servo", "ms", 2e3 / c.feed_mm_s)
+        else:
+            add("servo mismatch on the circle", "servo", "um", UM_PER_MM)
+        add(f"lost motion {first}", "lost_1", "um", UM_PER_MM)
+        add(f"lost motion {second}", "lost_2", "um", UM_PER_MM)
+        out["found"] = found
+        out["not_determined"] = [name for name in UNKNOWNS if name not in self.determined]
+        return out
+
+
+def fit(circles: Circles, *, skip_deg: float = SKIP_DEG) -> CircleFit:
+    """All of it by least squares. Readings within `skip_deg` of where an axis turns round are not used.
+    Raises ConfigError where too few are left."""
+    design = columns(circles)
+    quarter = np.abs((circles.angle_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4)
+    used = quarter > np.radians(skip_deg)
+    if used.sum() < 2 * len(UNKNOWNS):
+        raise ConfigError(
+            f"circle {circles.plane}: {int(used.sum())} readings away from the reversals; expected at least "
+            f"{2 * len(UNKNOWNS)}",
+            file=circles.source,
+        )
+    part, value = design[used], circles.value[used]
+    _, singular, v = np.linalg.svd(part, full_matrices=False)
+    rank = int((singular > _RANK * singular[0]).sum())
+    null = v[rank:]
+    determined = frozenset(
+        name for k, name in enumerate(UNKNOWNS) if not len(null) or np.abs(null[:, k]).max() < _SHARE
+    )
+    inverse = np.linalg.pinv(part, rcond=_RANK)
+    found = inverse @ value
+    residual = circles.value - design @ found
+    dof = len(value) - rank
+    noise = float(np.sqrt((residual[used] ** 2).sum() / max(dof, 1)))
+    spread = max(noise * _alike(circles, residual, used), circles.sigma)
+    sigma = spread * np.sqrt(np.diag(inverse @ inverse.T))
+    circular, hysteresis = _figures(circles, found)
+    return CircleFit(circles, found, sigma, determined, residual, used, noise, circular, hysteresis)
+
+
+def _alike(circles: Circles, residual: Array, used: Array) -> float:
+    """How much more uncertain a mean is because neighbours on the circle are alike: what straightness and
+    scales leave repeats, and is no noise (autocorrelation r of the first order, sqrt((1 + r) / (1 - r)))."""
+    product = square = 0.0
+    for d in (1, -1):
+        for run in np.unique(circles.run[circles.direction == d]):
+            rows = np.flatnonzero((circles.direction == d) & (circles.run == run) & used)
+            rest = residual[rows[np.argsort(circles.angle_rad[rows] % (2.0 * np.pi))]]
+            product += float(rest[:-1] @ rest[1:])
+            square += float(rest @ rest)
+    alike = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
+    return float(np.sqrt((1.0 + alike) / (1.0 - alike)))
+
+
+def columns(circles: Circles) -> Array:
+    """(n, 8) change of a reading for 1 mm of each of UNKNOWNS."""
+    t, d = circles.angle_rad, circles.direction.astype(float)
+    c, s = np.cos(t), np.sin(t)
+    return np.column_stack((
+        np.ones(len(t)), c, s, np.cos(2 * t), np.sin(2 * t), d * np.sin(2 * t),
+        0.5 * d * np.sign(s) * c, -0.5 * d * np.sign(c) * s,
+    ))  # fmt: skip
+
+
+def _figures(circles: Circles, found: Array) -> tuple[dict[int, float], float | None]:
+    """Circular deviation G of each direction (the largest of its runs) and hysteresis H (of the mean runs),
+    the centre of the least-squares circle taken out (ISO 230-4, 3.2 to 3.4)."""
+    t = circles.angle_rad % (2.0 * np.pi)
+    centred = circles.value - found[1] * np.cos(t) - found[2] * np.sin(t)
+    circular: dict[int, float] = {}
+    means = {}
+    grid = np.arange(_PLACES) * 2.0 * np.pi / _PLACES
+    for d in (1, -1):
+        laps = []
+        for run in np.unique(circles.run[circles.direction == d]):
+            rows = (circles.direction == d) & (circles.run == run)
+            circular[d] = max(circular.get(d, 0.0), float(np.ptp(centred[rows])))
+            order = np.argsort(t[rows])
+            laps.append(np.interp(grid, t[rows][order], centred[rows][order], period=2.0 * np.pi))
+        if laps:
+            means[d] = np.mean(laps, axis=0)
+    if len(means) < 2 or not _whole(t, circles.direction):
+        return circular, None
+    return circular, float(np.abs(means[1] - means[-1]).max())
+
+
+def _whole(angle: Array, direction: Index) -> bool:
+    """No gap above 10 degrees in either direction."""
+    for d in (1, -1):
+        turn = np.sort(angle[direction == d])
+        if np.diff(turn, append=turn[0] + 2.0 * np.pi).max() > np.radians(10.0):
+            return False
+    return True
+
+
+def readings_of(fits: Sequence[CircleFit]) -> tuple[SquarenessReading, ...]:
+    """The squareness of all circles that determine one."""
+    return tuple(r for r in (found.reading() for found in fits) if r is not None)

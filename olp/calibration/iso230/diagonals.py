@@ -1,0 +1,306 @@
+"""Positioning along face and body diagonals (ISO 230-6), and the scales and squareness that can be told
+from it.
+
+The elongation of a diagonal of direction u is  u_x^2 S_x + u_y^2 S_y + u_z^2 S_z - u_x u_y C0Y + u_x u_z B0Z
+- u_y u_z A0Z, with S the scale errors. Angular errors and straightness of the axes take part too, and no set
+of diagonals can tell them apart: so this checks a machine, and gives squareness where the angles are small.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from olp.calibration.iso230.conventions import AXES_OF, LEAN
+from olp.calibration.iso230.positioning import Statistics, statistics, targets_of
+from olp.calibration.observations.readings import Array, Index, SquarenessReading
+from olp.core.errors import ConfigError
+from olp.core.machine import SQUARENESS, ZERO, Vector
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.findings.catalogue import Finding
+
+SCALES = ("SX", "SY", "SZ")
+UNKNOWNS = (*SCALES, *SQUARENESS)
+#: Share of an unknown in the null space above which it is not determined.
+_SHARE = 1e-6
+_RANK = 1e-9
+#: a residual sum this many standard deviations above its expectation
+_TOO_MUCH = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagonal:
+    """Readings along the straight line between two axis positions, rows in the order of time.
+
+    `distance_mm` (n,) from the start, `value` (n,) actual minus commanded along the line in mm, `run` and
+    `direction` as in a `Line` (+1: approached from the start). `sigma` is the standard uncertainty of one
+    reading in mm, `sigma_scale` that of the laser's scale. Raises ConfigError.
+    """
+
+    start_mm: Vector
+    end_mm: Vector
+    distance_mm: Array
+    value: Array
+    run: Index
+    direction: Index
+    tool_mm: Vector = ZERO
+    sigma: float = 0.0
+    sigma_scale: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        length = self.length_mm
+        if not np.isfinite(length) or length <= 0.0:
+            raise ConfigError("diagonal: start and end are one place", file=self.source)
+        if np.count_nonzero(np.abs(self.unit) > 1e-9) < 2:
+            raise ConfigError(
+                f"diagonal: only {self.name.strip('0')} moves; expected a diagonal in two or three axes",
+                file=self.source,
+            )
+        n = len(self.distance_mm)
+        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction)):
+            raise ConfigError(f"diagonal: {n} readings; expected at least 2", file=self.source)
+        if self.distance_mm.min() < -1.0 or self.distance_mm.max() > length + 1.0:
+            raise ConfigError(
+                f"diagonal: targets from {self.distance_mm.min():g} to {self.distance_mm.max():g} mm, but "
+                f"start and end are {length:g} mm apart; expected distances from the start",
+                file=self.source,
+            )
+
+    @property
+    def length_mm(self) -> float:
+        return float(np.linalg.norm(np.subtract(self.end_mm, self.start_mm)))
+
+    @property
+    def unit(self) -> Array:
+        """(3,) direction from start to end."""
+        return np.asarray(np.subtract(self.end_mm, self.start_mm) / self.length_mm)
+
+    @property
+    def name(self) -> str:
+        """As ISO 230-6 names diagonals: P or N for each axis as it goes up in the last axis that moves; 0
+        for an axis that stands."""
+        u = self.unit
+        moving = np.flatnonzero(np.abs(u) > 1e-9)
+        u = u * np.sign(u[moving[-1]])
+        return "".join("0" if abs(v) <= 1e-9 else "P" if v > 0 else "N" for v in u)
+
+    def evaluate(self) -> Statistics:
+        """E, B, R ... along the diagonal, as ISO 230-6 takes them from ISO 230-2. Raises ConfigError."""
+        return statistics(self.distance_mm, self.value, self.direction, f"diagonal {self.name}", self.source)
+
+    def elongation(self) -> tuple[float, float]:
+        """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty:
+        from the scatter of the readings (`sigma` where that is more) or, where that is larger, from how far
+        the means of the targets are off the line."""
+        x = self.distance_mm - self.distance_mm.mean()
+        spread = float(x @ x)
+        if spread == 0.0:
+            raise ConfigError(f"diagonal {self.name}: one target; expected at least 2", file=self.source)
+        slope = float(x @ self.value) / spread
+        rest = self.value - self.value.mean() - slope * x
+        noise = float(np.sqrt(rest @ rest / max(len(x) - 2, 1)))
+        target, place = targets_of(self.distance_mm)
+        means = np.bincount(place, rest) / np.bincount(place)
+        bow = float(np.sqrt(means @ means / (len(target) - 2))) if len(target) > 2 else 0.0
+        apart = float(np.sqrt(((target - target.mean()) ** 2).sum()))
+        return slope, max(max(noise, self.sigma) / np.sqrt(spread), bow / apart)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiagonalFit:
+    """What diagonals say: (6,) `value` and `sigma` of UNKNOWNS in rad or mm/mm, those that are determined in
+    `determined`; `free` lists the changes of all six that no reading sees; `elongation` by diagonal with its
+    uncertainty and what the fit leaves of it."""
+
+    diagonals: tuple[Diagonal, ...]
+    value: Array
+    sigma: Array
+    determined: frozenset[str]
+    free: tuple[Mapping[str, float], ...]
+    elongation: Array
+    sigma_elongation: Array
+    residual: Array
+    chi_square: float
+    dof: int
+    stated: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+
+    def readings(self) -> tuple[SquarenessReading, ...]:
+        """The squareness that is determined, as at the middle of the diagonals and over their extent."""
+        ends = np.array([d.start_mm for d in self.diagonals] + [d.end_mm for d in self.diagonals], float)
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        middle = (low + high) / 2.0
+        out = []
+        for k, name in enumerate(SQUARENESS):
+            if name in self.determined:
+                spans = [(float(low[i]), float(high[i])) for i in AXES_OF[name]]
+                out.append(
+                    SquarenessReading(
+                        name,
+                        float(self.value[3 + k]),
+                        (float(middle[0]), float(middle[1]), float(middle[2])),
+                        (spans[0], spans[1]),
+                        self.diagonals[0].tool_mm,
+                        float(self.sigma[3 + k]),
+                        ", ".join(dict.fromkeys(d.source for d in self.diagonals if d.source)),
+                    )
+                )
+        return tuple(out)
+
+    @property
+    def findings(self) -> Iterator[Finding]:
+        missing = [name for name in UNKNOWNS if name not in self.determined]
+        if missing:
+            ways = ", or ".join(_words(change) for change in self.free)
+            yield Finding(
+                "OLP856",
+                f"{', '.join(missing)} not determined by diagonals {self.names}: no reading sees {ways}; "
+                "measure face diagonals, or state scales with their uncertainty",
+            )
+        if self.dof > 0 and self.chi_square > self.dof + _TOO_MUCH * np.sqrt(2.0 * self.dof):
+            worst = int(np.argmax(np.abs(self.residual) / self.sigma_elongation))
+            micro = float(self.residual[worst]) * self.diagonals[worst].length_mm * UM_PER_MM
+            yield Finding(
+                "OLP857",
+                f"diagonals: chi square {self.chi_square:.1f} at {self.dof} degrees of freedom, most on "
+                f"{self.diagonals[worst].name} ({micro:+.2f} um at its end)",
+            )
+
+    @property
+    def names(self) -> str:
+        return ", ".join(d.name for d in self.diagonals)
+
+    def as_dict(self) -> dict[str, Any]:
+        rows = []
+        for i, d in enumerate(self.diagonals):
+            row: dict[str, Any] = {
+                "name": d.name, "file": d.source, "length_mm": d.length_mm,
+                "elongation_um_m": self.elongation[i] / RAD_PER_URAD,
+                "sigma_um_m": self.sigma_elongation[i] / RAD_PER_URAD,
+                "left_um_m": self.residual[i] / RAD_PER_URAD,
+            }  # fmt: skip
+            # one run has no spread, and gives its elongation all the same
+            with contextlib.suppress(ConfigError):
+                row |= {f"{k}_um": v * UM_PER_MM for k, v in d.evaluate().figures().items()}
+            rows.append(row)
+        return {
+            "diagonals": rows,
+            "found": [
+                {
+                    "name": name,
+                    "value_urad" if name in SQUARENESS else "value_um_m": self.value[k] / RAD_PER_URAD,
+                    "sigma_urad" if name in SQUARENESS else "sigma_um_m": self.sigma[k] / RAD_PER_URAD,
+                }
+                for k, name in enumerate(UNKNOWNS)
+                if name in self.determined
+            ],
+            "not_determined": [name for name in UNKNOWNS if name not in self.determined],
+            "unseen_changes": [dict(change) for change in self.free],
+            "chi_square": self.chi_square,
+            "degrees_of_freedom": self.dof,
+        }
+
+
+def row_of(unit: Array) -> Array:
+    """(6,) elongation of a diagonal of direction `unit` (3,) for one unit of each of UNKNOWNS."""
+    shear = [LEAN[name] * unit[i] * unit[j] for name, (i, j) in AXES_OF.items()]
+    return np.concatenate((unit * unit, shear))
+
+
+def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] | None = None) -> DiagonalFit:
+    """Scales and squareness from diagonals by least squares; `known` gives (value, standard uncertainty) of
+    any of UNKNOWNS from other instruments, in mm/mm or rad.
+
+    The laser's scale error is one unknown with its stated uncertainty, common to all diagonals. Raises
+    ConfigError.
+    """
+    known = dict(known or {})
+    for name, (_, spread) in known.items():
+        if name not in UNKNOWNS or not spread > 0.0:
+            raise ConfigError(
+                f"known {name} with uncertainty {spread:g}; expected one of {', '.join(UNKNOWNS)} with an "
+                "uncertainty above zero"
+            )
+    if not diagonals:
+        raise ConfigError("no diagonals; expected face or body diagonals")
+    levers = np.array([d.tool_mm for d in diagonals], float)
+    if np.ptp(levers, axis=0).max() > 1.0:
+        raise ConfigError(
+            "diagonals with different tool vectors; angular errors would differ between them; expected one",
+            file=diagonals[-1].source,
+        )
+    pairs = [d.elongation() for d in diagonals]
+    elongation, sigma = np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
+    if (sigma == 0.0).any():
+        bare = diagonals[int(np.argmin(sigma))]
+        raise ConfigError(
+            f"diagonal {bare.name}: nothing is repeated and sigma_um is not stated; expected repeated runs, "
+            "or the uncertainty of a reading",
+            file=bare.source,
+        )
+    design = np.array([row_of(d.unit) for d in diagonals])
+    stated = np.array([[float(u == name) for u in UNKNOWNS] for name in known]).reshape(-1, len(UNKNOWNS))
+    design = np.vstack((design, stated))
+    value = np.concatenate((elongation, [v for v, _ in known.values()]))
+    weight = 1.0 / np.concatenate((sigma, [s for _, s in known.values()]))
+    scale = max(d.sigma_scale for d in diagonals)
+    system, right = design * weight[:, None], value * weight
+    # a laser that reads a share too much stretches every diagonal; weighted by its own uncertainty
+    laser = np.concatenate((np.full(len(diagonals), scale), np.zeros(len(known)))) * weight
+    full = np.vstack((np.column_stack((system, laser)), [*np.zeros(len(UNKNOWNS)), 1.0]))
+    columns = np.asarray(np.linalg.norm(design, axis=0))
+    _, singular, v = np.linalg.svd(design / np.where(columns > 0, columns, 1.0))
+    rank = int((singular > _RANK * singular[0]).sum())
+    null = _sparse(v[rank:] / np.where(columns > 0, columns, 1.0))
+    inverse = np.linalg.pinv(full, rcond=1e-12)
+    found = inverse @ np.append(right, 0.0)
+    covariance = inverse @ inverse.T
+    determined = frozenset(
+        name for k, name in enumerate(UNKNOWNS) if not len(null) or np.abs(null[:, k]).max() < _SHARE
+    )
+    rest = np.append(right, 0.0) - full @ found
+    left = elongation - design[: len(diagonals)] @ found[:6]
+    return DiagonalFit(
+        tuple(diagonals), found[:6], np.sqrt(np.diag(covariance)[:6]), determined,
+        tuple(_change(row) for row in null), elongation, sigma, left, float(rest @ rest),
+        len(value) - rank, MappingProxyType(known),
+    )  # fmt: skip
+
+
+def _sparse(rows: Array) -> Array:
+    """A basis of the same space whose rows have few parts (Gauss-Jordan)."""
+    rows = np.array(rows)
+    for k in range(len(rows)):
+        pivot = int(np.argmax(np.abs(rows[k])))
+        rows[k] /= rows[k, pivot]
+        for other in range(len(rows)):
+            if other != k:
+                rows[other] -= rows[other, pivot] * rows[k]
+    rows[np.abs(rows) < _SHARE] = 0.0
+    return rows
+
+
+def _change(row: Array) -> Mapping[str, float]:
+    """A direction in which nothing is seen, its largest part 1."""
+    row = row / row[np.argmax(np.abs(row))]
+    return MappingProxyType({name: float(v) for name, v in zip(UNKNOWNS, row, strict=True) if abs(v) > 1e-6})
+
+
+def _words(change: Mapping[str, float]) -> str:
+    return " with ".join(
+        f"{value:+.3g} {'um/m' if name in SCALES else 'urad'} in {name}" for name, value in change.items()
+    )
+
+
+def place_words(diagonal: Diagonal) -> str:
+    """Start and end as people read them."""
+    a, b = (
+        " ".join(f"{axis}{v:g}" for axis, v in zip(AXES, p, strict=True))
+        for p in (diagonal.start_mm, diagonal.end_mm)
+    )
+    return f"{a} to {b}"

@@ -1,0 +1,78 @@
+"""Lengths from stations that nobody surveyed (sequential multilateration) as rows of the adjustment.
+
+A tracking interferometer reads |tip - station| less a dead length. Both are unknowns of one station; the
+first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^2, then Gauss and Newton.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.parameters import Unknowns
+from olp.calibration.observations.readings import Lengths
+from olp.core.errors import CannotCompute
+from olp.errormodel.base import Array
+
+CHUNK = 4000
+#: Gauss and Newton have arrived where no station moves by more than this.
+STILL_MM = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Station:
+    """Where a station is thought to be, in the machine's frame, and its dead length."""
+
+    place_mm: Array
+    dead_mm: float
+
+    def moved(self, by: Array) -> Station:
+        return Station(self.place_mm + by[:3], self.dead_mm + float(by[3]))
+
+
+def first_station(lengths: Lengths) -> Station:
+    """The closed-form guess, as if the machine had no errors. Raises CannotCompute where the points leave a
+    choice."""
+    tip = lengths.axis_mm + lengths.tool_mm
+    centre = tip.mean(axis=0)
+    q, length = (tip - centre) / 1000.0, lengths.length_mm / 1000.0
+    table = np.column_stack([2.0 * q, 2.0 * length, np.ones(len(q))])
+    right = (q**2).sum(axis=1) - length**2
+    found, _, rank, _ = np.linalg.lstsq(table, right, rcond=1e-9)
+    if rank < 5:
+        raise CannotCompute(
+            f"the points of {lengths.source or 'a station'} lie in one plane or are too few; expected points "
+            "all over the volume"
+        )
+    return Station(1000.0 * found[:3] + centre, 1000.0 * float(found[3]))
+
+
+def lengths_block(lengths: Lengths, parameters: Unknowns, theta: Array, station: Station) -> Block:
+    """The readings of one station, linearised where the machine's errors are `theta`. Its unknowns are the
+    shift of the station and of its dead length."""
+    size = parameters.size
+    tip = lengths.axis_mm + lengths.tool_mm
+    scaled = lengths.sigma_scale > 0.0
+    precision = np.zeros(5 if scaled else 4)
+    if scaled:
+        precision[4] = 1.0 / lengths.sigma_scale**2
+
+    def chunks() -> Iterator[Chunk]:
+        for start in range(0, len(tip), CHUNK):
+            part = slice(start, start + CHUNK)
+            design = parameters.design(lengths.axis_mm[part], lengths.tool_mm[part])
+            ray = tip[part] + design @ theta - station.place_mm
+            distance = np.linalg.norm(ray, axis=1)
+            along = ray / distance[:, None]
+            rows = np.einsum("ni,nik->nk", along, design)
+            read = lengths.length_mm[part]
+            local = [-along, -np.ones((len(read), 1))]
+            if scaled:
+                local.append(read[:, None])
+            y = read - (distance - station.dead_mm) + rows @ theta
+            yield Chunk(rows, y, lengths.sigma_mm[part], np.concatenate(local, axis=1))
+
+    return Block(np.arange(size), precision, chunks, lengths.source or "lengths")

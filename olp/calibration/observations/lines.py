@@ -1,0 +1,177 @@
+"""Lines, squares and values of squareness as rows of the adjustment.
+
+A line's zero is not known, nor is the slope of a straightness: that of the line it was read against. Two
+lines that were read against the legs of one square share one such slope and the square's own error. A
+laser's wavelength scales a positioning line. All readings of a line drift together: a continuous function
+of time, linear during each run.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
+from olp.calibration.observations.readings import Line, SquarenessReading
+from olp.core.errors import ConfigError
+from olp.core.units import AXES
+from olp.errormodel.base import Array
+
+#: Targets this close are one.
+SAME_MM = 0.05
+#: No instrument reads better than this: 10 nm, 10 nrad.
+LEAST = 1e-5, 1e-8
+#: What an instrument may drift in a run where one run alone cannot tell: 2 um, 2 urad.
+DRIFT = 2e-3, 2e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviation of a reading about its drift, and that of the drift over one run; mm or rad.
+    `spread` is what the runs themselves show, None without repeated readings."""
+
+    sigma: float
+    drift: float
+    spread: float | None
+
+
+def noise_of(line: Line) -> Noise:
+    """From the spread of repeated readings and, where there are none, from what the line states.
+
+    Raises ConfigError where neither tells.
+    """
+    groups = group_of(line)
+    n, several = len(line.value), len(np.unique(line.run)) > 1
+    ramps = drift_ramps(line)
+    spread: float | None = None
+    drift = 0.0
+    if several:
+        # the mean of each target and direction is taken out of both sides: what is left is the drift
+        count = int(groups.max()) + 1
+        own = ramps - _means(ramps, groups, count)[groups]
+        value = line.value - _means(line.value[:, None], groups, count)[groups, 0]
+        steps, _, rank, _ = np.linalg.lstsq(own, value, rcond=1e-9)
+        free = n - count - int(rank)
+        if free >= 3:
+            rest = value - own @ steps
+            # by the median, so that one slip of the hand does not blunt all readings
+            robust = 1.4826 * float(np.median(np.abs(rest))) * np.sqrt(n / free)
+            spread = min(float(np.sqrt(rest @ rest / free)), 1.3 * robust)
+            drift = float(np.sqrt(np.mean(steps**2)))
+    least = LEAST[line.quantity == "angle"]
+    if spread is None and line.sigma <= 0.0:
+        raise ConfigError(
+            f"line {line.component} has no repeated readings and states no sigma; expected at least two runs "
+            f"or {'sigma_urad' if line.quantity == 'angle' else 'sigma_um'}",
+            file=line.source,
+        )
+    sigma = max(line.sigma, spread or 0.0, least)
+    return Noise(sigma, max(drift, 0.2 * sigma) if several else DRIFT[line.quantity == "angle"], spread)
+
+
+def _means(columns: Array, groups: np.ndarray, count: int) -> Array:
+    """(count, k) mean of columns (n, k) in each group."""
+    sums = np.stack([np.bincount(groups, column, count) for column in columns.T], axis=1)
+    return np.asarray(sums / np.bincount(groups, minlength=count)[:, None])
+
+
+def group_of(line: Line) -> np.ndarray:
+    """(n,) number of the target and direction of each reading."""
+    order = np.argsort(line.target_mm, kind="stable")
+    target = np.empty(len(order), np.int64)
+    target[order] = np.concatenate([[0], np.cumsum(np.diff(line.target_mm[order]) > SAME_MM)])
+    _, group = np.unique(2 * target + (line.direction > 0), return_inverse=True)
+    return np.asarray(group)
+
+
+def targets_of(line: Line) -> Array:
+    """The targets of a line, ascending, each once."""
+    q = np.sort(line.target_mm)
+    return np.asarray(q[np.concatenate([[True], np.diff(q) > SAME_MM])])
+
+
+def drift_ramps(line: Line) -> Array:
+    """(n, runs) columns: each rises from 0 to 1 during one run and stays there."""
+    index = np.arange(len(line.run), dtype=float)
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(line.run)) + 1, [len(line.run)]])
+    return np.stack(
+        [np.clip((index - a) / max(b - a, 1), 0.0, 1.0) for a, b in itertools.pairwise(starts)],
+        axis=1,
+    )
+
+
+def square_names(line: Line) -> tuple[str, str]:
+    """The shared nuisances of a straightness read against a square: its pose in this plane, its error."""
+    plane = "".join(sorted((line.component[1], line.component[2])))
+    return f"pose of square {line.square} in {plane}", f"error of square {line.square}"
+
+
+def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
+    """The readings of one line."""
+    n, axis = len(line.value), line.axis
+    q = line.target_mm
+    side = line.direction.astype(float)
+    from_datum = q - parameters.datum_mm[axis]
+    local = [np.ones(n)]
+    precision = [0.0]
+    if line.quantity == "angle":
+        parts = parameters.curve(line.component, q, side)
+    else:
+        position = np.tile(np.array(line.line_mm), (n, 1))
+        position[:, axis] = q
+        row, tool = AXES.index(line.component[1]), np.array(line.tool_mm)
+        parts = []
+        for other in range(3):
+            # what stands still still turns what moves: a constant angle tilts the line of an axis it carries
+            own = other == axis
+            on_table = own and line.reference == "table"
+            where = side if own else None
+            parts += parameters.displacement(row, other, position, tool, where, on_table=on_table)
+        if line.quantity == "straightness":
+            parts += [
+                (parameters.slices[name], sign * from_datum[:, None])
+                for name, (i, j, sign) in SHEAR.items()
+                if (i, j) == (row, axis)
+            ]
+            if line.square is None:
+                local.append(from_datum / 1000.0)
+                precision.append(0.0)
+            else:
+                # slopes against both legs differ in sign, and add up to the square's error
+                pose, error = (parameters.slices[name] for name in square_names(line))
+                first = axis < row
+                parts.append((pose, (1.0 if first else -1.0) * from_datum[:, None]))
+                if not first:
+                    parts.append((error, from_datum[:, None]))
+        elif line.sigma_scale > 0.0:
+            local.append(from_datum)
+            precision.append(1.0 / line.sigma_scale**2)
+    if noise.drift > 0.0:
+        ramps = drift_ramps(line)
+        local += list(ramps.T)
+        precision += [1.0 / noise.drift**2] * ramps.shape[1]
+    rows, columns = gathered(parts, n)
+    chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
+    return Block.of(chunk, columns, np.array(precision), line.source or line.component)
+
+
+def squareness_block(reading: SquarenessReading, parameters: Parameters) -> Block:
+    """A value of squareness: minus or plus the sum of the mean slopes of both lines."""
+    earlier, later, sign = SHEAR[reading.component]
+    parts = []
+    for moving, along, span in ((earlier, later, reading.span_mm[0]), (later, earlier, reading.span_mm[1])):
+        q = np.linspace(*span, 101)
+        weight = (q - q.mean()) / float(((q - q.mean()) ** 2).sum())
+        position = np.tile(np.array(reading.line_mm), (len(q), 1))
+        position[:, moving] = q
+        for axis in range(3):
+            for part, values in parameters.displacement(along, axis, position, np.array(reading.tool_mm)):
+                parts.append((part, sign * (weight @ values)[None, :]))
+    parts.append((parameters.slices[reading.component], np.ones((1, 1))))
+    rows, columns = gathered(parts, 1)
+    sigma = max(reading.sigma_rad, LEAST[1])
+    chunk = Chunk(rows, np.array([reading.value_rad]), np.array([sigma]), np.zeros((1, 0)))
+    return Block.of(chunk, columns, np.zeros(0), reading.source or reading.component)

@@ -1,0 +1,144 @@
+"""Directions from stations whose poses nobody knows (theodolites, angular pods) as rows of the adjustment.
+
+Each pod reads azimuth and elevation of the reflector in its own frame. Angles alone leave the scale of
+everything open; one known distance between two pods closes it. Poses start from the directions of the nominal
+points and follow by Gauss and Newton.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.parameters import Unknowns
+from olp.calibration.observations.readings import Pods
+from olp.core.errors import CannotCompute
+from olp.core.rigid_fit import fit_points, rotation_of
+from olp.errormodel.base import Array
+
+CHUNK = 2000
+#: Gauss and Newton have arrived where no pod moves by more than this.
+STILL_MM = 1e-5
+#: Turns of a pod count per metre of lever, so that all unknowns are of one size.
+LEVER_MM = 1000.0
+_STEPS, _AROUND = 30, (-0.7, 0.5, 1.7)
+#: A pose whose directions miss the nominal points by more than this (rad) is no pose.
+_FOUND_RAD = 2e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Place of a pod, and the rotation that takes directions of the machine's frame into the pod's."""
+
+    place_mm: Array
+    rotation: Array
+
+    def moved(self, step: Array) -> Pose:
+        """After a shift in mm and a turn in rad times LEVER_MM, in the machine's frame."""
+        return Pose(self.place_mm + step[:3], self.rotation @ rotation_of(-step[3:] / LEVER_MM))
+
+
+def first_poses(pods: Pods) -> list[Pose]:
+    """Poses from the nominal points, as if the machine had no errors. Raises CannotCompute."""
+    tip = pods.axis_mm + pods.tool_mm
+    return [_resected(tip, pods, k) for k in range(pods.count)]
+
+
+def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: list[Pose]) -> Block:
+    """The directions of all pods and the distances between them, linearised where the machine's errors are
+    `theta`. Six unknowns a pod: shift, and turn times LEVER_MM."""
+    size, unknowns = parameters.size, 6 * pods.count
+    tip = pods.axis_mm + pods.tool_mm
+
+    def chunks() -> Iterator[Chunk]:
+        for start in range(0, len(tip), CHUNK):
+            part = slice(start, start + CHUNK)
+            design = parameters.design(pods.axis_mm[part], pods.tool_mm[part])
+            shift = design @ theta
+            for k, pose in enumerate(poses):
+                misses, rows, local = _linear(tip[part] + shift, pods, k, part, pose)
+                on_theta = np.einsum("nai,nij->naj", rows, design).reshape(-1, size)
+                table = np.zeros((len(on_theta), unknowns))
+                table[:, 6 * k : 6 * k + 6] = local.reshape(-1, 6)
+                y = misses.reshape(-1) + on_theta @ theta
+                yield Chunk(on_theta, y, np.full(len(y), pods.sigma), table)
+        for i, j, length, sigma in pods.baselines:
+            apart = poses[j].place_mm - poses[i].place_mm
+            distance = float(np.linalg.norm(apart))
+            table = np.zeros((1, unknowns))
+            table[0, 6 * i : 6 * i + 3] = -apart / distance
+            table[0, 6 * j : 6 * j + 3] = apart / distance
+            yield Chunk(np.zeros((1, size)), np.array([length - distance]), np.array([sigma]), table)
+
+    return Block(np.arange(size), np.zeros(unknowns), chunks, pods.source or "pods")
+
+
+def _linear(tip: Array, pods: Pods, k: int, part: slice, pose: Pose) -> tuple[Array, Array, Array]:
+    """(n, 2) measured less expected azimuth and elevation, (n, 2, 3) what a shift of the tip does to them,
+    and (n, 2, 6) what the pod's unknowns do."""
+    ray = tip - pose.place_mm
+    x, y, z = (ray @ pose.rotation.T).T
+    flat = np.hypot(x, y)
+    square = flat**2 + z**2
+    misses = np.stack(
+        [
+            _small(pods.azimuth_rad[part, k] - np.arctan2(y, x)),
+            pods.elevation_rad[part, k] - np.arctan2(z, flat),
+        ],
+        axis=1,
+    )
+    own = np.zeros((len(ray), 2, 3))
+    own[:, 0, 0], own[:, 0, 1] = -y / flat**2, x / flat**2
+    own[:, 1, 0], own[:, 1, 1], own[:, 1, 2] = -x * z / flat / square, -y * z / flat / square, flat / square
+    rows = own @ pose.rotation
+    # a turn w of the pod moves what it sees by -w x ray
+    turned = np.cross(rows, ray[:, None, :])
+    return misses, rows, np.concatenate([-rows, turned / LEVER_MM], axis=2)
+
+
+def _resected(tip: Array, pods: Pods, k: int) -> Pose:
+    """The pose that sees the nominal points where they were seen; from starts all about them, the best."""
+    azimuth, elevation = pods.azimuth_rad[:, k], pods.elevation_rad[:, k]
+    flat = np.cos(elevation)
+    seen = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
+    low, span = tip.min(axis=0), np.ptp(tip, axis=0)
+    best: tuple[float, Pose] | None = None
+    for share in product(_AROUND, repeat=3):
+        place = low + np.array(share) * np.maximum(span, 0.3 * span.max())
+        direction = tip - place
+        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        pose = Pose(place, _turn(direction, seen))
+        cost = np.inf
+        for _ in range(_STEPS):
+            misses, _, local = _linear(tip, pods, k, slice(None), pose)
+            cost = float(np.sqrt(np.mean(misses**2)))
+            step, *_ = np.linalg.lstsq(local.reshape(-1, 6), misses.reshape(-1), rcond=1e-10)
+            limit = max(1.0, float(np.abs(step).max()) / 1000.0)
+            pose = pose.moved(np.asarray(step / limit, float))
+            if float(np.abs(step).max()) < 1e-4:
+                break
+        if best is None or cost < best[0]:
+            best = cost, pose
+        if cost < 0.1 * _FOUND_RAD:
+            break
+    if best is None or best[0] > _FOUND_RAD:
+        raise CannotCompute(
+            f"pod {k + 1} of {pods.source or 'the pods'} sees the points from no place; look at its angles, "
+            "and whether their rows are those of the points"
+        )
+    return best[1]
+
+
+def _turn(direction: Array, seen: Array) -> Array:
+    """(3, 3) rotation that brings unit vectors onto others best."""
+    both = np.concatenate([direction, -direction]), np.concatenate([seen, -seen])
+    return fit_points(both[0], both[1]).rotation
+
+
+def _small(angle: Array) -> Array:
+    """Angles between -pi and pi."""
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,100 @@
+"""Points in space as rows of the adjustment: places of the reflector in a frame that nobody knows.
+
+The best-fit rigid transform brings them near the machine's frame; what it leaves of the six motions of the
+frame, and of the instrument's scale, are unknowns of these points alone. Points in the machine's own frame
+have no such unknowns: what they show of the frame is the machine's. Balls of an artefact that the machine
+probed are such points too: commanded is where it found them, measured where its certificate has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.parameters import LEVER_MM, Unknowns, frame_columns
+from olp.calibration.observations.readings import Index, Points
+from olp.core.rigid_fit import Rigid, fit_frame
+from olp.errormodel.base import Array
+
+#: Points whose rows are made at once: 30 MB with 600 parameters.
+CHUNK = 2000
+#: No coordinate is known better than this: 1 nm.
+LEAST_MM = 1e-6
+#: Cosine of the elevation from which a pole counts as near.
+STEEP = 0.1
+
+
+def points_block(points: Points, parameters: Unknowns) -> Block:
+    """The readings of one set-up: three rows a point, along the axes or, where the points have covariances of
+    their own, along the principal axes of each. Raises CannotCompute where they make no frame."""
+    nominal = points.axis_mm + points.tool_mm
+    frame = _frame(points)
+    deviation = frame(points.measured_mm) - nominal
+    local = frame_columns(nominal - nominal.mean(axis=0), scale=points.sigma_scale > 0.0)
+    local = local[:, :, 6:] if points.known_frame else local
+    precision = np.zeros(local.shape[2])
+    if points.sigma_scale > 0.0:
+        precision[-1] = 1.0 / (points.sigma_scale * LEVER_MM) ** 2
+    size = parameters.size
+    sigma = np.full(nominal.shape, points.sigma)
+    turn: Array | None = None
+    if points.covariance_mm2 is not None:
+        variance, across = np.linalg.eigh(points.covariance_mm2)
+        sigma = np.sqrt(np.maximum(variance, LEAST_MM**2))
+        turn = across.transpose(0, 2, 1) @ frame.rotation.T
+        local = turn @ local
+        deviation = np.einsum("nij,nj->ni", turn, deviation)
+
+    def chunks() -> Iterator[Chunk]:
+        for start in range(0, len(nominal), CHUNK):
+            part = slice(start, start + CHUNK)
+            rows = parameters.design(points.axis_mm[part], points.tool_mm[part])
+            rows = rows if turn is None else turn[part] @ rows
+            yield Chunk(
+                rows.reshape(-1, size),
+                deviation[part].reshape(-1),
+                sigma[part].reshape(-1),
+                local[part].reshape(sigma[part].size, local.shape[2]),
+            )
+
+    return Block(np.arange(size), precision, chunks, points.source or "points")
+
+
+def deviations(points: Points) -> Array:
+    """(n, 3) measured less commanded places of the reflector in mm, in the frame that fits best, or in that
+    of the machine where it is known. Raises CannotCompute where the points make no frame."""
+    return np.asarray(_frame(points)(points.measured_mm) - points.axis_mm - points.tool_mm)
+
+
+def _frame(points: Points) -> Rigid:
+    if points.known_frame:
+        return Rigid.identity()
+    return fit_frame(points.measured_mm, points.axis_mm + points.tool_mm)
+
+
+def polar_points(
+    axis_mm: Array, tool_mm: Array, distance_mm: Array, azimuth_rad: Array, elevation_rad: Array,
+    *, sigma_mm: Array, sigma_rad: float, sigma_scale: float = 0.0, source: str = "",
+    row: Index | None = None,
+) -> Points:  # fmt: skip
+    """Distances and two angles from one station whose pose nobody knows, as points in its frame: `sigma_mm`
+    (n,) or one number of a distance, `sigma_rad` of an angle. Raises ConfigError."""
+    distance = np.asarray(distance_mm, float)
+    flat, up = np.cos(elevation_rad), np.sin(elevation_rad)
+    c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)
+    ray = np.stack([flat * c, flat * s, up], axis=1)
+    aside = np.stack([-s, c, np.zeros(len(s))], axis=1)
+    above = np.stack([-up * c, -up * s, flat], axis=1)
+    across = sigma_rad * distance
+    # near the vertical of the instrument its axes, not their encoders, limit what is across
+    sigmas = np.stack(
+        [np.broadcast_to(sigma_mm, distance.shape), across * np.maximum(flat, STEEP), across], axis=1
+    )
+    axes = np.stack([ray, aside, above], axis=2)
+    covariance = (axes * sigmas[:, None, :] ** 2) @ axes.transpose(0, 2, 1)
+    return Points(
+        axis_mm, tool_mm, ray * distance[:, None], float(np.sqrt(np.mean(sigmas**2))), sigma_scale, source,
+        np.zeros(0, np.int64) if row is None else row, covariance_mm2=covariance,
+    )  # fmt: skip

@@ -1,0 +1,206 @@
+"""Identifies the indirect thermal model from logs of sensors and of drift.
+
+A reading of component c at position q and time t is modelled as
+
+    sum over sensors i and shapes k of a_cik shape_k(q) (theta_i(t) - reference_i) + offset of its channel
+
+with theta_i the lagged temperature of sensor i. It is linear but for the lags: for given lags the
+coefficients follow by least squares (variable projection, G. Golub and V. Pereyra 1973), and the lags are
+found one after the other by the residual that is left. The offset of each channel in each log takes up the
+zero of its instrument. Held out of a first fit, the last log (or the last quarter of the only one) tells
+what the model is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.thermal.drift_problem import DriftLog as DriftLog
+from olp.calibration.thermal.drift_problem import Problem, rms, thinned
+from olp.core.errors import CannotCompute, ConfigError
+from olp.core.units import AXES
+from olp.errormodel.base import Array
+from olp.errormodel.structure import SHAPES, Distortion, Sensor, Structure
+from olp.findings.catalogue import Finding
+
+#: Sensors whose histories are so nearly combinations of one another tell nothing apart.
+MOST_CONDITION = 1e3
+#: A share of the axis that positions should reach over.
+_COVERED = 0.7
+#: More than this share of the drift left where it was not fitted is poor.
+_POOR = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentFit:
+    """How well one component is described, rms in mm or rad: of the drift (each channel about its mean), of
+    what the model leaves, and both in what was held out (NaN where nothing of it was). `covered` is the
+    share of the span that its positions reach over, `shapes` the shapes that they can tell."""
+
+    component: str
+    shapes: tuple[str, ...]
+    positions: int
+    readings: int
+    drift_rms: float
+    residual_rms: float
+    held_out_drift_rms: float
+    held_out_rms: float
+    covered: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ThermalFit:
+    """The identified structure; `condition` of the sensors' histories, scaled to the same size; the standard
+    uncertainty of each coefficient beside it, as in `structure.distortions` (offset, growth, bow)."""
+
+    structure: Structure
+    condition: float
+    components: tuple[ComponentFit, ...]
+    sigma: tuple[tuple[float, float, float], ...]
+    held_out: str
+
+    @property
+    def removed(self) -> float:
+        """Share of the drift that the model removes where it was not fitted, over all components, each scaled
+        by its own drift; NaN where nothing was held out."""
+        left = [c.held_out_rms / c.held_out_drift_rms for c in self.components if c.held_out_drift_rms > 0.0]
+        return 1.0 - float(np.sqrt(np.mean(np.square(left)))) if left else float("nan")
+
+
+def identify(
+    logs: Sequence[DriftLog],
+    box_mm: Array,
+    reference_degC: float | Mapping[str, float],
+    *,
+    sensors: Sequence[str] = (),
+) -> ThermalFit:
+    """The structure of logs with readings, over `box_mm` (3, 2). `reference_degC` is the temperature at
+    which the machine was calibrated, of all sensors or by name; `sensors` chooses some of them.
+
+    Raises ConfigError for logs that do not fit together and CannotCompute where they do not tell enough.
+    """
+    names = _names(logs, sensors)
+    logs = [thinned(log) for log in logs]
+    reference = {
+        n: float(reference_degC[n] if isinstance(reference_degC, Mapping) else reference_degC) for n in names
+    }
+    problem = Problem.of(logs, names, reference, box_mm)
+    training, held_out = problem.parts()
+    held: dict[str, tuple[float, float]] = {}
+    what = "nothing"
+    if held_out is not None:
+        lags = problem.lags(training)
+        held = problem.judge(lags, training, held_out)
+        what = problem.held_out_name()
+    lags = problem.lags(None)
+    return _result(problem, lags, held, what)
+
+
+def _names(logs: Sequence[DriftLog], chosen: Sequence[str]) -> list[str]:
+    if not logs:
+        raise ConfigError("no log is given; expected one or more")
+    names = list(logs[0].sensors_degC)
+    for log in logs[1:]:
+        if set(log.sensors_degC) != set(names):
+            raise ConfigError(
+                f"{log.name} has the sensors {', '.join(log.sensors_degC)}, and {logs[0].name} has "
+                f"{', '.join(names)}; expected the same in all"
+            )
+    unknown = [name for name in chosen if name not in names]
+    if unknown:
+        raise ConfigError(f"{unknown[0]} is no sensor of the logs; expected some of {', '.join(names)}")
+    if not any(log.readings for log in logs):
+        raise ConfigError("no log holds readings of drift; expected columns such as EXX@500_um")
+    return list(chosen) or names
+
+
+def _result(
+    problem: Problem, lags: Mapping[str, float], held: Mapping[str, tuple[float, float]], what: str
+) -> ThermalFit:
+    """The fit to all logs at these lags."""
+    rises = problem.rises(lags)
+    condition = problem.condition(rises)
+    if condition > MOST_CONDITION:
+        raise CannotCompute(
+            f"the sensors {', '.join(problem.names)} change together (condition {condition:.0f}), so "
+            f"what each of "
+            "them does cannot be told apart; log a day on which they differ, or choose some with --sensor"
+        )
+    used = sorted({c.log for c in problem.channels})
+    every = np.concatenate([rises[i] for i in used])
+    sensors = tuple(
+        Sensor(
+            name,
+            problem.reference[name],
+            (
+                float(every[:, i].min()) + problem.reference[name],
+                float(every[:, i].max()) + problem.reference[name],
+            ),
+            float(lags[name]),
+        )
+        for i, name in enumerate(problem.names)
+    )
+    distortions: list[Distortion] = []
+    sigma: list[tuple[float, float, float]] = []
+    fits = []
+    for component in problem.components:
+        columns, values = problem.design(component, problem.channels, rises)
+        count = problem.count(component)
+        freedom = len(values) - columns.shape[1] - sum(c.component == component for c in problem.channels)
+        if freedom <= 0:
+            raise CannotCompute(
+                f"{component} has {len(values)} readings for {columns.shape[1]} coefficients; log for longer"
+            )
+        found = problem.solve(columns, values)
+        left = values - columns @ found
+        size = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300)
+        inverse = np.linalg.pinv((columns / size).T @ (columns / size))
+        spread = np.sqrt(np.diag(inverse) * float(left @ left) / freedom) / size
+        log = problem.logs[used[0]]
+        for i, name in enumerate(problem.names):
+            a = [0.0, 0.0, 0.0]
+            s = [0.0, 0.0, 0.0]
+            for k in range(count):
+                a[k], s[k] = (float(v[k * len(problem.names) + i]) for v in (found, spread))
+            distortions.append(
+                Distortion(
+                    component, name, problem.span(component), a[0], a[1], a[2], log.line_mm, log.tool_mm
+                )
+            )
+            sigma.append((s[0], s[1], s[2]))
+        drift, unseen = held.get(component, (float("nan"), float("nan")))
+        places = sorted({c.position_mm for c in problem.channels if c.component == component})
+        low, high = problem.span(component)
+        fits.append(
+            ComponentFit(
+                component, SHAPES[:count], len(places), len(values), rms(values), rms(left), drift,
+                unseen, (places[-1] - places[0]) / (high - low),
+            )
+        )  # fmt: skip
+    return ThermalFit(Structure(sensors, tuple(distortions)), condition, tuple(fits), tuple(sigma), what)
+
+
+def findings(fit: ThermalFit) -> tuple[Finding, ...]:
+    """What a person should know before using the fit."""
+    out = []
+    for c in fit.components:
+        if len(c.shapes) < len(SHAPES):
+            missing = " and ".join(SHAPES[len(c.shapes) :])
+            what = f"{c.component} was read at {c.positions} positions: its {missing} is not known"
+            out.append(Finding("OLP881", what))
+        elif c.covered < _COVERED:
+            what = f"{c.component} was read over {c.covered:.0%} of its axis; beyond, its shape is continued"
+            out.append(Finding("OLP881", what))
+        if c.held_out_drift_rms > 0.0 and c.held_out_rms > _POOR * c.held_out_drift_rms:
+            share = c.held_out_rms / c.held_out_drift_rms
+            what = f"{c.component}: {share:.0%} of the drift is left where the model was not fitted"
+            out.append(Finding("OLP883", what))
+    known = {c.component for c in fit.components}
+    for axis in AXES:
+        bent = sorted(n for n in known if n[2] == axis and n[1] in AXES and n[1] != axis)
+        if bent and not any(n[2] == axis and n[1] in "ABC" for n in known):
+            out.append(Finding("OLP882", f"{', '.join(bent)} was read, and no angle of {axis}"))
+    return tuple(out)

@@ -1,0 +1,147 @@
+"""Brings measured points in another frame onto the nominal path: best-fit rigid transform."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.comparison.pairing import FAR, Order, Pairing, coarse, pair, thinned
+from olp.comparison.path import Array, Path
+from olp.core.rigid_fit import Rigid, fit_path, fit_points
+
+#: places that the search works on, and those of its first steps
+_FEW, _FIRST = 1536, 400
+_ROUNDS = 12
+#: a step that moves no point by more than this share of the residual ends the search
+_STILL = 1e-3
+#: residuals within this factor are equally good; the first one is taken
+_AS_GOOD = 1.5
+#: so much nearer the nearest places are, where the order of the points is none of the path
+_MUCH = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alignment:
+    """What brings measured points into the nominal frame, the order of the points, and the motions of the
+    whole that the path does not determine. `rival`: another place fits as well, as on a symmetric path."""
+
+    rigid: Rigid
+    order: Order
+    loose: tuple[str, ...]
+    rival: bool = False
+
+
+def paired(path: Path, points_mm: Array, order: Order | None, reach_mm: float) -> tuple[Order, Pairing]:
+    """Pair points (m, 3) in the nominal frame in their order, which is found where it is not given.
+
+    Along or against the path, whichever costs less; in none, where order leaves many points farther than
+    `reach_mm` from their place and the nearest places do not.
+    """
+    if order is not None:
+        return order, pair(path, points_mm, order)
+    found: Order = "forward" if _cost(path, points_mm) <= _cost(path.reversed(), points_mm) else "backward"
+    pairing = pair(path, points_mm, found)
+    typical = float(np.quantile(pairing.distance_mm, 0.75))
+    if typical > reach_mm:
+        some = points_mm[:: max(len(points_mm) // _FEW, 1)]
+        if _typical(path, some, "free") <= _MUCH * typical:
+            return "free", pair(path, points_mm, "free")
+    return found, pairing
+
+
+def _cost(path: Path, points: Array) -> float:
+    return coarse(path, points, _FIRST, FAR)[3]
+
+
+def _typical(path: Path, points: Array, order: Order) -> float:
+    return float(np.quantile(pair(path, points, order).distance_mm, 0.75))
+
+
+def align(path: Path, points_mm: Array, reach_mm: float, order: Order | None = None) -> Alignment:
+    """The best fit of points (m, 3) in an unknown frame, in the given order, or whatever theirs is.
+
+    First places at equal shares of both lengths are laid on each other, then pairing and fitting alternate.
+    Where that pairs nothing, principal axes are, and the points count as unordered. Residuals are distances
+    across the path, all points alike, without those farther than `reach_mm`.
+    """
+    found = []
+    for one, start in _starts(path, points_mm):
+        if order not in (None, one):
+            continue
+        rigid = start
+        for _ in range(3):
+            rigid = _match(path, points_mm, rigid, one)
+        found.append((_typical(path, _sample(rigid(points_mm), one, _FIRST), one), one, rigid))
+        if one == "backward" and min(f[0] for f in found) <= reach_mm:
+            break  # in order, it need not be tried without
+    least = min(residual for residual, _, _ in found)
+    good = [f for f in found if f[0] <= _AS_GOOD * least]
+    _, order, rigid = good[0]
+    some = points_mm[:: max(len(points_mm) // _FIRST, 1)]
+    rival = any(
+        np.abs(other(some) - rigid(some)).max() > 10.0 * max(residual, least) + reach_mm
+        for residual, _, other in good[1:]
+    )
+    loose: tuple[str, ...] = ()
+    for _ in range(_ROUNDS):
+        step, loose, residual = _step(path, rigid(_sample(points_mm, order, _FEW)), order, np.inf)
+        rigid = step.after(rigid)
+        if _moves(step, rigid(points_mm[:: max(len(points_mm) // _FEW, 1)])) <= _STILL * residual + 1e-9:
+            break
+    step, loose, _ = _step(path, rigid(points_mm), order, reach_mm)
+    return Alignment(step.after(rigid), order, loose, rival)
+
+
+def refit(path: Path, runs: Sequence[Array], pairings: Sequence[Pairing], reach_mm: float) -> Alignment:
+    """One best fit of several runs (m, 3) that lie near their places already."""
+    points, foot = np.concatenate(runs), np.concatenate([p.foot_mm for p in pairings])
+    kept = np.concatenate([(p.distance_mm <= reach_mm) & ~p.beyond for p in pairings])
+    along = path.axes(np.concatenate([p.segment for p in pairings]))[0]
+    rigid, loose = fit_path(points[kept], foot[kept], along[kept])
+    return Alignment(rigid, "forward", loose)
+
+
+def _starts(path: Path, points: Array) -> Iterator[tuple[Order, Rigid]]:
+    few, _ = thinned(points, _FIRST)
+    way = np.append(0.0, np.cumsum(np.sqrt((np.diff(few, axis=0) ** 2).sum(axis=1))))
+    share = way / max(way[-1], 1e-12) * path.length_mm
+    yield "forward", fit_points(few, path.at(share)[0])
+    yield "backward", fit_points(few, path.at(path.length_mm - share)[0])
+    nodes = path.at(np.linspace(0.0, path.length_mm, _FEW))[0]
+    a, b = points.mean(axis=0), nodes.mean(axis=0)
+    u = np.linalg.svd(points - a, full_matrices=False)[2]
+    v = np.linalg.svd(nodes - b, full_matrices=False)[2]
+    for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        w = np.diag((*signs, 1.0)) @ u
+        w[2] *= np.sign(np.linalg.det(w) * np.linalg.det(v))
+        rotation = v.T @ w
+        yield "free", Rigid(rotation, b - rotation @ a)
+
+
+def _sample(points: Array, order: Order, count: int) -> Array:
+    return points[:: max(len(points) // count, 1)] if order == "free" else thinned(points, count)[0]
+
+
+def _match(path: Path, points: Array, rigid: Rigid, order: Order) -> Rigid:
+    """One round of points onto places, which finds its way from afar."""
+    few = _sample(points, order, _FIRST)
+    if order == "free":
+        return fit_points(few, pair(path, rigid(few), "free").foot_mm)
+    along = path if order == "forward" else path.reversed()
+    few, _, s, _ = coarse(along, rigid(few), _FIRST)
+    return fit_points(few, along.at(s)[0]).after(rigid)
+
+
+def _step(path: Path, points: Array, order: Order, reach: float) -> tuple[Rigid, tuple[str, ...], float]:
+    pairing = pair(path, points, order)
+    kept = (pairing.distance_mm <= reach) & ~pairing.beyond
+    if kept.sum() < 6:
+        kept[:] = True
+    rigid, loose = fit_path(points[kept], pairing.foot_mm[kept], path.axes(pairing.segment[kept])[0])
+    return rigid, loose, float(np.sqrt(np.mean(pairing.distance_mm[kept] ** 2)))
+
+
+def _moves(step: Rigid, points: Array) -> float:
+    return float(np.sqrt(((step(points) - points) ** 2).sum(axis=1)).max())

@@ -1,0 +1,63 @@
+"""Accuracy and repeatability of poses and paths after ISO 9283:1998, positions only.
+
+All figures come from cycles that were run alike; the standard asks for 30 cycles for poses and 10 for paths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.comparison.path import Array
+
+POSE_CYCLES = 30
+PATH_CYCLES = 10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Repeated:
+    """Per pose or station (m,), in mm: `accuracy`, distance of the command from the barycentre of what was
+    attained; `repeatability`, mean distance from that barycentre plus three standard deviations of it, NaN
+    with one cycle. `bias` (m, 3): barycentre minus command."""
+
+    accuracy: Array
+    repeatability: Array
+    bias: Array
+
+
+def repeated(command_mm: Array, attained_mm: Array) -> Repeated:
+    """Figures of each place from commands (m, 3) and attained positions (n, m, 3) of n cycles.
+
+    ISO 9283, 7.2: AP_P = |mean - command| and RP_l = l + 3 S_l, l_j = |attained_j - mean|, S_l with n - 1;
+    8.2 and 8.3 take the same for the places of a path in its normal planes. A place that a cycle did not
+    reach (NaN) takes the cycles that did.
+    """
+    there = np.asarray(np.isfinite(attained_mm).all(axis=2), bool)
+    count = there.sum(axis=0)
+    weight = there[:, :, None]
+    value = np.where(weight, attained_mm, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = value.sum(axis=0) / count[:, None]
+        distance = np.sqrt(((attained_mm - mean) ** 2).sum(axis=2))
+        average = np.where(there, distance, 0.0).sum(axis=0) / count
+        square = np.where(there, (distance - average) ** 2, 0.0).sum(axis=0)
+        repeatability = np.where(count > 1, average + 3.0 * np.sqrt(square / (count - 1)), np.nan)
+    bias = mean - command_mm
+    return Repeated(np.sqrt((bias * bias).sum(axis=1)), repeatability, bias)
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """The largest value in mm and the index of its place; NaN and -1 where there is none."""
+
+    value_mm: float
+    place: int
+
+
+def largest(values: Array) -> Figure:
+    """AT, RT (and the largest AP, RP): the standard takes the worst place of the path."""
+    if not np.isfinite(values).any():
+        return Figure(float("nan"), -1)
+    place = int(np.nanargmax(values))
+    return Figure(float(values[place]), place)

@@ -1,0 +1,109 @@
+"""A nominal path as a polyline with arc length, and the local frame in which deviations are stated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import CannotCompute
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+#: Segments this much steeper than level have no left and right; X stands in for the vertical there.
+_UPRIGHT = 0.999
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """A polyline in mm: `vertex_mm` (n, 3), no two neighbours equal; per segment (n-1,) the `line` of the
+    program or file it comes from and whether it is `cutting` (a feed move, not a rapid). `s_mm` (n,) is arc
+    length."""
+
+    vertex_mm: Array
+    line: Index
+    cutting: Mask
+    s_mm: Array
+
+    @staticmethod
+    def through(points_mm: Array, line: Index | None = None, cutting: Mask | None = None) -> Path:
+        """A path through points (n, 3); `line` and `cutting` (n,) are those of the segment that ends there.
+
+        Repeated points are merged. Raises CannotCompute where fewer than two places are left.
+        """
+        points = np.asarray(points_mm, float)
+        line = np.arange(1, len(points) + 1) if line is None else np.asarray(line, np.int64)
+        cutting = np.ones(len(points), bool) if cutting is None else np.asarray(cutting, bool)
+        length = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1))
+        kept = np.append(True, length > 0.0) if len(points) else np.zeros(0, bool)
+        points, line, cutting = points[kept], line[kept], cutting[kept]
+        if len(points) < 2:
+            raise CannotCompute(
+                "the nominal path has fewer than two places; there is no path to compare with"
+            )
+        s = np.append(0.0, np.cumsum(length[length > 0.0]))
+        return Path(points, line[1:], cutting[1:], s)
+
+    def __len__(self) -> int:
+        """Number of segments."""
+        return len(self.line)
+
+    @property
+    def length_mm(self) -> float:
+        return float(self.s_mm[-1])
+
+    def reversed(self) -> Path:
+        """The same path gone through backwards."""
+        return Path(
+            self.vertex_mm[::-1].copy(), self.line[::-1].copy(), self.cutting[::-1].copy(),
+            self.s_mm[-1] - self.s_mm[::-1],
+        )  # fmt: skip
+
+    def at(self, s_mm: Array) -> tuple[Array, Index]:
+        """(m, 3) points at arc lengths (m,), and the segment of each."""
+        segment = np.clip(np.searchsorted(self.s_mm, s_mm, side="right") - 1, 0, len(self) - 1)
+        begin = self.s_mm[segment]
+        share = (s_mm - begin) / (self.s_mm[segment + 1] - begin)
+        a = self.vertex_mm[segment]
+        return a + share[:, None] * (self.vertex_mm[segment + 1] - a), segment
+
+    def axes(self, segment: Index) -> tuple[Array, Array, Array]:
+        """Unit vectors (m, 3) along, normal and binormal of segments.
+
+        The normal is level and points to the left of travel seen from +Z, the binormal completes the
+        right-handed triple, so that on a level path it points up. Where the path is upright, the normal is
+        +Y.
+        """
+        along = self.vertex_mm[segment + 1] - self.vertex_mm[segment]
+        along = along / np.sqrt((along * along).sum(axis=1))[:, None]
+        normal = np.column_stack((-along[:, 1], along[:, 0], np.zeros(len(along))))
+        upright = np.abs(along[:, 2]) > _UPRIGHT
+        if upright.any():
+            t = along[upright]
+            normal[upright] = np.array((0.0, 1.0, 0.0)) - t[:, 1:2] * t
+        normal /= np.sqrt((normal * normal).sum(axis=1))[:, None]
+        return along, normal, np.cross(along, normal)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Split:
+    """Deviations (m,) in mm, measured minus nominal: along the path, normal and binormal to it."""
+
+    along: Array
+    normal: Array
+    binormal: Array
+
+    @property
+    def across(self) -> Array:
+        """(m,) distance from the path in its normal plane."""
+        return np.asarray(np.hypot(self.normal, self.binormal), float)
+
+
+def split(path: Path, segment: Index, difference_mm: Array) -> Split:
+    """Differences (m, 3) measured minus nominal in the local frame of the segments (m,)."""
+    along, normal, binormal = path.axes(segment)
+    parts = [np.einsum("ij,ij->i", difference_mm, axis) for axis in (along, normal, binormal)]
+    return Split(*parts)

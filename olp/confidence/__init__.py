@@ -1,1 +1,0 @@
-"""How sure a corrected path is: bands, probabilities and advice from the uncertainty of the calibration."""

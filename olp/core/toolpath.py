@@ -1,0 +1,176 @@
+"""The nominal path of a program as columns: axis positions of the machine, in program order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.geometry import arc_points, quarter_shares
+from olp.core.machine import ZERO, Vector
+
+Array = npt.NDArray[np.float64]
+#: A tool vector in mm, and the payload in kg behind it where there is one.
+Tool = tuple[float, ...]
+#: An axis position in mm, and the tool with which it was touched.
+Touch = tuple[Vector, Tool]
+Index = npt.NDArray[np.int64]
+
+
+class Kind(IntEnum):
+    """What a move is. Arcs run clockwise or counter-clockwise seen against their plane's normal."""
+
+    RAPID = 0
+    LINE = 1
+    ARC_CW = 2
+    ARC_CCW = 3
+    PROBE = 4
+
+
+class Flag(IntFlag):
+    """What else is known of a move."""
+
+    PASS = 1  #: never corrected: G53, G28, G30, a section switched off
+    DELETED = 2  #: in a block that the block-delete switch removes
+    CYCLE = 4  #: made by a canned cycle: has no words of its own
+    WHOLE = 8  #: never split: the block moves a rotary axis too
+    INCREMENTAL = 16  #: its words are distances
+    MACHINE = 32  #: G53: its words are axis positions
+    INVERSE_TIME = 64  #: G93: its F word is one over its time
+    CONTROL = 128  #: made by the control itself, without words: axes become unknown (M6, G28, after a probe)
+
+
+def carried(tool_mm: Vector, payload_kg: float) -> Tool:
+    """A tool as error models take it: the payload is a fourth number where there is one."""
+    return (*tool_mm, payload_kg) if payload_kg else tool_mm
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """How words became axis positions for a stretch of moves, and which tool was in the spindle.
+
+    Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
+    `length_mm`). `tool_mm` is the lever, gauge point to tip, `payload_kg` what the machine carries.
+    `touched` is (axis position, lever and payload) of the touch-off of the work offset on the raw machine,
+    None where it was located by other means; `tool_touched` likewise for the length of the active tool. In a
+    rotated frame the words are turned first, by the rows of `turn`, None where nothing turns: axis position =
+    `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is the part of the offset by which the tip stays off
+    the point that is said, as over a hole.
+    """
+
+    unit_mm: float = 1.0
+    offset_mm: Vector = ZERO
+    length_mm: Vector = ZERO
+    tool_mm: Vector = ZERO
+    tool: int | None = None
+    work_offset: str = ""
+    touched: Touch | None = None
+    tool_touched: Touch | None = None
+    payload_kg: float = 0.0
+    turn: tuple[Vector, Vector, Vector] | None = None
+    lift_mm: Vector = ZERO
+
+    def origin_mm(self) -> Vector:
+        """The axis position of the program's origin, no tool length active."""
+        parts = zip(self.offset_mm, self.length_mm, self.lift_mm, strict=True)
+        x, y, z = (offset - length - lift for offset, length, lift in parts)
+        return (x, y, z)
+
+    def placed_mm(self, words: Sequence[float]) -> tuple[float, ...]:
+        """The axis position that three words say."""
+        said = [w * self.unit_mm for w in words]
+        if self.turn is not None:
+            said = [sum(r * v for r, v in zip(row, said, strict=True)) for row in self.turn]
+        return tuple(v + o for v, o in zip(said, self.offset_mm, strict=True))
+
+    def tip_mm(self, point: Array) -> Array:
+        """Places of the tip (n, 3) in this frame, from axis positions less the length."""
+        away = point - np.array(self.origin_mm())
+        return away if self.turn is None else np.asarray(away @ np.array(self.turn), float)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arcs:
+    """Arcs and helices: `move` (m,) index, `centre_mm` (m, 3) with the start's third coordinate, `plane`
+    (m,) 0..2, `sweep_rad` (m,) signed about the plane's normal, whole turns included."""
+
+    move: Index
+    centre_mm: Array
+    plane: npt.NDArray[np.int8]
+    sweep_rad: Array
+
+    @staticmethod
+    def none() -> Arcs:
+        return Arcs(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, np.int8), np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.move)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Toolpath:
+    """(n,) `kind`, `flag`, `line` (from 1), `frame`; (n, 3) `end_mm`, NaN where an axis is unknown."""
+
+    kind: npt.NDArray[np.uint8]
+    flag: npt.NDArray[np.uint8]
+    line: npt.NDArray[np.int32]
+    frame: npt.NDArray[np.int32]
+    end_mm: Array
+    frames: tuple[Frame, ...]
+    arcs: Arcs = field(default_factory=Arcs.none)
+    start_mm: tuple[float, float, float] = (float("nan"),) * 3
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def starts_mm(self, first: int = 0, last: int | None = None) -> Array:
+        """(m, 3) axis positions at the start of moves `first`..`last`."""
+        last = len(self) if last is None else last
+        out = np.empty((last - first, 3))
+        if last > first:
+            out[1:] = self.end_mm[first : last - 1]
+            out[0] = self.end_mm[first - 1] if first else self.start_mm
+        return out
+
+    def reach_mm(self) -> tuple[Array, Array]:
+        """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, on the way there;
+        NaN where an axis is not known. Both ends of a line in a box hold all of it."""
+        if not len(self.arcs):
+            return self.end_mm, self.end_mm
+        arcs, move = self.arcs, self.arcs.move
+        low, high = self.end_mm.copy(), self.end_mm.copy()
+        start = self.starts_mm()[move]
+        for quarter in range(4):
+            share = quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter)
+            at = arc_points(start, self.end_mm[move], arcs.centre_mm, arcs.plane, arcs.sweep_rad, share)
+            low[move], high[move] = np.fmin(low[move], at), np.fmax(high[move], at)
+        return low, high
+
+    def tool_mm(self, first: int = 0, last: int | None = None) -> Array:
+        """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3); with
+        payloads (4,) or (m, 4), kg in the last column."""
+        return self.per_frame(self._tools(), first, last)
+
+    def tools_mm(self) -> Array:
+        """(k, 3) the tool vectors of all frames; with payloads (k, 4)."""
+        return np.array(self._tools() or np.zeros((1, 3)), float)
+
+    def _tools(self) -> list[Tool]:
+        if any(f.payload_kg for f in self.frames):
+            return [(*f.tool_mm, f.payload_kg) for f in self.frames]
+        return [f.tool_mm for f in self.frames]
+
+    def per_frame(self, values: Sequence[Tool], first: int = 0, last: int | None = None) -> Array:
+        """One vector a frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
+        if not values:
+            return np.zeros(3)
+        table = np.array(values, float)
+        if len(values) == 1 or (table == table[0]).all():
+            return np.asarray(table[0], float)
+        part = self.frame[first:last]
+        if len(part) and (part == part[0]).all():
+            return np.asarray(table[part[0]], float)
+        return np.asarray(table[part], float)

@@ -1,0 +1,203 @@
+"""CSV tables over a grid of axis positions: deviation maps, and component errors per kg."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.machine import COMPONENTS
+from olp.core.units import AXES
+from olp.files.problems import Problem, config_error, nearest
+from olp.files.tables import Array, Row, headed, rows_of
+from olp.files.write import PathLike, read_bytes
+
+Index = npt.NDArray[np.int64]
+
+MAP_COLUMNS = ("DX_um", "DY_um", "DZ_um")
+SIGMA_COLUMNS = tuple(f"sigma_{name}" for name in MAP_COLUMNS)
+#: Positions this close are one level.
+LEVEL_MM = 1e-6
+#: So many missing nodes are named one by one.
+_NAMED = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridTable:
+    """`arguments` such as ("Y", "Z") with their ascending levels `knots_mm`, and the columns by name, each of
+    the shape of the grid, in mm or rad."""
+
+    arguments: tuple[str, ...]
+    knots_mm: tuple[Array, ...]
+    columns: Mapping[str, Array]
+
+
+def read_map(path: PathLike) -> GridTable:
+    """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, a row a node in any order, and standard
+    uncertainties `sigma_DX_um, sigma_DY_um, sigma_DZ_um` where they are stated; the columns DX, sigma_DX ..
+    of the result are in mm.
+
+    Raises InputError where the file cannot be read, ConfigError with every problem and its line.
+    """
+    table = _parse(read_bytes(path), str(path), _map_problems)
+    return GridTable(
+        table.arguments, table.knots_mm, {n.removesuffix("_um"): v for n, v in table.columns.items()}
+    )
+
+
+def read_component_grid(path: PathLike) -> GridTable:
+    """Read component errors of one axis per kg: one to three columns of axis positions (`Y_mm`, `Z_mm`), then
+    `EZY_um_kg`, `EAY_urad_kg` ...; the columns of the result are in mm/kg and rad/kg by ISO 230-1 name.
+
+    Raises as `read_map`.
+    """
+    table = _parse(read_bytes(path), str(path), _component_problems)
+    return GridTable(table.arguments, table.knots_mm, {n[:3]: v for n, v in table.columns.items()})
+
+
+def _parse(data: bytes, file: str, problems_of: Callable[[int, Sequence[str]], list[Problem]]) -> GridTable:
+    line, header, records = headed(data, file, "columns such as X_mm", problems_of)
+    rows, found = rows_of(header, records)
+    if found or not rows:
+        raise config_error(found or [(line, "no rows follow the header; expected one a node")], file)
+    arguments = tuple(name[0] for name in header if name in _POSITIONS)
+    at = np.array([[numbers[header.index(f"{a}_mm")] for a in arguments] for _, numbers in rows])
+    knots, index = _levels(at)
+    found = _node_problems(arguments, knots, index, rows)
+    if found:
+        raise config_error(found, file)
+    shape = tuple(len(k) for k in knots)
+    columns = {}
+    for place, name in enumerate(header):
+        if name not in _POSITIONS:
+            values = np.empty(shape)
+            values[tuple(index.T)] = [numbers[place] for _, numbers in rows]
+            columns[name] = values
+    return GridTable(arguments, knots, columns)
+
+
+_POSITIONS = tuple(f"{axis}_mm" for axis in AXES)
+
+
+def _map_problems(line: int, header: Sequence[str]) -> list[Problem]:
+    known = (*_POSITIONS, *MAP_COLUMNS)
+    problems = _header_problems(line, header, (*known, *SIGMA_COLUMNS))
+    missing = [name for name in known if name not in header]
+    sigmas = [name for name in SIGMA_COLUMNS if name in header]
+    if sigmas and len(sigmas) < 3:
+        missing += [name for name in SIGMA_COLUMNS if name not in header]
+        known = (*known, *SIGMA_COLUMNS)
+    if not problems and missing:
+        problems.append(
+            (line, f"there is no column {', '.join(missing)}; expected {', '.join(known)}, a row a node")
+        )
+    return problems
+
+
+def _component_problems(line: int, header: Sequence[str]) -> list[Problem]:
+    known = [*_POSITIONS, *(f"{n}_um_kg" if n[1] in AXES else f"{n}_urad_kg" for n in COMPONENTS)]
+    problems = _header_problems(line, header, known)
+    if problems:
+        return problems
+    if header[0] not in _POSITIONS:
+        return [(line, f'column 1 is "{header[0]}"; expected X_mm, Y_mm or Z_mm, the position of an axis')]
+    axes = sorted({name[2] for name in header if name not in _POSITIONS})
+    if not axes:
+        problems.append((line, "there is no error column; expected one such as EZX_um_kg or EBX_urad_kg"))
+    if len(axes) > 1:
+        problems.append(
+            (line, f"errors of the axes {' and '.join(axes)}; expected those of one axis: a file for each")
+        )
+    return problems
+
+
+def _header_problems(line: int, header: Sequence[str], known: Sequence[str]) -> list[Problem]:
+    problems: list[Problem] = []
+    for number, name in enumerate(header, 1):
+        if header.index(name) < number - 1:
+            problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
+        elif name not in known:
+            near = nearest(name, [n for n in known if n not in header])
+            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known[:6])} ..."
+            problems.append((line, f'column {number} is "{name}"; {hint}'))
+    return problems
+
+
+def _levels(at: Array) -> tuple[tuple[Array, ...], Index]:
+    """Ascending levels along each argument, and the (rows, arguments) number of each row's level."""
+    knots = []
+    index = np.zeros(at.shape, np.int64)
+    for k in range(at.shape[1]):
+        found = np.unique(at[:, k])
+        first = np.concatenate([[True], np.diff(found) > LEVEL_MM])
+        knots.append(found[first])
+        index[:, k] = (np.cumsum(first) - 1)[np.searchsorted(found, at[:, k])]
+    return tuple(knots), index
+
+
+def _node_problems(
+    arguments: Sequence[str], knots: Sequence[Array], index: Index, rows: Sequence[Row]
+) -> list[Problem]:
+    shape = tuple(len(k) for k in knots)
+    flat = np.ravel_multi_index(tuple(index.T), shape)
+    problems: list[Problem] = []
+
+    def node(number: int) -> str:
+        place = np.unravel_index(number, shape)
+        return ", ".join(f"{a} = {k[int(i)]:g}" for a, k, i in zip(arguments, knots, place, strict=True))
+
+    first: dict[int, int] = {}
+    for (line, _), number in zip(rows, flat.tolist(), strict=True):
+        if number in first:
+            problems.append(
+                (line, f"the node {node(number)} mm stands in line {first[number]} already; expected it once")
+            )
+        first.setdefault(number, line)
+    missing = np.setdiff1d(np.arange(int(np.prod(shape))), flat)
+    if not missing.size:
+        return problems
+    size = " x ".join(map(str, shape))
+    stray = _stray(arguments, knots, index, rows)
+    if stray:
+        return [*problems, *stray]
+    for number in missing[:_NAMED].tolist():
+        beside = flat[np.argmin(np.abs(flat - number))]
+        problems.append(
+            (
+                first[int(beside)],
+                f"the node {node(number)} mm is missing beside this one; expected a row for each node of the "
+                f"{size} grid",
+            )
+        )
+    if len(missing) > _NAMED:
+        problems.append((None, f"{len(missing)} of the {size} nodes are missing; expected a row for each"))
+    return problems
+
+
+def _stray(
+    arguments: Sequence[str], knots: Sequence[Array], index: Index, rows: Sequence[Row]
+) -> list[Problem]:
+    """Rows at a level that few others share: they lie on no grid."""
+    problems: list[Problem] = []
+    for k, axis in enumerate(arguments):
+        counts = np.bincount(index[:, k])
+        usual = int(np.bincount(counts).argmax())
+        rare = np.flatnonzero(2 * counts <= usual)
+        if usual == 1 and len(rows) > 1 and len(counts) == len(rows) and len(arguments) > 1:
+            problems.append(
+                (rows[0][0], f"every row has a {axis}_mm of its own: the positions lie on no grid")
+            )
+            continue
+        for level in rare.tolist():
+            line = rows[int(np.flatnonzero(index[:, k] == level)[0])][0]
+            problems.append(
+                (
+                    line,
+                    f"{axis}_mm = {knots[k][level]:g} stands in {counts[level]} rows, other levels in "
+                    f"{usual}: it "
+                    "lies on no grid; expected a row for each combination of levels",
+                )
+            )
+    return problems

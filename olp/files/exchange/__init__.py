@@ -1,1 +1,0 @@
-"""Compensation tables of controls, read and written; one module a format, `registry` lists them."""

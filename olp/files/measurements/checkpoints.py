@@ -1,0 +1,116 @@
+"""Points that stand alone: a CSV file that says in comments how it was taken, or the points of a plan.
+
+    # sigma_um = 8
+    # tool_mm = [0.0, 0.0, -120.0]
+    # frame = "instrument"
+    X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm
+
+Columns deviation_X_um, deviation_Y_um, deviation_Z_um (actual minus commanded) may stand in place of the
+measured ones.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path as FilePath
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from olp.calibration.observations.readings import Points
+from olp.core.errors import ConfigError
+from olp.core.machine import Vector
+from olp.core.units import MM_PER_UM
+from olp.files.fields import NotNegative, Positive, Triple
+from olp.files.measurements.point_readings import DEVIATION, MEASURED, PointReadings, parse_point_readings
+from olp.files.measurements.reader import PER_UNIT, load_measurements
+from olp.files.problems import config_error, validate
+from olp.files.schema_base import Table
+from olp.files.toml_text import Path
+from olp.files.write import PathLike, read_bytes
+
+MACHINE = "machine"
+
+
+class StatedOfPoints(Table):
+    """What a file of points may say of itself in comments `# key = value`."""
+
+    sigma_um: Positive | None = Field(
+        default=None, description="the standard uncertainty of a coordinate, in um"
+    )
+    sigma_scale_um_m: NotNegative = Field(
+        default=0.0, description="the standard uncertainty of the instrument's scale, in um/m"
+    )
+    tool_mm: Triple | None = Field(
+        default=None, description="the vector from the gauge point to the reflector, [X, Y, Z] in mm"
+    )
+    frame: Literal["machine", "instrument"] = Field(
+        default="instrument", description='what positions count in: "machine", or "instrument": its own'
+    )
+
+
+def load_checkpoints(
+    path: PathLike, *, sigma_um: float | None = None, tool_mm: Vector | None = None
+) -> tuple[Points, bool]:
+    """The points of one set-up, and whether they count in the machine's frame.
+
+    `sigma_um` and `tool_mm` fill in what the file does not say. Raises InputError where it cannot be read,
+    and ConfigError with every problem.
+    """
+    source = FilePath(path)
+    if source.is_dir() or source.suffix.lower() == ".toml":
+        found = load_measurements([source]).points
+        if len(found) != 1:
+            raise ConfigError(
+                f"holds {len(found)} sets of points; expected one; name its file", file=str(path)
+            )
+        return found[0], False
+    data = read_bytes(source)
+    header = next((line for line in data.splitlines() if line.strip() and not line.startswith(b"#")), b"")
+    deviates = b"deviation_" in header
+    readings = parse_point_readings(data, str(path), DEVIATION if deviates else MEASURED)
+    stated = _stated(readings)
+    problems = []
+    if stated.sigma_um is not None and sigma_um is not None and stated.sigma_um != sigma_um:
+        problems.append(f"sigma_um = {stated.sigma_um:g}, and {sigma_um:g} in the call; expected it once")
+    sigma = stated.sigma_um if stated.sigma_um is not None else sigma_um
+    if sigma is None:
+        problems.append("the uncertainty of a coordinate is not stated; expected a comment # sigma_um = 8")
+    if readings.tool_mm is not None and stated.tool_mm is not None:
+        problems.append("tool_mm is stated in a comment and in columns; expected it once")
+    tool = stated.tool_mm if stated.tool_mm is not None else tool_mm
+    if readings.tool_mm is None and tool is None:
+        problems.append(
+            "the vector from the gauge point to the reflector is not stated; expected columns tool_X_mm, "
+            "tool_Y_mm, tool_Z_mm, or a comment # tool_mm = [0.0, 0.0, -120.0]"
+        )
+    if problems:
+        raise config_error([(None, text) for text in problems], str(path))
+    vector = np.array(tool) if readings.tool_mm is None else readings.tool_mm
+    places = readings.measured
+    if deviates:
+        places = readings.axis_mm + vector + readings.measured * MM_PER_UM
+    points = Points(
+        axis_mm=readings.axis_mm,
+        tool_mm=vector,
+        measured_mm=places,
+        sigma=(sigma or 0.0) * MM_PER_UM,
+        sigma_scale=stated.sigma_scale_um_m * PER_UNIT,
+        source=str(path),
+        row=readings.row,
+    )
+    return points, stated.frame == MACHINE
+
+
+def _stated(readings: PointReadings) -> StatedOfPoints:
+    values: dict[str, Any] = {}
+    for key, (text, line) in readings.keys.items():
+        if key not in StatedOfPoints.model_fields:
+            continue
+        try:
+            values[key] = tomllib.loads(f"{key} = {text}")[key]
+        except tomllib.TOMLDecodeError:
+            raise config_error([(line, f"{key} = {text} is no value")], readings.file) from None
+    lines: dict[Path, int] = {(key,): line for key, (_, line) in readings.keys.items()}
+    return validate(StatedOfPoints, values, lines, readings.file)

@@ -1,0 +1,214 @@
+"""Readings of one component along one line, as every reader of an instrument's file returns them; and the
+native CSV of such readings.
+
+    # component = "EXX"
+    # line_mm = { Y = 700.0, Z = -600.0 }
+    # sense = "actual-minus-commanded"
+    target_mm,run,direction,value_um
+    0,1,1,0.0
+    100,1,1,3.2
+
+Rows stand in the order of time. A comment `# key = value` says something about the file, in the words of a
+table [[lines]] of a plan (`olp.files.measurements.reader`); any other comment is only read by people.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import ConfigError
+from olp.core.units import MM_PER_UM, RAD_PER_URAD
+from olp.files.problems import Problem, config_error, nearest
+from olp.files.tables import decoded
+from olp.files.write import PathLike, read_bytes
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+#: What a file may state, and the factor that makes it actual minus commanded of the tool relative to the
+#: workpiece. A table that moves by +1 um too much carries the workpiece along: the tool is 1 um behind.
+SENSES: Mapping[str, float] = MappingProxyType(
+    {
+        "actual-minus-commanded": 1.0,
+        "commanded-minus-actual": -1.0,
+        "table-motion actual-minus-commanded": -1.0,
+        "table-motion commanded-minus-actual": 1.0,
+    }
+)
+#: Units of values, and the factor to mm or rad.
+UNITS: Mapping[str, float] = MappingProxyType(
+    {
+        "mm": 1.0,
+        "um": MM_PER_UM,
+        "nm": 1e-6,
+        "rad": 1.0,
+        "mrad": 1e-3,
+        "urad": RAD_PER_URAD,
+        "arcsec": math.pi / 648_000.0,
+        "um/m": RAD_PER_URAD,
+        "mm/m": 1e-3,
+    }
+)
+ANGULAR = frozenset({"rad", "mrad", "urad", "arcsec", "um/m", "mm/m"})
+
+_KEY = re.compile(r"#+\s*([A-Za-z_]\w*)\s*=\s*(\S.*?)\s*$")
+_HEADER = ("target_mm", "run", "direction")
+_VALUES = {"value_um": "um", "value_urad": "urad"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad in the sense of the file
+    until `with_sense` makes it that of the contract; runs from 1, directions +1 or -1 (from which side the
+    target was approached).
+
+    `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name or
+    None where the file does not tell; `angular` says that values are in rad, None where the file does not
+    tell. `keys` is what the file states about itself, each with its line; `notes` are sentences on what the
+    reader assumed. `sense_known` says that the values are in the contract's sense.
+    """
+
+    file: str
+    target_mm: Array
+    value: Array
+    run: Index
+    direction: Index
+    line: Index
+    component: str | None = None
+    angular: bool | None = None
+    keys: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    sense_known: bool = False
+
+    def with_sense(self, sense: str) -> Readings:
+        """The same in the contract's sense, for values stated in `sense`, a key of SENSES."""
+        return Readings(
+            self.file, self.target_mm, self.value * SENSES[sense], self.run, self.direction, self.line,
+            self.component, self.angular, self.keys, self.notes, sense_known=True,
+        )  # fmt: skip
+
+
+def read_readings(path: PathLike) -> Readings:
+    """The readings of a native CSV file, in the sense that the file is written in.
+
+    Raises InputError where it cannot be read, and ConfigError with every problem and its line.
+    """
+    return parse_readings(read_bytes(path), str(path))
+
+
+def parse_readings(data: bytes, file: str) -> Readings:
+    """As `read_readings`, from the bytes of the file."""
+    text = decoded(data, file)
+    keys = dict(stated_keys(text))
+    records = [
+        (number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))])
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not records:
+        raise config_error([(None, f"holds no readings; expected {','.join(_HEADER)},value_um")], file)
+    line, header = records[0]
+    found = list(_header_problems(header))
+    if found:
+        raise config_error([(line, sentence) for sentence in found], file)
+    rows, problems = _rows(header, records[1:])
+    if not problems and len(rows) < 2:
+        problems = [(line, f"{len(rows)} readings; expected at least 2")]
+    if problems:
+        raise config_error(problems, file)
+    table = np.array(rows)
+    value = next(name for name in header if name in _VALUES)
+    unit = _VALUES[value]
+    column = {name: table[:, header.index(name)] for name in header}
+    component = keys["component"][0].strip("\"'") if "component" in keys else None
+    return Readings(
+        file,
+        column["target_mm"],
+        column[value] * UNITS[unit],
+        column["run"].astype(np.int64),
+        column["direction"].astype(np.int64),
+        np.array([number for number, _ in records[1:]]),
+        component,
+        unit in ANGULAR,
+        MappingProxyType(keys),
+    )
+
+
+def stated_keys(text: str) -> Iterator[tuple[str, tuple[str, int]]]:
+    """(key, (value as written, line)) of each comment `# key = value`."""
+    for number, line in enumerate(text.splitlines(), 1):
+        found = _KEY.fullmatch(line.strip())
+        if found:
+            yield found[1], (found[2], number)
+
+
+def check_component(readings: Readings, component: str) -> None:
+    """Raise ConfigError where the file names another component, or holds lengths for an angle."""
+    if readings.component is not None and readings.component != component:
+        line = readings.keys["component"][1] if "component" in readings.keys else None
+        sentence = f"the file says {readings.component}, the plan {component}; expected one of the two"
+        raise config_error([(line, sentence)], readings.file)
+    if readings.angular is not None and readings.angular != (component[1] in "ABC"):
+        found, wanted = ("angles", "lengths") if readings.angular else ("lengths", "angles")
+        raise ConfigError(
+            f"{component} is read in {wanted}, and the file holds {found}; is it another component?",
+            file=readings.file,
+        )
+
+
+def _header_problems(header: Sequence[str]) -> Iterator[str]:
+    known = (*_HEADER, *_VALUES)
+    if len(header) == 1 and re.search(r"[;\t]", header[0]):
+        yield "columns are separated by semicolons or tabs; expected commas, or a profile for this file"
+        return
+    for number, name in enumerate(header, 1):
+        if header.index(name) < number - 1:
+            yield f'column {number} repeats "{name}"; expected each column once'
+        elif name not in known:
+            near = nearest(name, known)
+            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
+            yield f'column {number} is "{name}"; {hint}; files of other instruments need a profile'
+    yield from (f"the column {name} is missing" for name in _HEADER if name not in header)
+    if sum(name in _VALUES for name in header) != 1:
+        yield "expected one column of values: value_um for lengths or value_urad for angles"
+
+
+def _rows(
+    header: Sequence[str], records: Sequence[tuple[int, list[str]]]
+) -> tuple[list[list[float]], list[Problem]]:
+    rows: list[list[float]] = []
+    problems: list[Problem] = []
+    for line, cells in records:
+        if len(cells) != len(header):
+            hint = "; is a decimal comma in it? write a decimal point" if len(cells) > len(header) else ""
+            problems.append((line, f"{len(cells)} values under {len(header)} columns{hint}"))
+            continue
+        numbers = []
+        for name, cell in zip(header, cells, strict=True):
+            number = _number(cell)
+            numbers.append(number)
+            if not math.isfinite(number):
+                wrong = "is empty" if not cell else f'= "{cell}" is no finite number'
+                problems.append((line, f"{name} {wrong}; leave the row out where the reading is missing"))
+            elif name == "direction" and number not in (1.0, -1.0):
+                problems.append((line, f"direction = {cell}; expected 1 (approached in +) or -1"))
+            elif name == "run" and (number != int(number) or number < 1):
+                problems.append((line, f"run = {cell}; expected a whole number from 1"))
+        rows.append(numbers)
+    return rows, problems
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell) if "_" not in cell else math.nan
+    except ValueError:
+        return math.nan

@@ -1,0 +1,346 @@
+"""The running state of an APT reading, and the statements between points that change it."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Setup, Vector
+from olp.core.toolpath import Flag, Kind
+from olp.core.units import MM_PER_INCH
+from olp.program.apt.arcs import ArcForm, circle, directed, movarc
+from olp.program.dialect import Dialect, Options
+from olp.program.frames import UP, FrameTable, lever_of, turn_of, turned
+from olp.program.statement_rows import Points, StatementCollector
+from olp.program.text.statements import Field, Statement, shown
+
+NAN = float("nan")
+#: text of INSERT that is a block of words, one of which may move
+_BLOCK = re.compile(rb"(?i)\s*(?:[A-Z]\s*[=+-]?\s*[\d.]+\s*|\([^)]*\)\s*)+\Z")
+_MOVING = re.compile(rb"(?i)[GXYZUVWABC]\s*[=+-]?\s*[\d.]|M\s*(?:98|6|06)\b|[PL]\s*\d")
+_OFF = frozenset((b"OFF", b"NOMORE"))
+#: words of CYCLE that state something and begin none
+_CYCLE_TALK = frozenset((b"INIT", b"CLEAR", b"PARAM", b"AVOID"))
+#: how far a direction may be from length 1
+UNIT = 1e-3
+_IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+_PER_MINUTE = {b"MMPM": 1.0, b"IPM": MM_PER_INCH, b"PERMIN": 1.0}
+_PER_TURN = {b"MMPR": 1.0, b"IPR": MM_PER_INCH, b"PERREV": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A cycle in force: depth below the point, clearance and height of the retract above it, in mm, None
+    where not stated; its feed."""
+
+    depth_mm: float | None
+    clear_mm: float | None
+    retract_mm: float | None
+    feed_mm_s: float
+
+
+class Events:
+    """State of one reading of one program, and a handler for each statement that changes it. `_resolve` gives
+    the points before an event their places; a reading has its own."""
+
+    def __init__(self, data: bytes, setup: Setup, dialect: Dialect, options: Options, words: bool) -> None:
+        self.data, self.setup, self.options = data, setup, options
+        self.out = StatementCollector(data, dialect, keep_words=words)
+        self.table = FrameTable(setup)
+        self.start = [NAN if p is None else p for p in setup.job.start_mm]
+        self.position = list(self.start)
+        self.unit_mm, self.unit_stated = 1.0, False
+        self.tool = setup.machine.default_tool
+        self.length_active = setup.machine.length_active
+        self.axis: Vector = UP
+        self.up: Vector = UP
+        self.systems: list[tuple[object, object]] = []
+        self.system: tuple[object, object] = (None, None)
+        self.home: list[float] | None = None
+        self.cycle: Cycle | None = None
+        self.last_cycle: Cycle | None = None
+        self.turns_s = 0.0
+        self.direction: Statement | None = None
+        self.ended = 0
+        self.feed_mm_s = NAN
+        self.feed_said = (0, -1)
+        self.rapid: list[int] = []
+        self.driven: dict[int, ArcForm] = {}
+        self.arcs: list[tuple[int, ArcForm]] = []
+        self.onward = 0
+        self.back: list[int] = []
+        self.unsure: int | None = None
+        self.points: Points
+        self.done = 0
+        self._handlers: dict[bytes, Callable[[Statement, int], None]] = {
+            b"FEDRAT": self._feed, b"UNITS": self._units, b"UNIT": self._units, b"CIRCLE": self._circle,
+            b"MOVARC": self._circle, b"LOADTL": self._load, b"LOAD": self._load, b"TOOLNO": self._load,
+            b"TURRET": self._load, b"CYCLE": self._cycle, b"CUTCOM": self._cutcom, b"TLAXIS": self._tlaxis,
+            b"CSYS": self._csys, b"MSYS": self._csys, b"ORIGIN": self._csys, b"TRACUT": self._tracut,
+            b"FROM": self._from, b"GOHOME": self._gohome, b"SPINDL": self._spindle, b"DELAY": self._delay,
+            b"STOP": self._rest, b"OPSTOP": self._rest, b"RETRCT": self._unknown, b"GOCLER": self._unknown,
+            b"INSERT": self._insert, b"INDIRV": self._indirv, b"FINI": self._fini,
+        }  # fmt: skip
+
+    def _move(self, row: int) -> int:
+        """The number of the move that a point becomes."""
+        if self.cycle is not None:
+            self._resolve(row)
+        return self.out.moves + row - self.done
+
+    def _unknown(self, statement: Statement, row: int) -> None:
+        """A move of the control's own: no position is known after it."""
+        self._resolve(row)
+        self.position = [NAN] * 3
+        if self.out.moves:
+            self.out.put_lone(
+                Kind.RAPID,
+                Flag.PASS | Flag.CONTROL,
+                statement.line,
+                len(self.table.frames) - 1,
+                self.position,
+            )
+        else:
+            self.start = [NAN] * 3
+
+    def _frame(self, line: int) -> int:
+        """The number of the present frame."""
+        name = self.setup.machine.default_work_offset
+        if self.system not in self.systems:
+            self.systems.append(self.system)
+        place = self.systems.index(self.system) + 1
+        own = f"CSYS{place}"
+        if place > 1 or self.setup.work_offset(own) is not None:
+            name = own
+        work = self.table.work_offset(
+            name, line, "the program" if place == 1 else f"coordinate system {place} of the program"
+        )
+        length = lever = ZERO
+        touched = None
+        if self.tool:
+            lever = lever_of(self.setup, self.tool, line)
+            if self.length_active:
+                tool = self.setup.tool(self.tool)
+                assert tool is not None
+                length = tool.length_mm
+                if tool.set_by == "touch" and tool.touched_at_mm is not None:
+                    touched = (tool.touched_at_mm, lever)
+        # an axis that was never said is the machine's own
+        self.up = UP if self.axis == UP else turned(turn_of(work.rotation_deg), self.axis)
+        return self.table.index(
+            work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, lever=lever, axis=self.up,
+            tool_touched=touched,
+        )  # fmt: skip
+
+    def _feed(self, statement: Statement, row: int) -> None:
+        self.feed_mm_s = feed_of(statement, self.unit_mm, self.turns_s)
+        said = next((f for f in statement.fields() if f.number is not None), None)
+        self.feed_said = statement.line, -1 if said is None else self.out.word(said)
+        self.out.put_feed(self._move(row), self.feed_mm_s, *self.feed_said)
+
+    def _units(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        said = [f.text for f in statement.fields()]
+        if said[:1] == [b"MM"]:
+            self.unit_mm = 1.0
+        elif said[:1] in ([b"INCH"], [b"INCHES"], [b"IN"]):
+            self.unit_mm = MM_PER_INCH
+        else:
+            raise ProgramError("UNITS names no unit that is read; expected MM or INCH", line=statement.line)
+        self.unit_stated = True
+
+    def _circle(self, statement: Statement, row: int) -> None:
+        form = (movarc if statement.head()[1] == b"MOVARC" else circle)(statement, self.out)
+        if self.arcs and self.arcs[-1][0] == row:
+            raise ProgramError("an arc follows an arc without a GOTO between them", line=statement.line)
+        self.arcs.append((row, form))
+
+    def _tlon(self, statement: Statement, row: int) -> None:
+        if self.direction is None:
+            raise ProgramError("TLON follows no INDIRV, so its direction is not known", line=statement.line)
+        form = directed(self.driven.pop(statement.line), self.direction, self.out)
+        self.direction = None
+        self.arcs.append((row, form))
+
+    def _indirv(self, statement: Statement, row: int) -> None:
+        self.direction = statement
+
+    def _load(self, statement: Statement, row: int) -> None:
+        fields = statement.fields()
+        if fields and fields[0].text == b"TOOL":
+            fields = fields[1:]
+        number = fields[0].number if fields else None
+        if number is None or (number[1] and number[0] % 10 ** number[1]):
+            raise ProgramError(
+                f"{shown(statement.head()[1])} needs the number of a tool", line=statement.line
+            )
+        self._unknown(statement, row)
+        self.tool = number[0] // 10 ** number[1]
+        self.length_active = True
+        if self.tool and self.setup.tool(self.tool) is None:
+            lever_of(self.setup, self.tool, statement.line)
+
+    def _cycle(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        fields = statement.fields()
+        word = fields[0].text if fields else b""
+        if word in _OFF:
+            self.cycle = None
+        elif word == b"ON":
+            self.cycle = self.last_cycle
+        elif word not in _CYCLE_TALK or len(fields) > 1:
+            self.cycle = self.last_cycle = self._cycle_of(fields)
+
+    def _cycle_of(self, fields: Sequence[Field]) -> Cycle:
+        after: dict[bytes, float] = {}
+        for word, number in itertools.pairwise(fields):
+            found = number.number
+            if word.number is None and found is not None:
+                after.setdefault(word.text, found[0] / 10.0 ** found[1])
+
+        def length(*names: bytes) -> float | None:
+            return next((abs(after[n]) * self.unit_mm for n in names if n in after), None)
+
+        feed = NAN
+        for name, scale in _PER_MINUTE.items():
+            if name in after:
+                feed = after[name] * scale / 60.0
+        return Cycle(
+            length(b"DEPTH", b"FEDTO"), length(b"CLEAR", b"RAPTO"), length(b"RTRCTO", b"RETURN"), feed
+        )
+
+    def _cutcom(self, statement: Statement, row: int) -> None:
+        said = {f.text for f in statement.fields()}
+        if said & {b"LEFT", b"RIGHT", b"ON"} and not self.options.contour:
+            raise ProgramError(
+                "CUTCOM (cutter compensation) makes the path inside the control; send the path of the tool's "
+                "centre, or take the points as that path with --contour",
+                line=statement.line,
+            )
+
+    def _tlaxis(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        numbers = [f.number for f in statement.fields()]
+        if len(numbers) != 3 or None in numbers:
+            raise ProgramError("TLAXIS is read with three numbers only", line=statement.line)
+        x, y, z = (n[0] / 10.0 ** n[1] for n in numbers if n is not None)
+        size = (x * x + y * y + z * z) ** 0.5
+        if not abs(size - 1.0) < UNIT:
+            raise ProgramError("TLAXIS is no direction of length 1", line=statement.line)
+        self.axis = axis_of(x / size, y / size, z / size)
+
+    def _csys(self, statement: Statement, row: int) -> None:
+        values = []
+        for field in statement.fields():
+            found = field.number
+            if found is None:
+                if field.text in (b"OFF", b"NOMORE"):
+                    continue
+                raise ProgramError(
+                    f"a coordinate system is named {shown(field.text)}; expected its numbers",
+                    line=statement.line,
+                )
+            values.append(round(found[0] / 10.0 ** found[1], 9) + 0.0)
+        key: object = tuple(values)
+        if key == _IDENTITY or not any(values) or key == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
+            key = None
+        csys, origin = self.system
+        system = (csys, key) if statement.head()[1] == b"ORIGIN" else (key, origin)
+        if system != self.system:
+            self._resolve(row)
+            self.system = system
+
+    def _tracut(self, statement: Statement, row: int) -> None:
+        said = [f.text for f in statement.fields()]
+        if said not in ([], [b"NOMORE"], [b"OFF"]):
+            raise ProgramError(
+                "TRACUT transforms points in the APT processor; send its output (CLDATA), or state the "
+                "transform as a frame of the job",
+                line=statement.line,
+            )
+
+    def _from(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        numbers = [f.number for f in statement.fields()][:3]
+        if len(numbers) != 3 or None in numbers:
+            raise ProgramError("FROM has no three numbers", line=statement.line)
+        place = np.array([n[0] / 10.0 ** n[1] for n in numbers if n is not None]) * self.unit_mm
+        number = self._frame(statement.line)
+        frame = self.table.frames[number]
+        place = place if frame.turn is None else np.array(frame.turn) @ place
+        self.position = (place + np.array(frame.offset_mm)).tolist()
+        self.home = list(self.position)
+        if self.out.moves:
+            self.out.put_lone(Kind.RAPID, Flag.PASS, statement.line, number, self.position)
+        else:
+            self.start = list(self.position)
+
+    def _gohome(self, statement: Statement, row: int) -> None:
+        if self.home is None:
+            self._unknown(statement, row)
+            return
+        self._resolve(row)
+        self.position = list(self.home)
+        number = self._frame(statement.line)
+        self.out.put_lone(Kind.RAPID, Flag.PASS, statement.line, number, self.position)
+
+    def _spindle(self, statement: Statement, row: int) -> None:
+        numbers = [f.number for f in statement.fields() if f.number is not None]
+        if numbers:
+            self.turns_s = abs(numbers[0][0] / 10.0 ** numbers[0][1]) / 60.0
+        self._rest(statement, row)
+
+    def _delay(self, statement: Statement, row: int) -> None:
+        number = next((f.number for f in statement.fields() if f.number is not None), None)
+        if number is None:
+            raise ProgramError("DELAY needs a number of seconds", line=statement.line)
+        if any(f.text == b"REV" for f in statement.fields()):
+            seconds = number[0] / 10.0 ** number[1] / self.turns_s if self.turns_s else 0.0
+        else:
+            seconds = number[0] / 10.0 ** number[1]
+        self.out.pauses.append((self._move(row), max(seconds, 0.0)))
+
+    def _rest(self, statement: Statement, row: int) -> None:
+        self.out.pauses.append((self._move(row), 0.0))
+
+    def _insert(self, statement: Statement, row: int) -> None:
+        said = re.sub(rb"(?i)\A\s*INSERT\s*/?", b"", statement.text)
+        if _BLOCK.match(said) and _MOVING.search(said):
+            raise ProgramError(
+                "INSERT hands the control a block that may move the machine; leave it to the post-processor",
+                line=statement.line,
+            )
+
+    def _fini(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        self.ended = statement.line
+
+    def _resolve(self, upto: int) -> None:
+        raise NotImplementedError
+
+
+def feed_of(statement: Statement, unit_mm: float, turns_s: float) -> float:
+    """mm/s of a FEDRAT; NaN where it says none that is a speed."""
+    value, words = NAN, set()
+    for field in statement.fields():
+        found = field.number
+        if found is None:
+            words.add(field.text)
+        elif value != value:
+            value = found[0] / 10.0 ** found[1]
+    for name, scale in _PER_MINUTE.items():
+        if name in words:
+            return value * (unit_mm if name == b"PERMIN" else scale) / 60.0
+    for name, scale in _PER_TURN.items():
+        if name in words:
+            return value * (unit_mm if name == b"PERREV" else scale) * turns_s if turns_s else NAN
+    return NAN if words & {b"INVERSE", b"INVERS"} else value * unit_mm / 60.0
+
+
+def axis_of(x: float, y: float, z: float) -> Vector:
+    return (x, y, z) if (x, y) != (0.0, 0.0) or z < 0 else UP

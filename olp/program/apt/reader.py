@@ -1,0 +1,344 @@
+"""Reads APT and cutter-location data: statements to a nominal toolpath and the words that can be edited.
+
+The way of a chunk: lines of plain GOTOs in columns and all other statements one by one (`statement_lexer`),
+then the events between the points in their order, and stretches of points between changes of frame at once.
+Nothing here knows an error model.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.core.toolpath import Flag, Kind
+from olp.program.apt.arcs import ArcForm, Resolved, joints, resolved, tlon
+from olp.program.apt.events import UNIT, Cycle, Events, axis_of
+from olp.program.apt.table import FREE, TABLE
+from olp.program.dialect import Dialect, Options, Support
+from olp.program.frames import UP
+from olp.program.program import Program
+from olp.program.statement_rows import Array, Index, Mask, Point, Points
+from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
+
+NAN = float("nan")
+_FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
+_CREO = re.compile(rb"\$\$->\s*([A-Z_]+)\s*/?")
+#: so many joints that turn right back are no accident
+_SEVERAL = 3
+_RAPID = frozenset((b"RAPID", b"RAPID/"))
+
+
+def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    right."""
+    return _Reader(data, setup, dialect, options, words).run()
+
+
+class _Reader(Events):
+    """One reading of one program."""
+
+    def run(self) -> Program:
+        for chunk in chunks(self.data):
+            self._chunk(chunk)
+        self._judge_turns()
+        x, y, z = self.start
+        end = self.ended or self.data.count(b"\n") + 1
+        return self.out.program(self.table.frames, (x, y, z), end, b"RAPID")
+
+    # -- one chunk -----------------------------------------------------------------------------------
+
+    def _chunk(self, chunk: Chunk) -> None:
+        out = self.out
+        out.begin(chunk)
+        if self.ended:
+            out.finish()
+            return
+        events: list[Statement] = []
+        alone: list[Point] = []
+        carry = 0
+        for found in chunk.statements(_FREE):
+            if found.line <= carry:
+                continue
+            if isinstance(found, Comment):
+                if found.text.lstrip()[:4] == b"$$->":
+                    statement = self._creo(chunk, found)
+                    carry = found.line + statement.lines - 1
+                    events.append(statement)
+                continue
+            text = found.text.strip().upper()
+            if text[:2] in (b"GO", b"TL") and (point := self._point(found, text)) is not None:
+                alone.append(point)
+            if text[:4] != b"GOTO":
+                events.append(found)
+            if text[:4] == b"FINI":
+                break
+        self.points = out.points(chunk, alone)
+        self.done = 0
+        upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
+        for statement, row in zip(events, upto, strict=True):
+            self._event(statement, row)
+            if self.ended:
+                out.finish()
+                return
+        self._resolve(len(self.points))
+        # what was said of the point behind the last one holds for the first of the next chunk
+        count = len(self.points)
+        self.rapid = [row - count for row in self.rapid]
+        self.arcs = [(row - count, form) for row, form in self.arcs]
+        out.finish()
+
+    def _event(self, statement: Statement, row: int) -> None:
+        text = statement.text.strip().upper()
+        if text in _RAPID:
+            self.rapid.append(row)
+            return
+        label, major = statement.head()
+        if statement.text.lstrip()[:2] == b"$$":
+            label, major = b"", b"CSYS"
+        free = _FREE.match(text)
+        if free:
+            label, major = b"", free[0].upper()
+        first = major.split(b",")[0].strip()
+        handler = self._handlers.get(first)
+        if first == b"RAPID":
+            self._resolve(row)
+            raise ProgramError("RAPID says more than one knows; expected RAPID alone", line=statement.line)
+        if label:
+            what = TABLE.get(first, (Support.REFUSED, "assigns what is not read"))[1]
+            raise ProgramError(
+                f"{shown(label)} = {shown(first)} {what or 'is not read'}", line=statement.line
+            )
+        if handler is not None:
+            handler(statement, row)
+            return
+        support, why = TABLE.get(first, (Support.REFUSED, "is no statement that olp knows, and may move"))
+        if first == b"TLON":
+            self._tlon(statement, row)
+        if first in (b"TLON", b"GODLTA"):
+            return
+        if support is Support.REFUSED:
+            raise ProgramError(f"{shown(first)} {why}", line=statement.line)
+
+    # -- points --------------------------------------------------------------------------------------
+
+    def _point(self, statement: Statement, text: bytes) -> Point | None:
+        """A GOTO, GODLTA or TLON that was not read in columns."""
+        _, major = statement.head()
+        line = statement.line
+        if major.startswith(b"TLON"):
+            self.driven[line], fields = tlon(statement, self.out)
+            return Point(line, statement.begin, statement.end, fields)
+        if major not in (b"GOTO", b"GODLTA"):
+            return None
+        fields = statement.fields()
+        if fields and all(f.text == b"" for f in fields[-1:]):
+            fields = fields[:-1]
+        if any(f.number is None for f in fields):
+            bad = next(f for f in fields if f.number is None)
+            raise ProgramError(
+                f"{shown(major)} names {shown(bad.text) or 'nothing'} where a number is expected; send the "
+                "output of the APT processor (CLDATA)",
+                line=line,
+            )
+        if len(fields) not in ((1, 3) if major == b"GODLTA" else (3, 6)):
+            raise ProgramError(
+                f"{shown(major)} has {len(fields)} numbers; expected "
+                + ("a distance along the tool axis, or three" if major == b"GODLTA" else "three, or six"),
+                line=line,
+            )
+        return Point(
+            line, statement.begin, statement.end, fields[:3], fields[3:], incremental=major == b"GODLTA"
+        )
+
+    # -- stretches of points -------------------------------------------------------------------------
+
+    def _resolve(self, upto: int) -> None:
+        """Positions, kinds and arcs of the points up to `upto`, which have one frame but for tool axes."""
+        a, self.done = self.done, max(upto, self.done)
+        if upto <= a:
+            return
+        points, count = self.points, upto - a
+        part = slice(a, upto)
+        line = points.line[part]
+        if not self.unit_stated:
+            self.out.remarks.setdefault("unit", (int(line[0]), "the program states no unit"))
+        frame, tilting, up = self._frames(points, part)
+        offset, turn = self._places(frame)
+        value = points.value[part] * self.unit_mm
+        value = value if turn is None else value @ turn.T
+        incremental = points.incremental[part]
+        end = value + offset
+        if incremental.any():
+            self._check_increments(points, part, turn)
+            end = _summed(value, end, incremental, self.position)
+        kind = np.full(count, Kind.LINE, np.uint8)
+        now = bisect_left(self.rapid, upto)
+        kind[np.array(self.rapid[:now], np.int64) - a] = Kind.RAPID
+        del self.rapid[:now]
+        flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
+        flag[tilting] |= np.uint8(Flag.WHOLE)
+        slot, begin, stop = points.slot[part], points.begin[part], points.end[part]
+        arcs = [(row - a, form) for row, form in self.arcs if row < upto]
+        self.arcs = [(row, form) for row, form in self.arcs if row >= upto]
+        if self.cycle is not None:
+            if arcs:
+                raise ProgramError("an arc stands under a CYCLE", line=int(line[arcs[0][0]]))
+            self._holes(self.cycle, line, frame, end, slot, begin, stop, up)
+        else:
+            if arcs:
+                rows = np.array([row for row, _ in arcs])
+                if (kind[rows] == Kind.RAPID).any() or (flag[rows] & ~np.uint8(Flag.INCREMENTAL)).any():
+                    bad = rows[(kind[rows] == Kind.RAPID) | (flag[rows] != 0)][0]
+                    raise ProgramError("an arc at rapid, or with another tool axis", line=int(line[bad]))
+                start = np.where(rows[:, None] > 0, end[np.maximum(rows - 1, 0)], np.array(self.position))
+                found = resolved(
+                    [form for _, form in arcs], start, end[rows], line[rows], self.unit_mm,
+                    offset if offset.ndim == 1 else offset[rows], turn,
+                )  # fmt: skip
+                self._check_turns(arcs, found, start, end, rows, kind)
+                kind[rows] = np.where(found.sweep > 0, Kind.ARC_CCW, Kind.ARC_CW)
+                self.out.put_arcs(rows + self.out.moves, found.centre, found.plane, found.sweep)
+                for row, form in arcs:
+                    self.out.arcs[row + self.out.moves] = form.text
+            self.out.put_moves(kind, flag, line, frame, end, slot, begin, stop)
+        self.position = end[-1].tolist()
+
+    def _check_turns(
+        self, arcs: Sequence[tuple[int, ArcForm]], found: Resolved, start: Array, end: Array, rows: Index,
+        kind: npt.NDArray[np.uint8],
+    ) -> None:  # fmt: skip
+        """What the joints of arcs with straight moves before them tell of the sense of turning."""
+        before = np.where(rows[:, None] > 1, end[np.maximum(rows - 2, 0)], np.array(self.position))
+        straight = (rows > 0) & (kind[np.maximum(rows - 1, 0)] == Kind.LINE) & ~np.isin(rows - 1, rows)
+        told = np.where(straight, joints(found, start, before), 0)
+        for (_, form), way in zip(arcs, told.tolist(), strict=True):
+            if form.way is not None or form.angle_rad is not None:
+                continue
+            if not form.sure and self.unsure is None:
+                self.unsure = form.line
+            if way > 0:
+                self.onward += 1
+            elif way < 0:
+                self.back.append(form.line)
+
+    def _judge_turns(self) -> None:
+        """Refuse a program whose arcs turn back where they should go on; remark one that does not tell."""
+        if len(self.back) >= _SEVERAL and len(self.back) > 2 * self.onward:
+            raise ProgramError(
+                "the arc turns right back where the move before it should go on: its normal seems to be "
+                "left-handed, which is not read",
+                line=self.back[0],
+            )
+        doubt = self.unsure if self.unsure is not None else next(iter(self.back), None)
+        if doubt is not None and not self.onward:
+            self.out.remarks["arcs"] = (doubt, "arcs are taken as right-handed about their normals")
+
+    def _frames(self, points: Points, part: slice) -> tuple[Index, Mask, Array]:
+        """Of each point: the number of its frame, whether the tool turns on the way to it, and the direction
+        (n, 3) from tip to gauge point as the machine sees it."""
+        direction, line = points.direction[part], int(points.line[part][0])
+        count = len(direction)
+        turning = np.zeros(count, bool)
+        stated = ~np.isnan(direction[:, 0])
+        if not stated.any():
+            number = self._frame(line)
+            return np.full(count, number), turning, np.broadcast_to(self.up, (count, 3))
+        size = np.sqrt((direction * direction).sum(axis=1))
+        wrong = stated & ~(np.abs(size - 1.0) < UNIT)
+        if wrong.any():
+            at = int(np.flatnonzero(wrong)[0])
+            raise ProgramError(
+                f"the tool axis has length {size[at]:.6g}; expected a direction of length 1",
+                line=int(points.line[part][at]),
+            )
+        held = np.maximum.accumulate(np.where(stated, np.arange(count), -1))
+        axes = np.where((held >= 0)[:, None], (direction / size[:, None])[held], np.array(self.axis))
+        before = np.vstack((np.array(self.axis), axes[:-1]))
+        turning = (axes != before).any(axis=1)
+        if not self.out.moves:
+            turning[0] = False
+        unique, which = np.unique(axes, axis=0, return_inverse=True)
+        which = which.reshape(-1)
+        number_of, up = np.zeros(len(unique), np.int64), np.zeros((len(unique), 3))
+        for k, (x, y, z) in enumerate(unique.tolist()):
+            self.axis = axis_of(x, y, z)
+            number_of[k] = self._frame(line)
+            up[k] = self.up
+        x, y, z = axes[-1].tolist()
+        self.axis = axis_of(x, y, z)
+        return number_of[which], turning, up[which]
+
+    def _places(self, frame: Index) -> tuple[Array, Array | None]:
+        frames = self.table.frames
+        first = frames[int(frame[0])]
+        turn = None if first.turn is None else np.array(first.turn)
+        if (frame == frame[0]).all():
+            return np.array(first.offset_mm), turn
+        return np.array([f.offset_mm for f in frames])[frame], turn
+
+    def _check_increments(self, points: Points, part: slice, turn: Array | None) -> None:
+        alone = points.incremental[part] & (points.slot[part][:, 0] < 0)
+        if alone.any() and self.axis != UP:
+            raise ProgramError(
+                "GODLTA with one number goes along the tool axis, which is tilted here; write it with three",
+                line=int(points.line[part][np.flatnonzero(alone)[0]]),
+            )
+
+    def _holes(
+        self, cycle: Cycle, line: Index, frame: Index, end: Array, slot: Index, begin: Index,
+        stop: Index, ups: Array,
+    ) -> None:  # fmt: skip
+        """Places of holes: to the clearance above the place, which the statement says, down, and up."""
+        out = self.out
+        at = np.array(self.position)
+        for i in range(len(line)):
+            where, up = int(line[i]), ups[i]
+            x, y, z = (up * (cycle.clear_mm or 0.0)).tolist()
+            own = self.table.lifted(int(frame[i]), (x, y, z)) if cycle.clear_mm else int(frame[i])
+            at = end[i] + up * (cycle.clear_mm or 0.0)
+            stroke = cycle.depth_mm is not None and cycle.clear_mm is not None
+            flag = np.array([Flag.CYCLE if stroke else 0], np.uint8)
+            out.put_moves(
+                np.array([Kind.RAPID], np.uint8), flag, [where], [own], at[None],
+                slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
+            )  # fmt: skip
+            out.put_feed(out.moves, cycle.feed_mm_s, where)
+            if cycle.depth_mm is not None and cycle.clear_mm is not None:
+                out.strokes.append((out.moves - 1, out.moves))
+                out.put_lone(Kind.LINE, Flag.CYCLE, where, own, end[i] - up * cycle.depth_mm)
+                at = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
+                out.put_lone(Kind.RAPID, Flag.CYCLE, where, own, at)
+        out.put_feed(out.moves, self.feed_mm_s, *self.feed_said)
+        end[-1] = at
+
+    # -- events --------------------------------------------------------------------------------------
+
+    def _creo(self, chunk: Chunk, comment: Comment) -> Statement:
+        """What Creo says in a comment, which goes on where its line ends with `$`."""
+        text, last = comment.text.rstrip(), comment.line - 1 - chunk.first_line
+        lines = 1
+        said = _CREO.match(text.upper())
+        while text.endswith(b"$") and last + 1 < len(chunk.line_start):
+            last, lines = last + 1, lines + 1
+            text = text[:-1] + chunk.raw(last).rstrip()
+        known = said is not None and said[1] == b"CSYS"
+        body = text[text.find(b"/") :] if known else b"/1,0,0,0,0,1,0,0,0,0,1,0"
+        statement = Statement(comment.line, comment.begin, comment.end, b"$$" + body, None, lines)
+        return (
+            statement if known else Statement(comment.line, comment.begin, comment.end, b"TITLE", None, lines)
+        )
+
+
+def _summed(value: Array, place: Array, incremental: Mask, at: Sequence[float]) -> Array:
+    """(n, 3) ends of points, some of them distances, from `at`."""
+    order = np.arange(len(value))
+    total = np.cumsum(np.where(incremental[:, None], value, 0.0), axis=0)
+    source = np.maximum.accumulate(np.where(~incremental, order, -1))
+    from_point = place[source] + (total - total[source])
+    return np.asarray(np.where((source >= 0)[:, None], from_point, np.array(at) + total), float)

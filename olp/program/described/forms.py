@@ -1,0 +1,98 @@
+"""Forms of statements: a small language that says how a statement is written, and what its fields are.
+
+`LMOVE TRANS({x}, {y}, {z} [, {a}, {b}, {c}])` reads: the words, the marks, numbers where `{x}` and the others
+stand, and an optional part in brackets. Blanks in a text are free around marks; between words there is at
+least one. `<MOVE|MOVES>` is either word, `...` whatever follows. `{target}`, `{frame}` and `{word}` are
+names.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from olp.core.errors import ConfigError
+
+NUMBERS = ("x", "y", "z", "a", "b", "c", "speed", "blend", "time", "tool", "number")
+NAMES = ("target", "frame", "word")
+
+_TOKEN = re.compile(
+    r"(?P<blank>\s+)|(?P<field>\{(?P<name>\w+)\})|(?P<rest>\.\.\.)|(?P<either><[^<>]+>)|(?P<open>\[)|(?P<close>\])|"
+    r"(?P<word>(?:(?!\.\.\.)[\w.$#%])+)|(?P<mark>[^\w\s])"
+)
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A form and the pattern that it means; `first` is the word that it begins with, "" where it may begin
+    with several."""
+
+    text: str
+    pattern: re.Pattern[str]
+    first: str
+    fields: frozenset[str]
+
+
+def form(text: str, *, ignore_case: bool) -> Form:
+    """The form that a text says. Raises ConfigError."""
+    out: list[str] = []
+    fields: list[str] = []
+    depth, first = 0, ""
+    before = "start"
+    blank = False
+    for found in _TOKEN.finditer(text):
+        kind = found.lastgroup if found.lastgroup != "name" else "field"
+        if kind == "blank":
+            blank = True
+            continue
+        said = found[0]
+        wordy = kind in ("field", "word", "either")
+        if kind in ("open", "close"):
+            depth += 1 if kind == "open" else -1
+            if depth < 0:
+                break
+            out.append(r"(?:\s*" if kind == "open" else ")?")
+            before = "mark" if kind == "open" else "close"
+            blank = False
+            continue
+        if before != "start":
+            # inside a word nothing may stand between its parts; around marks blanks are free
+            apart = wordy and before == "wordy"
+            out.append((r"\s+" if blank else "") if apart else r"\s*")
+        out.append(_piece(kind or "", found, fields, text))
+        if before == "start" and kind == "word":
+            first = said
+        before = "wordy" if wordy else "mark"
+        blank = False
+    if depth:
+        raise ConfigError(f'the form "{text}" has a bracket without its other one')
+    if len(set(fields)) < len(fields):
+        raise ConfigError(f'the form "{text}" has a field twice')
+    flags = re.IGNORECASE if ignore_case else 0
+    return Form(
+        text,
+        re.compile(r"\s*" + "".join(out) + r"\s*", flags),
+        first.upper() if ignore_case else first,
+        frozenset(fields),
+    )
+
+
+def _piece(kind: str, found: re.Match[str], fields: list[str], text: str) -> str:
+    """The pattern of one part of a form."""
+    if kind == "rest":
+        return r".*"
+    if kind == "either":
+        return "(?:" + "|".join(re.escape(word.strip()) for word in found[0][1:-1].split("|")) + ")"
+    if kind != "field":
+        return re.escape(found[0])
+    name = found["name"]
+    if name not in (*NUMBERS, *NAMES):
+        raise ConfigError(
+            f'the form "{text}" has a field {{{name}}}; expected one of {", ".join((*NUMBERS, *NAMES))}'
+        )
+    if name in ("number", "word"):
+        return _NUMBER if name == "number" else _NAME
+    fields.append(name)
+    return f"(?P<{name}>{_NUMBER if name in NUMBERS else _NAME})"

@@ -1,0 +1,254 @@
+"""The running state of a DMIS reading, and the statements between points that change it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Setup, Vector
+from olp.core.toolpath import Flag, Kind
+from olp.core.units import MM_PER_INCH
+from olp.program.dialect import Dialect
+from olp.program.frames import FrameTable, lever_of
+from olp.program.statement_rows import Points, StatementCollector
+from olp.program.text.statements import Statement, shown
+
+NAN = float("nan")
+_UNITS = {b"MM": 1.0, b"CM": 10.0, b"M": 1000.0, b"INCH": MM_PER_INCH}
+_SPEEDS = {b"MMPS": 1.0, b"MPM": 1000.0 / 60.0, b"IPS": MM_PER_INCH, b"IPM": MM_PER_INCH / 60.0,
+           b"MPMM": 1000.0 / 60.0, b"MMPM": 1.0 / 60.0}  # fmt: skip
+_LABEL = re.compile(rb"(?i)\A\s*([A-Z]+)\s*\(\s*([^()]*?)\s*\)\s*\Z")
+#: the frame of a program before its first datum: axis positions of the machine, as the control counts them
+MACHINE_FRAME = "MCS"
+
+
+class Events:
+    """State of one reading of one program, and a handler for each statement that changes it. `_resolve` gives
+    the points before an event their places; a reading has its own."""
+
+    def __init__(self, data: bytes, setup: Setup, dialect: Dialect, words: bool) -> None:
+        self.data, self.setup = data, setup
+        self.out = StatementCollector(data, dialect, keep_words=words)
+        self.table = FrameTable(setup)
+        self.start = [NAN if p is None else p for p in setup.job.start_mm]
+        self.unit_mm, self.unit_stated = 1.0, False
+        self.datum = MACHINE_FRAME
+        self.sensor: str | None = None
+        self.defined: dict[str, Vector | None] = {}
+        self.manual = False
+        self.feature: tuple[int, bool] | None = None
+        self.speed = {b"POSVEL": NAN, b"MESVEL": NAN}
+        self.nesting: list[bytes] = []
+        self.macro: str | None = None
+        self.moving_macros: set[str] = set()
+        self.macros: set[str] = set()
+        self.header = False
+        self.ended = 0
+        self.touches: set[int] = set()
+        self.points: Points
+        self.done = 0
+        self._handlers: dict[bytes, Callable[[Statement, bytes, int], None]] = {
+            b"UNITS": self._units, b"SNSDEF": self._snsdef, b"SNSLCT": self._snslct, b"TRANS": self._datum,
+            b"ROTATE": self._datum, b"DATSET": self._datum, b"RECALL": self._recall, b"MODE": self._mode,
+            b"TECOMP": self._thermal, b"TEMPR": self._thermal, b"FEDRAT": self._feed, b"MEAS": self._meas,
+            b"RMEAS": self._meas, b"ENDMES": self._endmes, b"FROM": self._from, b"GOHOME": self._gohome,
+            b"IF": self._branch, b"ELSE": self._branch, b"ELSEIF": self._branch, b"ENDIF": self._branch,
+            b"DO": self._branch, b"ENDDO": self._branch, b"MACRO": self._macro, b"ENDMAC": self._endmac,
+            b"CALL": self._call, b"ENDFIL": self._endfil, b"DECL": self._carry, b"RAPID": self._carry,
+        }  # fmt: skip
+
+    def _frame(self, line: int) -> int:
+        what = "the machine's own frame" if self.datum == MACHINE_FRAME else f"the datum D({self.datum})"
+        name = next(
+            (n for n in (*self.setup.job.work_offsets, *self.setup.machine.work_offsets)
+             if n.upper() == self.datum.upper()),
+            self.datum,
+        )  # fmt: skip
+        work = self.table.work_offset(name, line, what)
+        lever, tool = ZERO, None
+        if self.sensor is not None:
+            lever = self._stylus(self.sensor, line)
+        elif self.setup.machine.default_tool:
+            tool = self.setup.machine.default_tool
+            lever = lever_of(self.setup, tool, line)
+        # the control counts its axes at the end of the ram: the tip is there plus the offset of the stylus
+        x, y, z = (0.0 - v for v in lever)
+        return self.table.index(work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), lever=lever)
+
+    def _stylus(self, name: str, line: int) -> Vector:
+        stated = self.setup.stylus(name)
+        if stated is not None:
+            return stated
+        found = self.defined.get(name)
+        if found is None:
+            raise ProgramError(
+                f'the stylus {name} is selected, and its offset is said nowhere; give [styli."{name}"] '
+                "offset_mm = [x, y, z] in the job or machine file, end of the ram to centre of the tip",
+                line=line,
+            )
+        return found
+
+    def _unknown(self, statement: Statement, row: int) -> None:
+        """Behind this nobody knows where the machine stands."""
+        self._resolve(row)
+        if self.out.moves:
+            self.out.put_lone(
+                Kind.RAPID, Flag.PASS | Flag.CONTROL, statement.line, len(self.table.frames) - 1, [NAN] * 3
+            )
+        else:
+            self.start = [NAN] * 3
+
+    def _settled(self, statement: Statement) -> None:
+        """What changes the state has to happen on every way through the program."""
+        if self.nesting:
+            raise ProgramError(
+                f"{shown(statement.head()[1])} stands inside {shown(self.nesting[-1])}, so whether it counts "
+                "is known at run time only",
+                line=statement.line,
+            )
+
+    def _carry(self, statement: Statement, label: bytes, row: int) -> None:
+        return
+
+    def _units(self, statement: Statement, label: bytes, row: int) -> None:
+        self._settled(statement)
+        self._resolve(row)
+        fields = statement.fields()
+        unit = _UNITS.get(fields[0].text) if fields else None
+        if unit is None:
+            what = "UNITS names no unit that is read; expected MM, CM, M or INCH"
+            raise ProgramError(what, line=statement.line)
+        self.unit_mm, self.unit_stated = unit, True
+
+    def _snsdef(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        at = next((i for i, f in enumerate(fields) if f.text == b"CART"), -1)
+        fixed = any(f.text == b"FIXED" for f in fields[:at])
+        numbers = [f.number for f in fields[at + 1 : at + 4]]
+        name = _name(label)
+        if name is None:
+            return
+        self.defined[name] = None
+        if at > 0 and fixed and len(numbers) == 3 and None not in numbers:
+            x, y, z = (n[0] / 10.0 ** n[1] * self.unit_mm for n in numbers if n is not None)
+            self.defined[name] = (x, y, z)
+
+    def _snslct(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        name = _name(fields[0].text) if fields else None
+        if name is None:
+            raise ProgramError("SNSLCT names no sensor; expected S() or SA()", line=statement.line)
+        if name == self.sensor:
+            return
+        self._settled(statement)
+        self._unknown(statement, row)
+        self.sensor = name
+
+    def _datum(self, statement: Statement, label: bytes, row: int) -> None:
+        name = _name(label)
+        if name is None:
+            raise ProgramError(
+                f"{shown(statement.head()[1])} makes no datum D(), so its frame has no name",
+                line=statement.line,
+            )
+        self._settled(statement)
+        self._resolve(row)
+        self.datum = name
+
+    def _recall(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        found = _LABEL.match(fields[0].text) if fields else None
+        if found is None or found[1] not in (b"D", b"DA"):
+            if found is not None and found[1] in (b"S", b"SA", b"RT"):
+                raise ProgramError("RECALL is read for datums only", line=statement.line)
+            return
+        self._settled(statement)
+        self._resolve(row)
+        self.datum = found[2].decode("latin-1")
+
+    def _mode(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        self._settled(statement)
+        self._resolve(row)
+        self.manual = bool(fields) and fields[0].text == b"MAN"
+
+    def _thermal(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        if any(f.text == b"OFF" for f in fields[:1]):
+            return
+        name = shown(statement.head()[1])
+        self.out.remarks.setdefault("thermal", (statement.line, f"{name} makes the control compensate"))
+
+    def _feed(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        numbers = [f.number for f in fields if f.number is not None]
+        unit = next((_SPEEDS[f.text] for f in fields if f.text in _SPEEDS), NAN)
+        if fields and fields[0].text in self.speed and numbers:
+            self.speed[fields[0].text] = numbers[0][0] / 10.0 ** numbers[0][1] * unit
+        if fields and fields[0].text == b"MESVEL":
+            self.out.put_feed(self.out.moves + row - self.done, self.speed[b"MESVEL"], statement.line)
+
+    def _meas(self, statement: Statement, label: bytes, row: int) -> None:
+        if self.feature is not None:
+            raise ProgramError("MEAS stands inside MEAS; expected ENDMES first", line=statement.line)
+        self.feature = (statement.line, False)
+
+    def _endmes(self, statement: Statement, label: bytes, row: int) -> None:
+        if self.feature is None:
+            raise ProgramError("ENDMES ends no MEAS", line=statement.line)
+        if not self.feature[1]:
+            # the control goes to points of its own
+            self._unknown(statement, row)
+        self.feature = None
+
+    def _from(self, statement: Statement, label: bytes, row: int) -> None:
+        self._resolve(row)
+
+    def _gohome(self, statement: Statement, label: bytes, row: int) -> None:
+        self._unknown(statement, row)
+
+    def _branch(self, statement: Statement, label: bytes, row: int) -> None:
+        _, major = statement.head()
+        word = b"IF" if major[:2] == b"IF" else major
+        self._unknown(statement, row)
+        if word in (b"IF", b"DO"):
+            self.nesting.append(word)
+        elif word in (b"ENDIF", b"ENDDO"):
+            if not self.nesting or self.nesting[-1] != word[3:]:
+                raise ProgramError(f"{shown(word)} ends nothing", line=statement.line)
+            self.nesting.pop()
+
+    def _macro(self, statement: Statement, label: bytes, row: int) -> None:
+        name = _name(label)
+        if name is None:
+            return  # WinWerth heads its programs so
+        self._resolve(row)
+        self.macro = name
+        self.macros.add(name.upper())
+        self.nesting.append(b"MACRO")
+
+    def _endmac(self, statement: Statement, label: bytes, row: int) -> None:
+        self._resolve(row)
+        if self.macro is not None:
+            self.macro = None
+            self.nesting.pop()
+
+    def _call(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        name = next((n for f in fields if (n := _name(f.text)) is not None), None)
+        if name is None or name.upper() not in self.macros:
+            raise ProgramError("CALL runs what is not in this program, and may move", line=statement.line)
+
+    def _endfil(self, statement: Statement, label: bytes, row: int) -> None:
+        self._resolve(row)
+        self.ended = statement.line
+
+    def _resolve(self, upto: int) -> None:
+        raise NotImplementedError
+
+
+def _name(label: bytes) -> str | None:
+    """What stands in the brackets of S(), D(), M()."""
+    found = _LABEL.match(label)
+    return found[2].decode("latin-1") if found else None

@@ -1,0 +1,184 @@
+"""Reads DMIS part programs: motion statements to a nominal toolpath and the words that can be edited.
+
+Positioning (GOTO) and touching (PTMEAS) count at their ends alone: what is between them, the control decides.
+Feature nominals, tolerances and actuals are carried. Nothing here knows an error model.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.core.toolpath import Flag, Kind
+from olp.program.dialect import Dialect, Options, Support
+from olp.program.dmis.events import Events
+from olp.program.dmis.table import TABLE
+from olp.program.program import Program
+from olp.program.statement_rows import Point
+from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
+
+NAN = float("nan")
+_NO_TEXT = re.compile(rb"(?!)")
+
+
+def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    right."""
+    return _Reader(data, setup, dialect, words).run()
+
+
+class _Reader(Events):
+    """One reading of one program."""
+
+    def run(self) -> Program:
+        for chunk in chunks(self.data):
+            self._chunk(chunk)
+        if self.nesting and not self.ended:
+            raise ProgramError(f"{shown(self.nesting[-1])} has no end", line=max(self.data.count(b"\n"), 1))
+        x, y, z = self.start
+        end = self.ended or self.data.count(b"\n") + 1
+        return self.out.program(self.table.frames, (x, y, z), end, b"")
+
+    def _chunk(self, chunk: Chunk) -> None:
+        out = self.out
+        out.begin(chunk)
+        events: list[Statement] = []
+        alone: list[Point] = []
+        for found in () if self.ended else chunk.statements(_NO_TEXT):
+            if isinstance(found, Comment):
+                self._check_comment(chunk, found)
+                continue
+            if self._in_header(found):
+                continue
+            _, major = found.head()
+            if major in (b"GOTO", b"PTMEAS"):
+                point = self._point(found, major)
+                alone.append(point)
+                if major == b"PTMEAS":
+                    self.touches.add(point.line)
+            if major != b"GOTO":
+                events.append(found)
+        self.points = out.points(chunk, alone)
+        self.done = 0
+        upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
+        for statement, row in zip(events, upto, strict=True):
+            self._event(statement, row)
+            if self.ended:
+                break
+        if not self.ended:
+            self._resolve(len(self.points))
+        out.finish()
+
+    def _in_header(self, statement: Statement) -> bool:
+        """The block BEGIN/CHFILE … END/CHFILE of WinWerth holds keys and values, no statements."""
+        text = b"".join(statement.text.upper().split())
+        was = self.header
+        if text == b"BEGIN/CHFILE":
+            self.header = True
+        elif text == b"END/CHFILE":
+            self.header = False
+        return was or self.header
+
+    def _check_comment(self, chunk: Chunk, comment: Comment) -> None:
+        """A comment that ends with `$` goes on: what follows has to be a comment too, or nobody can tell."""
+        if not comment.text.rstrip().endswith(b"$") or comment.text.strip() == b"$$":
+            return
+        line = comment.line - chunk.first_line
+        if line < len(chunk.line_start):
+            after = chunk.raw(line).strip()
+            if after and not after.startswith(b"$$"):
+                raise ProgramError(
+                    "the comment before ends with `$`, so this line may belong to it; take that `$` away, or "
+                    "put `$$` before this line",
+                    line=comment.line + 1,
+                )
+
+    def _event(self, statement: Statement, row: int) -> None:
+        label, major = statement.head()
+        text = statement.text.strip()
+        if major.startswith(b"(") and major.endswith(b")"):
+            return
+        first = major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major
+        handler = self._handlers.get(first)
+        if handler is not None:
+            handler(statement, label, row)
+            return
+        if first == b"PTMEAS":
+            if self.feature is None:
+                raise ProgramError("PTMEAS stands outside MEAS and ENDMES", line=statement.line)
+            self.feature = (self.feature[0], True)
+            return
+        if label and b"/" not in statement.text:
+            raise ProgramError(
+                f"{shown(label)} is assigned, and what depends on it is known at run time only",
+                line=statement.line,
+            )
+        known = TABLE.get(first)
+        if known is None and not text:
+            return
+        support, why = known or (Support.REFUSED, "is no statement that olp knows, and may move")
+        if support is Support.REFUSED:
+            raise ProgramError(f"{shown(first)} {why}", line=statement.line)
+
+    # -- points --------------------------------------------------------------------------------------
+
+    def _point(self, statement: Statement, major: bytes) -> Point:
+        fields = statement.fields()
+        if fields and fields[-1].text == b"":
+            fields = fields[:-1]
+        if fields and fields[0].text == b"CART":
+            fields = fields[1:]
+        elif major == b"PTMEAS" or (fields and fields[0].number is None):
+            said = shown(fields[0].text) if fields else "nothing"
+            raise ProgramError(
+                f"{shown(major)}/{said} is not read; expected CART and x,y,z as numbers", line=statement.line
+            )
+        bad = next((f for f in fields if f.number is None), None)
+        if bad is not None:
+            raise ProgramError(
+                f"{shown(major)} names {shown(bad.text) or 'nothing'} where a number is expected; its value "
+                "is known at run time only",
+                line=statement.line,
+            )
+        if len(fields) not in ((3, 6) if major == b"PTMEAS" else (3,)):
+            raise ProgramError(
+                f"{shown(major)} has {len(fields)} numbers; expected x,y,z"
+                + (" and a direction" if major == b"PTMEAS" else ""),
+                line=statement.line,
+            )
+        return Point(statement.line, statement.begin, statement.end, fields[:3])
+
+    def _resolve(self, upto: int) -> None:
+        """The points up to `upto`, which have one frame and one stylus."""
+        a, self.done = self.done, max(upto, self.done)
+        if upto <= a:
+            return
+        part = slice(a, upto)
+        line = self.points.line[part]
+        wide = ~np.isnan(self.points.direction[part][:, 0])
+        if wide.any():
+            raise ProgramError("GOTO has 6 numbers; expected x,y,z", line=int(line[np.flatnonzero(wide)[0]]))
+        if self.macro is not None:
+            raise ProgramError(f"the macro {self.macro} moves, which is not read", line=int(line[0]))
+        number = self._frame(int(line[0]))
+        frame = self.table.frames[number]
+        value = self.points.value[part] * self.unit_mm
+        if frame.turn is not None:
+            value = value @ np.array(frame.turn).T
+        end = value + np.array(frame.offset_mm)
+        touch = np.array([n in self.touches for n in line.tolist()])
+        kind = np.where(touch, np.uint8(Kind.PROBE), np.uint8(Kind.RAPID))
+        flag = np.where(touch, np.uint8(Flag.WHOLE), np.uint8(0))
+        if self.manual:
+            flag |= np.uint8(Flag.PASS)
+        if not self.unit_stated:
+            self.out.remarks.setdefault("unit", (int(line[0]), "the program states no UNITS"))
+        self.out.put_moves(
+            kind, flag, line, np.full(len(line), number), end, self.points.slot[part],
+            self.points.begin[part], self.points.end[part],
+        )  # fmt: skip
+
+    # -- events --------------------------------------------------------------------------------------

@@ -1,0 +1,242 @@
+"""The feed of each move, from the F, S and G93 to G95 words of a program that has been read.
+
+An F word counts with the unit in force where it is written: a later G20 or G21 does not change it. A change
+of feed mode forgets F; LinuxCNC forgets it at each G94 and G95.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.units import MM_PER_INCH
+from olp.program.program import Program, Words
+from olp.program.rs274.motion import Array, Index, Mask
+
+_POW10 = 10.0 ** np.arange(19)
+_PER_MINUTE, _PER_TURN, _INVERSE = 940, 950, 930
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scan:
+    """The words of a program that tell about time: `word` (k,) their indices, `line` (k,) counted from 1;
+    the G codes among them once more, as ten times their number, in `code` and `code_line`."""
+
+    program: Program
+    words: Words
+    word: Index
+    line: Index
+    code: Index
+    code_line: Index
+    iso: bool
+
+    @staticmethod
+    def of(program: Program, words: Words, *, block_delete: bool) -> Scan:
+        """The F, G, M and S words of the blocks that are carried out."""
+        found = [np.flatnonzero(words.letter == letter) for letter in b"FGMS"]
+        word = np.sort(np.concatenate(found))
+        line = np.searchsorted(words.first_word, word, "right")
+        active = line <= program.end_line
+        if block_delete:
+            active &= ~np.isin(line, deleted_lines(program))
+        word, line = word[active], line[active]
+        g = words.letter[word] == ord("G")
+        code = np.rint(numbers(words, word[g]) * 10).astype(np.int64)
+        # axis words of ISO controls have increments, and so have their times
+        return Scan(program, words, word, line, code, line[g], program.rs274.cycles_apart)
+
+    def of_letter(self, letter: bytes) -> tuple[Index, Index]:
+        """Indices and lines of the words of a letter."""
+        mine = self.words.letter[self.word] == ord(letter)
+        return self.word[mine], self.line[mine]
+
+
+def numbers(words: Words, word: Index) -> Array:
+    """The numbers of words, as written."""
+    return np.asarray(words.mantissa[word] / _POW10[words.decimals[word]], float)
+
+
+def deleted_lines(program: Program) -> Index:
+    """The lines that start with `/`, counted from 1."""
+    text = np.frombuffer(program.data, np.uint8)
+    slash = np.flatnonzero(text == ord("/"))
+    line = np.searchsorted(program.line_start, slash, "right")
+    start = program.line_start[line - 1]
+    pairs = zip(start.tolist(), slash.tolist(), strict=True)
+    blank = [not program.data[a:b].strip() for a, b in pairs]
+    return np.unique(line[np.array(blank, bool)])
+
+
+def lengths_mm(path: Toolpath) -> Array:
+    """(n,) length of each move, along the arc where it is one; NaN from or to unknown positions."""
+    start, end = path.starts_mm(), path.end_mm
+    step = end - start
+    out = np.sqrt(np.einsum("ij,ij->i", step, step))
+    arcs = path.arcs
+    if len(arcs):
+        rows = np.arange(len(arcs))
+        axes = np.array(PLANES)[arcs.plane]
+        first, second, third = axes[:, 0], axes[:, 1], axes[:, 2]
+        centre = arcs.centre_mm
+        c0, c1 = centre[rows, first], centre[rows, second]
+        a, b = start[arcs.move], end[arcs.move]
+        radius = np.hypot(a[rows, first] - c0, a[rows, second] - c1)
+        radius = 0.5 * (radius + np.hypot(b[rows, first] - c0, b[rows, second] - c1))
+        out[arcs.move] = np.hypot(radius * arcs.sweep_rad, b[rows, third] - a[rows, third])
+    return np.asarray(out, float)
+
+
+def governing(scan: Scan) -> tuple[Index, Index]:
+    """(n,) the feed moves, and which of the F words of the scan, in order, gives the feed of each.
+
+    Raises ProgramError for a feed move without a feed, and a canned cycle in G93.
+    """
+    path = scan.program.toolpath
+    move = np.flatnonzero(path.kind != Kind.RAPID)
+    if not len(move):
+        return move, move
+    line = path.line[move].astype(np.int64)
+    mode, since = _modes(scan).at(line)
+    _, f_line = scan.of_letter(b"F")
+    latest = np.searchsorted(f_line, line, "right") - 1
+    inverse = mode == _INVERSE
+    # G93: a block's own; else since the mode began
+    needed = np.where(inverse, line, since)
+    stated = (latest >= 0) & (np.append(f_line, -1)[latest] >= needed)
+    _refuse(~stated, line, inverse)
+    _refuse_cycles(path, move, inverse, line)
+    return move, latest.astype(np.int64)
+
+
+def feeds(scan: Scan) -> Array:
+    """(n,) feed of each move in mm/s: inf for rapids, NaN for moves of the control's own and where the time
+    of G93 has no length. Raises ProgramError for a feed move without a feed, or one that cannot be read
+    right."""
+    path = scan.program.toolpath
+    out = np.full(len(path), np.inf)
+    out[(path.flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
+    move, latest = governing(scan)
+    if not len(move):
+        return out
+    line = path.line[move].astype(np.int64)
+    modes = _modes(scan)
+    mode, _ = modes.at(line)
+    f_word, f_line = scan.of_letter(b"F")
+    value, pointed = numbers(scan.words, f_word), scan.words.pointed[f_word]
+    unit = _unit(scan, f_line)
+    inverse = mode == _INVERSE
+    used = np.unique(latest)
+    _check_values(scan, modes, f_line[used], value[used], pointed[used], unit[used])
+    feed = value[latest] * unit[latest] / 60.0
+    turning = mode == _PER_TURN
+    if turning.any():
+        feed[turning] *= _spindle(scan, line[turning])
+    if inverse.any():
+        feed[inverse] = value[latest[inverse]] / 60.0 * lengths_mm(path)[move[inverse]]
+        feed[inverse & ~(feed > 0)] = np.nan
+    out[move] = feed
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Modes:
+    """Feed modes: (k,) lines on which each came into force, and the line from which F counts."""
+
+    line: Index
+    code: Index
+    since: Index
+
+    def at(self, line: Index) -> tuple[Index, Index]:
+        here = np.searchsorted(self.line, line, "right") - 1
+        return self.code[here], self.since[here]
+
+
+def _modes(scan: Scan) -> _Modes:
+    chosen = np.isin(scan.code, (_PER_MINUTE, _PER_TURN, _INVERSE))
+    line = np.concatenate(([0], scan.code_line[chosen]))
+    code = np.concatenate(([_PER_MINUTE], scan.code[chosen]))
+    changed = np.append(True, code[1:] != code[:-1])
+    if scan.program.dialect.name == "linuxcnc":
+        changed[1:] |= code[1:] != _INVERSE
+    since = np.maximum.accumulate(np.where(changed, line, 0))
+    return _Modes(line, code, since)
+
+
+def _unit(scan: Scan, line: Index) -> Array:
+    """mm per unit of F words on these lines; RS-274 takes F before a G20 or G21 of the same block."""
+    chosen = np.isin(scan.code, (200, 210))
+    side = "left" if scan.program.dialect.name == "linuxcnc" else "right"
+    before = np.searchsorted(scan.code_line[chosen], line, side=side)  # type: ignore[call-overload]
+    inch = np.concatenate(([False], scan.code[chosen] == 200))[before]
+    return np.asarray(np.where(inch, MM_PER_INCH, 1.0), float)
+
+
+def _spindle(scan: Scan, line: Index) -> Array:
+    """Turns a minute of the spindle: the S word in force on these lines."""
+    word, at = scan.of_letter(b"S")
+    value = numbers(scan.words, word)
+    here = np.searchsorted(at, line, "right")
+    turns = np.concatenate(([0.0], value))[here]
+    bad = ~(turns > 0)
+    if bad.any():
+        raise ProgramError(
+            "G95 counts its feed by turns of the spindle, and no S word came before; give S or use G94",
+            line=int(line[np.flatnonzero(bad)[0]]),
+        )
+    surface = np.isin(scan.code, (960, 970))
+    if (scan.code == 960).any():
+        mode = np.concatenate(([False], scan.code[surface] == 960))
+        constant = mode[np.searchsorted(scan.code_line[surface], line, "right")]
+        if constant.any():
+            raise ProgramError(
+                "under G96 the turns of the spindle, which G95 needs for the feed, depend on a radius; "
+                "use G97 or G94",
+                line=int(line[np.flatnonzero(constant)[0]]),
+            )
+    return turns
+
+
+def _refuse(missing: Mask, line: Index, inverse: Mask) -> None:
+    if not missing.any():
+        return
+    i = int(np.flatnonzero(missing)[0])
+    if inverse[i]:
+        raise ProgramError("in G93 each feed move needs an F word of its own", line=int(line[i]))
+    raise ProgramError(
+        "a feed move has no feed: no F word came since the feed mode (G93, G94, G95) was set; give F",
+        line=int(line[i]),
+    )
+
+
+def _refuse_cycles(path: Toolpath, move: Index, inverse: Mask, line: Index) -> None:
+    bad = inverse & ((path.flag[move] & np.uint8(Flag.CYCLE)) != 0)
+    if bad.any():
+        raise ProgramError(
+            "in G93 a block has one time, and a canned cycle makes many moves; use G94",
+            line=int(line[np.flatnonzero(bad)[0]]),
+        )
+
+
+def _check_values(scan: Scan, modes: _Modes, line: Index, value: Array, pointed: Mask, unit: Array) -> None:
+    """Refuse feeds that are not above zero, and those whose missing point leaves open what they are."""
+    bad = ~(value > 0)
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        raise ProgramError(f"the feed F{value[i]:g} is not above zero", line=int(line[i]))
+    if scan.program.calculator:
+        return
+    # Fanuc counts whole mm/min; Haas asks its setting 77, and other units have increments of their own
+    mode, _ = modes.at(line)
+    plain = (mode == _PER_MINUTE) & (unit == 1.0) & (scan.program.dialect.name == "fanuc")
+    open_ = ~pointed & ~plain & (mode != _INVERSE)
+    if open_.any():
+        i = int(np.flatnonzero(open_)[0])
+        raise ProgramError(
+            f"F{value[i]:g} has no decimal point, and what it counts depends on the control's settings; "
+            'write a point, or state decimal_point = "calculator" in the machine file',
+            line=int(line[i]),
+        )

@@ -1,0 +1,65 @@
+"""The feed of each move and the word that says it, whatever the dialect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.core.errors import ProgramError, UsageError
+from olp.core.toolpath import Flag, Kind
+from olp.program.feeds.moves import Scan, feeds, governing
+from olp.program.program import Program, Statements, Words
+from olp.program.rs274.motion import Array, Index
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FeedWords:
+    """The (k,) words that say feeds and their lines, and of the m feed moves that one of them governs the
+    `move` and which word it is, `owner`."""
+
+    word: Index
+    line: Index
+    move: Index
+    owner: Index
+
+
+def feed_words(program: Program, words: Words, *, block_delete: bool) -> FeedWords:
+    """Which word governs which move. Raises ProgramError for a feed move without a feed."""
+    if program.statements is None:
+        scan = Scan.of(program, words, block_delete=block_delete)
+        word, line = scan.of_letter(b"F")
+        return FeedWords(word, line, *governing(scan))
+    _stated(program, program.statements)
+    said = program.statements.feeds
+    move = np.flatnonzero(program.toolpath.kind != Kind.RAPID)
+    latest = np.searchsorted(said.move, move, "right") - 1
+    own = said.word[latest] >= 0
+    # a word may count again behind a cycle, which has a feed of its own
+    word, first, which = np.unique(said.word, return_index=True, return_inverse=True)
+    none = int((word < 0).any())
+    return FeedWords(word[none:], said.line[first[none:]], move[own], which.reshape(-1)[latest[own]] - none)
+
+
+def programmed(program: Program, *, block_delete: bool = False) -> Array:
+    """(n,) feed of each move in mm/s: inf for rapids, NaN for moves of the control's own and where it is not
+    known. Raises ProgramError for a feed move without a feed, UsageError for a program read without words."""
+    if program.statements is not None:
+        return _stated(program, program.statements)
+    if program.words is None:
+        raise UsageError("the program was read without its words; feeds need them")
+    return feeds(Scan.of(program, program.words, block_delete=block_delete))
+
+
+def _stated(program: Program, statements: Statements) -> Array:
+    path, feed = program.toolpath, statements.feed_mm_s
+    free = np.uint8(Flag.CONTROL | Flag.CYCLE)
+    lacking = (path.kind == Kind.LINE) | (path.kind == Kind.ARC_CW) | (path.kind == Kind.ARC_CCW)
+    lacking &= ((path.flag & free) == 0) & ~(feed > 0)
+    if lacking.any():
+        raise ProgramError(
+            "a feed move has no feed that is a speed: none in a unit of speed, or a turn of a spindle whose "
+            "turns are said, came before it",
+            line=int(path.line[np.flatnonzero(lacking)[0]]),
+        )
+    return feed

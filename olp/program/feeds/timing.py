@@ -1,0 +1,204 @@
+"""What a program says about time: feeds, path modes, dwells and rests, beside the moves of its toolpath.
+
+A second look at the words of a program that has been read, for re-timing alone: reading for a correction does
+nothing for it. Sources: NIST IR 6556 (3.5, 3.8: order of execution, G93 to G95, G61 and G64), LinuxCNC's
+interpreter (tests/program/feeds/test_timing.py asks it), and the manuals of Fanuc, Haas and Grbl for what
+differs there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import ProgramError, UsageError
+from olp.core.toolpath import Kind
+from olp.program.feeds.moves import Scan, numbers
+from olp.program.feeds.stated import programmed
+from olp.program.program import Program, Statements
+from olp.program.rs274.motion import Array, Index, Mask
+
+#: How far a control may round corners where a program does not say: Grbl's default of $11, and what a person
+#: expects of a finishing cut.
+BLEND_MM = 0.01
+
+#: M codes that LinuxCNC carries out along with the motion, without a rest: M62, M63, M67.
+_ALONG = (620, 630, 670)
+#: M codes that take effect after the motion of their block: on all controls, and on ISO controls besides.
+_AFTER = (0, 10, 20, 300, 600)
+_AFTER_ISO = (50, 90)
+
+
+class PathControl(IntEnum):
+    """How a control passes from block to block."""
+
+    BLEND = 0  #: G64: rounds corners within a tolerance
+    EXACT_PATH = 1  #: G61 of RS-274: stays on the path, rests only where that has a corner
+    EXACT_STOP = 2  #: G61.1, and G61 of ISO controls: rests at the end of each block
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mode:
+    """A path mode from its line on; `stated_mm` is the tolerance that the program gives for it, None where
+    it gives none."""
+
+    line: int
+    control: PathControl
+    stated_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Timing:
+    """Of n moves: (n,) `feed_mm_s`, inf for rapids and NaN where the control moves by itself or a time has no
+    length; (n,) `control`, values of `PathControl`, and `blend_mm`, the tolerance of G64 where it is in force
+    (0 elsewhere). Of the n + 1 places before, between and after them: `rest` (n + 1,), whether the motion has
+    to rest there, and `dwell_s` (n + 1,), for how long at least."""
+
+    feed_mm_s: Array
+    control: npt.NDArray[np.uint8]
+    blend_mm: Array
+    rest: Mask
+    dwell_s: Array
+
+
+def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool = False) -> Timing:
+    """Feeds, path modes, rests and dwells of a program that was read with its words.
+
+    `blend_mm` is the tolerance where the path mode is G64 without one; `block_delete` as in the reading.
+    Raises ProgramError with its line for a feed move without a feed, and for a feed or a dwell that cannot
+    be read right; UsageError for a tolerance of nothing, and where the program was read without words.
+    """
+    if not blend_mm > 0:
+        raise UsageError(f"the tolerance of G64 is {blend_mm:g} mm; expected a length above zero")
+    if program.words is None:
+        raise UsageError("the program was read without its words; re-timing needs them")
+    path = program.toolpath
+    feed = np.array(programmed(program, block_delete=block_delete))
+    if program.statements is not None:
+        return _of_statements(program, program.statements, feed, blend_mm)
+    scan = Scan.of(program, program.words, block_delete=block_delete)
+    control, blend = _path_control(program, _modes(program, scan), blend_mm)
+    rest, dwell = _rests(program, scan)
+    probes = np.flatnonzero(path.kind == Kind.PROBE)
+    rest[probes + 1] = True
+    if scan.iso:
+        # in-position check of G0 on both sides, whatever the mode
+        rapids = np.flatnonzero(path.kind == Kind.RAPID)
+        rest[rapids] = rest[rapids + 1] = True
+    for hole in program.holes:
+        for at, seconds in hole.rests:
+            if not seconds >= 0:
+                raise ProgramError("a dwell cannot be negative", line=hole.line)
+            rest[hole.first + at] = True
+            dwell[hole.first + at] += seconds
+    for column in (feed, control, blend, rest, dwell):
+        column.setflags(write=False)
+    return Timing(feed, control, blend, rest, dwell)
+
+
+def _of_statements(program: Program, said: Statements, feed: Array, blend_mm: float) -> Timing:
+    """Statements say no path mode: the control blends within the tolerance, but for its mode at the start."""
+    count = len(program.toolpath)
+    rest, dwell = said.rest.copy(), said.dwell_s.copy()
+    probes = np.flatnonzero(program.toolpath.kind == Kind.PROBE)
+    rest[probes + 1] = True
+    stops = any(mode.name == "G61.1" for mode in program.path_modes)
+    control = np.full(count, PathControl.EXACT_STOP if stops else PathControl.BLEND, np.uint8)
+    blend = np.full(count, 0.0 if stops else blend_mm)
+    for column in (feed, control, blend, rest, dwell):
+        column.setflags(write=False)
+    return Timing(feed, control, blend, rest, dwell)
+
+
+def path_modes(program: Program, *, block_delete: bool = False) -> tuple[Mode, ...]:
+    """The path modes of a program that was read with its words, in the order of lines; before the first one
+    the control blends, with a tolerance of its own. Statements say none: the machine file does."""
+    if program.statements is not None:
+        return tuple(Mode(m.line, PathControl.EXACT_STOP) for m in program.path_modes if m.name == "G61.1")
+    assert program.words is not None
+    return _modes(program, Scan.of(program, program.words, block_delete=block_delete))
+
+
+def _modes(program: Program, scan: Scan) -> tuple[Mode, ...]:
+    found = []
+    for mode in program.path_modes:
+        code = mode.name.split()[0]
+        if code == "G64":
+            # P0 and less is no tolerance, as LinuxCNC's trajectory planner takes it
+            stated = mode.tolerance_mm if mode.tolerance_mm is not None and mode.tolerance_mm > 0 else None
+            found.append(Mode(mode.line, PathControl.BLEND, stated))
+        else:
+            stop = code == "G61.1" or scan.iso
+            found.append(Mode(mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH))
+    if scan.iso:
+        # G62 and G63 end exact stop as G64 does
+        lines = scan.code_line[np.isin(scan.code, (620, 630))].tolist()
+        found += [Mode(line, PathControl.BLEND) for line in lines]
+    return tuple(sorted(found, key=lambda mode: mode.line))
+
+
+def _path_control(
+    program: Program, modes: tuple[Mode, ...], blend_mm: float
+) -> tuple[npt.NDArray[np.uint8], Array]:
+    """Per move its path mode and tolerance; a mode holds from its own block on."""
+    at = np.searchsorted(np.array([m.line for m in modes], np.int64), program.toolpath.line, "right")
+    control = np.array([PathControl.BLEND] + [m.control for m in modes], np.uint8)[at]
+    stated = [blend_mm if m.stated_mm is None else m.stated_mm for m in modes]
+    blend = np.array([blend_mm, *stated], float)[at]
+    blend[control != PathControl.BLEND] = 0.0
+    return control, blend
+
+
+def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
+    """Where the motion rests, and how long, for what stands in blocks: G4, G9, M and S words."""
+    line = program.toolpath.line
+    rest = np.zeros(len(line) + 1, bool)
+    dwell = np.zeros(len(line) + 1)
+    word, at = scan.of_letter(b"M")
+    code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
+    if program.dialect.name == "linuxcnc":
+        at, code = at[~np.isin(code, _ALONG)], code[~np.isin(code, _ALONG)]
+    late = np.isin(code, _AFTER + _AFTER_ISO if scan.iso else _AFTER)
+    rest[np.searchsorted(line, at[late], "right")] = True
+    rest[np.searchsorted(line, at[~late], "left")] = True
+    rest[np.searchsorted(line, scan.of_letter(b"S")[1], "left")] = True
+    if scan.iso:
+        rest[np.searchsorted(line, scan.code_line[scan.code == 90], "right")] = True
+    pauses = scan.code_line[scan.code == 40]
+    if len(pauses):
+        where = np.searchsorted(line, pauses, "left")
+        rest[where] = True
+        np.add.at(dwell, where, _dwell_seconds(program, scan, pauses))
+    return rest, dwell
+
+
+def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
+    """Seconds of each G4 block: P, and on ISO controls X or U too."""
+    words = scan.words
+    first = words.first_word[pauses - 1].astype(np.int64)
+    count = words.first_word[pauses] - first
+    owner = np.repeat(np.arange(len(pauses)), count)
+    word = np.repeat(first - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
+    time = np.isin(words.letter[word], list(b"PXU" if scan.iso else b"P"))
+    owner, word = owner[time], word[time]
+    stated = np.bincount(owner, minlength=len(pauses))
+    if (stated > 1).any():
+        raise ProgramError(
+            "a dwell has two times in one block", line=int(pauses[np.flatnonzero(stated > 1)[0]])
+        )
+    if not scan.iso and (stated == 0).any():
+        raise ProgramError(
+            "a dwell G4 has no P word with its time", line=int(pauses[np.flatnonzero(stated == 0)[0]])
+        )
+    number = numbers(words, word)
+    pointed = words.pointed[word]
+    seconds = np.zeros(len(pauses))
+    # P counts milliseconds where it has no point; X and U do where lengths count increments
+    bare = ~pointed & ((words.letter[word] == ord("P")) | (not program.calculator))
+    seconds[owner] = np.where(bare & scan.iso, number / 1000.0, number)
+    if (seconds < 0).any():
+        raise ProgramError("a dwell cannot be negative", line=int(pauses[np.flatnonzero(seconds < 0)[0]]))
+    return seconds

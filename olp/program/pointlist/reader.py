@@ -1,0 +1,243 @@
+"""Reads a list of positions as a program: a row a place, in order, with whatever else the rows hold.
+
+A list says where the machine goes, hardly ever how: so rows are way-points, and what lies between them is
+judged only where the layout says that they are joined by straight lines. Only X, Y and Z are ever edited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import InputError, ProgramError
+from olp.core.machine import Setup
+from olp.core.toolpath import Array, Flag, Frame, Kind
+from olp.program.dialect import Dialect, Options, Row, Support
+from olp.program.frames import FrameTable
+from olp.program.places import frame_index
+from olp.program.pointlist.columns import columns
+from olp.program.program import Program
+from olp.program.text.delimited import AXES, MM_S, Cells, Layout, first_lines, stated_frame, told
+from olp.program.text.numbers import number
+from olp.program.verbatim import Moves
+
+_TURNING = ("A", "B", "C", "I", "J", "K")
+_SUPPORT = {
+    "X": (Support.CORRECTED, ""),
+    "Y": (Support.CORRECTED, ""),
+    "Z": (Support.CORRECTED, ""),
+    "tool": (Support.READ, "the tool of the row: its lever"),
+    "A": (Support.CARRIED, "three linear axes cannot turn the tool"),
+    "B": (Support.CARRIED, "three linear axes cannot turn the tool"),
+    "C": (Support.CARRIED, "three linear axes cannot turn the tool"),
+    "I": (Support.CARRIED, "three linear axes cannot turn the tool"),
+    "J": (Support.CARRIED, "three linear axes cannot turn the tool"),
+    "K": (Support.CARRIED, "three linear axes cannot turn the tool"),
+    "speed": (Support.CARRIED, ""),
+    "blend": (Support.CARRIED, ""),
+    "t": (Support.CARRIED, "with a column of time no row is inserted"),
+    "name": (Support.CARRIED, ""),
+    "line": (Support.CARRIED, ""),
+    "any other column": (Support.CARRIED, ""),
+    "comment": (Support.CARRIED, ""),
+    "a row that is no row of numbers": (Support.REFUSED, "it may be a place"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointList(Dialect):
+    """A list of positions; `layout` None: told from its first rows."""
+
+    family: str = "list"
+    layout: Layout | None = None
+
+    def rows(self) -> Sequence[Row]:
+        return [Row(f"column {k}" if len(k) < 6 else k, what, why) for k, (what, why) in _SUPPORT.items()]
+
+
+POINT_LIST = PointList(
+    name="list", title="list of positions (CSV, TXT)", path_mode="not stated", comment=(b"# ", b"")
+)
+
+
+def with_layout(layout: Layout) -> PointList:
+    """The dialect of lists that are laid out so."""
+    comment = (layout.comment.encode() + b" ", b"")
+    return replace(POINT_LIST, layout=layout, comment=comment, marks=layout.stamp)
+
+
+@dataclass(slots=True)
+class _Found:
+    """Rows of a list: line, bytes, feed and numbers of each, as lists or columns, the `values` as written,
+    tools and orientations; and the line where each tool comes first."""
+
+    line: Any = field(default_factory=list)
+    bounds: Any = field(default_factory=list)
+    feed: Any = field(default_factory=list)
+    spans: Any = field(default_factory=list)
+    plain: tuple[Any, Any, Any, Any] | None = None
+    values: Sequence[Sequence[float]] | Array = ()
+    tool: list[int | None] = field(default_factory=list)
+    tools: dict[int | None, int] = field(default_factory=dict)
+    turns: dict[tuple[str, ...], int] = field(default_factory=dict)
+
+
+def read_list(
+    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a list. Raises ProgramError with the line of what is wrong."""
+    assert isinstance(dialect, PointList)
+    try:
+        layout = dialect.layout or told(first_lines(data))
+        if layout is None:
+            raise ProgramError(
+                "does not tell which columns hold X, Y and Z; name them by name or number with --column X=.. "
+                "--column Y=.. --column Z=.., or give a profile with --profile"
+                if data.strip()
+                else "holds no positions; expected a row a place"
+            )
+        unit = layout.unit_mm
+        found = _rows(data, layout)
+    except InputError as error:
+        raise ProgramError(error.message, line=error.line) from None
+    frame_name = stated_frame(first_lines(data)) or layout.frame
+    table = FrameTable(setup)
+    kind = Kind.LINE if layout.joined == "lines" else Kind.RAPID
+    whole = kind is Kind.LINE and (not layout.insert or "t" in layout.columns)
+    name = frame_name or setup.machine.default_work_offset
+    count = len(found.line)
+    index = {tool: frame_index(table, setup, name, tool, unit, line) for tool, line in found.tools.items()}
+    frames = table.frames
+    frame = np.zeros(count, np.int32)
+    if len(index) > 1:
+        frame[:] = [index[tool] for tool in found.tool]
+    kinds = np.full(count, kind, np.uint8)
+    kinds[:1] = Kind.RAPID
+    moves = Moves(plain=found.plain)
+    moves.put_all(
+        kind=kinds, flag=np.full(count, Flag.WHOLE if whole else 0), line=found.line, frame=frame,
+        end=_placed(frames, frame, np.array(found.values, float).reshape(-1, 3)),
+        slot=np.arange(3 * count), bounds=found.bounds, feed=found.feed, spans=found.spans,
+    )  # fmt: skip
+    return moves.program(
+        data, dialect, setup, frames, _remarks(layout, found, frame_name, setup),
+        decimal=b"," if layout.decimal == "comma" else b".", words=words,
+    )  # fmt: skip
+
+
+def _placed(frames: Sequence[Frame], index: npt.NDArray[np.int32], values: Array) -> Array:
+    """(n, 3) axis positions of the numbers of rows (n, 3)."""
+    out = np.empty_like(values)
+    for i, frame in enumerate(frames):
+        rows = index == i
+        said = values[rows] * frame.unit_mm
+        turned = said if frame.turn is None else said @ np.array(frame.turn).T
+        out[rows] = turned + np.array(frame.offset_mm)
+    return out
+
+
+def _in_columns(
+    data: bytes, layout: Layout, cells: Cells, xyz: list[int], tool: int | None, speed: int | None,
+    turning: list[int],
+) -> _Found | None:  # fmt: skip
+    """The rows of a plain table, None where it is not plain."""
+    speed = speed if layout.speed_unit is not None else None
+    others = [*turning, *(p for p in (tool, speed) if p is not None)]
+    plain = columns(data, layout, cells.header_line, xyz, others)
+    if plain is None:
+        return None
+    count = len(plain.line)
+    texts = [[data[a:b] for a, b in plain.cells[:, k].tolist()] for k in range(len(others))]
+    found = _Found(values=plain.value)
+    rows = texts[: len(turning)]
+    for k, turn in enumerate(zip(*rows, strict=True) if rows else [()]):
+        found.turns.setdefault(tuple(t.decode("latin-1") for t in turn), int(plain.line[k]))
+    found.tools[None] = int(plain.line[0])
+    if tool is not None:
+        said = texts[len(turning)]
+        if not all(t.isdigit() for t in said):
+            return None
+        found.tool = [int(t) for t in said]
+        first = dict(zip(reversed(found.tool), reversed(plain.line.tolist()), strict=True))
+        found.tools = {t: first[t] for t in dict.fromkeys(found.tool)}
+    feed = np.full(count, np.nan)
+    if speed is not None and layout.speed_unit is not None:
+        known = [number(t, b"," if layout.decimal == "comma" else b".") for t in texts[-1]]
+        if None in known:
+            return None
+        feed = np.array([k.value for k in known if k is not None]) * MM_S[layout.speed_unit]
+    found.line, found.feed = plain.line, feed
+    found.bounds = np.column_stack((plain.begin, plain.end))
+    found.spans = np.column_stack((plain.start.ravel(), plain.stop.ravel()))
+    found.plain = (plain.mantissa.ravel(), plain.decimals.ravel(), plain.start.ravel(), plain.stop.ravel())
+    return found
+
+
+def _rows(data: bytes, layout: Layout) -> _Found:
+    cells = Cells(data, layout)
+    decimal = b"," if layout.decimal == "comma" else b"."
+    places = [cells.place(axis) for axis in AXES]
+    if None in places:
+        raise InputError("has no columns for X, Y and Z; name them with --column X=.. or in a profile")
+    xyz = [p for p in places if p is not None]
+    tool, speed = cells.place("tool"), cells.place("speed")
+    factor = MM_S[layout.speed_unit] if layout.speed_unit else float("nan")
+    feed = float("nan")
+    turning = [p for role in _TURNING if (p := cells.place(role)) is not None]
+    plain = _in_columns(data, layout, cells, xyz, tool, speed, turning)
+    if plain is not None:
+        return plain
+    found = _Found()
+    values: list[tuple[float, ...]] = []
+    for line, row in cells.rows():
+        if max(xyz) >= len(row):
+            raise InputError(
+                f"{len(row)} columns; expected at least {max(xyz) + 1} between {layout.delimiter}s", line=line
+            )
+        numbers = [number(data[slice(*row[p])], decimal) for p in xyz]
+        wrong = next((p for p, n in zip(xyz, numbers, strict=True) if n is None), None)
+        if wrong is not None:
+            raise InputError(
+                f'column {wrong + 1} is "{cells.text(row[wrong])[:40]}"; expected a number with a decimal '
+                f"{layout.decimal}",
+                line=line,
+            )
+        text = cells.text(row[tool]) if tool is not None and tool < len(row) else ""
+        if text and not text.isdigit():
+            raise InputError(
+                f'"{text}" is no tool number; expected the number of a table [tools.N]', line=line
+            )
+        said = number(data[slice(*row[speed])], decimal) if speed is not None and speed < len(row) else None
+        # a row without a speed keeps that of the row before
+        feed = feed if said is None else said.value * factor
+        found.feed.append(feed)
+        known = [n for n in numbers if n is not None]
+        found.spans += [row[p] for p in xyz]
+        found.line.append(line)
+        found.bounds.append(cells.bounds)
+        values.append(tuple(n.value for n in known))
+        found.turns.setdefault(tuple(cells.text(row[p]) for p in turning if p < len(row)), line)
+        found.tool.append(int(text) if text else None)
+        found.tools.setdefault(found.tool[-1], line)
+    found.values = values
+    return found
+
+
+def _remarks(
+    layout: Layout, found: _Found, frame_name: str | None, setup: Setup
+) -> list[tuple[str, int, str]]:
+    line = int(found.line[0]) if len(found.line) else 1
+    out = [("told", line, said) for said in layout.assumed]
+    if frame_name is None:
+        out.append(("told", line, f"positions are stated in {setup.machine.default_work_offset}"))
+    if len(found.turns) > 1:
+        out.append(("turning", list(found.turns.values())[1], "the orientation changes from row to row"))
+    if not layout.stamp:
+        out.append(("unmarked", line, "the profile allows no comment, so nothing marks the corrected list"))
+    if layout.joined == "points":
+        out.append(("joined", line, "how the machine goes from row to row is not stated"))
+    return out

@@ -1,0 +1,127 @@
+"""What a reading collects, chunk by chunk: word, move and arc columns, holes and remarks; at its end the
+`Program` of them.
+
+Nothing here interprets; indices of words count over the whole text (`Context.base` leads from a chunk there).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.toolpath import Arcs, Toolpath
+from olp.program.program import ArcSlots, Hole, Program, Words
+from olp.program.rs274.lexer import WordChunk
+from olp.program.rs274.motion import Array, Index, Mask
+from olp.program.rs274.state import State
+from olp.program.text.columns import Columns
+
+
+class Collector:
+    """The columns of one program on their way. Without `keep_words` those that only writing needs are left
+    out.
+
+    `moves` and `word_count` count what came so far, `start` is the axis position before the first move.
+    `remarks` leads from a name to the first line of it and a text.
+    """
+
+    def __init__(self, data: bytes, start: tuple[float, float, float], *, keep_words: bool) -> None:
+        self.data = data
+        self.start = start
+        self.keep_words = keep_words
+        self.columns = Columns(len(data) // 3)
+        self.moves = self.word_count = 0
+        self.holes: list[Hole] = []
+        self.remarks: dict[str, tuple[int, str]] = {}
+
+    def put_words(self, chunk: WordChunk) -> None:
+        self.columns.put("line_start", chunk.line_start, np.int32)
+        self.columns.put("line_end", chunk.line_end, np.int32)
+        if self.keep_words:
+            for name in ("letter", "mantissa", "decimals", "pointed"):
+                column = getattr(chunk, name)
+                self.columns.put(name, column, column.dtype)
+            for name in ("start", "number", "end"):
+                self.columns.put("word_" + name, getattr(chunk, name), np.int32)
+            self.columns.put("first_word", chunk.first_word[:-1] + self.word_count, np.int32)
+        self.word_count += len(chunk.letter)
+
+    def put_moves(
+        self,
+        kind: npt.NDArray[np.uint8],
+        flag: npt.NDArray[np.uint8],
+        line: npt.ArrayLike,
+        frame: npt.ArrayLike,
+        end: Array,
+        slot: npt.ArrayLike,
+    ) -> None:
+        self.columns.put("kind", kind, np.uint8)
+        self.columns.put("flag", flag, np.uint8)
+        self.columns.put("line", line, np.int32)
+        self.columns.put("frame", frame, np.int32)
+        self.columns.put("end", end, np.float64)
+        if self.keep_words:
+            self.columns.put("slot", slot, np.int32)
+        self.moves += len(kind)
+
+    def put_arcs(
+        self, move: Index, centre: Array, plane: Index, sweep: Array, words: Index, absolute: Mask
+    ) -> None:
+        self.columns.put("arc_move", move, np.int64)
+        self.columns.put("arc_centre", centre, np.float64)
+        self.columns.put("arc_plane", plane, np.int8)
+        self.columns.put("arc_sweep", sweep, np.float64)
+        self.columns.put("arc_words", words, np.int32)
+        self.columns.put("arc_absolute", absolute, np.bool_)
+
+    def program(self, state: State, end_line: int) -> Program:
+        """All of it, with the frames and path modes of the final `state`. Takes the columns: once only."""
+        return Program(
+            data=self.data,
+            dialect=state.profile,
+            toolpath=self._toolpath(state),
+            words=self._words() if self.keep_words else None,
+            slot=self.columns.take("slot", np.int32, 3),
+            arc_slots=ArcSlots(
+                self.columns.take("arc_words", np.int32, 5), self.columns.take("arc_absolute", np.bool_)
+            ),
+            line_start=self.columns.take("line_start", np.int32),
+            line_end=self.columns.take("line_end", np.int32),
+            captures=tuple(state.captures),
+            path_modes=tuple(state.path_modes),
+            holes=tuple(self.holes),
+            remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
+            end_line=end_line,
+            calculator=not state.bare_increments,
+        )
+
+    def _toolpath(self, state: State) -> Toolpath:
+        arcs = Arcs(
+            self.columns.take("arc_move", np.int64),
+            self.columns.take("arc_centre", np.float64, 3),
+            self.columns.take("arc_plane", np.int8),
+            self.columns.take("arc_sweep", np.float64),
+        )
+        return Toolpath(
+            kind=self.columns.take("kind", np.uint8),
+            flag=self.columns.take("flag", np.uint8),
+            line=self.columns.take("line", np.int32),
+            frame=self.columns.take("frame", np.int32),
+            end_mm=self.columns.take("end", np.float64, 3),
+            frames=tuple(state.frames),
+            arcs=arcs,
+            start_mm=self.start,
+        )
+
+    def _words(self) -> Words:
+        self.columns.put("first_word", [self.word_count], np.int32)
+        return Words(
+            self.columns.take("letter", np.uint8),
+            self.columns.take("mantissa", np.int64),
+            self.columns.take("decimals", np.int8),
+            self.columns.take("pointed", np.bool_),
+            self.columns.take("word_start", np.int32),
+            self.columns.take("word_number", np.int32),
+            self.columns.take("word_end", np.int32),
+            self.columns.take("first_word", np.int32),
+        )

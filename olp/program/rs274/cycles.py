@@ -1,0 +1,303 @@
+"""Geometry of the canned drilling cycles G73, G74, G81-G86 and G89: which strokes one hole makes.
+
+Pure functions of numbers in program coordinates and program units. Codes are integers, ten times the
+G number (810 is G81). The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC
+carries it out; `profile="fanuc"` gives that of Fanuc and Haas controls, which differ in these points only:
+
+- an initial level below R: LinuxCNC goes straight to R first; Fanuc positions in the plane at the level
+  where it stands, then goes to R.
+- a start at or below R in a series with G99: LinuxCNC rises to R, with G98 to the initial level, on its
+  diagonal way to the hole; Fanuc positions at the level where it stands.
+- tapping (G84, G74) and G89 feed up to R on Fanuc, then go to the initial level as a rapid; LinuxCNC
+  feeds all the way.
+- pecks: the clearance is 0.010 inch (0.254 mm) in LinuxCNC and a parameter of the control on Fanuc
+  (5114, 5115) and Haas (settings 22, 52). Pass it as `clearance`; where it is not known the end points
+  of the hole hold and the pecks between them do not.
+
+Grbl has no canned cycles. G76 and G87 (orientation and shift of the spindle) and G88 (an operator moves
+the axes by hand) are refused, and so is tapping outside G17 on LinuxCNC, whose release 2.9 sends the feed
+strokes of G84 and G74 there along the wrong axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from olp.core.errors import ProgramError
+
+Point = tuple[float, float, float]
+Kind = Literal["rapid", "feed", "dwell", "spindle"]
+Spindle = Literal["", "stop", "reverse", "restore"]
+
+#: Axis numbers (first, second, tool axis) of a plane; X is 0.
+PLANES: dict[int, tuple[int, int, int]] = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+
+#: The clearance between the bottom of the last peck and the end of the rapid that returns to it, in LinuxCNC.
+LCNC_CLEARANCE_MM = 0.254
+LCNC_CLEARANCE_INCH = 0.010
+
+_TAPPING = frozenset({740, 840})
+_PECKING = frozenset({730, 830})
+_DWELL_NEEDED = frozenset({820, 860, 890})
+# A peck step far below the resolution of the numbers would never end.
+_MAX_PECKS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """One step of a cycle. `x`, `y`, `z` is the position after it, in program coordinates and units.
+
+    `seconds` is the time of a dwell. `spindle` says what a spindle step does: "stop", "reverse" (start
+    in the other direction) or "restore" (start as before the cycle).
+    """
+
+    kind: Kind
+    x: float
+    y: float
+    z: float
+    seconds: float = 0.0
+    spindle: Spindle = ""
+
+    @property
+    def point(self) -> Point:
+        return (self.x, self.y, self.z)
+
+
+def levels(r: float, z: float, *, absolute: bool, initial_z: float) -> tuple[float, float]:
+    """Absolute R and Z levels from the words of the block.
+
+    In G91 (RS-274 and Fanuc alike) R counts from the initial level of the series, and Z from R.
+    """
+    if absolute:
+        return r, z
+    return initial_z + r, initial_z + r + z
+
+
+def hole_moves(
+    code: int,
+    *,
+    start: Point,
+    xy: tuple[float, float],
+    r: float,
+    z: float,
+    q: float | None = None,
+    p: float | None = None,
+    retract_to_r: bool,
+    initial_z: float,
+    plane: int = 17,
+    clearance: float = LCNC_CLEARANCE_MM,
+    profile: Literal["linuxcnc", "fanuc"] = "linuxcnc",
+) -> tuple[Stroke, ...]:
+    """Strokes of one hole, in order; rapids of zero length are left out, a feed of zero length is not.
+
+    `start` is the position before the block, (x, y, z). `xy` is the place of the hole along the first and
+    second axis of the plane: (X, Y) in G17, (Z, X) in G18, (Y, Z) in G19. `r`, `z` and `initial_z` are
+    absolute, along the tool axis; `initial_z` is the position on that axis before the first cycle of the
+    series of contiguous cycles. `q` is the peck, `p` the dwell in s, `clearance` the distance kept above
+    the last peck (G83) or drawn back after it (G73). All lengths in program units.
+
+    A second hole of the same series starts where the first ended, with the same `initial_z`.
+    Raises ProgramError (without a line) for a cycle without offline geometry and for words it cannot accept.
+    """
+    _check(code, plane, r, z, q, p)
+    if profile == "linuxcnc" and code in _TAPPING and plane != 17:
+        raise ProgramError(
+            f"G{code // 10} in plane G{plane}: LinuxCNC 2.9 taps along the wrong axes outside G17; use G17"
+        )
+    axes = PLANES[plane]
+    like_lcnc = profile == "linuxcnc"
+    level = start[axes[2]]
+    clear = r if retract_to_r else max(initial_z, r)
+    hole = _Hole(
+        position=list(start),
+        axes=axes,
+        r=r,
+        z=z,
+        q=q or 0.0,
+        p=p or 0.0,
+        clear=clear,
+        clearance=clearance,
+        feed_home=like_lcnc,
+    )
+    if like_lcnc:
+        if initial_z < r:
+            hole.rapid_to(r)
+        if level <= r or initial_z < r:
+            level = clear
+    hole.rapid_over(xy, level)
+    hole.rapid_to(r)
+    _RECIPES[code](hole)
+    return tuple(hole.strokes)
+
+
+def cycle_moves(
+    code: int,
+    *,
+    start: Point,
+    xy: tuple[float, float],
+    step: tuple[float, float] = (0.0, 0.0),
+    repeats: int = 1,
+    r: float,
+    z: float,
+    q: float | None = None,
+    p: float | None = None,
+    retract_to_r: bool,
+    initial_z: float,
+    plane: int = 17,
+    clearance: float = LCNC_CLEARANCE_MM,
+    profile: Literal["linuxcnc", "fanuc"] = "linuxcnc",
+) -> tuple[Stroke, ...]:
+    """Strokes of a block with a repeat count (L; K on Fanuc): first hole at `xy`, the next `step` further.
+
+    In G90 the step is zero: RS-274 makes the same hole again. Other arguments and errors as in `hole_moves`.
+    """
+    if repeats < 1:
+        raise ProgramError("the cycle is repeated fewer than one time; expected L1 or more")
+    strokes: list[Stroke] = []
+    for _ in range(repeats):
+        strokes += hole_moves(
+            code, start=start, xy=xy, r=r, z=z, q=q, p=p, retract_to_r=retract_to_r, initial_z=initial_z,
+            plane=plane, clearance=clearance, profile=profile,
+        )  # fmt: skip
+        start = strokes[-1].point
+        xy = (xy[0] + step[0], xy[1] + step[1])
+    return tuple(strokes)
+
+
+@dataclass(slots=True)
+class _Hole:
+    """One hole on its way: the position, the strokes so far, and the values of the cycle."""
+
+    position: list[float]
+    axes: tuple[int, int, int]
+    r: float
+    z: float
+    q: float
+    p: float
+    clear: float
+    clearance: float
+    feed_home: bool
+    strokes: list[Stroke] = field(default_factory=list)
+
+    def rapid_over(self, xy: tuple[float, float], level: float) -> None:
+        before = tuple(self.position)
+        first, second, tool = self.axes
+        self.position[first], self.position[second], self.position[tool] = *xy, level
+        if tuple(self.position) != before:
+            self._add("rapid")
+
+    def rapid_to(self, level: float) -> None:
+        if self.position[self.axes[2]] != level:
+            self.position[self.axes[2]] = level
+            self._add("rapid")
+
+    def feed_to(self, level: float) -> None:
+        self.position[self.axes[2]] = level
+        self._add("feed")
+
+    def dwell(self) -> None:
+        self._add("dwell", seconds=self.p)
+
+    def spindle(self, action: Spindle) -> None:
+        self._add("spindle", spindle=action)
+
+    def _add(self, kind: Kind, *, seconds: float = 0.0, spindle: Spindle = "") -> None:
+        x, y, z = self.position
+        self.strokes.append(Stroke(kind, x, y, z, seconds, spindle))
+
+    def drill(self) -> None:
+        self.feed_to(self.z)
+        self.rapid_to(self.clear)
+
+    def drill_dwell(self) -> None:
+        self.feed_to(self.z)
+        self.dwell()
+        self.rapid_to(self.clear)
+
+    def peck(self) -> None:
+        self._pecks(full_retract=True)
+
+    def chip_break(self) -> None:
+        self._pecks(full_retract=False)
+
+    def _pecks(self, *, full_retract: bool) -> None:
+        # Repeated subtraction, as the control does it: a closed form may differ by one peck through rounding.
+        depth = self.r - self.q
+        while depth > self.z:
+            self.feed_to(depth)
+            if full_retract:
+                self.rapid_to(self.r)
+            self.rapid_to(depth + self.clearance)
+            depth -= self.q
+        self.drill()
+
+    def tap(self) -> None:
+        self.feed_to(self.z)
+        self.spindle("stop")
+        self.spindle("reverse")
+        self.dwell()
+        self.feed_to(self.clear if self.feed_home else self.r)
+        self.spindle("stop")
+        self.spindle("restore")
+        self.rapid_to(self.clear)
+
+    def bore(self) -> None:
+        self.feed_to(self.z)
+        self.feed_to(self.r)
+        self.rapid_to(self.clear)
+
+    def bore_stop(self) -> None:
+        self.feed_to(self.z)
+        self.dwell()
+        self.spindle("stop")
+        self.rapid_to(self.clear)
+        self.spindle("restore")
+
+    def bore_dwell(self) -> None:
+        self.feed_to(self.z)
+        self.dwell()
+        self.feed_to(self.clear if self.feed_home else self.r)
+        self.rapid_to(self.clear)
+
+
+_RECIPES: dict[int, Callable[[_Hole], None]] = {
+    730: _Hole.chip_break,
+    740: _Hole.tap,
+    810: _Hole.drill,
+    820: _Hole.drill_dwell,
+    830: _Hole.peck,
+    840: _Hole.tap,
+    850: _Hole.bore,
+    860: _Hole.bore_stop,
+    890: _Hole.bore_dwell,
+}
+
+#: The cycles that `hole_moves` knows.
+CODES = frozenset(_RECIPES)
+
+
+def _check(code: int, plane: int, r: float, z: float, q: float | None, p: float | None) -> None:
+    name = f"G{code / 10:g}"
+    if code not in CODES:
+        raise ProgramError(
+            f"{name} has no geometry that is known offline; expected one of "
+            f"{', '.join(f'G{known / 10:g}' for known in sorted(CODES))}; write the hole as plain moves"
+        )
+    if plane not in PLANES:
+        raise ProgramError(f"{name} in plane G{plane}; expected G17, G18 or G19")
+    if not all(map(math.isfinite, (r, z))):
+        raise ProgramError(f"{name} without a finite R and Z; give both on the first block of the cycle")
+    if r < z:
+        raise ProgramError(f"{name} has R {r:g} below the bottom {z:g}; R must not be below it")
+    if code in _PECKING:
+        if q is None or not q > 0:
+            raise ProgramError(f"{name} needs a peck Q greater than zero, found {q}")
+        if (r - z) / q > _MAX_PECKS:
+            raise ProgramError(f"{name} with Q {q:g} makes more than {_MAX_PECKS} pecks; give a larger Q")
+    if code in _DWELL_NEEDED and p is None:
+        raise ProgramError(f"{name} needs a dwell P; P0 is none")
+    if p is not None and p < 0:
+        raise ProgramError(f"{name} has a negative dwell P {p:g}")

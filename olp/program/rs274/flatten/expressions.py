@@ -1,0 +1,323 @@
+"""Expressions of parametric programs: `#1`, `#<name>`, `[ ]`, functions and operators.
+
+Two dialects. "linuxcnc" follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC evaluates it:
+`**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`; all from left to
+right; a sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. "fanuc" is Custom
+Macro B: `* / MOD AND`, then `+ - OR XOR`, then comparisons; FIX and FUP count by magnitude; a variable
+that was never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
+
+Text is compact and lower case: the caller has taken out blanks and comments. Angles are in degrees.
+Every error is a ProgramError without a line, which the caller adds.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+from olp.core.errors import ProgramError
+
+Dialect = Literal["linuxcnc", "fanuc"]
+
+#: LinuxCNC takes two numbers as equal, and a number as whole, within this.
+EQUAL_WITHIN = 1e-4
+
+
+class Parameters(Protocol):
+    """Where an expression finds its parameters; raises ProgramError for what is not knowable off line."""
+
+    def number(self, index: int) -> float | None:
+        """Value of #index; None is a vacant variable."""
+        ...
+
+    def named(self, name: str) -> float:
+        """Value of #<name>."""
+        ...
+
+    def exists(self, name: str) -> bool:
+        """Whether #<name> is defined."""
+        ...
+
+
+#: A compiled expression. None is a vacant variable, and only a bare variable can be vacant.
+Expression = Callable[[Parameters], float | None]
+Binary = Callable[[float, float], float]
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
+_UNSIGNED = re.compile(r"\d+\.?\d*|\.\d+")
+_FUNCTION = re.compile(r"(abs|acos|asin|atan|cos|exp|fix|fup|ln|round|rnd|sin|sqrt|sqr|tan|exists)(?=\[)")
+_OPERATOR = re.compile(r"\*\*|\*|/|\+|-|mod|and|xor|or|eq|ne|gt|ge|lt|le")
+_COMPARISONS = ("eq", "ne", "gt", "ge", "lt", "le")
+_LEVELS: dict[Dialect, tuple[tuple[str, ...], ...]] = {
+    "linuxcnc": (("and", "or", "xor"), _COMPARISONS, ("+", "-"), ("*", "/", "mod"), ("**",)),
+    "fanuc": (_COMPARISONS, ("+", "-", "or", "xor"), ("*", "/", "mod", "and")),
+}
+_MAX_DEPTH = 60
+
+
+def whole(value: float, what: str) -> int:
+    """`value` as an integer where it is one within 1e-4; ProgramError otherwise."""
+    nearest = math.floor(value + 0.5) if math.isfinite(value) else 0
+    if not math.isfinite(value) or abs(value - nearest) > EQUAL_WITHIN:
+        raise ProgramError(f"{what} is {value:g}; expected a whole number")
+    return nearest
+
+
+def filled(value: float | None) -> float:
+    """A vacant variable counts as zero in arithmetic."""
+    return 0.0 if value is None else value
+
+
+class Reader:
+    """Compiles the values of one line; `at` is the position in `text`."""
+
+    def __init__(self, text: str, dialect: Dialect, at: int = 0) -> None:
+        self.text = text
+        self.dialect: Dialect = dialect
+        self.at = at
+        self._depth = 0
+
+    def number(self) -> float | None:
+        """A plain number at this place, or None where something else stands; moves past it."""
+        match = _NUMBER.match(self.text, self.at)
+        if match is None:
+            return None
+        self.at = match.end()
+        return float(match.group())
+
+    def value(self) -> Expression:
+        """A real value: number, parameter, function or bracketed expression, with an optional sign."""
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise ProgramError(f"an expression is nested deeper than {_MAX_DEPTH}; split it over lines")
+        try:
+            return self._value()
+        finally:
+            self._depth -= 1
+
+    def _value(self) -> Expression:
+        text, at = self.text, self.at
+        head = text[at : at + 1]
+        if head in ("+", "-") and head:
+            self.at += 1
+            operand = self.value()
+            return operand if head == "+" else _negated(operand)
+        if head == "[":
+            return self.bracket()
+        if head == "#":
+            return self.parameter()
+        plain = _UNSIGNED.match(text, at)
+        if plain:
+            self.at = plain.end()
+            return _constant(float(plain.group()))
+        function = _FUNCTION.match(text, at)
+        if function:
+            self.at = function.end()
+            return self._call(function.group(1))
+        raise ProgramError(f"expected a number, a parameter or [expression] at {text[at : at + 12]!r}")
+
+    def parameter_index(self) -> Callable[[Parameters], int | str]:
+        """Index (int) or name (str) of the parameter at this place, which starts with `#`."""
+        self.at += 1
+        if self.text.startswith("<", self.at):
+            end = self.text.find(">", self.at)
+            if end < 0:
+                raise ProgramError("a parameter name has no closing '>'")
+            name = self.text[self.at + 1 : end]
+            self.at = end + 1
+            return lambda _: name
+        index = self.value()
+        return lambda parameters: whole(filled(index(parameters)), "a parameter number")
+
+    def parameter(self) -> Expression:
+        where = self.parameter_index()
+
+        def read(parameters: Parameters) -> float | None:
+            key = where(parameters)
+            return parameters.named(key) if isinstance(key, str) else parameters.number(key)
+
+        return read
+
+    def bracket(self) -> Expression:
+        """`[expression]`."""
+        self._expect("[")
+        inside = self._level(0)
+        self._expect("]")
+        return inside
+
+    def unbracketed(self) -> Expression:
+        """An expression without brackets around it, as Macro B has it to the right of `=`."""
+        return self._level(0)
+
+    def _level(self, level: int) -> Expression:
+        levels = _LEVELS[self.dialect]
+        if level == len(levels):
+            return self.value()
+        left = self._level(level + 1)
+        while True:
+            match = _OPERATOR.match(self.text, self.at)
+            if match is None or match.group() not in levels[level]:
+                return left
+            self.at = match.end()
+            left = self._joined(match.group(), left, self._level(level + 1))
+
+    def _joined(self, operator: str, left: Expression, right: Expression) -> Expression:
+        if self.dialect == "fanuc" and operator in ("eq", "ne"):
+            same = operator == "eq"
+            return lambda p: float((left(p) == right(p)) is same)
+        table = _LINUXCNC if self.dialect == "linuxcnc" else _FANUC
+        function = table[operator]
+
+        def joined(parameters: Parameters) -> float:
+            return _finite(function(filled(left(parameters)), filled(right(parameters))), operator)
+
+        return joined
+
+    def _call(self, name: str) -> Expression:
+        if name == "exists":
+            self._expect("[")
+            if not self.text.startswith("#<", self.at):
+                raise ProgramError("EXISTS takes a named parameter, as in EXISTS[#<name>]")
+            where = self.parameter_index()
+            self._expect("]")
+            return lambda parameters: float(parameters.exists(str(where(parameters))))
+        argument = self.bracket()
+        if name == "atan":
+            if self.text.startswith("/[", self.at):
+                self.at += 1
+                run = self.bracket()
+                angle = _atan2_degrees if self.dialect == "linuxcnc" else _atan2_fanuc
+                return lambda p: angle(filled(argument(p)), filled(run(p)))
+            if self.dialect == "linuxcnc":
+                raise ProgramError("ATAN takes two arguments, as in ATAN[y]/[x]")
+            return lambda p: math.degrees(math.atan(filled(argument(p))))
+        function = (_FUNCTIONS | _FANUC_ROUNDING if self.dialect == "fanuc" else _FUNCTIONS)[name]
+        return lambda p: _finite(function(filled(argument(p))), name)
+
+    def _expect(self, character: str) -> None:
+        if not self.text.startswith(character, self.at):
+            found = self.text[self.at : self.at + 12]
+            raise ProgramError(f"expected {character!r} in an expression, found {found!r}")
+        self.at += 1
+
+
+def _constant(value: float) -> Expression:
+    return lambda _: value
+
+
+def _negated(operand: Expression) -> Expression:
+    return lambda parameters: -filled(operand(parameters))
+
+
+def _finite(value: float, what: str) -> float:
+    if not math.isfinite(value):
+        raise ProgramError(f"{what.upper()} gives a number without bound")
+    return value
+
+
+def _divide(a: float, b: float) -> float:
+    if b == 0:
+        raise ProgramError("division by zero in an expression")
+    return a / b
+
+
+def _modulo(a: float, b: float) -> float:
+    if b == 0:
+        raise ProgramError("MOD by zero in an expression")
+    rest = math.fmod(a, b)
+    return rest + abs(b) if rest < 0 else rest
+
+
+def _fanuc_modulo(a: float, b: float) -> float:
+    if b == 0:
+        raise ProgramError("MOD by zero in an expression")
+    return math.fmod(a, b)
+
+
+def _power(a: float, b: float) -> float:
+    try:
+        return math.pow(a, b)
+    except (ValueError, OverflowError):
+        raise ProgramError(f"{a:g} ** {b:g} has no finite real value") from None
+
+
+def _guarded(function: Callable[[float], float], name: str) -> Callable[[float], float]:
+    def call(x: float) -> float:
+        try:
+            return function(x)
+        except (ValueError, OverflowError):
+            raise ProgramError(f"{name}[{x:g}] has no finite real value") from None
+
+    return call
+
+
+def _atan2_degrees(rise: float, run: float) -> float:
+    return math.degrees(math.atan2(rise, run))
+
+
+def _atan2_fanuc(rise: float, run: float) -> float:
+    if rise < 0:
+        raise ProgramError(
+            "ATAN of a negative first argument is given in 0..360 or -180..180 as a parameter of the control "
+            "says, which is not known off line; write the angle with ACOS or ASIN"
+        )
+    return math.degrees(math.atan2(rise, run))
+
+
+def _bits(function: Callable[[int, int], int], name: str) -> Binary:
+    return lambda a, b: float(function(whole(a, f"an operand of {name}"), whole(b, f"an operand of {name}")))
+
+
+_ARITHMETIC: dict[str, Binary] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": _divide,
+    "gt": lambda a, b: float(a > b),
+    "ge": lambda a, b: float(a >= b),
+    "lt": lambda a, b: float(a < b),
+    "le": lambda a, b: float(a <= b),
+}
+_LINUXCNC: dict[str, Binary] = _ARITHMETIC | {
+    "**": _power,
+    "mod": _modulo,
+    "eq": lambda a, b: float(abs(a - b) < EQUAL_WITHIN),
+    "ne": lambda a, b: float(abs(a - b) >= EQUAL_WITHIN),
+    "and": lambda a, b: float(a != 0 and b != 0),
+    "or": lambda a, b: float(a != 0 or b != 0),
+    "xor": lambda a, b: float((a != 0) != (b != 0)),
+}
+_FANUC: dict[str, Binary] = _ARITHMETIC | {
+    "mod": _fanuc_modulo,
+    "and": _bits(lambda a, b: a & b, "AND"),
+    "or": _bits(lambda a, b: a | b, "OR"),
+    "xor": _bits(lambda a, b: a ^ b, "XOR"),
+}
+
+
+def _round_half_away(x: float) -> float:
+    return math.copysign(math.floor(abs(x) + 0.5), x)
+
+
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "abs": abs,
+    "acos": _guarded(lambda x: math.degrees(math.acos(x)), "ACOS"),
+    "asin": _guarded(lambda x: math.degrees(math.asin(x)), "ASIN"),
+    "cos": lambda x: math.cos(math.radians(x)),
+    "exp": _guarded(math.exp, "EXP"),
+    "fix": lambda x: float(math.floor(x)),
+    "fup": lambda x: float(math.ceil(x)),
+    "ln": _guarded(math.log, "LN"),
+    "round": _round_half_away,
+    "rnd": _round_half_away,
+    "sin": lambda x: math.sin(math.radians(x)),
+    "sqrt": _guarded(math.sqrt, "SQRT"),
+    "sqr": _guarded(math.sqrt, "SQRT"),
+    "tan": lambda x: math.tan(math.radians(x)),
+}
+_FANUC_ROUNDING: dict[str, Callable[[float], float]] = {
+    "fix": lambda x: float(math.trunc(x)),
+    "fup": lambda x: math.copysign(math.ceil(abs(x)), x),
+}

@@ -1,0 +1,267 @@
+"""Lines of a parametric program: one line of bytes compiled to words, assignments and a flow statement.
+
+Blanks mean nothing, also inside numbers; `(...)` and `;` start comments. Every word keeps its place in
+the bytes, so that a line is written back by splicing values into it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from olp.core.errors import ProgramError
+from olp.program.rs274.flatten.expressions import Dialect, Expression, Parameters, Reader
+
+_LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
+_SKIP = re.compile(r"\([^)]*\)?|;.*|[\x00-\x20]+")
+_LETTER = re.compile(r",?[a-z@^]")
+_LITERAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
+_PLAIN_END = re.compile(r"[a-z@^,]|$|#")
+_LABEL = re.compile(r"\d+|<[^>]*>")
+_KEYWORD = re.compile(
+    r"endsub|sub|call|return|elseif|else|endif|if|endwhile|while|do|endrepeat|repeat|break|continue"
+)
+_WITH_VALUE = frozenset({"if", "elseif", "while", "repeat"})
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A letter and its value. `value` is None for a plain number, which `number` gives.
+
+    `start`, `value_start` and `end` are places in the raw line. `pointed`: the plain number has a point.
+    """
+
+    letter: str
+    number: float
+    value: Expression | None
+    pointed: bool
+    start: int
+    value_start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """`#n = value`; `target` gives the number or the name."""
+
+    target: Callable[[Parameters], int | str]
+    value: Expression
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """A statement that steers the run. `label` is "" where an expression (`dynamic`) gives it.
+
+    Keywords are those of LinuxCNC's O-words, "program" for a header such as O1234, and of Macro B
+    "when-goto", "when-then", "while-do", "do", "end" and "goto".
+    """
+
+    keyword: str
+    label: str
+    dynamic: Expression | None = None
+    values: tuple[Expression, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One source line; `number` counts from 1. `opaque` lines hold something that is not understood."""
+
+    number: int
+    raw: bytes
+    eol: bytes
+    percent: bool = False
+    deleted: bool = False
+    opaque: bool = False
+    words: tuple[Word, ...] = ()
+    assignments: tuple[Assignment, ...] = ()
+    flow: Flow | None = None
+    comments: tuple[bytes, ...] = ()
+
+    @property
+    def plain(self) -> bool:
+        """True where the line has no variable, so that its bytes can be copied."""
+        return not self.assignments and all(word.value is None for word in self.words)
+
+
+def split_lines(data: bytes) -> list[bytes]:
+    """Lines with their ends (LF, CR LF or a lone CR)."""
+    return [line for line in _LINE.findall(data) if line]
+
+
+def compile_line(line: bytes, number: int, dialect: Dialect) -> Line:
+    """Compile one line with its end. Raises ProgramError (without a line) for a broken expression."""
+    raw = line.rstrip(b"\r\n")
+    eol = line[len(raw) :]
+    text, places, comments = _compact(raw)
+    if text.startswith("%"):
+        return Line(number, raw, eol, percent=True)
+    at = 0
+    deleted = text.startswith("/")
+    if deleted:
+        at = 2 if text[1:2].isdigit() and text[2:3] else 1
+    try:
+        return _compile(_Source(number, raw, eol, text, places, deleted, comments), at, dialect)
+    except ProgramError:
+        if "#" in text or "[" in text or text[at : at + 1] == "o":
+            raise
+        return Line(number, raw, eol, deleted=deleted, opaque=True, comments=comments)
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    number: int
+    raw: bytes
+    eol: bytes
+    text: str
+    places: list[int]
+    deleted: bool
+    comments: tuple[bytes, ...]
+
+
+def _compact(raw: bytes) -> tuple[str, list[int], tuple[bytes, ...]]:
+    """Lower-case text without blanks and comments, the places of its characters, and the comments."""
+    # Latin-1 keeps one character a byte, also in lower case.
+    source = raw.decode("latin-1")
+    pieces: list[str] = []
+    places: list[int] = []
+    comments: list[bytes] = []
+    at = 0
+    for match in _SKIP.finditer(source):
+        pieces.append(source[at : match.start()])
+        places.extend(range(at, match.start()))
+        at = match.end()
+        if match.group()[0] in "(;":
+            comments.append(raw[match.start() : match.end()])
+    pieces.append(source[at:])
+    places.extend(range(at, len(source)))
+    return "".join(pieces).lower(), places, tuple(comments)
+
+
+def _compile(source: _Source, at: int, dialect: Dialect) -> Line:
+    text = source.text
+    reader = Reader(text, dialect, at)
+    words: list[Word] = []
+    assignments: list[Assignment] = []
+    flow: Flow | None = None
+    while reader.at < len(text):
+        start = reader.at
+        first = all(word.letter == "n" for word in words) and not assignments
+        if text[start] == "#":
+            assignments.append(_assignment(reader, source.places))
+            continue
+        if first and text[start] == "o":
+            flow = _o_word(reader)
+        elif first and dialect == "fanuc":
+            flow = _macro_b(reader, assignments, source.places)
+        if flow is not None:
+            if reader.at < len(text):
+                rest = text[reader.at :]
+                raise ProgramError(f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood")
+            break
+        words.append(_word(reader, source.places, dialect))
+    return Line(
+        source.number, source.raw, source.eol, deleted=source.deleted, words=tuple(words),
+        assignments=tuple(assignments), flow=flow, comments=source.comments,
+    )  # fmt: skip
+
+
+def _word(reader: Reader, places: list[int], dialect: Dialect) -> Word:
+    text, start = reader.text, reader.at
+    letter = _LETTER.match(text, start)
+    if letter is None:
+        raise ProgramError(f"expected a word at {text[start : start + 12]!r}")
+    at = letter.end()
+    literal = _LITERAL.match(text, at)
+    if literal and _PLAIN_END.match(text, literal.end()):
+        number, value, pointed = float(literal.group()), None, "." in literal.group()
+        reader.at = literal.end()
+    else:
+        reader.at = at
+        number, value, pointed = 0.0, reader.value(), False
+        written = text[at : reader.at]
+        if dialect == "fanuc" and ("round[" in written or "rnd[" in written):
+            raise ProgramError(
+                "ROUND inside a word rounds to the least increment, which is not known here; "
+                "assign the rounded value to a variable first"
+            )
+    return Word(letter.group(), number, value, pointed, places[start], places[at], places[reader.at - 1] + 1)
+
+
+def _assignment(reader: Reader, places: list[int]) -> Assignment:
+    start = reader.at
+    target = reader.parameter_index()
+    if not reader.text.startswith("=", reader.at):
+        raise ProgramError("a parameter stands where a word is expected, without '='")
+    reader.at += 1
+    value = reader.unbracketed() if reader.dialect == "fanuc" else reader.value()
+    return Assignment(target, value, places[start], places[reader.at - 1] + 1)
+
+
+def _o_word(reader: Reader) -> Flow:
+    text = reader.text
+    reader.at += 1
+    dynamic: Expression | None = None
+    label = ""
+    static = _LABEL.match(text, reader.at)
+    if static:
+        label = static.group().strip("<>")
+        if static.group()[0] != "<":
+            label = str(int(label))
+        reader.at = static.end()
+    else:
+        dynamic = reader.value()
+    keyword = _KEYWORD.match(text, reader.at)
+    if keyword is None:
+        if reader.at < len(text) or not label.isdigit():
+            raise ProgramError(f"O-word without a known keyword at {text[reader.at : reader.at + 12]!r}")
+        return Flow("program", label)
+    reader.at = keyword.end()
+    values: list[Expression] = []
+    while text.startswith("[", reader.at):
+        values.append(reader.bracket())
+    name = keyword.group()
+    if name in _WITH_VALUE and len(values) != 1:
+        raise ProgramError(f"O-word {name.upper()} has {len(values)} values; expected one [expression]")
+    if dynamic is not None and name != "call":
+        raise ProgramError(f"O-word {name.upper()} has a computed label; only CALL may have one")
+    return Flow(name, label, dynamic, tuple(values))
+
+
+def _macro_b(reader: Reader, assignments: list[Assignment], places: list[int]) -> Flow | None:
+    text, at = reader.text, reader.at
+    if text.startswith("if[", at):
+        reader.at += 2
+        condition = reader.bracket()
+        if text.startswith("goto", reader.at):
+            reader.at += 4
+            return Flow("when-goto", "", None, (condition, reader.value()))
+        if text.startswith("then", reader.at):
+            reader.at += 4
+            while text.startswith("#", reader.at):
+                assignments.append(_assignment(reader, places))
+            return Flow("when-then", "", None, (condition,))
+        raise ProgramError("IF is followed by neither GOTO nor THEN")
+    if text.startswith("while[", at):
+        reader.at += 5
+        condition = reader.bracket()
+        if not text.startswith("do", reader.at):
+            raise ProgramError("WHILE is not followed by DO")
+        reader.at += 2
+        return Flow("while-do", _number_label(reader), None, (condition,))
+    for keyword in ("goto", "do", "end"):
+        if text.startswith(keyword, at):
+            reader.at += len(keyword)
+            if keyword == "goto":
+                return Flow("goto", "", None, (reader.value(),))
+            return Flow(keyword, _number_label(reader))
+    return None
+
+
+def _number_label(reader: Reader) -> str:
+    number = reader.number()
+    if number is None:
+        raise ProgramError("DO and END take a plain number")
+    return str(int(number))

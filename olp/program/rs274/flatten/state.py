@@ -1,0 +1,326 @@
+"""What the flattener knows of the control while it unrolls: modes, and the position in program coordinates.
+
+A value that cannot be known off line is None; asking for it refuses, not knowing it does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from olp.core.errors import ProgramError
+from olp.core.units import AXES, MM_PER_INCH
+from olp.program.rs274.cycles import (
+    CODES,
+    LCNC_CLEARANCE_INCH,
+    LCNC_CLEARANCE_MM,
+    PLANES,
+    Stroke,
+    cycle_moves,
+    levels,
+)
+from olp.program.rs274.flatten.expressions import Dialect, whole
+
+#: A word with its value; None is a value whose unit is not known (no decimal point on a Fanuc control).
+Value = tuple[str, float | None]
+
+_LINEAR = frozenset({0, 10, 20, 30, 330})
+_SPLINES = frozenset({50, 51, 52, 53})
+_MOTION = _LINEAR | CODES | {331, 382, 383, 384, 385, 760, 800, 870, 880}
+_UNSETTING = (
+    frozenset({100, 101, 280, 300, 281, 301, 310, 331, 430, 431, 432, 440, 490, 520, 541, 921, 922, 923, 540})
+    | frozenset(range(550, 594))
+    | frozenset({382, 383, 384, 385, 760, 870, 880, 650, 660})
+)
+#: Of these, the ones that hold already for the move of their own block.
+_FRAMES = frozenset({430, 431, 432, 440, 490, 541, 540}) | frozenset(range(550, 594))
+_LENGTHS = frozenset({430, 440, 490})
+_ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
+_EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
+_NO_AXES = frozenset({40, 100, 520, 920, 530, 280, 300, 650})
+_STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
+#: Words that a cycle takes for itself.
+CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
+
+
+@dataclass(slots=True)
+class State:
+    """Modes and position of the control; `unit` None means that neither G20 nor G21 was met."""
+
+    dialect: Dialect
+    position: list[float | None] = field(default_factory=lambda: [None, None, None])
+    absolute: bool = True
+    unit: int | None = None
+    plane: int = 17
+    motion: int | None = None
+    retract_to_r: bool = False
+    inverse_time: bool = False
+    compensated: bool = False
+    odd_frame: bool = False
+    spindle: int | None = None
+    path: str = "G64"
+    feed: float | None = None
+    speed: float | None = None
+    initial: float | None = None
+    saved: tuple[bool, int | None, int, bool, bool, str] | None = None
+    held_absolute: bool = True
+    held: dict[str, float | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        # Before G98 or G99 is met LinuxCNC retracts to R, a Fanuc to the initial level.
+        self.retract_to_r = self.dialect == "linuxcnc"
+
+    def at(self, axis: int) -> float:
+        """Program position of an axis; ProgramError where it is not known."""
+        value = self.position[axis]
+        if value is None or self.compensated:
+            raise ProgramError(
+                f"the position of {AXES[axis]} is asked for and not known off line; "
+                f"command {AXES[axis]} in the program before"
+            )
+        return value
+
+    def forget(self) -> None:
+        self.position = [None, None, None]
+
+    def codes(self, words: Sequence[Value]) -> set[int]:
+        return {round(value * 10) for letter, value in words if letter == "g" and value is not None}
+
+    def is_cycle(self, words: Sequence[Value]) -> bool:
+        """Whether a block with these words makes a canned cycle."""
+        codes = self.codes(words)
+        motion = codes & _MOTION
+        if motion:
+            return bool(motion & CODES)
+        return self.motion in CODES and not codes & _NO_AXES and any(letter in "xyz" for letter, _ in words)
+
+    def apply(self, words: Sequence[Value]) -> None:
+        """Follow one block that is not a cycle."""
+        codes = self._modes(words)
+        motion = codes & _MOTION
+        if self.dialect == "linuxcnc":
+            motion |= codes & _SPLINES
+        if motion or codes & {280, 300}:
+            self.initial = None
+            self.held = {}
+        if motion:
+            # G80 beside another motion ends the cycle, and the other moves
+            self.motion = next(iter(motion - {800} or motion))
+        given = {AXES.lower().index(letter): value for letter, value in words if letter in ("x", "y", "z")}
+        if 920 in codes:
+            for axis, value in given.items():
+                self.position[axis] = value
+        elif 530 in codes:
+            for axis in given:
+                self.position[axis] = None
+        elif not codes & _NO_AXES and given:
+            self._move(given)
+        if any(letter in "@^" for letter, _ in words):
+            self.forget()
+        reached = [self.position[a] if a in given else None for a in range(3)]
+        self._after(codes)
+        if self.absolute and not codes & (_NO_AXES | _UNSETTING - _FRAMES) and not self.odd_frame:
+            self.position = [p if p is not None else r for p, r in zip(self.position, reached, strict=True)]
+
+    def _modes(self, words: Sequence[Value]) -> set[int]:
+        codes = self.codes(words)
+        for unit in (20, 21):
+            if unit * 10 in codes:
+                self._change_unit(unit)
+        for plane in PLANES:
+            if plane * 10 in codes:
+                self.plane = plane
+        if codes & {900, 910}:
+            self.absolute = 900 in codes
+        if codes & {980, 990}:
+            self.retract_to_r = 990 in codes
+        if codes & {930, 940, 950}:
+            self.inverse_time = 930 in codes
+        if codes & {610, 611, 640}:
+            self._path_mode(codes, words)
+        if codes & {410, 411, 420, 421}:
+            self.compensated = True
+        self.odd_frame = (self.odd_frame or bool(codes & _ODD_FRAME)) and not codes & _EVEN_FRAME
+        for letter, value in words:
+            if letter == "f":
+                self.feed = value
+            elif letter == "s":
+                self.speed = value
+            elif letter == "m" and value is not None:
+                if value in (3, 4, 5):
+                    self.spindle = int(value)
+                elif value == 6 or value >= 100:
+                    self.forget()
+                elif 70 <= value <= 72 and self.dialect == "linuxcnc":
+                    self._keep_modes(int(value))
+        return codes
+
+    def _after(self, codes: set[int]) -> None:
+        if 400 in codes and self.compensated:
+            self.compensated = False
+            self.forget()
+        unsetting = codes & _UNSETTING
+        if unsetting and unsetting <= _LENGTHS and self.dialect == "fanuc" and not self.odd_frame:
+            self.position[2] = None
+        elif unsetting or self.odd_frame:
+            self.forget()
+
+    def _move(self, given: dict[int, float | None]) -> None:
+        for axis, value in given.items():
+            before = self.position[axis]
+            if self.motion not in _LINEAR | _SPLINES or value is None:
+                self.position[axis] = None
+            elif self.absolute:
+                self.position[axis] = value
+            else:
+                self.position[axis] = None if before is None else before + value
+
+    def _change_unit(self, unit: int) -> None:
+        if self.unit != unit:
+            factor = None if self.unit is None else MM_PER_INCH if unit == 21 else 1 / MM_PER_INCH
+            if self.unit is not None and self.initial is not None:
+                raise ProgramError("the unit changes within a series of canned cycles; end it with G80 first")
+            self.position = [None if p is None or factor is None else p * factor for p in self.position]
+            self.unit = unit
+
+    def _keep_modes(self, code: int) -> None:
+        """M70 saves the modes, M71 drops them, M72 brings them back."""
+        if code == 70:
+            modes = (self.absolute, self.unit, self.plane)
+            self.saved = (*modes, self.retract_to_r, self.inverse_time, self.path)
+        elif code == 71:
+            self.saved = None
+        elif self.saved is None:
+            raise ProgramError("M72 without saved modes; M70 must come before")
+        else:
+            unit = self.saved[1]
+            if unit is None and self.unit is not None:
+                self.forget()
+            self.absolute, _, self.plane, self.retract_to_r, self.inverse_time, self.path = self.saved
+            if unit is not None:
+                self._change_unit(unit)
+
+    def _path_mode(self, codes: set[int], words: Sequence[Value]) -> None:
+        if 640 in codes:
+            given = [(letter, value) for letter, value in words if letter in ("p", "q") and value is not None]
+            self.path = "G64" + "".join(f" {letter.upper()}{value:.9g}" for letter, value in given)
+        else:
+            self.path = "G61.1" if 611 in codes else "G61"
+
+    def cycle(self, words: Sequence[Value], clearance: float | None) -> tuple[Stroke, ...]:
+        """Follow a block that makes a canned cycle; its strokes. ProgramError where a value is not known."""
+        for letter, value in words:
+            if letter in ("a", "b", "c", "u", "v", "w", "@", "^"):
+                raise ProgramError(f"a canned cycle moves {letter.upper()}, which is not understood")
+            if letter == "m" and value in _STOPS:
+                raise ProgramError(f"M{value:g} in the block of a canned cycle; give it a block of its own")
+        codes = self._modes(words)
+        if self.inverse_time or self.compensated or self.odd_frame:
+            raise ProgramError("a canned cycle in inverse time, cutter compensation or a turned frame")
+        chosen = codes & CODES
+        code = next(iter(chosen)) if chosen else self.motion
+        if code is None:
+            raise ProgramError("a canned cycle without a code")
+        if self.motion not in CODES:
+            self.initial = None
+            self.held = {}
+        elif code != self.motion and self.dialect == "linuxcnc":
+            self.held = {}
+        self.motion = code
+        given = {letter: value for letter, value in words if letter in CYCLE_WORDS}
+        first, second, tool = PLANES[self.plane]
+        if self.initial is None:
+            self.initial = self.at(tool)
+        depth = AXES[tool].lower()
+        turned = self.dialect == "fanuc" and self.held and self.held_absolute is not self.absolute
+        if turned and not {depth, "r"} <= given.keys():
+            raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth anew")
+        self.held_absolute = self.absolute
+        self.held |= {letter: given[letter] for letter in (depth, "r", "q", "p") if letter in given}
+        repeats = self._repeats(given)
+        if repeats == 0:
+            return ()
+        xy, step = self._place(given, first, second)
+        r, z = levels(self._needed("r"), self._needed(depth), absolute=self.absolute, initial_z=self.initial)
+        self.at(tool)
+        strokes = cycle_moves(
+            code,
+            start=(self._or_nan(0), self._or_nan(1), self._or_nan(2)),
+            xy=xy,
+            step=step,
+            repeats=repeats,
+            r=r,
+            z=z,
+            q=self._optional("q"),
+            p=self._optional("p"),
+            retract_to_r=self.retract_to_r,
+            initial_z=self.initial,
+            plane=self.plane,
+            clearance=self._clearance(code, clearance),
+            profile=self.dialect,
+        )
+        self.position = list(strokes[-1].point)
+        self._after(codes)
+        return strokes
+
+    def _repeats(self, given: dict[str, float | None]) -> int:
+        letters = "l" if self.dialect == "linuxcnc" else "kl"
+        for letter in letters:
+            if letter in given:
+                count = whole(self._known(letter, given[letter]), f"the repeat count {letter.upper()}")
+                return count or self._none()
+        return 1
+
+    def _none(self) -> int:
+        if self.dialect == "linuxcnc":
+            raise ProgramError("the cycle is repeated L0 times; expected L1 or more")
+        return 0
+
+    def _place(
+        self, given: dict[str, float | None], first: int, second: int
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        xy, step = [0.0, 0.0], [0.0, 0.0]
+        for i, axis in enumerate((first, second)):
+            letter = AXES[axis].lower()
+            if letter not in given:
+                xy[i] = self.at(axis)
+                continue
+            value = self._known(letter, given[letter])
+            xy[i] = value
+            if not self.absolute:
+                step[i] = value
+                xy[i] += self.at(axis)
+        return (xy[0], xy[1]), (step[0], step[1])
+
+    def _known(self, letter: str, value: float | None) -> float:
+        if value is None:
+            raise ProgramError(
+                f"{letter.upper()} has no decimal point: it counts in least increments or in whole units, "
+                "as a parameter of the control says; write the point"
+            )
+        return value
+
+    def _needed(self, letter: str) -> float:
+        if letter not in self.held:
+            raise ProgramError(f"the canned cycle has no {letter.upper()} word")
+        return self._known(letter, self.held[letter])
+
+    def _optional(self, letter: str) -> float | None:
+        return None if letter not in self.held else self._known(letter, self.held[letter])
+
+    def _or_nan(self, axis: int) -> float:
+        value = self.position[axis]
+        return math.nan if value is None else value
+
+    def _clearance(self, code: int, clearance: float | None) -> float:
+        if clearance is not None or code not in (730, 830):
+            return clearance or 0.0
+        if self.dialect == "fanuc":
+            raise ProgramError(
+                f"G{code // 10} pecks with a clearance that a parameter of the control sets; "
+                "give peck_clearance_mm (--peck-clearance-mm)"
+            )
+        if self.unit is None:
+            raise ProgramError(f"G{code // 10} before any G20 or G21, on which its peck clearance depends")
+        return LCNC_CLEARANCE_INCH if self.unit == 20 else LCNC_CLEARANCE_MM

@@ -1,0 +1,256 @@
+"""Unrolls a parametric RS-274 program into plain blocks: no variables, no flow, no subprograms.
+
+An evaluator of our own runs the program and writes each block that it meets with numbers for its
+expressions. The result is a plain program for the same control. It is NOT lossless: assignments, flow and
+the names of subprograms are gone, blocks of loops are repeated, and what follows the program's end is
+left out. Lines without a variable are copied byte for byte; a block number is kept on the first visit of
+its line only.
+
+What the control alone knows is refused with the line that asks for it: probe results, tool tables, stored
+offsets, a position that the program has not commanded. Parameters that were never set are 0 in RS-274
+(#31 to #5060) and refused on a Fanuc (#100 and up keep values of earlier runs).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from decimal import Decimal
+
+from olp.core.errors import ProgramError, UsageError
+from olp.core.units import AXES
+from olp.program.rs274.cycles import Stroke
+from olp.program.rs274.flatten.expressions import Dialect, filled, whole
+from olp.program.rs274.flatten.lines import Line, Word
+from olp.program.rs274.flatten.run import Walk
+from olp.program.rs274.flatten.state import CYCLE_WORDS, State, Value
+from olp.program.rs274.flatten.unit import Frame, Unit
+from olp.program.rs274.flatten.values import Variables
+
+_DIALECTS: dict[str, Dialect] = {
+    "linuxcnc": "linuxcnc",
+    "grbl": "linuxcnc",
+    "fanuc": "fanuc",
+    "haas": "fanuc",
+}
+# Words of a Fanuc that take no decimal point.
+_COUNTS = frozenset("gmnpltdhos")
+_COMMENT = re.compile(rb"\([^)]*\)")
+_ENDS = frozenset({2, 30})
+
+
+def no_subprograms(name: str) -> bytes | None:
+    """The default of `flatten`: there is no other file."""
+    return None
+
+
+def flatten(
+    data: bytes,
+    *,
+    profile: str,
+    subprograms: Callable[[str], bytes | None] = no_subprograms,
+    block_delete: bool = False,
+    expand_cycles: bool = False,
+    file: str | None = None,
+    peck_clearance: float | None = None,
+    limit: int = 1_000_000,
+) -> bytes:
+    """Plain blocks of a program; see the module for what is kept.
+
+    `profile` is the dialect: linuxcnc, grbl, fanuc or haas. `subprograms` gives the text of a program that
+    the file does not hold, by its number or lower-case name. `block_delete`: blocks with `/` are left out
+    (switch on); else they count as executed. `expand_cycles` writes canned cycles as G0, G1, G4 and spindle
+    blocks; `peck_clearance` (program units) is the control's clearance of G73 and G83, needed for fanuc and
+    haas. `limit` is the largest number of blocks that the run may visit.
+    Raises ProgramError with the line in the source (or in the subprogram, whose name it then gives as the
+    file), UsageError for an unknown profile.
+    """
+    dialect = _DIALECTS.get(profile)
+    if dialect is None:
+        raise UsageError(f"profile {profile!r} cannot be flattened; expected one of {', '.join(_DIALECTS)}")
+    writer = _Flattener(
+        dialect, expand_cycles=expand_cycles, exact_stop=profile == "linuxcnc", peck_clearance=peck_clearance
+    )
+    main = Unit(data, dialect, file)
+    visit = writer.block
+    Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
+    return writer.text(main)
+
+
+def number_text(value: float, letter: str, dialect: Dialect, exact: bool = False) -> str:
+    """A number that came from an expression: 10 significant digits, at most 4 decimals on a Fanuc.
+
+    `exact` gives all digits: the centre of an arc with R is the square root of a difference of its ends,
+    which loses half of them. A Fanuc reads a number without a point in least increments, so lengths get
+    one there.
+    """
+    if dialect == "fanuc" and letter in _COUNTS and letter != "g":
+        return str(whole(value, f"the value of {letter.upper()}"))
+    if not math.isfinite(value):
+        raise ProgramError(f"the value of {letter.upper()} is not finite")
+    decimals = 0 if value == 0 else min(12, max(0, 9 - math.floor(math.log10(abs(value)))))
+    if dialect == "fanuc":
+        decimals = min(decimals, 4)
+    text = f"{Decimal(repr(value)):f}" if exact and dialect == "linuxcnc" else f"{value:.{decimals}f}"
+    if "." in text:
+        text = text.rstrip("0")
+    if dialect == "linuxcnc" or letter == "g":
+        text = text.rstrip(".")
+    elif "." not in text:
+        text += "."
+    return text[1:] if text in ("-0", "-0.") else text
+
+
+class _Flattener:
+    """Writes the blocks that a walk visits and follows the state of the control."""
+
+    def __init__(
+        self, dialect: Dialect, *, expand_cycles: bool, exact_stop: bool, peck_clearance: float | None
+    ) -> None:
+        self.dialect: Dialect = dialect
+        self.state = State(dialect)
+        self.variables = Variables(self.state)
+        self.expand_cycles = expand_cycles
+        self.exact_stop = exact_stop
+        self.peck_clearance = peck_clearance
+        self._seen: set[tuple[int, int]] = set()
+        self._out: list[tuple[bytes, bytes]] = []
+
+    def text(self, main: Unit) -> bytes:
+        """All blocks; lines that had no end of their own take the program's."""
+        eol = next((line_end for _, line_end in self._out if line_end), b"\n")
+        whole_text = b"".join(raw + (line_end or eol) for raw, line_end in self._out)
+        last = self._out[-1] if self._out else (b"", b"")
+        return whole_text[: -len(eol)] if self._out and not last[1] and not main.ends_with_eol else whole_text
+
+    def block(self, line: Line, frame: Frame, without: frozenset[int]) -> bool:
+        """Write one executed line, its words at indices `without` left out; True where the program ends."""
+        seen = (frame.unit.key, line.number) in self._seen
+        self._seen.add((frame.unit.key, line.number))
+        if line.opaque:
+            self._out.append((line.raw, line.eol))
+            self.state.forget()
+            return False
+        values = [(word.letter, self._value(word)) for word in line.words]
+        settings = [(a.target(self.variables), a.value(self.variables)) for a in line.assignments]
+        cut = set(without)
+        for i, word in enumerate(line.words):
+            if self._vacant(word, values[i][1]) or (word.letter == "n" and seen):
+                cut.add(i)
+        kept = (i for i in range(len(line.words)) if i not in cut)
+        active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
+        strokes: tuple[Stroke, ...] | None = None
+        before = (self.state.absolute, self.state.path, tuple(self.state.position))
+        if self.state.is_cycle(active):
+            strokes = self._cycle(active)
+        else:
+            self.state.apply(active)
+        if strokes is not None and self.expand_cycles:
+            cut |= {i for i, w in enumerate(line.words) if self._of_cycle(w, values[i][1])}
+            self._write(line, values, cut, exact=False)
+            self._write_strokes(strokes, line, before)
+        else:
+            self._write(line, values, cut, exact=frame.unit.radius_arcs)
+        for target, value in settings:
+            self.variables.assign(target, value)
+        return any(letter == "m" and value in _ENDS for letter, value in active)
+
+    def _value(self, word: Word) -> float | None:
+        return word.number if word.value is None else word.value(self.variables)
+
+    def _vacant(self, word: Word, value: float | None) -> bool:
+        return word.value is not None and value is None
+
+    def _tracked(self, word: Word, value: float | None) -> float | None:
+        """The value in program units; None where a missing point leaves its unit open."""
+        open_unit = self.dialect == "fanuc" and word.value is None and not word.pointed
+        if open_unit and word.letter not in _COUNTS and word.letter not in ("f", "k") and value != 0:
+            return None
+        return value
+
+    def _cycle(self, active: list[Value]) -> tuple[Stroke, ...] | None:
+        if not self.expand_cycles:
+            try:
+                self.state.cycle(active, self.peck_clearance or 1.0)
+            except ProgramError:
+                # Only the position is lost; a block that asks for it refuses.
+                self.state.forget()
+            return None
+        if self.dialect == "fanuc" and self.state.codes(active) & {740, 840}:
+            raise ProgramError("G74 and G84 are synchronised by the control: plain moves cannot replace them")
+        return self.state.cycle(active, self.peck_clearance)
+
+    def _of_cycle(self, word: Word, value: float | None) -> bool:
+        if word.letter == "g":
+            return self.state.is_cycle([("g", value)]) and round(filled(value) * 10) == self.state.motion
+        return word.letter in CYCLE_WORDS
+
+    def _write(
+        self, line: Line, values: list[tuple[str, float | None]], cut: set[int], *, exact: bool
+    ) -> None:
+        if line.plain and not cut and line.flow is None:
+            self._out.append((line.raw, line.eol))
+            return
+        # A flow statement has no word of its own: only comments and assignments are in the line.
+        if line.flow is not None and line.flow.keyword != "program":
+            if line.comments:
+                self._out.append((b" ".join(line.comments), line.eol))
+            return
+        pieces, at = [], 0
+        splices = [(a.start, a.end, b"") for a in line.assignments]
+        for i, (word, (letter, value)) in enumerate(zip(line.words, values, strict=True)):
+            if i in cut:
+                splices.append((word.start, word.end, b""))
+            elif word.value is not None:
+                text = number_text(filled(value), letter, self.dialect, exact)
+                splices.append((word.value_start, word.end, text.encode()))
+        for start, end, text_bytes in sorted(splices):
+            inner = _COMMENT.findall(line.raw[start:end])
+            pieces += [line.raw[at:start], text_bytes, *inner]
+            if not text_bytes:
+                end += len(line.raw[end:]) - len(line.raw[end:].lstrip(b" \t"))
+            at = end
+        pieces.append(line.raw[at:])
+        rest = [word for i, word in enumerate(line.words) if i not in cut]
+        if line.comments or any(word.letter != "n" for word in rest) or line.flow is not None:
+            raw = b"".join(pieces)
+            self._out.append((raw.rstrip() if line.raw.rstrip() == line.raw else raw, line.eol))
+
+    def _write_strokes(
+        self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float | None, ...]]
+    ) -> None:
+        """Blocks of a cycle. LinuxCNC stops exactly at every corner of a cycle, whatever the path mode is."""
+        exact = self.exact_stop and self.state.path != "G61"
+        lines: list[str] = []
+        at = list(before[2])
+        spindle = self.state.spindle
+        for stroke in strokes:
+            if stroke.kind in ("rapid", "feed"):
+                words = [
+                    AXES[i] + number_text(v, "x", self.dialect)
+                    for i, v in enumerate(stroke.point)
+                    if not math.isnan(v) and v != at[i]
+                ]
+                at = list(stroke.point)
+                if words:
+                    lines.append(" ".join(["G0" if stroke.kind == "rapid" else "G1", *words]))
+            elif stroke.kind == "dwell":
+                if stroke.seconds > 0:
+                    lines.append("G4 P" + number_text(stroke.seconds, "p", self.dialect))
+            elif stroke.spindle == "stop":
+                lines.append("M5")
+            else:
+                if spindle not in (3, 4):
+                    raise ProgramError("the cycle turns the spindle, whose direction M3 or M4 has not set")
+                lines.append(f"M{spindle if stroke.spindle == 'restore' else 7 - spindle}")
+        if not lines:
+            return
+        if not self.state.absolute:
+            lines.insert(0, "G90")
+            lines.append("G91")
+        if exact:
+            lines.insert(0, "G61")
+            lines.append(self.state.path)
+        mark = b"/" if line.deleted else b""
+        self._out += [(mark + text.encode(), line.eol) for text in lines]

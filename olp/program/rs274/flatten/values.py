@@ -1,0 +1,144 @@
+"""Parameters of a program while it is unrolled: local, common, named, and those the evaluator can know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from olp.core.errors import ProgramError
+from olp.program.rs274.flatten.expressions import filled
+from olp.program.rs274.flatten.lines import Line
+from olp.program.rs274.flatten.state import State
+
+_LINUXCNC_LOCAL = 30
+_LINUXCNC_FREE = 5060
+_LINUXCNC_LAST = 5602
+# Turns DEBUG comments on and off, which moves nothing.
+_DEBUG_SWITCH = 5599
+_FANUC_LOCAL = 33
+_FANUC_COMMON = 1000
+_ARGUMENT_NUMBERS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, *range(17, 27))
+_ARGUMENTS = dict(zip("abcijkdefhmqrstuvwxyz", _ARGUMENT_NUMBERS, strict=True))
+_NOT_ARGUMENTS = frozenset("glnop")
+_COUNT_ARGUMENTS = frozenset("dhmst")
+
+
+class Variables:
+    """Parameters of the run. What only the control knows raises ProgramError."""
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        self.common: dict[int, float | None] = {}
+        self.globals: dict[str, float] = {"_value": 0.0, "_value_returned": 0.0}
+        self.locals: dict[int, float | None] = {}
+        self.names: dict[str, float] = {}
+
+    def number(self, index: int) -> float | None:
+        if self.state.dialect == "fanuc":
+            return self._fanuc(index)
+        if not 1 <= index <= _LINUXCNC_LAST:
+            raise ProgramError(f"#{index} is out of range; parameters are #1 to #{_LINUXCNC_LAST}")
+        if index <= _LINUXCNC_LOCAL:
+            return self.locals.get(index, 0.0)
+        if index <= _LINUXCNC_FREE:
+            return self.common.get(index, 0.0)
+        if 5420 <= index <= 5422:
+            return self.state.at(index - 5420)
+        raise ProgramError(
+            f"#{index} is kept by the control (probe result, offset, tool or position) and not known "
+            "off line; use a free parameter (#31 to #5060)"
+        )
+
+    def _fanuc(self, index: int) -> float | None:
+        if index == 0:
+            return None
+        if 0 < index <= _FANUC_LOCAL:
+            return self.locals.get(index)
+        if index in self.common:
+            return self.common[index]
+        for base in (5001, 5041):
+            if base <= index <= base + 2:
+                return self.state.at(index - base)
+        raise ProgramError(
+            f"#{index} is not set by the program before and not known off line; assign it in the program"
+        )
+
+    def named(self, name: str) -> float:
+        known = self._predefined(name)
+        if known is not None:
+            return known()
+        table = self.globals if name.startswith("_") else self.names
+        if name not in table:
+            raise ProgramError(f"#<{name}> is not set by the program before and not known off line")
+        return table[name]
+
+    def exists(self, name: str) -> bool:
+        if name.startswith(("_ini[", "_hal[")):
+            raise ProgramError(f"#<{name}> belongs to the control and is not known off line")
+        table = self.globals if name.startswith("_") else self.names
+        return self._predefined(name) is not None or name in table
+
+    def _predefined(self, name: str) -> Callable[[], float] | None:
+        state = self.state
+        if name in ("_x", "_y", "_z"):
+            return lambda: state.at("xyz".index(name[1]))
+        if name in ("_metric", "_imperial"):
+            return lambda: float((self._set(state.unit, name) == 21) is (name == "_metric"))
+        if name in ("_absolute", "_incremental"):
+            return lambda: float(state.absolute is (name == "_absolute"))
+        if name == "_plane":
+            return lambda: state.plane * 10.0
+        if name in ("_feed", "_rpm"):
+            return lambda: float(self._set(state.feed if name == "_feed" else state.speed, name))
+        return None
+
+    def _set(self, value: float | None, name: str) -> float:
+        if value is None:
+            raise ProgramError(f"#<{name}> is asked for before the program sets it")
+        return value
+
+    def assign(self, target: int | str, value: float | None) -> None:
+        if isinstance(target, str):
+            if self._predefined(target) is not None:
+                raise ProgramError(f"#<{target}> belongs to the control and cannot be set")
+            (self.globals if target.startswith("_") else self.names)[target] = filled(value)
+        elif self.state.dialect == "fanuc":
+            self._assign_fanuc(target, value)
+        elif 1 <= target <= _LINUXCNC_LOCAL:
+            self.locals[target] = value
+        elif 1 <= target <= _LINUXCNC_FREE or target == _DEBUG_SWITCH:
+            self.common[target] = value
+        else:
+            raise ProgramError(f"#{target} belongs to the control: no plain block does what setting it does")
+
+    def _assign_fanuc(self, index: int, value: float | None) -> None:
+        if 1 <= index <= _FANUC_LOCAL:
+            self.locals[index] = value
+        elif 100 <= index < _FANUC_COMMON:
+            self.common[index] = value
+        elif index == 3000:
+            raise ProgramError("the program stops here with an alarm of its own (#3000)")
+        elif index not in (3003, 3004):
+            raise ProgramError(f"#{index} belongs to the control: no plain block does what setting it does")
+
+
+def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, float | None]]:
+    """(variable, value) of G65's words; I, J, K may come in several sets, as in argument list II."""
+    group, last = 0, ""
+    for word in line.words:
+        letter = word.letter
+        if letter in _NOT_ARGUMENTS:
+            continue
+        if letter not in _ARGUMENTS:
+            raise ProgramError(f"G65 has the argument {letter.upper()}, which is no argument of a macro")
+        value = word.number if word.value is None else word.value(variables)
+        if word.value is None and not word.pointed and value != 0 and letter not in _COUNT_ARGUMENTS:
+            raise ProgramError(
+                f"the argument {letter.upper()} has no decimal point: the control scales it by its least "
+                "increment; write the point"
+            )
+        index = _ARGUMENTS[letter]
+        if letter in "ijk":
+            group += bool(last) and letter <= last
+            last = letter
+            index += 3 * group
+        yield index, value

@@ -1,0 +1,263 @@
+"""What is in force on each line of a chunk: modal codes, the end of the program; and which lines are events,
+to be read one by one.
+
+All of it is found for a whole chunk at once. Refused here are lines that hold more than words, two codes of
+one modal group, and block delete that later blocks depend on.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import ProgramError
+from olp.program.rs274.lexer import WordChunk
+from olp.program.rs274.motion import Array, Index, Mask, modal, values
+from olp.program.rs274.profiles import CUTTER_COMPENSATION, Act
+from olp.program.rs274.state import State
+
+Modal = npt.NDArray[np.int16]
+
+#: plane code to index into `geometry.PLANES`
+PLANE_OF = {170: 0, 180: 1, 190: 2}
+
+_FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
+#: Events whose axis words are not motion: G10 G52 G92 G43.1
+_CLAIMS = (100, 520, 920, 921, 922, 923, 431)
+_LENGTHS = np.zeros(256, bool)
+_LENGTHS[list(b"XYZIJKRQ")] = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Codes:
+    """The G words of a chunk: line, code x 10, what it does."""
+
+    line: Index
+    code: Index
+    act: npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Context:
+    """A chunk with its numbers and the modal codes in force on each line; `base` is its first word's
+    index.
+
+    `event` marks the lines to be read one by one, `consumed` those whose axis words are not motion.
+    """
+
+    chunk: WordChunk
+    value: Array
+    base: int
+    codes: Codes
+    motion: Modal
+    plane: Modal
+    distance: Modal
+    arc_distance: Modal
+    feed: Modal
+    retract: Modal
+    event: Mask
+    consumed: Mask
+    #: numbers as written, by the unit in force
+    scaled: dict[float, Array] = field(default_factory=dict)
+
+    def number(self, line: int) -> int:
+        """The number of a line of the chunk in the program, counted from 1."""
+        return self.chunk.first_line + line + 1
+
+
+class Modes:
+    """The codes in force, from chunk to chunk; those that end a chunk are kept in the `state`."""
+
+    def __init__(self, state: State, *, block_delete: bool, contour: bool) -> None:
+        self._state = state
+        self._block_delete = block_delete
+        profile = state.profile
+        self._cycles_apart = profile.cycles_apart
+        self._claims = (*_CLAIMS, 40) if profile.cycles_apart else _CLAIMS
+        self._act = np.full(2000, Act.REFUSE, np.int8)
+        for code, act in profile.codes.items():
+            self._act[code] = act
+        if contour:
+            self._act[list(CUTTER_COMPENSATION)] = Act.CARRY
+        self._m_event = np.ones(10_001, bool)
+        self._m_event[[m * 10 for m in profile.harmless_m]] = False
+        self._linear_motion = state.motion
+        self._ended = self._tape = False
+
+    def program_end(self, chunk: WordChunk) -> int:
+        """The number of lines up to the end of the program: M2, M30, or the second tape mark."""
+        last = 0 if self._ended else len(chunk.line_start)
+        ends = chunk.line[(chunk.letter == 77) & np.isin(chunk.mantissa, (2, 30)) & (chunk.decimals == 0)]
+        if self._block_delete:
+            ends = ends[~chunk.deleted[ends]]
+        if ends.size and ends[0] < last:
+            if chunk.deleted[ends[0]]:
+                raise ProgramError(
+                    "block delete decides here whether the program ends; expected one end for both switch "
+                    "positions",
+                    line=chunk.first_line + int(ends[0]) + 1,
+                )
+            last, self._ended = int(ends[0]) + 1, True
+        for mark in chunk.marks.tolist():
+            if mark >= last:
+                break
+            if not self._tape and chunk.first_line == 0 and not chunk.first_word[mark]:
+                self._tape = True
+            else:
+                last, self._ended = mark, True
+        return last
+
+    def read(self, chunk: WordChunk, base: int, active: Mask) -> Context:
+        """The codes on the lines of a chunk; those of lines that are not active do not count. Its first word
+        is the program's `base`th."""
+        value, state = values(chunk), self._state
+        usable = active[chunk.line]
+        codes = self._codes(chunk, value, usable)
+        context = Context(
+            chunk,
+            value,
+            base,
+            codes,
+            motion=self._motion(chunk, codes),
+            plane=_modal(chunk, codes, Act.PLANE, state.plane),
+            distance=_modal(chunk, codes, Act.DISTANCE, state.distance),
+            arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
+            feed=_modal(chunk, codes, Act.FEED, state.feed),
+            retract=_modal(chunk, codes, Act.RETRACT, state.retract),
+            event=self._events(chunk, value, codes, usable),
+            consumed=self._consumed(codes, active),
+        )
+        _check_deleted(context, active, state)
+        return context
+
+    def leave(self, context: Context, line: int) -> None:
+        """Keep the codes in force on this line, the last one that is read, for the next chunk."""
+        state = self._state
+        state.plane, state.distance = int(context.plane[line]), int(context.distance[line])
+        state.arc_distance, state.feed = int(context.arc_distance[line]), int(context.feed[line])
+        state.retract = int(context.retract[line])
+        state.motion = None if context.motion[line] < 0 else int(context.motion[line])
+
+    def _codes(self, chunk: WordChunk, value: Array, usable: Mask) -> Codes:
+        g = np.flatnonzero((chunk.letter == 71) & usable)
+        code = np.clip(np.rint(value[g] * 10), 0, 1999).astype(np.int64)
+        act = self._act[code]
+        act[np.abs(code - value[g] * 10) > 1e-6] = Act.REFUSE
+        return Codes(chunk.line[g], code, act)
+
+    def _events(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> Mask:
+        """The lines with a G word that is an event or refused, an M word not known as harmless, or a T
+        word."""
+        letter, line = chunk.letter, chunk.line
+        event = np.zeros(len(chunk.line_start), bool)
+        event[codes.line[(codes.act == Act.EVENT) | (codes.act == Act.REFUSE)]] = True
+        m = np.flatnonzero((letter == 77) & usable)
+        event[line[m[self._m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
+        event[line[(letter == 84) & usable]] = True
+        return event
+
+    def _consumed(self, codes: Codes, active: Mask) -> Mask:
+        consumed = ~active
+        consumed[codes.line[(codes.act == Act.EVENT) & np.isin(codes.code, self._claims)]] = True
+        return consumed
+
+    def _motion(self, chunk: WordChunk, codes: Codes) -> Modal:
+        chosen = codes.act == Act.MOTION
+        at, code = codes.line[chosen], codes.code[chosen]
+        if (code == 800).any():
+            # G80 may stand beside another motion code, which wins
+            beside = np.isin(at, at[1:][at[1:] == at[:-1]])
+            at, code = at[~(beside & (code == 800))], code[~(beside & (code == 800))]
+        if self._cycles_apart:
+            # cycles are a group of their own: a lone G80 hands back to the last of G0 to G3
+            code = code.copy()
+            for i, c in enumerate(code.tolist()):
+                if c == 800:
+                    code[i] = -1 if self._linear_motion is None else self._linear_motion
+                elif c < 330:
+                    self._linear_motion = c
+        return _in_force(chunk, at, code, self._state.motion)
+
+
+def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
+    """Refuse active lines that hold more than words."""
+    for line in chunk.odd.tolist():
+        if not active[line]:
+            continue
+        text = data[chunk.line_start[line] : chunk.line_end[line]].strip()
+        number = chunk.first_line + line + 1
+        shown = text[:60].decode("latin-1")
+        if _FLOW.search(text):
+            raise ProgramError(
+                f"`{shown}` uses parameters, expressions or flow control; unroll the program with --flatten",
+                line=number,
+            )
+        raise ProgramError(
+            f"`{shown}` is not understood and may move the machine; expected words of a letter and a number",
+            line=number,
+        )
+
+
+def scaled(context: Context, state: State, remarks: dict[str, tuple[int, str]]) -> Array:
+    """The chunk's numbers as written, in program units: without a decimal point they count increments on
+    some controls, which is remarked."""
+    if not state.bare_increments:
+        return context.value
+    if state.unit_mm in context.scaled:
+        return context.scaled[state.unit_mm]
+    chunk = context.chunk
+    bare = np.flatnonzero(~chunk.pointed & _LENGTHS[chunk.letter])
+    if not bare.size:
+        return context.value
+    out = context.value.copy()
+    for letter in np.unique(chunk.letter[bare]).tolist():
+        mine = bare[chunk.letter[bare] == letter]
+        out[mine] *= state.increment(chr(letter))
+    remarks.setdefault("increments", (context.number(int(chunk.line[bare[0]])), ""))
+    context.scaled[state.unit_mm] = out
+    return out
+
+
+def _modal(chunk: WordChunk, codes: Codes, which: Act, now: int | None) -> Modal:
+    chosen = codes.act == which
+    return _in_force(chunk, codes.line[chosen], codes.code[chosen], now)
+
+
+def _in_force(chunk: WordChunk, at: Index, code: Index, now: int | None) -> Modal:
+    if (at[1:] == at[:-1]).any():
+        twice = int(at[1:][at[1:] == at[:-1]][0])
+        raise ProgramError(
+            "two G codes of the same modal group stand in this block; a control takes one",
+            line=chunk.first_line + twice + 1,
+        )
+    return modal(len(chunk.line_start), at, code, -1 if now is None else now)
+
+
+def _check_deleted(context: Context, active: Mask, state: State) -> None:
+    """A `/` block must not change how later blocks are read, unless the next block restates it."""
+    chunk = context.chunk
+    deleted = np.flatnonzero(chunk.deleted & active)
+    pairs = (
+        (context.motion, -1 if state.motion is None else state.motion),
+        (context.plane, state.plane),
+        (context.distance, state.distance),
+        (context.arc_distance, state.arc_distance),
+        (context.feed, state.feed),
+        (context.retract, state.retract),
+    )
+    for line in deleted.tolist():
+        following = line + 1
+        while following < len(chunk.deleted) and chunk.deleted[following]:
+            following += 1
+        restated = (context.codes.line == following) & (context.codes.act == Act.MOTION)
+        for which, (mode, carry) in enumerate(pairs):
+            before = mode[line - 1] if line else carry
+            if mode[line] != before and not (which == 0 and restated.any()):
+                raise ProgramError(
+                    "a block under block delete changes a modal code that later blocks depend on; "
+                    "restate the code in the next block or remove the `/`",
+                    line=context.number(line),
+                )

@@ -1,0 +1,53 @@
+"""Programs that go from position to position and wait there, in the words of a control."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import CannotCompute
+from olp.core.units import AXES
+from olp.program.rs274.profiles import Profile
+
+Array = npt.NDArray[np.float64]
+#: Lines of comments are no longer than some controls take.
+_WIDTH = 68
+#: What every program sets first: mm, absolute, no cycle, no tool length, no cutter compensation.
+_MODES = "G21 G90 G94 G80 G40 G49"
+
+
+def positions_program(
+    profile: Profile, positions_mm: Array, dwell_s: Sequence[float], digits: int, notes: Sequence[str]
+) -> bytes:
+    """Rapids in machine coordinates (G53) through axis positions (n, 3), each with a dwell after it.
+
+    A position is followed by no dwell where `dwell_s` (n,) is 0. `digits` are the decimals of words, `notes`
+    become comments. Z goes first to the height of the first position, alone: let that be a clear one. Raises
+    CannotCompute for a control that is not of this family.
+    """
+    if 530 not in profile.codes:
+        raise CannotCompute(f"{profile.title} has no G53; take the points from the CSV file")
+    opening, closing = (mark.decode() for mark in profile.comment)
+    lines = [f"{opening}{line}{closing}" for note in notes for line in textwrap.wrap(_plain(note), _WIDTH)]
+    lines.append(_MODES)
+    before: list[str] = []
+    for place, wait in zip(np.round(positions_mm, digits).tolist(), dwell_s, strict=True):
+        words = [f"{axis}{value + 0.0:.{digits}f}" for axis, value in zip(AXES, place, strict=True)]
+        if not before:
+            lines.append(f"G53 G0 {words[2]}")
+        if words != before:
+            lines.append(f"G53 G0 {' '.join(words)}")
+        before = words
+        if wait > 0.0:
+            count = profile.increments_without_point
+            lines.append(f"G4 P{round(1000.0 * wait)}" if count else f"G4 P{wait:.3f}")
+    lines.append("M30" if 30 in profile.harmless_m else "M2")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _plain(note: str) -> str:
+    """Without marks that would end a comment."""
+    return note.replace("(", "[").replace(")", "]").encode("ascii", "replace").decode()

@@ -1,0 +1,242 @@
+"""Reads RS-274 and ISO 6983 text: bytes to a nominal toolpath and the words that can be edited.
+
+The way of a chunk of lines: lexer columns -> modal codes per line (`modes`) -> motion lines -> stretches
+between events, each resolved in bulk (`motion`), with the blocks that change frames (`state`) or need the
+present position (`singles`) carried out one by one. `collector` takes what comes of it. Nothing here knows an
+error model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.core.toolpath import Flag, Kind
+from olp.program.dialect import Options
+from olp.program.directives import Directives, with_payloads
+from olp.program.program import Program
+from olp.program.rs274.collector import Collector
+from olp.program.rs274.lexer import WordChunk, chunks
+from olp.program.rs274.modes import PLANE_OF, Context, Modes, check_odd, scaled
+from olp.program.rs274.motion import Array, Blocks, arc_geometry, fill, gather
+from olp.program.rs274.profiles import CYCLES, PROBES, Profile
+from olp.program.rs274.special_blocks import Singles, event_block
+from olp.program.rs274.state import NAN, Effect, State
+
+#: motion code to kind of move; 255 where it is not plain motion, the last entry standing for "none yet"
+_KIND = np.full(1001, 255, np.uint8)
+_KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
+_ALONE = np.array(sorted(CYCLES | PROBES))
+#: Events that need the present position
+_POSITION = (100, 280, 300, 530, 920)
+
+
+def read(
+    data: bytes, setup: Setup, profile: Profile, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    right.
+
+    Without `words` the columns that only writing needs are left out. Payloads that the job gives by line
+    stand in the text of the result as comments (`directives`).
+    """
+    return _Reader(data, setup, profile, options or Options(), words).run()
+
+
+@dataclass(slots=True, eq=False)
+class _Rows:
+    """The motion lines of a chunk on their way: how many have a frame, how many a position."""
+
+    blocks: Blocks
+    frame: npt.NDArray[np.int32]
+    assigned: int = 0
+    resolved: int = 0
+
+
+class _Reader:
+    """One reading of one program: takes its chunks in turn and shares them out."""
+
+    def __init__(self, data: bytes, setup: Setup, profile: Profile, options: Options, words: bool) -> None:
+        self.data = data = with_payloads(data, setup.job.payloads, profile.comment)
+        self.options = options
+        self.state = State.at_start(setup, profile)
+        x, y, z = self.state.position
+        self.out = Collector(data, (x, y, z), keep_words=words)
+        self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
+        self.switches = Directives(data)
+        self.payloads: dict[int, float] = {}
+        self.singles = Singles(self.state, self.out, self.switches)
+        self.end_line = 0
+
+    def run(self) -> Program:
+        data = self.data
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise ProgramError(
+                "the text is UTF-16; expected one byte a character; save it as plain text", line=1
+            )
+        if data[:3] == b"\xef\xbb\xbf":
+            # a byte order mark is blank to the lexer, and stays where it is
+            data = b"   " + data[3:]
+        for chunk in chunks(data):
+            self._chunk(chunk)
+        return self.out.program(self.state, self.end_line)
+
+    # -- one chunk ---------------------------------------------------------------------------------
+
+    def _chunk(self, chunk: WordChunk) -> None:
+        base = self.out.word_count
+        self.out.put_words(chunk)
+        self.payloads = self.switches.follow(chunk)
+        last = self.modes.program_end(chunk)
+        if not last:
+            return
+        self.end_line = chunk.first_line + last
+        active = np.arange(len(chunk.line_start)) < last
+        if self.options.block_delete:
+            active &= ~chunk.deleted
+        check_odd(self.data, chunk, active)
+        context = self.modes.read(chunk, base, active)
+        # a payload makes a new frame, from the motion of its own line on
+        context.event[[line for line in self.payloads if active[line]]] = True
+        self._stretches(context, gather(chunk, context.motion, context.consumed))
+        self.modes.leave(context, last - 1)
+
+    # -- stretches between events ------------------------------------------------------------------
+
+    def _stretches(self, context: Context, blocks: Blocks) -> None:
+        chunk, state, event = context.chunk, self.state, context.event
+        rows = _Rows(blocks, np.zeros(len(blocks), np.int32))
+        alone = np.isin(context.motion[blocks.line], _ALONE)
+        special = event.copy()
+        special[blocks.line[alone]] = True
+        for at in np.flatnonzero(special).tolist():
+            upto = int(np.searchsorted(blocks.line, at))
+            here = upto < len(blocks) and blocks.line[upto] == at
+            self._assign(context, rows, upto)
+            if not event[at]:
+                self._alone(context, rows, upto, Effect())
+                continue
+            number, deleted = context.number(at), bool(chunk.deleted[at])
+            words, codes = event_block(context, at, state.profile)
+            moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
+            if moved or any(c in _POSITION for c in codes):
+                self._resolve(context, rows, upto)
+            state.distance = int(context.distance[at])
+            state.payload_kg = self.payloads.get(at, state.payload_kg)
+            effect = state.run(number, words, codes, self.out.moves)
+            if moved:
+                self.singles.control_move(number, deleted=deleted)
+            if here and (alone[upto] or effect.home or effect.machine):
+                self._alone(context, rows, upto, effect)
+            if effect.home:
+                for axis in effect.home:
+                    state.position[axis] = NAN
+                self.singles.control_move(number, deleted=deleted)
+        self._assign(context, rows, len(blocks))
+        self._resolve(context, rows, len(blocks))
+
+    def _alone(self, context: Context, rows: _Rows, row: int, effect: Effect) -> None:
+        """A row that is carried out by itself, after those before it."""
+        self._resolve(context, rows, row)
+        self._assign(context, rows, row + 1)
+        rows.resolved = row + 1
+        slot = rows.blocks.slot[row : row + 1]
+        self.singles.run(context, int(rows.blocks.line[row]), slot, int(rows.frame[row]), effect)
+
+    def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
+        """Give the present frame to the rows that came since the last event."""
+        if upto > rows.assigned:
+            line = context.number(int(rows.blocks.line[rows.assigned]))
+            rows.frame[rows.assigned : upto] = self.state.frame(line)
+            if not self.state.unit_stated:
+                self.out.remarks.setdefault("unit", (line, "mm"))
+            rows.assigned = upto
+
+    def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:
+        """Positions, kinds and arcs of the plain rows up to `upto`."""
+        a, rows.resolved = rows.resolved, max(upto, rows.resolved)
+        if upto <= a:
+            return
+        chunk, blocks, state = context.chunk, rows.blocks, self.state
+        line = blocks.line[a:upto]
+        number = line + (chunk.first_line + 1)
+        motion = context.motion[line]
+        kind = _KIND[np.maximum(motion, -1)]
+        if (kind == 255).any():
+            i = int(np.flatnonzero(kind == 255)[0])
+            _refuse_motion(int(motion[i]), int(number[i]))
+        incremental = context.distance[line] == 910
+        frame = rows.frame[a:upto]
+        offset, unit = self._offsets(frame)
+        value = scaled(context, state, self.out.remarks)
+        slot = blocks.slot[a:upto]
+        end = fill(slot, value, incremental if incremental.any() else None, offset, unit, state.position)
+        flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
+        flag[blocks.other[a:upto]] |= np.uint8(Flag.WHOLE)
+        flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
+        inverse = context.feed[line] == 930
+        if inverse.any():
+            flag[inverse] |= np.uint8(Flag.INVERSE_TIME)
+        if self.switches:
+            flag[self.switches.off(number)] |= np.uint8(Flag.PASS)
+        arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
+        if arcs.stop > arcs.start:
+            self._arcs(context, rows, arcs, a, end, value, offset, unit)
+        self.out.put_moves(kind, flag, number, frame, end, np.where(slot >= 0, slot + context.base, -1))
+        state.position[:] = end[-1].tolist()
+
+    def _arcs(
+        self,
+        context: Context,
+        rows: _Rows,
+        arcs: slice,
+        a: int,
+        end: Array,
+        value: Array,
+        offset: Array,
+        unit: Array | float,
+    ) -> None:
+        blocks = rows.blocks
+        row = blocks.arc_row[arcs] - a
+        words = blocks.arc_slot[arcs]
+        line = blocks.line[blocks.arc_row[arcs]]
+        start = np.where(row[:, None] > 0, end[np.maximum(row - 1, 0)], np.array(self.state.position))
+        size = np.where(words >= 0, value[words], np.nan)
+        size[:, :4] *= np.asarray(unit)[row] if np.ndim(unit) else unit
+        absolute = context.arc_distance[line] == 901
+        plane = np.array([PLANE_OF[p] for p in (170, 180, 190)])[(context.plane[line] - 170) // 10]
+        cw = context.motion[line] == 20
+        centre, sweep = arc_geometry(
+            start,
+            end[row],
+            size,
+            clockwise=cw,
+            plane=plane,
+            absolute=absolute,
+            offset=np.broadcast_to(offset, end.shape)[row],
+            line=line + (context.chunk.first_line + 1),
+        )
+        slot = np.where(words >= 0, words + context.base, -1)
+        self.out.put_arcs(row + self.out.moves, centre, plane, sweep, slot, absolute)
+
+    def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
+        frames = self.state.frames
+        if (frame == frame[0]).all():
+            one = frames[int(frame[0])]
+            return np.array(one.offset_mm), one.unit_mm
+        offsets = np.array([f.offset_mm for f in frames])
+        units = np.array([f.unit_mm for f in frames])
+        return offsets[frame], units[frame][:, None]
+
+
+def _refuse_motion(code: int, line: int) -> None:
+    if code in (-1, 800):
+        raise ProgramError(
+            "axis words stand in a block, but no motion code is in force; expected G0, G1, G2 or G3",
+            line=line,
+        )
+    raise ProgramError(f"G{code / 10:g} is not read as motion", line=line)

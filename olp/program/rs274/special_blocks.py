@@ -1,0 +1,268 @@
+"""Blocks that are carried out one by one: canned cycles, probes, G53 moves, the way to G28's intermediate
+point and the moves of the control's own; and the checks of a block with an event.
+
+What an event does to frames and tools is in `state`, the strokes of one hole are in `cycles`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag, Kind
+from olp.program.directives import Directives
+from olp.program.program import Hole
+from olp.program.rs274.collector import Collector
+from olp.program.rs274.cycles import Stroke, hole_moves, levels
+from olp.program.rs274.modes import PLANE_OF, Context, scaled
+from olp.program.rs274.motion import Index, fill
+from olp.program.rs274.profiles import CUTTER_COMPENSATION, CYCLES, Act, Profile
+from olp.program.rs274.state import NAN, Effect, State, Word
+
+_M_REFUSED = {
+    700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
+    730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
+    990: "repeats the program",
+}  # fmt: skip
+
+
+def event_block(context: Context, at: int, profile: Profile) -> tuple[list[Word], list[int]]:
+    """The words and event codes of a line of the chunk; refuses what cannot be read right."""
+    chunk, codes = context.chunk, context.codes
+    span = range(int(chunk.first_word[at]), int(chunk.first_word[at + 1]))
+    words = [
+        Word(chr(chunk.letter[i]), float(context.value[i]), context.base + i, bool(chunk.pointed[i]))
+        for i in span
+    ]
+    mine = slice(np.searchsorted(codes.line, at), np.searchsorted(codes.line, at, "right"))
+    line = context.number(at)
+    events = _checked(codes.code[mine], codes.act[mine], words, profile, line)
+    changes = set(events) - {40, 280, 300, 530} or any(w.letter == "M" and w.value in (6, 61) for w in words)
+    if chunk.deleted[at] and changes:
+        raise ProgramError(
+            "a block under block delete changes offsets, units, path mode or the tool, so later blocks "
+            "depend on the switch; remove the `/`",
+            line=line,
+        )
+    return words, events
+
+
+def _checked(
+    code: Index, act: npt.NDArray[np.int8], words: list[Word], profile: Profile, line: int
+) -> list[int]:
+    """The event codes of a block; refuses those that cannot be read right."""
+    for c, a in zip(code.tolist(), act.tolist(), strict=True):
+        if a == Act.REFUSE:
+            why = profile.refusals.get(c)
+            name = f"G{c / 10:g}"
+            if c in CUTTER_COMPENSATION:
+                why = f"{why}; program the tool path, or take the contour as tool path with --contour"
+            raise ProgramError(
+                why or f"{name} is not known to the {profile.name} profile and may move the machine",
+                line=line,
+            )
+    for word in words:
+        m = round(word.value * 10)
+        if word.letter == "M" and m in _M_REFUSED:
+            raise ProgramError(f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with --flatten", line=line)
+    return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
+
+
+class Singles:
+    """Carries such blocks out: from the position in `state`, with their moves and holes put into `out`."""
+
+    def __init__(self, state: State, out: Collector, switches: Directives) -> None:
+        self._state = state
+        self._out = out
+        self._switches = switches
+        # a series of cycles: its count, the level before it, and the words that its blocks inherit, in mm
+        self._series = 0
+        self._initial = 0.0
+        self._sticky: dict[str, float] = {}
+
+    def run(self, context: Context, at: int, slot: Index, frame: int, effect: Effect) -> None:
+        """Carry out the motion on line `at` of the chunk, whose axis words are `slot` (1, 3), in this
+        frame."""
+        motion = int(context.motion[at])
+        if motion in CYCLES and not effect.home and not effect.machine:
+            self._cycle(context, at, frame, motion)
+        else:
+            self._move(context, at, slot, frame, motion, effect)
+
+    def control_move(self, line: int, *, deleted: bool) -> None:
+        """A move of the control's own: some axes are unknown after it."""
+        if not self._out.moves:
+            x, y, z = self._state.position
+            self._out.start = (x, y, z)
+            return
+        self._out.put_moves(
+            np.array([Kind.RAPID], np.uint8),
+            np.array([Flag.PASS | Flag.CONTROL | _deleted(deleted)], np.uint8),
+            np.array([line]),
+            np.array([len(self._state.frames) - 1]),
+            np.array([self._state.position]),
+            np.full((1, 3), -1),
+        )
+
+    def _move(
+        self, context: Context, at: int, slot: Index, frame_index: int, motion: int, effect: Effect
+    ) -> None:
+        """A probe, a G53 move or the way to G28's intermediate point."""
+        state, line = self._state, context.number(at)
+        frame = state.frames[frame_index]
+        incremental = bool(context.distance[at] == 910)
+        deleted = bool(context.chunk.deleted[at])
+        flag = _deleted(deleted)
+        kind = Kind.RAPID
+        offset = np.array(frame.offset_mm)
+        if effect.machine:
+            if incremental:
+                raise ProgramError("G53 names axis positions; expected G90, the block is in G91", line=line)
+            if motion not in (0, 10):
+                raise ProgramError("G53 goes with G0 or G1 only", line=line)
+            kind = Kind(motion // 10)
+            flag |= Flag.PASS | Flag.MACHINE
+            offset = np.zeros(3)
+        elif effect.home:
+            flag |= Flag.PASS
+        else:
+            kind = Kind.PROBE
+        if incremental:
+            flag |= Flag.INCREMENTAL
+        before = list(state.position)
+        relative = np.array([True]) if incremental else None
+        value = scaled(context, state, self._out.remarks)
+        end = fill(slot, value, relative, offset, frame.unit_mm, before)
+        self._out.put_moves(
+            np.array([kind], np.uint8), np.array([flag], np.uint8), np.array([line]),
+            np.array([frame_index]), end, np.where(slot >= 0, slot + context.base, -1),
+        )  # fmt: skip
+        state.position[:] = end[0].tolist()
+        if kind == Kind.PROBE:
+            # it may stop anywhere on its way
+            for i in range(3):
+                if state.position[i] != before[i]:
+                    state.position[i] = NAN
+            self.control_move(line, deleted=deleted)
+
+    def _cycle(self, context: Context, at: int, frame_index: int, code: int) -> None:
+        state, out, chunk, line = self._state, self._out, context.chunk, context.number(at)
+        frame = state.frames[frame_index]
+        incremental = bool(context.distance[at] == 910)
+        plane = PLANE_OF[int(context.plane[at])]
+        first, second, third = PLANES[plane]
+        words = {
+            chr(chunk.letter[i]): i for i in range(int(chunk.first_word[at]), int(chunk.first_word[at + 1]))
+        }
+        value = scaled(context, state, out.remarks)
+        given = {letter: float(value[i]) for letter, i in words.items()}
+        if "P" in given:
+            given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
+        self._inherit(context, at, given, code, third, frame.unit_mm)
+        times = self._repeats(context, words, line)
+        offset = frame.offset_mm
+        z_word, r_word = self._sticky["XYZ"[third]], self._sticky["R"]
+        if incremental:
+            r, z = levels(r_word, z_word, absolute=False, initial_z=self._initial)
+        else:
+            r, z = r_word + offset[third], z_word + offset[third]
+        place, step = [], []
+        for axis in (first, second):
+            held, letter = state.position[axis], "XYZ"[axis]
+            number = given[letter] * frame.unit_mm if letter in given else None
+            step.append(number if incremental and number is not None else 0.0)
+            place.append(held if number is None else held + number if incremental else number + offset[axis])
+        if any(np.isnan((*place, *state.position))):
+            raise ProgramError(
+                "a canned cycle starts where an axis has not been commanded yet; command X, Y and Z first, "
+                "or give start_mm in the job file",
+                line=line,
+            )
+        start = (state.position[0], state.position[1], state.position[2])
+        exempt = Flag.PASS if self._switches.off(line) else Flag(0)
+        flag = Flag.CYCLE | _deleted(bool(chunk.deleted[at])) | exempt
+        for repeat in range(times):
+            try:
+                strokes = hole_moves(
+                    code, start=start, xy=(place[0], place[1]), r=r, z=z, q=self._sticky.get("Q"),
+                    p=self._sticky.get("P"), retract_to_r=bool(context.retract[at] == 990),
+                    initial_z=self._initial, plane=17 + plane,
+                    profile="linuxcnc" if state.profile.name == "linuxcnc" else "fanuc",
+                )  # fmt: skip
+            except ProgramError as error:
+                raise ProgramError(error.message, line=line) from None
+            moving = [s for s in strokes if s.kind in ("rapid", "feed")]
+            count = len(moving)
+            begin = out.moves
+            out.put_moves(
+                np.array([Kind.RAPID if s.kind == "rapid" else Kind.LINE for s in moving], np.uint8),
+                np.full(count, flag, np.uint8),
+                np.full(count, line),
+                np.full(count, frame_index),
+                np.array([s.point for s in moving], float).reshape(count, 3),
+                np.full((count, 3), -1),
+            )
+            out.holes.append(
+                Hole(
+                    line=line, first=begin, last=out.moves,
+                    words={letter: context.base + i for letter, i in words.items()}, plane=plane,
+                    place_mm=(place[0], place[1]), r_mm=r, z_mm=z, initial_mm=self._initial,
+                    incremental=incremental, repeat=repeat, repeats=times, series=self._series, code=code,
+                    rests=_rests(strokes),
+                )
+            )  # fmt: skip
+            start = moving[-1].point if moving else start
+            place = [place[0] + step[0], place[1] + step[1]]
+        state.position[:] = list(start)
+
+    def _inherit(
+        self, context: Context, at: int, given: dict[str, float], code: int, third: int, unit_mm: float
+    ) -> None:
+        """Keep the words that later blocks of a series inherit; a new series starts after any other move."""
+        previous = int(context.motion[at - 1]) if at else (self._state.motion or -1)
+        holes = self._out.holes
+        if not (previous in CYCLES and holes and holes[-1].last == self._out.moves):
+            self._series += 1
+            self._initial = self._state.position[third]
+            self._sticky = {}
+        elif previous != code:
+            self._sticky = {}
+        for letter in "RQ" + "XYZ"[third]:
+            if letter in given:
+                self._sticky[letter] = given[letter] * unit_mm
+        if "P" in given:
+            self._sticky["P"] = given["P"]
+        missing = [letter for letter in ("R", "XYZ"[third]) if letter not in self._sticky]
+        if missing:
+            raise ProgramError(
+                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=context.number(at)
+            )
+
+    def _repeats(self, context: Context, words: dict[str, int], line: int) -> int:
+        """How many holes the block makes: its L word, or K on ISO controls."""
+        word = words.get("L", words.get("K") if self._state.profile.name != "linuxcnc" else None)
+        times = 1 if word is None else round(float(context.value[word]))
+        if times < 1:
+            raise ProgramError(
+                "a canned cycle with zero repeats only stores values, which is not read yet", line=line
+            )
+        return times
+
+
+def _rests(strokes: Sequence[Stroke]) -> tuple[tuple[int, float], ...]:
+    """Dwells and turns of the spindle in a hole: moves before each, seconds."""
+    out, moves = [], 0
+    for stroke in strokes:
+        if stroke.kind in ("rapid", "feed"):
+            moves += 1
+        else:
+            out.append((moves, stroke.seconds))
+    return tuple(out)
+
+
+def _deleted(deleted: bool) -> Flag:
+    return Flag.DELETED if deleted else Flag(0)

@@ -1,0 +1,306 @@
+"""Tables of positions as text: how one is laid out, what its first rows tell of that, and where its cells
+are.
+
+A layout is a value; files that people write make one (`olp.files.point_profile`), or the first rows of a
+table do (`told`), which then says in words what it took for granted. Bytes are never decoded but to compare
+names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+from olp.core.errors import InputError
+
+Delimiter = Literal["comma", "semicolon", "tab", "space"]
+Span = tuple[int, int]
+
+MM = {"mm": 1.0, "um": 1e-3, "m": 1e3, "inch": 25.4}
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+MM_S = {"mm/s": 1.0, "mm/min": 1 / 60, "m/s": 1e3, "m/min": 1e3 / 60, "inch/min": 25.4 / 60}
+#: "space" is any run of blanks
+DELIMITERS: dict[str, str | None] = {"comma": ",", "semicolon": ";", "tab": "\t", "space": None}
+
+#: what a column may hold, and the names by which a header says so (in lower case, without their unit)
+ROLES: dict[str, tuple[str, ...]] = {
+    "X": ("x",),
+    "Y": ("y",),
+    "Z": ("z",),
+    "t": ("t", "time"),
+    "name": ("name", "point", "tag", "label"),
+    "line": ("line",),
+    "A": ("a", "rx", "roll", "yaw"),
+    "B": ("b", "ry", "pitch"),
+    "C": ("c", "rz"),
+    "I": ("i", "nx"),
+    "J": ("j", "ny"),
+    "K": ("k", "nz"),
+    "speed": ("speed", "feed", "feedrate", "velocity"),
+    "blend": ("blend", "zone", "rounding"),
+    "tool": ("tool", "stylus", "sensor"),
+    "SX": ("sx", "stylus_x"),
+    "SY": ("sy", "stylus_y"),
+    "SZ": ("sz", "stylus_z"),
+}
+AXES = ("X", "Y", "Z")
+
+#: Rows that are looked at to tell a layout.
+LOOK = 40
+#: bytes that hold them
+_HEAD = 1 << 16
+_FRAME = re.compile(r"[#/%;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_COMMA_NUMBER = re.compile(r"[-+]?\d+,\d+")
+_AXIS = re.compile(r"([xyz])(?:[ _]*[\[(]?(mm|um|m|inch)[\])]?)?")
+_OTHER = re.compile(r"(.+?)(?:(?:[ _]+|[ _]*[\[(])(?:mm|deg|rad|s|ms|us|(?:mm|m|inch)[/_](?:s|min))[\])]?)?")
+_SPEED = re.compile(r".+?[ _]*[\[(]?(mm|m|inch)[/_](s|min)[\])]?")
+_MARKS = ("#", "//", "%")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a table is laid out. `columns` leads from what a column holds (ROLES) to its name or its number
+    from 1. `unit` is that of X, Y and Z, None where nothing states it. `point` is what a row of measured
+    points states: a place on the surface or the centre of the tip. `assumed` says in words what was told from
+    the rows."""
+
+    columns: Mapping[str, str | int]
+    delimiter: Delimiter = "comma"
+    decimal: Literal["point", "comma"] = "point"
+    unit: str | None = None
+    time_unit: str = "s"
+    speed_unit: str | None = None
+    header: bool = True
+    comment: str = "#"
+    frame: str | None = None
+    point: Literal["surface", "centre"] | None = None
+    tip_radius_mm: float | None = None
+    approach_mm: float | None = None
+    joined: Literal["points", "lines"] = "points"
+    insert: bool = False
+    stamp: bool = True
+    assumed: tuple[str, ...] = field(default=())
+
+    @property
+    def unit_mm(self) -> float:
+        """mm per unit of X, Y and Z. Raises InputError where nothing states the unit."""
+        if self.unit is None:
+            raise InputError(
+                "states no unit of X, Y and Z; name it in the header (X_mm or `X [inch]`), with --unit, or "
+                "with "
+                "the key unit of a profile"
+            )
+        return MM[self.unit]
+
+
+def mapping(columns: Mapping[str, str | int]) -> Mapping[str, str | int]:
+    """Columns that nobody can change."""
+    return MappingProxyType(dict(columns))
+
+
+def told(lines: Sequence[str]) -> Layout | None:
+    """The layout that the first rows of a table suggest, None where they leave a choice.
+
+    A header that names X, Y and Z, with or without their unit; names and three numbers, as SpatialAnalyzer
+    writes them; or three numbers and nothing else.
+    """
+    comment = next((m for m in _MARKS[1:] if any(line.lstrip().startswith(m) for line in lines)), "#")
+    rows = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith(("#", comment))]
+    if not rows:
+        return None
+    delimiter = _delimiter(rows)
+    cells = [_split(row, delimiter) for row in rows]
+    decimal: Literal["point", "comma"] = "point"
+    if any(_COMMA_NUMBER.fullmatch(c) for row in cells for c in row):
+        decimal = "comma"
+    said = [f"columns are separated by {delimiter}"]
+    if decimal == "comma":
+        said.append("the decimal mark is a comma")
+    found = _named(cells[0])
+    if found is not None:
+        columns, unit = found
+        said.append(_columns_said(columns, unit))
+        speed = _SPEED.fullmatch(str(columns.get("speed", "")).lower())
+        return Layout(
+            mapping(columns), delimiter, decimal, unit, comment=comment, assumed=tuple(said),
+            speed_unit=None if speed is None else f"{speed[1]}/{speed[2]}",
+        )  # fmt: skip
+    number = [bool(_NUMBER.fullmatch(c.replace(",", "."))) for c in cells[0]]
+    columns = {}
+    if number == [True] * 3:
+        columns = {"X": 1, "Y": 2, "Z": 3}
+    text = next((i for i, is_number in enumerate(number) if is_number), 0)
+    # a point may be named by a number: what counts are three numbers at the end behind a word
+    if text and all(number[text:]) and len(number) - 3 in (text, text + 1):
+        x = len(number) - 2
+        columns = {"X": x, "Y": x + 1, "Z": x + 2, "name": x - 1}
+    if not columns:
+        return None
+    said.append(_columns_said(columns, None))
+    return Layout(
+        mapping(columns), delimiter, decimal, None, header=False, comment=comment, assumed=tuple(said)
+    )
+
+
+def first_lines(data: bytes) -> list[str]:
+    """The first rows of a text, to tell its layout from."""
+    head = data[:_HEAD].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    if len(data) > _HEAD:
+        # the last line may be cut
+        head = head[: head.rfind("\n") + 1] or head
+    return head.split("\n")[:LOOK]
+
+
+def stated_frame(lines: Sequence[str], file: str = "") -> str | None:
+    """The frame that a comment among the first rows names, as in `# frame=G54`. Raises InputError, with its
+    line, for a second one that differs."""
+    stated = None
+    for number, line in enumerate(lines, 1):
+        match = _FRAME.match(line)
+        if match and stated not in (None, match[1]):
+            raise InputError(
+                f"the frame is {match[1]} here and {stated} before; expected one frame a file",
+                file=file or None, line=number,
+            )  # fmt: skip
+        stated = match[1] if match else stated
+    return stated
+
+
+def _columns_said(columns: Mapping[str, str | int], unit: str | None) -> str:
+    named = ", ".join(f"{role} in column {column}" for role, column in columns.items())
+    return f"{named}; {f'in {unit}' if unit else 'no unit is stated'}"
+
+
+def _delimiter(rows: Sequence[str]) -> Delimiter:
+    row = rows[-1]
+    if ";" in row:
+        return "semicolon"
+    if "\t" in row:
+        return "tab"
+    decimal_commas = sum(bool(_COMMA_NUMBER.fullmatch(cell)) for cell in row.split())
+    return "comma" if "," in row and decimal_commas < 3 else "space"
+
+
+def _split(row: str, delimiter: str) -> list[str]:
+    return [cell.strip().strip('"') for cell in row.split(DELIMITERS[delimiter])]
+
+
+def _named(header: Sequence[str]) -> tuple[dict[str, str | int], str | None] | None:
+    """Columns whose names say what they hold, and the unit of X, Y and Z in them."""
+    found: dict[str, str | int] = {}
+    units: set[str] = set()
+    for role, names in ROLES.items():
+        for cell in header:
+            match = (_AXIS if role in AXES else _OTHER).fullmatch(cell.lower())
+            if match is None or match[1] not in names:
+                continue
+            if role in AXES and match[2]:
+                units.add(match[2])
+            found[role] = cell
+            break
+    if not set(AXES) <= found.keys() or len(units) > 1:
+        return None
+    return found, next(iter(units), None)
+
+
+class Cells:
+    """Rows of a table and where the cells of each are, as positions in the bytes of the text."""
+
+    def __init__(self, data: bytes, layout: Layout, file: str = "") -> None:
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise InputError("the text is UTF-16; expected one byte a character; save it as UTF-8", line=1)
+        self.data, self.layout, self.file = data, layout, file
+        mark = DELIMITERS[layout.delimiter]
+        self._mark = None if mark is None else mark.encode()
+        self._comments = (b"#", layout.comment.encode())
+        #: where the row that was last given begins and ends
+        self.bounds: Span = (0, 0)
+        self.header: list[str] = []
+        self.header_line = 0
+        if layout.header:
+            for number, start, end in self._lines():
+                self.header = [self.text(span) for span in self.split(start, end)]
+                self.header_line = number
+                break
+
+    def place(self, role: str) -> int | None:
+        """The index of the column that holds something, None where the table has none. Raises InputError."""
+        column = self.layout.columns.get(role)
+        if column is None:
+            return None
+        if isinstance(column, int):
+            return column - 1
+        if column in self.header:
+            return self.header.index(column)
+        known = ", ".join(self.header) or "their numbers"
+        raise InputError(
+            f'there is no column "{column}"; expected one of {known}', line=self.header_line or 1
+        )
+
+    def rows(self) -> Iterator[tuple[int, list[Span]]]:
+        """Line (from 1) and cells of each row of data."""
+        for number, start, end in self._lines():
+            if number > self.header_line:
+                self.bounds = (start, end)
+                yield number, self.split(start, end)
+
+    def text(self, span: Span) -> str:
+        raw = self.data[span[0] : span[1]]
+        try:
+            return raw.decode("utf-8")
+        except UnicodeDecodeError:
+            return raw.decode("latin-1")
+
+    def split(self, start: int, end: int) -> list[Span]:
+        """Spans of the cells of a row, without blanks and quotes around them."""
+        data, mark = self.data, self._mark
+        spans = []
+        if mark is None:
+            for found in re.finditer(rb"\S+", data[start:end]):
+                spans.append(self._bare(start + found.start(), start + found.end()))
+            return spans
+        at = start
+        while True:
+            stop = at
+            while stop < end and data[stop : stop + 1] in (b" ", b"\t") and mark != b"\t":
+                stop += 1
+            if data[stop : stop + 1] == b'"':
+                closing = data.find(b'"', stop + 1, end)
+                while closing >= 0 and data[closing + 1 : closing + 2] == b'"':
+                    closing = data.find(b'"', closing + 2, end)
+                stop = end if closing < 0 else closing
+            stop = data.find(mark, stop, end)
+            stop = end if stop < 0 else stop
+            spans.append(self._bare(at, stop))
+            if stop >= end:
+                return spans
+            at = stop + 1
+
+    def _bare(self, start: int, end: int) -> Span:
+        data = self.data
+        while start < end and data[start] in b" \t":
+            start += 1
+        while end > start and data[end - 1] in b" \t":
+            end -= 1
+        if end - start > 1 and data[start] == data[end - 1] == 34:
+            return self._bare(start + 1, end - 1)
+        return start, end
+
+    def _lines(self) -> Iterator[tuple[int, int, int]]:
+        """Number, start and end of the lines that are neither empty nor comments."""
+        data = self.data
+        at = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+        ending = re.compile(rb"\r\n|\n|\r")
+        number = 0
+        while at < len(data):
+            number += 1
+            found = ending.search(data, at)
+            stop, following = (len(data), len(data)) if found is None else found.span()
+            held = data[at:stop].strip()
+            if held and not held.startswith(self._comments):
+                yield number, at, stop
+            at = following

@@ -1,0 +1,111 @@
+"""Tests that a user can run next day, predicted from the error model: circles after ISO 230-4 and body
+diagonals after ISO 230-6, with the machine as it is and with corrected commands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from olp.compensation.invert import invert
+from olp.core.units import UM_PER_MM
+from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.reversal import plays
+
+#: Radius of the circles at most, and their share of the shorter side of the calibrated box.
+_RADIUS_MM, _SHARE = 150.0, 0.4
+_PLACES = 720
+_TARGETS = 21
+#: steps between targets of a diagonal, so that lost motion is taken up as it would be
+_STEPS = 20
+_PLANES = {"XY": (0, 1), "YZ": (1, 2), "ZX": (2, 0)}
+
+
+def predicted(model: ErrorModel, tool_mm: Array, digit_mm: float) -> dict[str, Any]:
+    """What a ball-bar and a laser on the diagonals should show in the middle of the calibrated box, in um.
+
+    `tool_mm` (3,) is the tool vector, or (4,) with the payload in kg, `digit_mm` the last digit of corrected
+    commands. Following error and thermal drift are not part of it.
+    """
+    return {
+        "tool_mm": tool_mm[:3].tolist(),
+        "circles": [_circle(model, tool_mm, digit_mm, plane) for plane in _PLANES],
+        "diagonals": _diagonals(model, tool_mm, digit_mm),
+    }
+
+
+def _runs(model: ErrorModel, target: Array, tool: Array, digit: float) -> dict[str, Array]:
+    """Where the tip goes on targets (n, 3), commanded as they are and corrected."""
+    command = target
+    for _ in range(2):
+        # the flank depends on the corrected commands, and they on the flank
+        command = invert(model, target, tool, plays(model, command))
+    command = np.round(command / digit) * digit
+    return {
+        name: c + model.error(c, tool, plays(model, c))
+        for name, c in (("before", target), ("after", command))
+    }
+
+
+def _circle(model: ErrorModel, tool: Array, digit: float, plane: str) -> dict[str, Any]:
+    """Circular deviation G of each direction and hysteresis H (ISO 230-4, 3.2 to 3.4), the centre of the
+    least-squares circle taken out as a ball-bar does."""
+    first, second = _PLANES[plane]
+    box = np.asarray(model.box_mm, float)
+    centre = box.mean(axis=1)
+    side = float(np.diff(box, axis=1)[[first, second]].min())
+    radius = min(_RADIUS_MM, round(_SHARE * side))
+    # a lap and a quarter: the first quarter takes up what is not known of lost motion
+    angle = 2.0 * np.pi * np.arange(_PLACES * 5 // 4) / _PLACES
+    out: dict[str, Any] = {"plane": plane, "radius_mm": radius, "centre_mm": centre.tolist()}
+    radial: dict[str, list[Array]] = {"before": [], "after": []}
+    for sense in (1.0, -1.0):
+        target = np.tile(centre, (len(angle), 1))
+        target[:, first] += radius * np.cos(sense * angle)
+        target[:, second] += radius * np.sin(sense * angle)
+        for name, actual in _runs(model, target, tool, digit).items():
+            lap = (actual - centre)[-_PLACES:, [first, second]]
+            radial[name].append(_radial(lap, radius)[np.argsort((sense * angle[-_PLACES:]) % (2 * np.pi))])
+    for name, (forward, backward) in radial.items():
+        out[name] = {
+            "G_ccw_um": float(np.ptp(forward)) * UM_PER_MM,
+            "G_cw_um": float(np.ptp(backward)) * UM_PER_MM,
+            "H_um": float(np.abs(forward - backward).max()) * UM_PER_MM,
+            "radial_um": (forward * UM_PER_MM).tolist(),
+        }
+    return out
+
+
+def _radial(lap: Array, radius: float) -> Array:
+    """(n,) distance from the centre of the least-squares circle, minus the nominal radius."""
+    system = np.column_stack((2.0 * lap, np.ones(len(lap))))
+    x, y, _ = np.linalg.lstsq(system, (lap * lap).sum(axis=1), rcond=None)[0]
+    return np.asarray(np.hypot(lap[:, 0] - x, lap[:, 1] - y) - radius, float)
+
+
+def _diagonals(model: ErrorModel, tool: Array, digit: float) -> dict[str, Any]:
+    """Deviation of positioning along the four body diagonals of the calibrated box, to and fro; systematic
+    deviation E and reversal B of each, and the largest of them (ISO 230-6, after ISO 230-2)."""
+    box = np.asarray(model.box_mm, float)
+    rows = []
+    worst: dict[str, dict[str, float]] = {}
+    for name, signs in (("PPP", (1, 1, 1)), ("NPP", (-1, 1, 1)), ("PNP", (1, -1, 1)), ("NNP", (-1, -1, 1))):
+        low = np.where(np.array(signs) > 0, box[:, 0], box[:, 1])
+        high = np.where(np.array(signs) > 0, box[:, 1], box[:, 0])
+        share = np.linspace(0.02, 0.98, (_TARGETS - 1) * _STEPS + 1)
+        target = low + np.concatenate((share, share[-2::-1]))[:, None] * (high - low)
+        along = (high - low) / np.linalg.norm(high - low)
+        row: dict[str, Any] = {"name": name, "length_mm": float(np.linalg.norm(high - low))}
+        for side, actual in _runs(model, target, tool, digit).items():
+            moved = ((actual - target) @ along) * UM_PER_MM
+            moved -= moved[0]
+            there, back = moved[: len(share)][::_STEPS], moved[len(share) - 1 :][::_STEPS][::-1]
+            # the turning point belongs to both directions, and the first one has no direction yet
+            both = np.stack((there[1:-1], back[1:-1]))
+            figures = {"E_um": float(np.ptp(both)), "B_um": float(np.abs(both[0] - both[1]).max())}
+            row[side] = figures | {"deviation_um": ((there + back) / 2).tolist()}
+            kept = worst.setdefault(side, {"E_um": 0.0, "B_um": 0.0})
+            for key, value in figures.items():
+                kept[key] = max(kept[key], value)
+        rows.append(row)
+    return {"rows": rows, **worst}

@@ -1,0 +1,307 @@
+"""How far the tip is from the nominal path: at the way-points and between them.
+
+The actual path of a program is its commands plus the error model, sampled so finely that the model cannot
+hide anything between two samples. It is held against the nominal path move by move: `groups` tells
+which moves of the program belong to which nominal move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.geometry import arc_distance, arc_points, segment_distance
+from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.reversal import play_states
+from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
+
+Index = npt.NDArray[np.int64]
+#: enough for deviations, which are small, and half the memory
+Single = npt.NDArray[np.float32]
+
+_BLOCK = 1 << 15
+_AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: samples of an arc move at the least
+_ARC_STEPS = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deviation:
+    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way and at its end, `bend`
+    the part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
+    `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known
+    yet."""
+
+    waypoint: Single
+    path: Single
+    bend: Single
+    judged: Mask
+    flank: Array
+
+    def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
+        """Largest and rms in um, at way-points of all judged moves and along those that are `cutting`."""
+        at = self.waypoint[self.judged & np.isfinite(self.waypoint)]
+        along = self.path[self.judged & cutting & np.isfinite(self.path)]
+        return {"waypoints": _figures(at), "between": _figures(along)}
+
+
+def _figures(values: Single) -> dict[str, float]:
+    if not len(values):
+        return {"max_um": 0.0, "rms_um": 0.0}
+    rms = float(np.sqrt(np.mean(np.square(values, dtype=np.float64))))
+    return {"max_um": float(values.max()) * 1e3, "rms_um": rms * 1e3}
+
+
+def cutting_moves(path: Toolpath) -> Mask:
+    """(n,) moves on which the whole path counts and not its end alone: feed moves, not of canned cycles, nor
+    to a touch whose way is the control's own."""
+    own = (path.kind == Kind.PROBE) & ((path.flag & np.uint8(Flag.WHOLE)) != 0)
+    cutting = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
+    return np.asarray(cutting & ~own, bool)
+
+
+def measure(
+    nominal: Toolpath,
+    target_mm: Array,
+    path: Toolpath,
+    groups: Index,
+    model: ErrorModel,
+    bend_mm: float,
+    exempt: Mask | None = None,
+) -> Deviation:
+    """Hold the actual path of `path` against the nominal one.
+
+    `target_mm` (n, 3) are the nominal way-points where the part really lies; `groups` (n,) is the index of
+    the last move of `path` that belongs to each nominal move. `exempt` moves pass uncorrected and are not
+    judged.
+    """
+    count = len(nominal)
+    waypoint = np.full(count, np.nan, np.float32)
+    worst = np.full(count, np.nan, np.float32)
+    bend = np.zeros(count, np.float32)
+    judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
+    if exempt is not None:
+        judged &= ~exempt
+    flank = _unknown_flank(path, groups, model)
+    judged &= ~(flank > bend_mm)
+    tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
+    for a in range(0, count, _BLOCK):
+        b = min(a + _BLOCK, count)
+        tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
+    return Deviation(waypoint, worst, bend, judged, flank)
+
+
+def _unknown_flank(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
+    """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is
+    more. It shrinks as an axis moves to and fro, and is gone once that range is the lost motion."""
+    width = model.lost_motion_mm(path.end_mm) if len(groups) else None
+    if width is None:
+        return np.zeros(len(groups))
+    out = np.zeros(len(path))
+    for axis in np.flatnonzero((np.nan_to_num(width) > 0).any(axis=0)).tolist():
+        command, lost = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
+        resets = np.flatnonzero(np.isnan(command))
+        edges = [0, *(resets + 1).tolist(), len(command)]
+        for a, b in pairwise(edges):
+            if b > a:
+                part = command[a:b]
+                reach = np.maximum.accumulate(part) - np.minimum.accumulate(part)
+                out[a:b] = np.hypot(out[a:b], np.maximum(lost[a:b] - np.nan_to_num(reach), 0.0) / 2)
+    return np.maximum(out[groups], np.concatenate((out[:1], out[groups[:-1]])))
+
+
+class Tracer:
+    """Goes through the nominal moves in blocks, carrying the play of the axes."""
+
+    def __init__(
+        self, nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, bend: float
+    ) -> None:
+        self.nominal, self.target, self.path, self.groups = nominal, target, path, groups
+        self.model, self.bend = model, bend
+        self.play: Array | None = None
+        self.last: Array | None = None
+        self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
+        self.has_play = model.lost_motion_mm(np.array(model.box_mm).mean(axis=1)[None]) is not None
+        self.nominal_arc = _arc_index(nominal)
+        self.path_arc = _arc_index(path)
+
+    @staticmethod
+    def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Index]:
+        """Where the tip really is (m, 3) along a path, every `step_mm`, and the move of each (m,)."""
+        tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
+        start, end, tool = path.starts_mm(), path.end_mm, path.tool_mm()
+        length = np.nan_to_num(np.sqrt(((end - start) ** 2).sum(axis=1)))
+        arc = tracer.path_arc if tracer.path_arc is not None else np.full(len(path), -1)
+        rows = np.flatnonzero(arc >= 0)
+        if rows.size:
+            radius = np.sqrt(((start[rows] - path.arcs.centre_mm) ** 2).sum(axis=1))
+            length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
+        steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
+        point, part, _ = tracer.points(start, end, arc, steps, np.isfinite(length))
+        return tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
+
+    def points(
+        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask
+    ) -> tuple[Array, Index, Array]:
+        """Sample moves at equal steps: positions, the move of each sample, and its share of the move."""
+        part = np.repeat(np.arange(len(steps)), steps)
+        offset = np.cumsum(steps) - steps
+        share = (np.arange(len(part)) - offset[part] + 1) / steps[part]
+        if len(part) == len(steps):
+            return end, part, share
+        point = start[part] + share[:, None] * (end - start)[part]
+        point[offset + steps - 1] = end
+        curved = np.flatnonzero(arc[part] >= 0)
+        curved = curved[(share[curved] < 1) & known[part[curved]]]
+        if curved.size:
+            arcs, which = self.path.arcs, arc[part[curved]]
+            point[curved] = arc_points(
+                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
+                arcs.sweep_rad[which], share[curved],
+            )  # fmt: skip
+        return point, part, share
+
+    def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> None:
+        """Fill the columns of nominal moves a..b."""
+        first = int(self.groups[a - 1]) + 1 if a else 0
+        last = int(self.groups[b - 1]) + 1
+        path = self.path
+        start, end = path.starts_mm(first, last), path.end_mm[first:last]
+        owner = np.searchsorted(self.groups[a:b], np.arange(first, last))
+        tool = path.tool_mm(first, last)
+        delta = end - start
+        steps = np.ones(last - first, np.int64)
+        known = np.asarray(np.isfinite(delta).all(axis=1))
+        cut = known & (path.kind[first:last] != Kind.RAPID)
+        which = longer(delta, self.clear_mm)
+        which = which[cut[which]]
+        if which.size:
+            steps[which] = steps_needed(
+                self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend, at_most=1 << 12
+            )
+        arc = self.path_arc[first:last] if self.path_arc is not None else np.full(last - first, -1)
+        steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
+        if arc.max(initial=-1) >= 0:
+            self._arc_steps(arc, known, steps, start, tool)
+        reached, inner = self._samples(start, end, arc, steps, known, tool)
+        # ends of parts inside a nominal move are on the way, too
+        last_part = np.zeros(last - first, bool)
+        last_part[self.groups[a:b] - first] = True
+        cuts = np.flatnonzero(~last_part)
+        away = reached[last_part] - self.target[a:b]
+        waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        worst[:] = waypoint
+        if len(inner.part) or len(cuts):
+            self._bend(reached, inner, owner, arc >= 0, bend)
+            self._on_the_way(a, b, first, owner, inner.with_ends(cuts, reached), worst)
+
+    def _samples(
+        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array
+    ) -> tuple[Array, _Inner]:
+        """Where the tip really is at the end of each part, and at samples inside parts."""
+        long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
+        point, part, share = self.points(start[long], end[long], arc[long], steps[long], known[long])
+        part = long[part]
+        inside = share < 1.0
+        if self.has_play:
+            # play depends on all that came before, so the samples are gone through in order
+            actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
+            return actual[~inside], _Inner(part[inside], share[inside], actual[inside])
+        part, share, point = part[inside], share[inside], point[inside]
+        reached = self.actual(end, tool)
+        return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
+
+    def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, tool: Array) -> None:
+        rows = np.flatnonzero((arc >= 0) & known)
+        arcs = self.path.arcs
+        centre = arcs.centre_mm[arc[rows]]
+        radius = np.sqrt(((start[rows] - centre) ** 2).sum(axis=1))
+        reach = np.minimum(radius * np.abs(arcs.sweep_rad[arc[rows]]), 2 * radius)
+        delta = np.repeat(reach[:, None], 3, axis=1)
+        part = tool if tool.ndim == 1 else tool[rows]
+        steps[rows] = np.maximum(
+            steps[rows],
+            steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10),
+        )
+
+    def actual(self, point: Array, tool: Array) -> Array:
+        """Where the tip really is; carries the play of the axes from call to call."""
+        play = None
+        if self.has_play and len(point):
+            chain = point if self.last is None else np.concatenate((self.last, point))
+            width = self.model.lost_motion_mm(chain)
+            assert width is not None
+            play = play_states(chain, width, self.play)[len(chain) - len(point) :]
+            self.last, self.play = point[-1:], play[-1]
+        return point + self.model.error(point, tool, play)
+
+    def _on_the_way(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
+        """Distances of samples from their nominal move, the largest per move."""
+        nominal = self.nominal
+        goal = self.target[a:b]
+        begin = np.zeros_like(goal)
+        begin[1:] = goal[:-1]
+        begin[0] = self.target[a - 1] if a else np.array(nominal.start_mm)
+        of = owner[inner.part]
+        distance = segment_distance(inner.actual, begin[of], goal[of])
+        arc = self.nominal_arc[a:b] if self.nominal_arc is not None else None
+        if arc is not None and arc.max(initial=-1) >= 0:
+            rows = np.flatnonzero(arc[of] >= 0)
+            which = arc[of[rows]]
+            arcs = nominal.arcs
+            shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
+            distance[rows] = arc_distance(
+                inner.actual[rows], nominal.starts_mm(a, b)[of[rows]] + shift, goal[of[rows]],
+                arcs.centre_mm[which] + shift, arcs.plane[which], arcs.sweep_rad[which],
+                self._near(owner, first, inner.part[rows], inner.share[rows], of[rows]),
+            )  # fmt: skip
+        np.fmax.at(worst, of, distance)
+
+    def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
+        """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
+        turn = np.zeros(len(owner))
+        if self.path_arc is not None:
+            arc = self.path_arc[first : first + len(owner)]
+            turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
+        total = np.bincount(owner, turn)
+        before = np.cumsum(turn) - turn
+        begin = np.cumsum(total) - total
+        place = before[part] - begin[of] + share * turn[part]
+        return np.asarray(place / np.maximum(total[of], 1e-12), float)
+
+    def _bend(self, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
+        """How far the samples of straight parts leave the chord between the actual ends of their part."""
+        straight = (inner.part > 0) & ~curved[inner.part]
+        part, actual = inner.part[straight], inner.actual[straight]
+        departure = segment_distance(actual, reached[part - 1], reached[part])
+        np.fmax.at(bend, owner[part], departure)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Inner:
+    """Samples inside parts: the part, the share of it, and where the tip is."""
+
+    part: Index
+    share: Array
+    actual: Array
+
+    def with_ends(self, cuts: Index, reached: Array) -> _Inner:
+        """These, and the ends of the parts `cuts`."""
+        return _Inner(
+            np.concatenate((self.part, cuts)),
+            np.concatenate((self.share, np.ones(len(cuts)))),
+            np.concatenate((self.actual, reached[cuts])),
+        )
+
+
+def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:
+    """(n,) index into the arcs of each move, -1 where it is none."""
+    if not len(path.arcs):
+        return None
+    out = np.full(len(path), -1, np.int64)
+    out[path.arcs.move] = np.arange(len(path.arcs))
+    return out

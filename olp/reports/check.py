@@ -1,0 +1,190 @@
+"""The findings of a gate in the forms that people and pipelines read: text, JSON, SARIF 2.1.0, JUnit XML."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+from urllib.parse import quote
+from xml.etree import ElementTree
+
+from olp import __version__
+from olp.findings.catalogue import GATE_CODES, RULES
+from olp.findings.rule import Rule, Severity
+from olp.reports.report import Report, findings_text, number, pairs, printable, table, to_json
+
+_LEVEL = {Severity.INFO: "note", Severity.WARNING: "warning", Severity.ERROR: "error"}
+_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+#: rows of the table of clearances
+_NEAREST = 8
+
+
+def to_text(report: Report, fail_on: str) -> str:
+    """Plain text of at most 100 columns."""
+    sections = (
+        _heads(report),
+        _clearance(report),
+        findings_text(report["findings"]),
+        _verdict(report, fail_on),
+    )
+    return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def _heads(report: Report) -> Iterator[str]:
+    machine, program = report["machine"], report["program"]
+    yield from pairs([
+        ("Program", printable(f"{program['name'] or 'stdin'}, {program['lines']} lines")),
+        ("Checked", report["checked"]),
+        ("Machine", printable("{name}, chain {chain}, control {controller}".format(**machine))),
+        ("Codes", f"{len(report['rules'])} of {len(GATE_CODES)} checked"),
+    ])  # fmt: skip
+
+
+def _clearance(report: Report) -> Iterator[str]:
+    blocks = report.get("clearance") or ()
+    if not blocks:
+        return
+    yield "Least clearance in mm, place in the frame of the mesh"
+    rows = [
+        [
+            str(b["line"]), b["part"], printable(b["mesh"]), number(b["clearance_mm"], 3),
+            " ".join(number(v, 3) for v in b["point_mm"]),
+        ]
+        for b in sorted(blocks, key=lambda b: b["clearance_mm"])[:_NEAREST]
+    ]  # fmt: skip
+    yield from table(["line", "part", "mesh", "clearance", "place"], rows, left=3)
+
+
+def _verdict(report: Report, fail_on: str) -> Iterator[str]:
+    failing = failures(report, fail_on)
+    if failing:
+        yield f"NO GO: {len(failing)} of {len(report['findings'])} findings are at or above {fail_on}."
+    else:
+        yield "Go: no finding" + ("." if fail_on == "never" else f" at or above {fail_on}.")
+
+
+def failures(report: Report, fail_on: str) -> list[Mapping[str, Any]]:
+    """The findings that fail the gate."""
+    if fail_on == "never":
+        return []
+    least = Severity[fail_on.upper()]
+    return [f for f in report["findings"] if Severity[f["severity"].upper()] >= least]
+
+
+def to_sarif(report: Report, fail_on: str) -> str:
+    """SARIF 2.1.0 (OASIS): a run with every rule that was checked; a finding without a line stands at the
+    program as a whole, further lines are related locations."""
+    rules = [RULES[code] for code in report["rules"]]
+    uri = _uri(report["program"]["path"])
+    run = {
+        "tool": {
+            "driver": {
+                "name": "olp",
+                "version": __version__,
+                "rules": [_sarif_rule(rule) for rule in rules],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "results": [_sarif_result(f, report["rules"], uri) for f in report["findings"]],
+        "invocations": [{"executionSuccessful": True, "exitCode": int(bool(failures(report, fail_on)))}],
+    }
+    return json.dumps({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2) + "\n"
+
+
+def _sarif_rule(rule: Rule) -> dict[str, Any]:
+    return {
+        "id": rule.code,
+        "name": "".join(word.capitalize() for word in rule.title.replace("-", " ").split()),
+        "shortDescription": {"text": rule.title},
+        "fullDescription": {"text": rule.why},
+        "help": {"text": f"{rule.remedy}\n\nExample: {rule.example}"},
+        "defaultConfiguration": {"level": _LEVEL[rule.severity]},
+    }
+
+
+def _sarif_result(finding: Mapping[str, Any], rules: Sequence[str], uri: str) -> dict[str, Any]:
+    def place(line: int | None) -> dict[str, Any]:
+        region = {} if line is None else {"region": {"startLine": line}}
+        return {"physicalLocation": {"artifactLocation": {"uri": uri}, **region}}
+
+    related = [{"id": k, **place(line)} for k, line in enumerate(finding["lines"][1:], 1)]
+    return {
+        "ruleId": finding["code"],
+        "ruleIndex": rules.index(finding["code"]),
+        "level": _LEVEL[Severity[finding["severity"].upper()]],
+        "message": {"text": finding["message"]},
+        "locations": [place(finding["line"])],
+        **({"relatedLocations": related} if related else {}),
+    }
+
+
+def _uri(path: str) -> str:
+    """The URI reference of a program: relative as it was named, else with the scheme of files."""
+    pure = PurePath(path or "stdin")
+    return pure.as_uri() if pure.is_absolute() else quote(pure.as_posix())
+
+
+def to_junit(report: Report, fail_on: str) -> str:
+    """JUnit XML as Jenkins, GitLab and others read it: a test a code, failed where a finding fails the gate;
+    milder findings go into the output of the suite."""
+    failing = {id(f) for f in failures(report, fail_on)}
+    name = report["program"]["name"] or "stdin"
+    failed = {f["code"] for f in report["findings"] if id(f) in failing}
+    suite = ElementTree.Element(
+        "testsuite", name="olp check", package="olp", id="0", hostname="localhost",
+        timestamp=f"{report['date'] or '1970-01-01'}T00:00:00", tests=str(len(report["rules"])),
+        failures=str(len(failed)), errors="0", time="0",
+    )  # fmt: skip
+    ElementTree.SubElement(suite, "properties")
+    mild = []
+    for code in report["rules"]:
+        case = ElementTree.SubElement(
+            suite,
+            "testcase",
+            name=f"{code} {RULES[code].title}",
+            classname=f"olp.check.{printable(name)}",
+            time="0",
+        )
+        found = [f for f in report["findings"] if f["code"] == code]
+        texts = [printable(_sentence(f, name)) for f in found]
+        if code in failed:
+            failure = ElementTree.SubElement(case, "failure", type=code, message=texts[0])
+            failure.text = "\n".join([*texts, f"What to do: {RULES[code].remedy}"])
+        else:
+            mild += texts
+    ElementTree.SubElement(suite, "system-out").text = "\n".join(mild)
+    ElementTree.SubElement(suite, "system-err")
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, "unicode") + "\n"
+
+
+def _sentence(finding: Mapping[str, Any], name: str) -> str:
+    place = name if finding["line"] is None else f"{name}:{finding['line']}"
+    return f"{place}: {finding['severity']}: {finding['code']} {finding['message']}"
+
+
+def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
+    """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the place in the frame
+    named."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"])
+    for row in rows:
+        names = (row["part"], row["mesh"], row["role"], row["frame"])
+        lengths = (f"{v:.6f}" for v in row["point_mm"])
+        writer.writerow([row["line"], f"{row['clearance_mm']:.6f}", *names, *lengths])
+    return buffer.getvalue().encode()
+
+
+#: format to what writes it, from the report ("olp-check-1") and the severity that fails the gate
+FORMATS: dict[str, Callable[[Report, str], str]] = {
+    "text": to_text,
+    "json": lambda report, fail_on: to_json(report).decode(),
+    "sarif": to_sarif,
+    "junit": to_junit,
+}

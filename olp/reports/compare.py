@@ -1,0 +1,170 @@
+"""The report of a comparison for people: before and after, frame, ISO 9283 figures, worst lines."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator
+from typing import Any
+
+from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, shortened, table
+
+#: Titles of figures of a group of runs, with the keys that lead to them.
+ACROSS = (
+    ("largest distance from the path", ("across_um", "max")),
+    ("95 % of points within", ("across_um", "q95")),
+    ("rms distance", ("across_um", "rms")),
+    ("mean distance", ("across_um", "mean")),
+)
+ISO = (
+    ("path accuracy AT", ("iso_9283", "AT_um")),
+    ("path repeatability RT", ("iso_9283", "RT_um")),
+    ("pose accuracy AP", ("iso_9283", "AP_um")),
+    ("pose repeatability RP", ("iso_9283", "RP_um")),
+)
+_MAX_ROWS = 20
+
+
+def to_text(report: Report) -> str:
+    """Plain text of at most 100 columns."""
+    sections = (
+        _heads(report),
+        _frame(report),
+        _verdict(report),
+        _before_after(report),
+        _runs(report),
+        _poses(report),
+        _worst(report),
+        findings_text(report.get("findings") or ()),
+    )
+    return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def figure(group: Report | None, keys: tuple[str, str]) -> Any:
+    """A figure of a group of runs, None where it has none."""
+    return ((group or {}).get(keys[0]) or {}).get(keys[1])
+
+
+def change(before: Any, after: Any) -> str:
+    """How much smaller a figure became, such as "12.3 x smaller"; empty where it cannot be said."""
+    if not isinstance(before, float) or not isinstance(after, float) or not before > 0 or not after > 0:
+        return ""
+    return f"{before / after:.1f} x smaller" if before >= after else f"{after / before:.1f} x larger"
+
+
+def taken_by_fit(frame: Report) -> str:
+    """How much of an error the best fit leaves, where that is known."""
+    if "error_rms_um" not in frame:
+        return ""
+    before, after = number(frame["error_rms_um"]), number(frame["left_by_fit_rms_um"])
+    return f"of {before} um rms {frame['error_is']}, such a fit leaves {after} um"
+
+
+def table_rows(report: Report) -> list[tuple[str, Any, Any]]:
+    """Title, figure before, figure after in um, of what there is."""
+    rows = [
+        (title, figure(report.get("before"), keys), figure(report.get("after"), keys))
+        for title, keys in (*ACROSS, *ISO)
+    ]
+    return [row for row in rows if any(isinstance(v, float) and math.isfinite(v) for v in row[1:])]
+
+
+def _heads(report: Report) -> Iterator[str]:
+    nominal, machine, path = (report.get(key) or {} for key in ("nominal", "machine", "path"))
+
+    def files(rows: Any) -> str:
+        return ", ".join(f"{printable(row['name'])} ({row['points']} points)" for row in rows or ())
+
+    length = f", {path['cutting_mm'] / 1e3:.3f} m cutting, {path['compared_in']}" if path else ""
+    yield from pairs([
+        ("Nominal", f"{printable(nominal.get('name', ''))}{length}"),
+        ("Measured", files(report.get("measured"))),
+        ("Before", files(report.get("measured_before"))),
+        ("Machine", ", ".join(str(v) for v in machine.values())),
+    ])  # fmt: skip
+
+
+def _frame(report: Report) -> Iterator[str]:
+    frame = report.get("frame") or {}
+    if not frame.get("fitted"):
+        return
+    x, y, z = frame["shift_mm"]
+    a, b, c = frame["angles_deg"]
+    yield "Best-fit frame, measured to nominal"
+    yield f"  shift in mm {x:.4f}, {y:.4f}, {z:.4f}; turn A, B, C in deg {a:.6f}, {b:.6f}, {c:.6f}"
+    if taken := taken_by_fit(frame):
+        yield from textwrap.wrap(taken, WIDTH, initial_indent="  ", subsequent_indent="  ")
+
+
+def _verdict(report: Report) -> Iterator[str]:
+    if "holds" not in report:
+        return
+    size = figure(report.get("after"), ("across_um", "max"))
+    if size is None:
+        yield "NOT SHOWN TO BE WITHIN TOLERANCE: no measured point of a cutting move counts."
+        return
+    verdict = "Within tolerance" if report["holds"] else "ABOVE TOLERANCE"
+    yield from textwrap.wrap(
+        f"{verdict}: the measured path is at most {number(size)} um from the nominal one; "
+        f"{report['tolerance_um']:g} um are allowed.",
+        WIDTH,
+    )
+
+
+def _before_after(report: Report) -> Iterator[str]:
+    rows = table_rows(report)
+    if not rows:
+        return
+    if report.get("before"):
+        yield "Before and after, in um"
+        cells = [[title, number(a), number(b), change(a, b)] for title, a, b in rows]
+        yield from table(["", "before", "after", ""], cells)
+    else:
+        yield "Measured, in um"
+        yield from table(["", ""], [[title, number(b)] for title, _, b in rows])
+
+
+def _runs(report: Report) -> Iterator[str]:
+    rows = [
+        [
+            printable(row["name"]), name, str(row.get("counted", row["points"])),
+            *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
+            *(number((row.get(f"{side}_um") or {}).get("mean")) for side in ("normal", "binormal")),
+            *(number((row.get(f"{side}_um") or {}).get("rms")) for side in ("normal", "binormal")),
+        ]
+        for name in ("before", "after")
+        for row in (report.get(name) or {}).get("runs") or ()
+    ]  # fmt: skip
+    if rows:
+        yield "Runs, in um; normal is level and to the left of travel, binormal up from it"
+        header = ["", "", "points", "max", "rms", "normal", "binormal", "n rms", "b rms"]
+        yield from table(header, rows, left=2)
+
+
+def _poses(report: Report) -> Iterator[str]:
+    for name in ("before", "after"):
+        poses = (report.get(name) or {}).get("poses") or ()
+        if not poses:
+            continue
+        yield f"Poses {name}, in um" if report.get("before") else "Poses, in um"
+        rows = [
+            [printable(str(p["name"])), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
+            for p in poses[:_MAX_ROWS]
+        ]
+        yield from table(["", "AP", "RP", "X", "Y", "Z"], rows)
+        if len(poses) > _MAX_ROWS:
+            yield f"  and {len(poses) - _MAX_ROWS} more"
+
+
+def _worst(report: Report) -> Iterator[str]:
+    worst = (report.get("after") or {}).get("worst") or ()
+    if not worst:
+        return
+    texts = {row["line"]: printable(row["text"]) for row in report.get("worst") or ()}
+    yield "Lines that are farthest off, in um"
+    rows = [
+        [str(row["line"]), number(row["max_um"]), shortened(texts.get(row["line"], ""), 60)]
+        for row in worst[:5]
+    ]
+    for line in table(["line", "max", ""], [[a, b, ""] for a, b, _ in rows], left=0):
+        yield f"{line}  {rows.pop(0)[2]}".rstrip() if line.split()[0] != "line" else line

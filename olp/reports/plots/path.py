@@ -1,0 +1,252 @@
+"""Plots of a measured or predicted path: picture, deviation along it, histogram, circles and diagonals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from olp.comparison.figures import Run
+from olp.comparison.path import Array, Path
+from olp.core.units import UM_PER_MM
+from olp.reports.plots.base import drawn
+from olp.uncertainty.spread import Confidence
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = {"before": "#c0453a", "after": "#1f6fb2"}
+_NOMINAL = "#9aa3ab"
+_COLUMNS = 900
+_DRAWN = 30_000
+#: smallest deviation that a logarithmic axis shows
+_FLOOR_UM = 1e-2
+
+Runs = Mapping[str, Sequence[Run]]
+
+
+def picture(path: Path, runs: Runs) -> bytes:
+    """The path in plan view, coloured by its distance from the nominal one, before and after."""
+
+    def draw(figure: Figure) -> None:
+        from matplotlib.collections import LineCollection
+        from matplotlib.colors import LogNorm
+
+        names = [name for name in ("before", "after") if runs.get(name)]
+        plots = figure.subplots(1, len(names), squeeze=False)[0]
+        sizes = [run.deviation.across[run.counted] * UM_PER_MM for name in names for run in runs[name]]
+        top = max((float(size.max()) for size in sizes if len(size)), default=1.0)
+        norm = LogNorm(max(top / 300.0, _FLOOR_UM), max(top, 10 * _FLOOR_UM))
+        pieces = None
+        for plot, name in zip(plots, names, strict=True):
+            _nominal(plot, path)
+            for run in runs[name][:1]:
+                xy, size = _sampled(run)
+                ends = np.stack((xy[:-1], xy[1:]), axis=1)
+                near = np.sqrt(((xy[1:] - xy[:-1]) ** 2).sum(axis=1)) < 12 * _usual(xy)
+                pieces = LineCollection(
+                    list(ends[near]), array=np.maximum(size[1:][near], _FLOOR_UM), norm=norm, cmap="viridis",
+                    linewidths=1.1, rasterized=True,
+                )  # fmt: skip
+                plot.add_collection(pieces)
+            plot.set(aspect="equal", title=name, xlabel="X in mm", ylabel="Y in mm")
+            plot.autoscale_view()
+        if pieces is not None:
+            figure.colorbar(pieces, ax=list(plots), label="distance from the nominal path in um", shrink=0.8)
+
+    span = np.ptp(path.vertex_mm[:, :2], axis=0)
+    sides = sum(bool(runs.get(name)) for name in ("before", "after"))
+    height = (6.0 / max(sides, 1)) * float(span[1] / max(span[0], 1e-9)) + 0.7
+    return drawn("picture", (7.4, min(max(height, 1.8), 5.0)), draw)
+
+
+def _usual(xy: Array) -> float:
+    step = np.sqrt((np.diff(xy, axis=0) ** 2).sum(axis=1))
+    return max(float(np.quantile(step, 0.9)), 1e-6) if len(step) else 1.0
+
+
+def _nominal(plot: Axes, path: Path) -> None:
+    from matplotlib.collections import LineCollection
+
+    xy = path.vertex_mm[:, :2]
+    step = max(len(path) // _DRAWN, 1)
+    kept = np.flatnonzero(path.cutting)[::step]
+    lines = np.stack((xy[kept], xy[kept + 1]), axis=1)
+    plot.add_collection(LineCollection(list(lines), colors=_NOMINAL, linewidths=0.5, rasterized=True))
+
+
+def _sampled(run: Run) -> tuple[Array, Array]:
+    rows = np.flatnonzero(run.counted)
+    rows = rows[:: max(len(rows) // _DRAWN, 1)]
+    return run.pairing.foot_mm[rows][:, :2], run.deviation.across[rows] * UM_PER_MM
+
+
+def along(path: Path, runs: Runs, tolerance_um: float | None) -> bytes:
+    """Distance from the nominal path along it; bands from least to most where points are many."""
+
+    def draw(figure: Figure) -> None:
+        plot = figure.subplots()
+        edges = np.linspace(0.0, path.length_mm, _COLUMNS + 1)
+        for name in ("before", "after"):
+            group = [run for run in runs.get(name, ()) if run.counted.any()]
+            if not group:
+                continue
+            low, high = np.full(_COLUMNS, np.inf), np.full(_COLUMNS, -np.inf)
+            for run in group:
+                column = np.clip(np.searchsorted(edges, run.pairing.s_mm[run.counted]) - 1, 0, _COLUMNS - 1)
+                size = run.deviation.across[run.counted] * UM_PER_MM
+                np.minimum.at(low, column, size)
+                np.maximum.at(high, column, size)
+            seen = np.isfinite(low)
+            bands = (
+                np.maximum(np.where(seen, low, np.nan), _FLOOR_UM),
+                np.maximum(np.where(seen, high, np.nan), _FLOOR_UM),
+            )
+            middle = (edges[1:] + edges[:-1]) / 2e3
+            plot.fill_between(middle, *bands, color=COLOURS[name], alpha=0.35, linewidth=0, step="mid")
+            plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{name}, largest")
+        _tolerance(plot, tolerance_um)
+        plot.set_yscale("log")
+        plot.set(xlabel="along the path in m", ylabel="distance in um", xlim=(0.0, path.length_mm / 1e3))
+        plot.grid(color="0.92", linewidth=0.5)
+        plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+    return drawn("along", (7.4, 2.4), draw)
+
+
+def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
+    if tolerance_um is not None:
+        plot.axhline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
+
+
+def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
+    """How many points are how far from the nominal path, before and after."""
+
+    def draw(figure: Figure) -> None:
+        plot = figure.subplots()
+        sizes = {
+            name: np.concatenate([run.deviation.across[run.counted] * UM_PER_MM for run in group])
+            for name, group in runs.items()
+            if any(run.counted.any() for run in group)
+        }
+        top = max((float(size.max()) for size in sizes.values()), default=1.0)
+        edges = np.geomspace(_FLOOR_UM, max(top, 10 * _FLOOR_UM) * 1.01, 61)
+        for name, size in sizes.items():
+            count, _ = np.histogram(np.maximum(size, _FLOOR_UM * 1.001), edges)
+            plot.stairs(count / len(size) * 100, edges, fill=True, alpha=0.35, color=COLOURS[name])
+            plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=name)
+        if tolerance_um is not None:
+            plot.axvline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
+        plot.set_xscale("log")
+        plot.set(xlabel="distance from the nominal path in um", ylabel="share of points in %")
+        plot.grid(color="0.92", linewidth=0.5)
+        plot.legend(frameon=False, loc="upper left")
+
+    return drawn("histogram", (7.4, 2.2), draw)
+
+
+def bands(found: Confidence) -> bytes:
+    """Expected distance from the nominal place at way-points with its band, and the probability of being
+    within the tolerance, before and after, along the program; where points are many the least sure ones."""
+
+    def draw(figure: Figure) -> None:
+        plot, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        step = np.sqrt((np.diff(found.points.axis_mm, axis=0) ** 2).sum(axis=1))
+        way = np.concatenate(([0.0], np.cumsum(step))) / 1e3
+        column = np.unique(np.linspace(0, len(way), _COLUMNS + 1).astype(int)[:-1])
+        middle = way[column]
+        for name, deviation, inside in (
+            ("before", found.points.before_mm, found.within_before),
+            ("after", found.points.after_mm, found.within_after),
+        ):
+            size = np.sqrt((deviation**2).sum(axis=1))
+            high = np.maximum.reduceat(size + found.band_mm, column) * UM_PER_MM
+            low = np.minimum.reduceat(np.maximum(size - found.band_mm, 0.0), column) * UM_PER_MM
+            colour = COLOURS[name]
+            plot.fill_between(middle, low, high, color=colour, alpha=0.3, linewidth=0, step="mid")
+            expected = np.maximum.reduceat(size, column) * UM_PER_MM
+            plot.plot(middle, expected, color=colour, linewidth=0.8, label=name)
+            least = 100.0 * np.minimum.reduceat(inside, column)
+            below.plot(middle, least, color=colour, linewidth=0.8, drawstyle="steps-mid")
+        _tolerance(plot, found.within_mm * UM_PER_MM)
+        plot.set(ylabel="distance in um")
+        plot.set_ylim(bottom=0.0)
+        below.set(xlabel="along the way-points in m", ylabel="within, %", ylim=(-3, 103))
+        below.set_xlim(0.0, max(float(way[-1]), 1e-6))
+        for part in (plot, below):
+            part.grid(color="0.92", linewidth=0.5)
+        plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
+
+    return drawn("bands", (7.4, 3.4), draw)
+
+
+def components(path: Path, runs: Runs) -> bytes:
+    """Normal and binormal deviation of the first run of each group along the path."""
+
+    def draw(figure: Figure) -> None:
+        plots = figure.subplots(2, 1, sharex=True)
+        for plot, side in zip(plots, ("normal", "binormal"), strict=True):
+            for name in ("before", "after"):
+                for run in runs.get(name, ())[:1]:
+                    rows = np.flatnonzero(run.counted)
+                    rows = rows[:: max(len(rows) // _DRAWN, 1)]
+                    value = getattr(run.deviation, side)[rows] * UM_PER_MM
+                    plot.plot(run.pairing.s_mm[rows] / 1e3, value, ",", color=COLOURS[name], rasterized=True)
+                    plot.plot([], [], color=COLOURS[name], label=name)
+            plot.set_ylabel(f"{side} in um")
+            plot.grid(color="0.92", linewidth=0.5)
+        plots[0].legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
+        plots[1].set(xlabel="along the path in m", xlim=(0.0, path.length_mm / 1e3))
+
+    return drawn("components", (7.4, 3.2), draw)
+
+
+def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
+    """Predicted radial deviations of circles, counter-clockwise, magnified about a common circle."""
+
+    def draw(figure: Figure) -> None:
+        plots = figure.subplots(1, len(rows), subplot_kw={"projection": "polar"}, squeeze=False)[0]
+        for plot, row in zip(plots, rows, strict=True):
+            top = max(float(np.abs(row["before"]["radial_um"]).max()), 1.0)
+            for name in ("before", "after"):
+                value = np.asarray(row[name]["radial_um"])
+                angle = np.linspace(0.0, 2.0 * np.pi, len(value), endpoint=False)
+                plot.plot(
+                    np.append(angle, 0.0),
+                    np.append(value, value[0]),
+                    color=COLOURS[name],
+                    linewidth=1.0,
+                    label=name,
+                )
+            plot.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color="0.4", linewidth=0.6)
+            plot.set_ylim(-2.5 * top, 1.3 * top)
+            plot.set_yticks([-top, 0.0, top], [f"-{top:.0f}", "0", f"{top:.0f} um"], fontsize=6)
+            plot.set_xticks(np.radians((0, 90, 180, 270)), ["0", "90", "180", "270"], fontsize=6)
+            plot.grid(color="0.9", linewidth=0.5)
+            plot.spines["polar"].set_visible(False)
+            plot.set_title(f"{row['plane']}, radius {row['radius_mm']:g} mm", fontsize=8)
+        plots[0].legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.15, -0.12), fontsize=7)
+
+    return drawn("circles", (7.4, 2.7), draw)
+
+
+def diagonals(rows: Sequence[Mapping[str, Any]]) -> bytes:
+    """Predicted deviation of positioning along the body diagonals, mean of both directions."""
+
+    def draw(figure: Figure) -> None:
+        plots = figure.subplots(1, len(rows), sharey=True, squeeze=False)[0]
+        for plot, row in zip(plots, rows, strict=True):
+            for name in ("before", "after"):
+                value = row[name]["deviation_um"]
+                share = np.linspace(0.02, 0.98, len(value)) * row["length_mm"]
+                plot.plot(share, value, ".-", color=COLOURS[name], linewidth=0.9, markersize=2.5, label=name)
+            plot.axhline(0.0, color="0.5", linewidth=0.5)
+            plot.set(title=row["name"], xlabel="mm")
+            plot.title.set_fontsize(8)
+            plot.grid(color="0.92", linewidth=0.5)
+        plots[0].set_ylabel("deviation in um")
+        plots[0].legend(frameon=False, fontsize=7)
+
+    return drawn("diagonals", (7.4, 2.0), draw)

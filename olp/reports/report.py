@@ -1,0 +1,354 @@
+"""The report of a run for people (`to_text`) and for programs (`to_json`).
+
+A report is a mapping in the form "olp-report-1" whose keys end in their units. What is absent is left out.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import math
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from olp.findings.catalogue import RULES
+
+WIDTH = 100
+#: Lines of the program that a finding lists by number.
+MAX_LINES = 8
+MAX_SOURCES = 24
+MAX_WORST = 10
+
+Report = Mapping[str, Any]
+
+
+def to_json(report: Report) -> bytes:
+    """UTF-8 JSON with sorted keys; numbers that are not finite become null, dates ISO 8601."""
+    return (json.dumps(_plain(report), indent=2, sort_keys=True, allow_nan=False) + "\n").encode()
+
+
+def to_text(report: Report) -> str:
+    """Plain text of at most 100 columns, with nothing but ASCII in its own words and tables."""
+    sections = (
+        _heads(report),
+        _verdict(report),
+        _deviation(report),
+        _budget(report),
+        _moves(report),
+        _sources(report),
+        _worst(report),
+        uncertainty_text(report),
+        findings_text(report.get("findings") or ()),
+        sentences("What this proves", report.get("proves") or ()),
+        sentences("What it does not prove", report.get("does_not_prove") or ()),
+    )
+    return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> Iterator[str]:
+    """Lines of a table; the first `left` columns are aligned to the left, the others to the right."""
+    body = [list(header), *(list(row) for row in rows)]
+    widths = [max(len(row[column]) for row in body) for column in range(len(header))]
+    for row in body:
+        cells = (
+            cell.ljust(width) if column < left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield ("  " + "  ".join(cells)).rstrip()
+
+
+def pairs(values: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Lines of `name  value`, aligned and wrapped; empty values are left out."""
+    kept = [(name, value) for name, value in values if value]
+    width = max((len(name) for name, _ in kept), default=0) + 2
+    for name, value in kept:
+        yield from textwrap.wrap(
+            value, WIDTH, initial_indent=name.ljust(width), subsequent_indent=" " * width
+        ) or [name]
+
+
+def number(value: object, digits: int = 2) -> str:
+    """A number for a table: fixed point, a dash where there is none, and never a nonzero shown as 0."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "-"
+    text = f"{value + 0.0:.{digits}f}"
+    if value and not float(text):
+        return f"{'>-' if value < 0 else '<'}{10.0**-digits:.{digits}f}"
+    return text
+
+
+def printable(text: str) -> str:
+    """Text of a program in one line, without what a terminal would act on."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def shortened(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 2] + ".."
+
+
+def _plain(value: Any) -> Any:
+    """Only what JSON knows; arrays and their scalars have `tolist`."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple | set | frozenset):
+        items = sorted(value, key=str) if isinstance(value, set | frozenset) else value
+        return [_plain(item) for item in items]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, datetime.date):
+        return value.isoformat()
+    return value
+
+
+def _part(report: Report, *keys: str) -> Report:
+    """A nested mapping, empty where it is absent."""
+    for key in keys:
+        report = report.get(key) or {}
+    return report
+
+
+def _heads(report: Report) -> Iterator[str]:
+    program, machine = _part(report, "program"), _part(report, "machine")
+    calibration, digits = _part(report, "calibration"), _part(report, "digits")
+    yield from pairs(
+        [
+            (
+                "Program",
+                _joined(
+                    program.get("name"),
+                    _counted(program.get("lines"), "line"),
+                    _counted(program.get("moves"), "move"),
+                    program.get("dialect"),
+                ),
+            ),
+            (
+                "Machine",
+                _joined(
+                    machine.get("name"),
+                    _prefixed("chain", machine.get("chain")),
+                    _prefixed("control", machine.get("controller")),
+                ),
+            ),
+            (
+                "Calibration",
+                _joined(
+                    calibration.get("model"),
+                    _prefixed("measured", calibration.get("measured")),
+                    _prefixed("valid until", calibration.get("valid_until")),
+                    _degrees(calibration.get("temperature_degC")),
+                ),
+            ),
+            ("Written with", _joined(*(f"{count} decimals in {unit}" for unit, count in digits.items()))),
+        ]
+    )
+
+
+def _joined(*values: object) -> str:
+    return ", ".join(printable(str(value)) for value in values if value not in (None, ""))
+
+
+def _counted(value: object, noun: str) -> str:
+    return "" if value is None else f"{value} {noun}{'' if value == 1 else 's'}"
+
+
+def _prefixed(word: str, value: object) -> str:
+    return "" if value is None else f"{word} {value}"
+
+
+def _degrees(value: object) -> str:
+    return f"at {value:g} degC" if isinstance(value, int | float) else ""
+
+
+def _verdict(report: Report) -> Iterator[str]:
+    tolerance, deviation = report.get("tolerance_um"), _part(report, "deviation")
+    largest = deviation.get("path_max_um")
+    if tolerance is None or largest is None:
+        return
+    allowed = deviation.get("allowed_um")
+    limit = "" if allowed is None else f"; with rounding to the last digit {number(allowed)} um are allowed"
+    verdict = "Within tolerance" if deviation.get("holds") else "ABOVE TOLERANCE"
+    yield from textwrap.wrap(
+        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one. "
+        f"The tolerance is {tolerance:g} um{limit}.",
+        WIDTH,
+    )
+
+
+def _deviation(report: Report) -> Iterator[str]:
+    deviation = _part(report, "deviation")
+    sides = [side for side in ("before", "after") if deviation.get(side)]
+    places = [("at waypoints", "waypoints"), ("between waypoints", "between")]
+    rows = [
+        [title]
+        + [number(_part(deviation, side, key).get(name)) for side in sides for name in ("max_um", "rms_um")]
+        for title, key in places
+        if any(_part(deviation, side, key) for side in sides)
+    ]
+    if rows:
+        yield "Deviation from the nominal path in um"
+        yield from table(["", *(f"{side} {name}" for side in sides for name in ("max", "rms"))], rows)
+
+
+def _budget(report: Report) -> Iterator[str]:
+    budget = _part(report, "budget_um")
+    titles = {
+        "model_and_chords": "model and chords, under the tolerance",
+        "rounding": "rounding to the last digit",
+        "increment": "least increment of the control",
+        "random_2_sigma": "random: repeatability, two standard deviations",
+        "inversion": "inversion of the model",
+        "lost_motion_unknown": "lost motion not yet taken up",
+    }
+    # What a later version adds shows under its own key.
+    others = (key for key in sorted(budget) if key not in titles and not isinstance(budget[key], Mapping))
+    names = (name for name in (*titles, *others) if name in budget)
+    rows = [[titles.get(name, name.replace("_", " ")), number(budget[name])] for name in names]
+    if rows:
+        yield "What is left after correction, largest in um"
+        yield from table(["", "max"], rows)
+    angle = _part(report, "orientation")
+    if angle:
+        yield (
+            "  Orientation of the tool, which three linear axes cannot correct: "
+            f"{number(angle.get('max_urad'), 1)} urad max, {number(angle.get('rms_urad'), 1)} rms"
+        )
+
+
+def _moves(report: Report) -> Iterator[str]:
+    moves = _part(report, "moves")
+    if not moves:
+        return
+    of = ", ".join(
+        f"{moves[key]} {title}"
+        for key, title in (
+            ("corrected", "corrected"),
+            ("approximated", "approximated"),
+            ("passed", "passed uncorrected"),
+        )
+        if key in moves
+    )
+    changes = ", ".join(
+        f"{moves[key]} {title}"
+        for key, title in (
+            ("split", "moves split"),
+            ("inserted_blocks", "blocks inserted"),
+            ("changed_words", "words changed"),
+            ("inserted_words", "words inserted"),
+        )
+        if key in moves
+    )
+    total = f"{moves['total']} in all: " if "total" in moves else ""
+    yield from pairs([("Moves", total + of), ("Changes", changes)])
+
+
+def _sources(report: Report) -> Iterator[str]:
+    sources = report.get("sources") or ()
+    if not sources:
+        return
+    yield "Error before correction by source in um, largest first"
+    rows = (
+        [source.get("name", ""), number(source.get("max_um")), number(source.get("rms_um"))]
+        for source in sources[:MAX_SOURCES]
+    )
+    yield from table(["", "max", "rms"], rows)
+    if len(sources) > MAX_SOURCES:
+        yield f"  and {len(sources) - MAX_SOURCES} smaller ones"
+
+
+def _worst(report: Report) -> Iterator[str]:
+    blocks = report.get("worst") or ()
+    if not blocks:
+        return
+    yield "Worst blocks in um"
+    rows = (
+        [str(block.get("line", "")), number(block.get("before_um")), number(block.get("after_um"))]
+        for block in blocks[:MAX_WORST]
+    )
+    lines = list(table(["line", "before", "after"], rows, left=0))
+    room = WIDTH - max(map(len, lines)) - 2
+    yield lines[0] + "  text"
+    for line, block in zip(lines[1:], blocks, strict=False):
+        yield f"{line}  {shortened(printable(str(block.get('text', ''))), room)}".rstrip()
+
+
+def percent(value: object) -> str:
+    """A probability for a table: 100 % only where no draw says otherwise."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "-"
+    text = f"{100.0 * value:.1f}"
+    return (
+        f"{'>99.9' if text == '100.0' and value < 1.0 else '<0.1' if text == '0.0' and value > 0 else text} %"
+    )
+
+
+def uncertainty_text(report: Report) -> Iterator[str]:
+    """How sure the corrected path is, where the calibration states uncertainties."""
+    part = _part(report, "uncertainty")
+    if not part:
+        return
+    band, within, expected = part["band_um"], part["within"], part["expected"]
+    yield f"Uncertainty of the tip at {part['waypoints']} way-points, from the calibration"
+    yield from pairs(
+        [
+            (
+                "  Band",
+                f"+-{number(band['median_um'])} um median, {number(band['max_um'])} um largest "
+                f"(expanded, k = {part['coverage_factor']:g}, in the worst direction)",
+            ),
+            (
+                "  Deviation",
+                f"{number(expected['before_rms_um'])} um rms expected before, "
+                f"{number(expected['after_rms_um'])} um after; better with probability "
+                f"{percent(expected['probability_better'])}",
+            ),
+            (
+                f"  Within {within['tolerance_um']:g} um",
+                f"all of the program with probability {percent(within['before']['program'])} before, "
+                f"{percent(within['after']['program'])} after; the worst way-point "
+                f"{percent(within['before']['least'])} before, {percent(within['after']['least'])} after",
+            ),
+            ("  From", str(part["source"])),
+            ("  Zero", str(part["zero_setting"])),
+            ("  Age", "" if part["growth_by_age"] == 1.0 else f"times {part['growth_by_age']:.3g}"),
+        ]
+    )
+
+
+def findings_text(findings: Sequence[Report]) -> Iterator[str]:
+    """Lines on findings in the form of `Finding.as_dict`, the most severe first."""
+    if not findings:
+        return
+    yield f"Findings ({len(findings)}), explained by olp explain CODE"
+    for finding in by_severity(findings):
+        code = str(finding.get("code", ""))
+        title = RULES[code].title if code in RULES else ""
+        yield f"  {code}  {finding.get('severity', '')}: {title}{_place(finding)}"
+        message = printable(str(finding.get("message", "")))
+        yield from textwrap.wrap(message, WIDTH, initial_indent=" " * 10, subsequent_indent=" " * 10)
+
+
+def by_severity(findings: Iterable[Report]) -> list[Report]:
+    """Findings in the form of `Finding.as_dict`, the most severe first."""
+    order = {"error": 0, "warning": 1, "info": 2}
+    return sorted(findings, key=lambda f: order.get(str(f.get("severity")), 3))
+
+
+def _place(finding: Report) -> str:
+    lines = list(finding.get("lines") or ())
+    if not lines and finding.get("line") is not None:
+        lines = [finding["line"]]
+    count = finding.get("count", 1)
+    shown = ", ".join(str(line) for line in lines[:MAX_LINES])
+    more = ", ..." if len(lines) > MAX_LINES or count > len(lines) > 0 else ""
+    place = f", line{'s' if len(lines) > 1 else ''} {shown}{more}" if lines else ""
+    return place + (f" ({count} in all)" if count > 1 else "")
+
+
+def sentences(title: str, sentences: Sequence[str]) -> Iterator[str]:
+    if sentences:
+        yield title
+    for sentence in sentences:
+        yield from textwrap.wrap(sentence, WIDTH, initial_indent="  - ", subsequent_indent="    ")

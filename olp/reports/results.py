@@ -1,0 +1,84 @@
+"""The report of a correction of reported results, for people."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator
+
+from olp.findings.catalogue import RULES
+from olp.reports.document import Block, Document, Grid, Notice, Pairs, Paragraph, Section
+from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, sentences, table
+
+#: points and sources that are shown
+_ROWS = 10
+_WORST = ("line", "point", "X", "Y", "Z", "size")
+
+
+def to_text(report: Report) -> str:
+    """Plain text of at most 100 columns."""
+    sections = (
+        list(pairs(_head(report))),
+        ["Error added to the points, in um", *table(("", "max", "rms"), _figures(report))],
+        ["By source, in um", *table(("", "max", "rms"), _sources(report))],
+        ["Largest, in um", *table(_WORST, _worst(report), left=2)],
+        list(findings_text(report["findings"])),
+        list(sentences("Why", report["why"])),
+        list(sentences("What it does not prove", report["does_not_prove"])),
+    )
+    return "\n\n".join("\n".join(line[:WIDTH] for line in lines) for lines in sections if lines) + "\n"
+
+
+def to_document(report: Report, version: str, date: datetime.date | None) -> Document:
+    """The same as a document."""
+    notices: list[Block] = [
+        Notice(f["severity"], f["code"], RULES[f["code"]].title, f["message"], RULES[f["code"]].remedy)
+        for f in report["findings"]
+    ]
+    name = report["results"]["name"] or "results"
+    return Document(
+        "Correction of reported results", ", ".join(filter(None, (name, date.isoformat() if date else ""))),
+        None,
+        [
+            Section("Results", [Pairs(_head(report))]),
+            Section("Why", [Paragraph(text) for text in report["why"]]),
+            Section("Error added to the points, in um", [Grid(("", "max", "rms"), _figures(report))]),
+            Section("By source, in um", [Grid(("", "max", "rms"), _sources(report))]),
+            Section("Largest, in um", [Grid(_WORST, _worst(report), left=2)]),
+            Section("Findings", notices or [Paragraph("None.")]),
+            Section("What it does not prove", [Paragraph(text) for text in report["does_not_prove"]]),
+        ],
+        f"olp {version}",
+    )  # fmt: skip
+
+
+def _head(report: Report) -> list[tuple[str, str]]:
+    results, machine, calibration = report["results"], report["machine"], report["calibration"]
+    frames = ", ".join(printable(frame) for frame in results["frames"])
+    return [
+        ("Results", f"{printable(results['name']) or '<stdin>'}, {results['points']} points, "
+         f"{results['dialect']}, in {frames}"),
+        ("Machine", f"{printable(machine['name'])}, chain {machine['chain']}"),
+        ("Calibration", f"{calibration['model']}, measured {calibration['measured']}"),
+    ]  # fmt: skip
+
+
+def _figures(report: Report) -> list[tuple[str, str, str]]:
+    found = report["correction"]
+    rows = [("in space", number(found["max_um"]), number(found["rms_um"]))]
+    rows += [(axis, number(most), "") for axis, most in zip("XYZ", found["max_by_axis_um"], strict=True)]
+    return [*rows, ("left by rounding", number(found["rounding_um"]), "")]
+
+
+def _sources(report: Report) -> list[tuple[str, str, str]]:
+    return [(s["name"], number(s["max_um"]), number(s["rms_um"])) for s in report["sources"]]
+
+
+def _worst(report: Report) -> list[tuple[str, ...]]:
+    worst = sorted(report["points"], key=lambda p: -p["size_um"])[:_ROWS]
+    return [tuple(_row(point)) for point in worst]
+
+
+def _row(point: Report) -> Iterator[str]:
+    yield str(point["line"])
+    yield printable(point["name"])
+    yield from (number(value) for value in (*point["added_um"], point["size_um"]))

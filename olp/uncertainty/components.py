@@ -1,0 +1,85 @@
+"""Which components of a calibration are known well enough that correcting them surely helps.
+
+A component is corrected by its calibrated values v, and its true ones are v + d with d unknown. The mean
+square of what it leaves falls by mean(v^2 + 2 v d): a normal variable, so the probability that it falls is
+known. By expectation it always falls; who leaves a component out gives up a small gain to be sure of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.errormodel.base import Array
+from olp.errormodel.calibration import Calibration
+from olp.errormodel.sensitivity import value_rows
+from olp.errormodel.uncertainty import Entry, Uncertainty
+from olp.uncertainty.probability import normal
+from olp.uncertainty.spread import SURE
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A component error or squareness: root mean squares over the curve of its `value` and of its standard
+    uncertainty `sigma` (mm or rad), and the probability that correcting it helps."""
+
+    name: str
+    value: float
+    sigma: float
+    helps: float
+
+    @property
+    def sure(self) -> bool:
+        return self.helps >= SURE
+
+
+def components(calibration: Calibration, uncertainty: Uncertainty) -> list[Component]:
+    """All components that the calibration corrects and whose uncertainty is known, the most certain last."""
+    found: list[Component] = []
+    for curve in calibration.curves:
+        weight = np.gradient(curve.position_mm)
+        for name in curve.names:
+            parts = [(uncertainty.find("mean", name), curve.mean(name))]
+            half = curve.half_difference(name)
+            if half is not None:
+                parts.append((uncertainty.find("half", name), half))
+            found += _component(name, [(e, curve.position_mm, v, weight) for e, v in parts], calibration)
+    for name, value in calibration.squareness.items():
+        entry = uncertainty.find("squareness", name)
+        found += _component(name, [(entry, np.zeros(1), np.array([value]), np.ones(1))], calibration)
+    return sorted(found, key=lambda component: component.helps)
+
+
+def unsure(calibration: Calibration, uncertainty: Uncertainty) -> frozenset[str]:
+    """Components that are better left out by who wants to be sure."""
+    return frozenset(c.name for c in components(calibration, uncertainty) if not c.sure)
+
+
+def _component(
+    name: str, parts: list[tuple[Entry | None, Array, Array, Array]], calibration: Calibration
+) -> Iterator[Component]:
+    mean = variance = 0.0
+    common: Array = np.zeros(0)
+    own = 0.0
+    known = False
+    terms = [term for term in calibration.cyclic if term.component == name]
+    for entry, q, value, weight in parts:
+        share = weight / weight.sum()
+        mean += float(share @ value**2)
+        if entry is None:
+            continue
+        known = True
+        rows = value_rows(entry, q)
+        rank = entry.factor.shape[1]
+        variance += float(share @ (rows**2).sum(axis=1))
+        along = (share * value) @ rows
+        common = along[:rank] + (common if len(common) else 0.0)
+        own += float(along[rank:] @ along[rank:])
+    # a cyclic term is as good as the component: it goes with it
+    mean += sum(0.5 * term.amplitude**2 for term in terms)
+    spread = 2.0 * float(np.sqrt(common @ common + own))
+    if known and mean > 0.0:
+        helps = 1.0 if spread == 0.0 else float(normal(mean / spread))
+        yield Component(name, float(np.sqrt(mean)), float(np.sqrt(variance)), helps)

@@ -1,0 +1,348 @@
+"""The way-points of a program with the uncertainty of where the tip really is.
+
+Way-points are ends of moves whose path counts, and bottoms of holes: not rapids, nor moves of the control's
+own. What a touch-off
+on the raw machine holds has the same unknown errors in it, so each way-point has the uncertainty of the
+difference from there; "true" work offsets cancel nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.plan import zero_shifts
+from olp.core.machine import Vector
+from olp.core.progress import Progress
+from olp.core.toolpath import Flag, Frame, Kind, Toolpath
+from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.reversal import plays
+from olp.errormodel.sensitivity import Rows, Sensitivity
+from olp.program.program import Program
+from olp.uncertainty.probability import normal, within
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Index = npt.NDArray[np.int64]
+#: Coverage factor of bands: with normal errors about 95 % of a coordinate.
+COVERAGE = 2.0
+#: Draws of the whole calibration for what holds at many way-points at once, and numbers to draw at the most.
+DRAWS, FEWEST_DRAWS, WORK = 2000, 250, 4e7
+SEED = 20260514
+#: What is held to be sure: a gain that exceeds its standard uncertainty. A number whose size is its expanded
+#: uncertainty (2 sigma) is corrected with just this probability of a gain.
+SURE = 0.8413
+_BLOCK = 2048
+_AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Places of a path: (n,) nominal `move`, (n, 3) nominal `axis_mm`, `before_mm` and `after_mm`, the
+    deviations of the tip that the calibration predicts for the nominal and the corrected program, and `play`
+    (n, 3), None where no axis has lost motion."""
+
+    move: Index
+    axis_mm: Array
+    before_mm: Array
+    after_mm: Array
+    play: Array | None
+
+    def __len__(self) -> int:
+        return len(self.move)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unknowns:
+    """How well a machine is known: `sensitivity` to the unknown parts of its calibration, and the standard
+    deviation of its own scatter at one place by axis."""
+
+    sensitivity: Sensitivity
+    repeatability_mm: Vector
+
+    def touches(self, frames: tuple[Frame, ...]) -> tuple[Rows, Array]:
+        """(frames, 3, columns): what the touch-offs of each frame hold of the unknowns; and (frames,) how
+        many there are."""
+        out = np.zeros((len(frames), 3, self.sensitivity.columns), np.float32)
+        count = np.zeros(len(frames))
+        for k, frame in enumerate(frames):
+            for touch in (frame.touched, frame.tool_touched):
+                if touch is not None:
+                    at, lever = touch
+                    out[k] += self.sensitivity.rows(np.array([at]), np.array(lever, float))[:, 0]
+                    count[k] += 1
+        return out, count
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Confidence:
+    """Of n way-points in program order, in mm: see `Points`; (n, 3) standard uncertainties `sigma_mm` along
+    X, Y, Z; (n,) `band_mm`, 2 sigma in the direction where it is longest; (n,) probabilities `within_before`
+    and `within_after` that the tip is no farther than `within_mm` from its place, and `nearer`, that
+    correction brings it nearer.
+
+    `lines` (l,) of the program with the probabilities that all their way-points are within, `program_before`
+    and `program_after` that all of the program's are, from so many `draws`; `gain` is the probability that
+    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm`
+    is the largest standard uncertainty by temperatures.
+    """
+
+    points: Points
+    line: Index
+    within_mm: float
+    sigma_mm: Array
+    band_mm: Array
+    within_before: Array
+    within_after: Array
+    nearer: Array
+    lines: Index
+    line_before: Array
+    line_after: Array
+    program_before: float
+    program_after: float
+    gain: float
+    draws: int
+    expansion_mm: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def way_points(
+    nominal: Program, corrected: Program, groups: Index, passed: Index, model: ErrorModel
+) -> Points:
+    """The way-points of a program and of its correction, whose moves up to groups (n,) belong to each nominal
+    one. Moves in `passed` stay uncorrected and are left out; of canned cycles the bottoms of holes count."""
+    path, written = nominal.toolpath, corrected.toolpath
+    shift = zero_shifts(path.frames, model) if path.frames else np.zeros((1, 3))
+    keep = ((path.flag & _AWAY) == 0) & (path.kind != Kind.RAPID)
+    keep[passed] = False
+    other = groups.copy()
+    cycle = (path.flag & np.uint8(Flag.CYCLE)) != 0
+    bottom, there = _bottoms(nominal), _bottoms(corrected)
+    if len(bottom) == len(there):
+        both = (bottom >= 0) & (there >= 0)
+        other[bottom[both]] = there[both]
+        cycle[bottom[both]] = False
+    keep &= ~cycle
+    keep &= np.isfinite(path.end_mm).all(axis=1) & np.isfinite(written.end_mm[other]).all(axis=1)
+    move = np.flatnonzero(keep)
+    tool = path.tool_mm()
+    tool = tool if tool.ndim == 1 else tool[move]
+    held = path.end_mm[move] + shift[path.frame[move]]
+
+    def deviation(end_mm: Array, rows: Index) -> tuple[Array, Array | None]:
+        states = plays(model, end_mm)
+        play = None if states is None else states[rows]
+        return model.error(end_mm[rows], tool, play) + end_mm[rows] - held, play
+
+    before, play = deviation(path.end_mm, move)
+    after, _ = deviation(written.end_mm, other[move])
+    known = np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1)
+    return Points(
+        move[known], path.end_mm[move[known]], before[known], after[known],
+        None if play is None else play[known],
+    )  # fmt: skip
+
+
+def _bottoms(program: Program) -> Index:
+    """The last feed move into each hole of a canned cycle; -1 where there is none."""
+    kind = program.toolpath.kind
+    feeds = [np.flatnonzero(kind[hole.first : hole.last] != Kind.RAPID) for hole in program.holes]
+    return np.array(
+        [
+            hole.first + int(own[-1]) if len(own) else -1
+            for hole, own in zip(program.holes, feeds, strict=True)
+        ],
+        np.int64,
+    )
+
+
+def covariances(unknowns: Unknowns, path: Toolpath, points: Points) -> Array:
+    """(n, 3, 3) covariance of the tip's place at points of a path, in mm^2."""
+    touch, count = unknowns.touches(path.frames)
+    out = np.zeros((len(points), 3, 3))
+    for part, rows in _blocks(unknowns.sensitivity, path, points, np.arange(len(points)), touch):
+        out[part] = _covariance(rows)
+    out += _scatter(unknowns, count, path, points)
+    return out
+
+
+def bands(covariance: Array) -> Array:
+    """(n,) expanded uncertainty in the direction where it is largest."""
+    return np.asarray(COVERAGE * np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 2], 0.0)))
+
+
+def confidence(
+    unknowns: Unknowns,
+    path: Toolpath,
+    points: Points,
+    within_mm: float,
+    *,
+    tell: Progress,
+    seed: int = SEED,
+) -> Confidence:
+    """Bands and probabilities at each way-point, exact for normal errors to first order; those of lines and
+    of the whole by Monte-Carlo over the calibration's covariance, in memory of blocks."""
+    n = len(points)
+    line = path.line[points.move].astype(np.int64)
+    covariance = np.zeros((n, 3, 3))
+    touch, count = unknowns.touches(path.frames)
+    change = points.before_mm - points.after_mm
+    share = np.zeros(unknowns.sensitivity.columns)
+    expands, expansion = unknowns.sensitivity.expansion is not None, 0.0
+    joint = _Joint(unknowns, path, points, touch, count, within_mm, seed)
+    order = np.argsort(line, kind="stable")
+    for a in range(0, n, _BLOCK):
+        which = order[a : a + _BLOCK]
+        tell("uncertainty", a / n)
+        for part, rows in _blocks(unknowns.sensitivity, path, points, which, touch, joint):
+            covariance[part] = _covariance(rows)
+            if expands:
+                expansion = max(expansion, float((rows[:, :, -4:] ** 2).sum(axis=(0, 2)).max(initial=0.0)))
+            share += np.einsum("ink,ni->k", rows, change[part], optimize=True)
+    joint.end()
+    covariance += _scatter(unknowns, count, path, points)
+    mean = (points.before_mm**2).sum(axis=1) - (points.after_mm**2).sum(axis=1)
+    spread = 2.0 * np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", change, covariance, change), 0.0))
+    loose = _scatter_of_sum(unknowns, count, path, points, change)
+    total = 2.0 * float(np.sqrt(share @ share + loose))
+    return Confidence(
+        points=points,
+        line=line,
+        within_mm=within_mm,
+        sigma_mm=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
+        band_mm=bands(covariance),
+        within_before=within(covariance, points.before_mm, within_mm),
+        within_after=within(covariance, points.after_mm, within_mm),
+        nearer=_positive(mean, spread),
+        lines=np.array(joint.lines, np.int64),
+        line_before=np.array(joint.good[0]),
+        line_after=np.array(joint.good[1]),
+        program_before=float((joint.worst[0] <= within_mm**2).mean()),
+        program_after=float((joint.worst[1] <= within_mm**2).mean()),
+        gain=float(_positive(np.array([mean.sum()]), np.array([total]))[0]),
+        draws=joint.draws,
+        expansion_mm=expansion**0.5,
+    )
+
+
+def _positive(mean: Array, spread: Array) -> Array:
+    """(n,) probability that a normal variable is above zero; a half where it is certainly zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(spread > 0.0, normal(mean / spread), 0.5 + 0.5 * np.sign(mean))
+
+
+def _blocks(
+    sensitivity: Sensitivity, path: Toolpath, points: Points, which: Index, touch: Rows,
+    joint: _Joint | None = None,
+) -> Iterator[tuple[Index, Rows]]:  # fmt: skip
+    """Points in blocks, with their rows (3, b, columns) less what their touch-off holds."""
+    tool = path.tool_mm()
+    for a in range(0, len(which), _BLOCK):
+        part = which[a : a + _BLOCK]
+        move = points.move[part]
+        lever = tool if tool.ndim == 1 else tool[move]
+        play = None if points.play is None else points.play[part]
+        weights = sensitivity.weights(points.axis_mm[part], lever, play)
+        rows = np.stack([one @ sensitivity.table for one in weights])
+        if touch.any():
+            rows -= touch[path.frame[move]].transpose(1, 0, 2)
+        if joint is not None:
+            joint.add(part, weights)
+        yield part, rows
+
+
+def _covariance(rows: Rows) -> Array:
+    out = np.zeros((rows.shape[1], 3, 3))
+    for i, j in _PAIRS:
+        out[:, i, j] = out[:, j, i] = np.einsum("nk,nk->n", rows[i], rows[j])
+    return out
+
+
+def _scatter(unknowns: Unknowns, count: Array, path: Toolpath, points: Points) -> Array:
+    """(n, 3, 3) of the machine's own scatter, at the way-point and at each touch."""
+    own = np.diag(np.array(unknowns.repeatability_mm) ** 2)
+    touches = count[path.frame[points.move]] if len(count) else np.zeros(len(points))
+    return np.asarray((1.0 + touches)[:, None, None] * own)
+
+
+def _scatter_of_sum(unknowns: Unknowns, count: Array, path: Toolpath, points: Points, change: Array) -> float:
+    """Variance of the sum over way-points of change times scatter: a touch scatters once for its frame."""
+    square = np.array(unknowns.repeatability_mm) ** 2
+    total = float((change**2 @ square).sum())
+    frame = path.frame[points.move]
+    for k in np.flatnonzero(count):
+        total += float(count[k] * (change[frame == k].sum(axis=0) ** 2 @ square))
+    return total
+
+
+class _Joint:
+    """Draws of all unknowns at once, followed through the way-points in the order of lines."""
+
+    def __init__(
+        self, unknowns: Unknowns, path: Toolpath, points: Points, touch: Rows, count: Array,
+        within_mm: float, seed: int,
+    ) -> None:  # fmt: skip
+        self.draws = int(np.clip(WORK / max(len(points), 1), FEWEST_DRAWS, DRAWS))
+        self.path, self.points, self.limit = path, points, within_mm**2
+        self.random = np.random.default_rng(seed)
+        sensitivity = unknowns.sensitivity
+        drawn = self.random.standard_normal((sensitivity.columns, self.draws), dtype=np.float32)
+        self.values = sensitivity.table @ drawn
+        self.scatter = np.array(unknowns.repeatability_mm)
+        self.held = touch @ drawn
+        if self.scatter.any() and count.any():
+            noise = self.random.standard_normal(self.held.shape, dtype=np.float32)
+            noise *= (np.sqrt(count)[:, None] * self.scatter)[:, :, None]
+            self.held = self.held + noise
+        self.touched = bool(count.any())
+        self.lines: list[int] = []
+        self.good: tuple[list[float], list[float]] = ([], [])
+        self.worst = np.zeros((2, self.draws))
+        self.last: tuple[int, Array] | None = None
+
+    def add(self, part: Index, weights: Sequence[csr_array]) -> None:
+        """The next way-points, in the order of lines."""
+        sides = (self.points.before_mm[part], self.points.after_mm[part])
+        square = np.zeros((2, len(part), self.draws), np.float32)
+        frame = self.path.frame[self.points.move[part]]
+        for i, one in enumerate(weights):
+            moved = one @ self.values
+            if self.touched:
+                moved -= self.held[frame, i]
+            if self.scatter[i]:
+                noise = self.random.standard_normal(moved.shape, dtype=np.float32)
+                moved += np.float32(self.scatter[i]) * noise
+            for k, side in enumerate(sides):
+                away = moved + side[:, i, None].astype(np.float32)
+                square[k] += away * away
+        line = self.path.line[self.points.move[part]]
+        starts = np.flatnonzero(np.concatenate(([True], line[1:] != line[:-1])))
+        worst = np.maximum.reduceat(square, starts, axis=1)
+        np.maximum(self.worst, worst.max(axis=1), out=self.worst)
+        numbers = line[starts].tolist()
+        if self.last is not None and self.last[0] == numbers[0]:
+            worst[:, 0] = np.maximum(worst[:, 0], self.last[1])
+        else:
+            self.end()
+        # the last one may go on in what comes next
+        self.last = (numbers[-1], worst[:, -1].copy())
+        self.lines += numbers[:-1]
+        shares = (worst[:, :-1] <= self.limit).mean(axis=2).tolist()
+        for good, share in zip(self.good, shares, strict=True):
+            good.extend(share)
+
+    def end(self) -> None:
+        """The line that came last is complete."""
+        if self.last is not None:
+            self.lines.append(self.last[0])
+            for side, worst in zip(self.good, self.last[1], strict=True):
+                side.append(float((worst <= self.limit).mean()))
+            self.last = None

@@ -1,0 +1,118 @@
+"""A calibration from the files of measurements: read, fit, and the files to write."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.covariance import covariance_of
+from olp.calibration.estimator.curves import calibration_of, sigmas_of
+from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
+from olp.calibration.estimator.residual_map import map_findings, map_summary, residual_map
+from olp.calibration.estimator.summary import findings_of, summary
+from olp.calibration.observations.readings import MapWish, Measurements
+from olp.core.errors import ConfigError
+from olp.core.machine import Setup, Vector
+from olp.core.progress import Progress
+from olp.errormodel.calibration import Calibration
+from olp.files.calibration.writer import calibration_files
+from olp.files.measurements.reader import load_measurements
+from olp.findings.catalogue import Finding
+from olp.workflows.session import PathLike, setup_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedCalibration:
+    """A calibration with what it was made from.
+
+    `fit` holds all parameters with their covariance (`fit.sigma(axis_mm, tool_mm)` is the uncertainty of the
+    error of the curves anywhere), `report` what was found as a mapping ("olp-fit-1"), `findings` what to know
+    about it. `nonrigid` is what was looked for beyond rigid bodies where a map was wanted;
+    `nonrigid.sigma(axis_mm, tool_mm)` is the uncertainty with the map.
+    """
+
+    calibration: Calibration
+    fit: Fit
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+    nonrigid: NonRigid | None = None
+
+    def files(self, target: PathLike) -> dict[Path, bytes]:
+        """The bytes of the calibration file `target` and of its curves beside it."""
+        sigma = sigmas_of(self.fit, self.calibration)
+        covariance = covariance_of(self.fit, self.calibration)
+        notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
+        return calibration_files(
+            self.calibration, Path(target), sigma=sigma, covariance=covariance, notes=notes
+        )
+
+
+def fit_calibration(
+    data: PathLike | Sequence[PathLike] | Measurements,
+    machine: PathLike | Setup | None = None,
+    *,
+    datum_mm: Vector | None = None,
+    valid_until: datetime.date | None = None,
+    map: bool | MapWish | None = None,
+    progress: Progress | None = None,
+) -> FittedCalibration:
+    """The calibration of a machine from its measurements.
+
+    `data` are plans (olp-measurements-1), folders or files of readings that describe themselves, or
+    Measurements. Chain, travel and tools come from the machine file; without one the plan states the chain.
+    `datum_mm` is where the curves are zero, by default the place of the calibrated box nearest to zero. `map`
+    asks for a map of what no rigid bodies make, or forbids it; without it the plan says.
+    Raises InputError, ConfigError with every problem of the files, and CannotCompute.
+    """
+    described = None if machine is None else setup_of(machine, None).machine
+    if isinstance(data, Measurements):
+        measurements = data
+    else:
+        sources = [data] if isinstance(data, str | Path) else list(data)
+        measurements = load_measurements(sources, None if described is None else described.chain)
+    chain = described.chain if described is not None else measurements.chain
+    if chain is None:
+        raise ConfigError(
+            "the chain is stated nowhere; give the machine file (-m), or the key chain of the plan"
+        )
+    if described is not None and described.name != measurements.machine:
+        raise ConfigError(
+            f'the measurements are of machine "{measurements.machine}", and the machine file is of '
+            f'"{described.name}"; expected one machine'
+        )
+    if described is not None:
+        both = sorted(described.compensated_by_controller & measurements.active_during_measurement)
+        if both:
+            raise ConfigError(
+                f"active_during_measurement names {', '.join(both)}, and so does compensated_by_controller "
+                "of the machine file; expected each in one of them"
+            )
+    travel = None if described is None else [described.axes[axis].travel_mm for axis in "XYZ"]
+    found = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
+    wish = measurements.map if map is None else (map or None)
+    beyond = None
+    if wish is not None:
+        wish = measurements.map or MapWish() if wish is True else wish
+        beyond = nonrigid(found, noise=wish.noise, progress=progress)
+        found = beyond.fit
+    calibration = calibration_of(found, valid_until)
+    mapped = (
+        residual_map(beyond, calibration, wish.within_mm) if beyond and wish and beyond.processes else None
+    )
+    if mapped is not None:
+        calibration = dataclasses.replace(calibration, maps=(mapped,))
+    tools = [] if described is None else [tool.lever_mm for tool in described.tools.values()]
+    levers = [lever for lever in tools if lever is not None]
+    report, findings = summary(found, calibration, levers), findings_of(found, levers, travel)
+    if beyond is not None:
+        report["map"] = map_summary(beyond, mapped)
+        findings = (*findings, *map_findings(beyond, mapped))
+    return FittedCalibration(calibration, found, report, findings, beyond)
+
+
+__all__ = ["FittedCalibration", "fit_calibration"]

@@ -1,0 +1,343 @@
+"""What to measure for a wanted uncertainty: methods compared by time against accuracy, and the files of
+one."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from olp.calibration.design import layout
+from olp.calibration.design.prediction import Planned, Prediction, predict
+from olp.calibration.design.visiting import move_s, order
+from olp.calibration.diagnosis.deciding import offsets
+from olp.calibration.observations.readings import Line
+from olp.core.errors import CannotCompute, UsageError
+from olp.core.machine import Machine, Setup, Vector
+from olp.core.units import AXES, MM_PER_UM, UM_PER_MM
+from olp.errormodel.base import Array
+from olp.files.measurements.plan_files import Pass, plan_files
+from olp.findings.catalogue import Finding
+from olp.program.registry import read
+from olp.program.rs274.positions import positions_program
+from olp.program.rs274.profiles import Profile
+from olp.workflows.session import PathLike, control_of, setup_of
+
+Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
+INSTRUMENTS: tuple[Instrument, ...] = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
+#: Numbers of points that are tried, fewest first; points beside lines; stations of multilateration.
+COUNTS = (30, 60, 120, 250, 500, 1000)
+BESIDE, STATIONS = 40, 6
+#: A coordinate of a tracker in mm where nobody states another.
+TRACKER = 8e-3
+#: Minutes to set up a line, an instrument at a place, and another reflector; seconds of a reading.
+SET_UP_MIN = {"line": 30.0, "station": 45.0, "reflector": 5.0}
+DWELL_S = {"lines": 3.0, "tracker": 3.0, "lines-and-tracker": 3.0, "pods": 5.0, "multilateration": 2.0}
+#: Lines go on beyond their first and last target by this, so that lost motion is taken up.
+OVERRUN_MM = 5.0
+#: Programs come back to their places within half a digit of the output, and this.
+_SAME_MM = 1e-9
+_SEED = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Method:
+    """One way to measure: its geometry, what it would know, and its time. `passes` are runs of the machine,
+    `set_up_min` what people need beside it."""
+
+    instrument: Instrument
+    name: str
+    planned: Planned
+    prediction: Prediction
+    passes: tuple[Pass, ...]
+    machine_s: float
+    set_up_min: float
+
+    @property
+    def hours(self) -> float:
+        return self.machine_s / 3600.0 + self.set_up_min / 60.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasurementPlan:
+    """A plan: `chosen` of all `methods` that were compared, the report ("olp-plan-1") as a mapping, findings.
+
+    `files(folder)` are a plan to be filled in (measurements.toml), its CSV files, and programs that go there.
+    """
+
+    setup: Setup
+    chosen: Method
+    methods: tuple[Method, ...]
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+    dwell_s: float
+
+    def files(self, folder: PathLike, date: datetime.date | None = None) -> dict[Path, bytes]:
+        """Bytes by path. Raises CannotCompute for a control whose programs cannot be written."""
+        return dict(_files(self, Path(folder), date))
+
+
+def plan_measurements(
+    machine: PathLike | Setup,
+    *,
+    uncertainty_um: float = 5.0,
+    instrument: Instrument | None = None,
+    box_mm: Sequence[tuple[float, float]] | None = None,
+    tools: Sequence[Vector] = (),
+    sigma_um: float | None = None,
+    periods_mm: Sequence[Sequence[float]] = ((), (), ()),
+    dwell_s: float | None = None,
+    settle_s: float = 1.0,
+    points: int | None = None,
+) -> MeasurementPlan:
+    """Propose what to measure so that a correction leaves about `uncertainty_um` (rms length, in the frame
+    that fits best).
+
+    Without `instrument` the quickest method that gets there is chosen; `points` fixes their number. `box_mm`
+    is the volume (default: the travel less a hundredth at each end), `tools` are vectors from the gauge point
+    to the reflector (default: three that are not on one line), `sigma_um` the uncertainty of a tracker's
+    coordinate, `periods_mm` those of screws and scales by axis. Raises UsageError, ConfigError and
+    CannotCompute.
+    """
+    setup = setup_of(machine, None)
+    described = setup.machine
+    box = _box(described, box_mm)
+    reflectors = list(tools) or _reflectors(described)
+    levers = [tool.lever_mm for tool in described.tools.values()]
+    judged = list(dict.fromkeys([reflectors[0], *(lever for lever in levers if lever is not None)]))
+    sigma = TRACKER if sigma_um is None else sigma_um * MM_PER_UM
+    names = INSTRUMENTS if instrument is None else (instrument,)
+    methods: list[Method] = []
+    for name in names:
+        dwell = DWELL_S[name] if dwell_s is None else dwell_s
+        for title, planned in _candidates(name, described.name, box, reflectors, sigma, periods_mm, points):
+            found = predict(planned, described.chain, box, judged)
+            passes = tuple(_passes(planned, described, dwell + settle_s, box))
+            seconds = sum(_seconds(run, described) for run in passes)
+            methods.append(Method(name, title, planned, found, passes, seconds, _set_up(planned)))
+    good = [m for m in methods if m.prediction.rms_mm <= uncertainty_um * MM_PER_UM]
+    chosen = min(good, key=lambda m: m.hours) if good else min(methods, key=lambda m: m.prediction.rms_mm)
+    used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
+    report = _report(described, box, chosen, methods, uncertainty_um, reflectors, judged)
+    return MeasurementPlan(
+        setup, chosen, tuple(methods), report, tuple(_findings(chosen, uncertainty_um)), used
+    )
+
+
+def _box(machine: Machine, box_mm: Sequence[tuple[float, float]] | None) -> Array:
+    travel = np.array([machine.axes[a].travel_mm for a in AXES])
+    if box_mm is None:
+        margin = 0.01 * np.ptp(travel, axis=1)
+        return np.asarray(np.round(travel + np.stack([margin, -margin], axis=1), 1))
+    box = np.array(box_mm, float)
+    for k, a in enumerate(AXES):
+        low, high = box[k]
+        if not (travel[k, 0] <= low < high <= travel[k, 1]):
+            raise UsageError(
+                f"the box along {a} is {low:g} to {high:g} mm; expected a part of its travel, "
+                f"{travel[k, 0]:g} to {travel[k, 1]:g}"
+            )
+    return box
+
+
+def _reflectors(machine: Machine) -> list[Vector]:
+    tool = machine.tools.get(machine.default_tool) if machine.default_tool is not None else None
+    lever = tool.lever_mm if tool is not None else None
+    first = lever if lever is not None else (0.0, 0.0, -100.0)
+    rest = [(float(x), float(y), float(z)) for x, y, z in offsets([first]).tolist()]
+    return [first, *(vector for vector in rest if vector != first)][:3]
+
+
+def _candidates(
+    name: Instrument, machine: str, box: Array, tools: Sequence[Vector], sigma: float,
+    periods_mm: Sequence[Sequence[float]], points: int | None,
+) -> Iterator[tuple[str, Planned]]:  # fmt: skip
+    counts = COUNTS if points is None else (points,)
+    if name == "lines":
+        yield "lines: laser, levels, squares", layout.lines(machine, box, tools[0], periods_mm, _SEED)
+    elif name == "lines-and-tracker":
+        n = points or BESIDE
+        both = layout.together(
+            layout.lines(machine, box, tools[0], periods_mm, _SEED),
+            layout.points(machine, box, tools, n, sigma, _SEED),
+        )
+        yield f"lines and {n} points of a tracker", both
+    else:
+        make: Callable[[int], Planned]
+        if name == "tracker":
+            words = "{} points of a tracker"
+            make = lambda n: layout.points(machine, box, tools, n, sigma, _SEED)  # noqa: E731
+        elif name == "pods":
+            words = "{} points of two pods"
+            make = lambda n: layout.pods(machine, box, tools, n, layout.POD, _SEED)  # noqa: E731
+        else:
+            words = f"{STATIONS} stations with {{}} lengths"
+            make = lambda n: layout.lengths(  # noqa: E731
+                machine, box, tools, n, STATIONS, layout.LENGTH, _SEED
+            )
+        for n in counts:
+            yield words.format(n), make(n)
+
+
+def _passes(planned: Planned, machine: Machine, wait_s: float, box: Array) -> Iterator[Pass]:
+    """Runs of the machine, each with one instrument at one place and one reflector."""
+    taken = planned.measurements
+    for axis in AXES:
+        own = [line for line in taken.lines if line.component[2] == axis]
+        if own:
+            k, line = AXES.index(axis), own[0]
+            yield _line_pass(axis, k, line, machine, wait_s, box, len(own))
+    for cloud in layout.scattered(taken):
+        if cloud in taken.lengths[1:]:
+            # stations see the same points one after the other
+            continue
+        vectors = list(dict.fromkeys(map(tuple, cloud.tool_mm.tolist())))
+        for number, vector in enumerate(vectors, start=1):
+            rows = np.flatnonzero((cloud.tool_mm == np.array(vector)).all(axis=1))
+            places = cloud.axis_mm[rows]
+            rows = rows[order(places, machine.axes)]
+            label = "stations" if taken.lengths else cloud.source
+            yield Pass(
+                f"{label}-{number}", _approached(cloud.axis_mm[rows], box), _waits(len(rows), wait_s),
+                f"reflector at X {vector[0]:g} Y {vector[1]:g} Z {vector[2]:g} from the gauge point",
+                cloud.source, rows, max(1, len(taken.lengths)),
+            )  # fmt: skip
+
+
+def _line_pass(
+    axis: str, k: int, line: Line, machine: Machine, wait_s: float, box: Array, lines: int
+) -> Pass:
+    target, run = line.target_mm, line.run
+    low, high = machine.axes[axis].travel_mm
+    first, last = float(target.min()), float(target.max())
+    ends = max(first - OVERRUN_MM, low), min(last + OVERRUN_MM, high)
+    stops: list[tuple[float, float]] = []
+    for number in np.unique(run):
+        own = target[run == number]
+        half = len(own) // 2
+        stops += [(ends[0], 0.0), *((q, wait_s) for q in own[:half].tolist())]
+        stops += [(ends[1], 0.0), *((q, wait_s) for q in own[half:].tolist())]
+    places = np.tile(np.array(line.line_mm, float), (len(stops), 1))
+    places[:, k] = [q for q, _ in stops]
+    waits = [0.0, *(wait for _, wait in stops)]
+    words = f"lines along {axis}: {len(np.unique(run))} runs there and back, once for each error of {axis}"
+    return Pass(f"line-{axis.lower()}", _approached(places, box), waits, words, f"line {axis}", repeats=lines)
+
+
+def _approached(places: Array, box: Array) -> Array:
+    """The first place is reached from above."""
+    above = places[:1].copy()
+    above[0, 2] = box[2, 1]
+    return np.concatenate([above, places])
+
+
+def _waits(n: int, wait_s: float) -> list[float]:
+    return [0.0, *([wait_s] * n)]
+
+
+def _seconds(run: Pass, machine: Machine) -> float:
+    once = float(move_s(np.diff(run.places_mm, axis=0), machine.axes).sum()) + sum(run.wait_s)
+    return once * run.repeats
+
+
+def _set_up(planned: Planned) -> float:
+    taken = planned.measurements
+    minutes = SET_UP_MIN["line"] * len(taken.lines)
+    minutes += SET_UP_MIN["station"] * (len(taken.points) + len(taken.lengths))
+    minutes += sum(SET_UP_MIN["station"] * pods.count for pods in taken.pods)
+    for cloud in layout.scattered(taken):
+        minutes += SET_UP_MIN["reflector"] * len(np.unique(cloud.tool_mm, axis=0))
+    return minutes
+
+
+def _report(
+    machine: Machine, box: Array, chosen: Method, methods: Sequence[Method], wanted: float,
+    reflectors: Sequence[Vector], judged: Sequence[Vector],
+) -> dict[str, Any]:  # fmt: skip
+    return {
+        "schema": "olp-plan-1",
+        "machine": machine.name,
+        "chain": machine.chain,
+        "box_mm": {axis: box[k].tolist() for k, axis in enumerate(AXES)},
+        "wanted_um": wanted,
+        "method": chosen.name,
+        "instrument": chosen.instrument,
+        "predicted_um": chosen.prediction.rms_mm * UM_PER_MM,
+        "predicted_worst_um": chosen.prediction.worst_mm * UM_PER_MM,
+        "machine_h": chosen.machine_s / 3600.0,
+        "set_up_h": chosen.set_up_min / 60.0,
+        "cannot_see": list(chosen.prediction.hidden),
+        "reflectors": [{"name": f"reflector {k}", "tool_mm": list(v)} for k, v in enumerate(reflectors, 1)],
+        "judged_with": [{"name": f"tool {k}", "tool_mm": list(v)} for k, v in enumerate(judged, 1)],
+        "methods": [
+            {
+                "name": m.name,
+                "predicted_um": m.prediction.rms_mm * UM_PER_MM,
+                "worst_um": m.prediction.worst_mm * UM_PER_MM,
+                "machine_h": m.machine_s / 3600.0,
+                "set_up_h": m.set_up_min / 60.0,
+                "total_h": m.hours,
+                "reaches": m.prediction.rms_mm <= wanted * MM_PER_UM,
+                "cannot_see": list(m.prediction.hidden),
+            }
+            for m in sorted(methods, key=lambda m: m.hours)
+        ],
+    }
+
+
+def _findings(chosen: Method, wanted: float) -> Iterator[Finding]:
+    rms = chosen.prediction.rms_mm * UM_PER_MM
+    if rms > wanted:
+        yield Finding("OLP837", f"{chosen.name} leaves about {rms:.1f} um; wanted were {wanted:g} um")
+    if chosen.prediction.hidden:
+        yield Finding("OLP838", f"{chosen.name} cannot see {', '.join(chosen.prediction.hidden)}")
+
+
+def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> Iterator[tuple[Path, bytes]]:
+    machine, chosen = plan.setup.machine, plan.chosen
+    for name, data in plan_files(machine, chosen.planned, chosen.passes, chosen.name, date):
+        yield folder / name, data
+    profile = _control(plan.setup)
+    digits = max(0, math.ceil(-math.log10(min(machine.least_increment_mm)) - 1e-9))
+    ending = "ngc" if machine.controller == "linuxcnc" else "nc"
+    for run in chosen.passes:
+        notes = [
+            f"{machine.name}: {run.words}",
+            f"{int(np.count_nonzero(run.wait_s))} stops in machine coordinates. Clear the way first: moves "
+            "are straight or axis by axis, inside "
+            + ", ".join(f"{a} {run.places_mm[:, k].min():g}..{run.places_mm[:, k].max():g}"
+                        for k, a in enumerate(AXES)),
+        ]  # fmt: skip
+        text = positions_program(profile, run.places_mm, run.wait_s, digits, notes)
+        _proved(text, run, plan.setup, digits)
+        yield folder / f"{run.name}.{ending}", text
+
+
+def _control(setup: Setup) -> Profile:
+    """What the control reads. Raises CannotCompute where no program of positions is written for it."""
+    control = control_of(setup)
+    if not isinstance(control, Profile):
+        raise CannotCompute(
+            f"no programs of positions are written for {control.title}; take the points from the CSV files, "
+            "or name an RS-274 control in the machine file"
+        )
+    return control
+
+
+def _proved(text: bytes, run: Pass, setup: Setup, digits: int) -> None:
+    """Read a program back: it must stop where it is meant to. Its first block moves Z alone."""
+    path = read(text, setup, _control(setup)).toolpath
+    wanted = np.round(run.places_mm, digits)
+    kept = np.concatenate([[True], (np.diff(wanted, axis=0) != 0.0).any(axis=1)])
+    wanted = wanted[kept]
+    found = path.end_mm[1:]
+    if found.shape != wanted.shape or not np.abs(found - wanted).max() <= _SAME_MM:
+        raise CannotCompute(f"program {run.name} does not read back as its places; report this")
+
+
+__all__ = ["INSTRUMENTS", "MeasurementPlan", "Method", "plan_measurements"]

@@ -1,0 +1,208 @@
+"""A calibration refined by a measured run: from files to the new calibration, its covariance and findings."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from olp.calibration.diagnosis.refinement import Refinement, refine
+from olp.calibration.estimator.covariance import sigmas_at
+from olp.calibration.observations.readings import Points
+from olp.comparison.nominal import nominal_of
+from olp.core.errors import CannotCompute, ConfigError
+from olp.core.machine import Setup, Vector
+from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
+from olp.errormodel.base import Array
+from olp.errormodel.build import build
+from olp.errormodel.calibration import Calibration
+from olp.errormodel.reversal import plays
+from olp.errormodel.uncertainty import Uncertainty, fingerprint
+from olp.files.calibration.covariance import load_uncertainty
+from olp.files.calibration.reader import load_calibration
+from olp.files.calibration.writer import calibration_files
+from olp.files.measurements.checkpoints import load_checkpoints
+from olp.files.write import read_bytes
+from olp.findings.catalogue import Finding
+from olp.program.registry import read
+from olp.workflows.compare import compare
+from olp.workflows.session import PathLike, reading, setup_of
+
+#: A run whose chi-square a degree of freedom is beyond this was not foreseen by the covariance.
+MISFIT = 1.5
+#: More points of a path tell no more: they are thinned evenly.
+MOST_POINTS = 3000
+#: Changes that are told one by one: those beyond so many old standard deviations.
+TOLD = 1.0
+_LISTED = 10
+#: Components of a path's tangent below this move no axis.
+_MOVES = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RefinedCalibration:
+    """A calibration moved within its covariance by a measured run, and what is left of the covariance.
+
+    `refinement` holds figures in mm and rad, `report` the same as a mapping ("olp-refinement-1").
+    """
+
+    calibration: Calibration
+    uncertainty: Uncertainty
+    refinement: Refinement
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+
+    def files(self, target: PathLike) -> dict[Path, bytes]:
+        """The bytes of the new calibration file `target`, its curves and its covariance beside it."""
+        notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
+        return calibration_files(
+            self.calibration,
+            Path(target),
+            sigma=sigmas_at(self.calibration, self.uncertainty),
+            covariance=self.uncertainty,
+            notes=notes,
+        )
+
+
+def refine_calibration(
+    calibration: PathLike,
+    measured: PathLike | Points,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    program: PathLike | None = None,
+    frame_known: bool = False,
+    sigma_um: float | None = None,
+    tool_mm: Vector | None = None,
+    date: datetime.date | None = None,
+) -> RefinedCalibration:
+    """Update a calibration by what was measured with it, within its covariance.
+
+    `measured` are points: commanded axis positions and where an instrument saw the reflector (a file as for
+    `diagnose_calibration`, or Points). With `program`, the nominal program, they are tip positions along a
+    run of its correction, paired as `compare` pairs them; deviations across the path count. `sigma_um` is the
+    standard uncertainty of a coordinate, `date` the day of the run. Raises InputError, ConfigError where the
+    calibration states no uncertainty, and CannotCompute.
+    """
+    setup = setup_of(machine, job)
+    described = dataclasses.replace(setup.machine, calibration=str(calibration))
+    old = load_calibration(calibration, described)
+    known = load_uncertainty(calibration, old)
+    if known is None or not known.entries:
+        raise ConfigError(
+            "states no uncertainty, within which it could move; expected [covariance] or sigma_ columns, as "
+            "olp calibrate fit writes them",
+            file=str(calibration),
+        )
+    skip = frozenset(described.compensated_by_controller - old.active_during_measurement)
+    along: Array | None = None
+    play: Array | None = None
+    if program is not None:
+        if sigma_um is None or isinstance(measured, Points):
+            raise ConfigError("points along a program state no uncertainty; expected sigma_um")
+        run = dataclasses.replace(setup, machine=described)
+        points, along, play = _along(old, skip, run, program, measured, sigma_um * MM_PER_UM)
+    elif isinstance(measured, Points):
+        points = measured
+    else:
+        points, in_machine = load_checkpoints(measured, sigma_um=sigma_um, tool_mm=tool_mm)
+        frame_known = frame_known or in_machine
+    done = refine(
+        old, described.chain, known, points, frame_known=frame_known, skip=skip, play=play, along=along
+    )
+    new = done.calibration if date is None else dataclasses.replace(done.calibration, measured=date)
+    left = done.uncertainty
+    if date is not None:
+        left = dataclasses.replace(left, fingerprint=fingerprint(new))
+    return RefinedCalibration(
+        new, left, done, _report(new, done, len(points.axis_mm)), tuple(_findings(done))
+    )
+
+
+def _along(
+    calibration: Calibration,
+    skip: frozenset[str],
+    setup: Setup,
+    program: PathLike,
+    measured: PathLike,
+    sigma: float,
+) -> tuple[Points, Array, Array | None]:
+    """Points of a corrected run with the commands that led there, tangents of the path and play of axes."""
+    chain = setup.machine.chain
+    model = build(calibration, chain, outside="hold", skip_components=skip)
+    found = compare(program, [measured], setup)
+    path, run = found.path, found.runs[0]
+    assert path is not None
+    data = read_bytes(program)
+    setup, dialect = reading(setup, data, str(program))
+    toolpath = read(data, setup, dialect).toolpath
+    axes = nominal_of(toolpath, model, "axes")
+    if len(axes.path) != len(path):
+        raise CannotCompute("the path has moves whose axis positions are not known; give start_mm in the job")
+    use = np.flatnonzero(run.counted)
+    if len(use) < 4:
+        raise CannotCompute(f"{len(use)} points lie on cutting moves of the program; expected at least 4")
+    use = use[:: max(1, -(-len(use) // MOST_POINTS))]
+    segment = run.pairing.segment[use]
+    share = (run.pairing.s_mm[use] - path.s_mm[segment]) / np.diff(path.s_mm)[segment]
+    begin, end = axes.path.vertex_mm[segment], axes.path.vertex_mm[segment + 1]
+    target = begin + share[:, None] * (end - begin)
+    tool = toolpath.tool_mm()
+    tool = np.broadcast_to(tool if tool.ndim == 1 else tool[axes.move[segment]], target.shape)
+    states = plays(model, axes.path.vertex_mm)
+    play = None if states is None else states[segment + 1]
+    command = target - model.error(target, tool, play)
+    seen = command + tool + model.error(command, tool, play)
+    seen = seen + run.points_mm[use] - run.pairing.foot_mm[use]
+    way = end - begin
+    length = np.linalg.norm(way, axis=1)
+    tangent = np.where(length[:, None] > _MOVES, way / np.maximum(length, _MOVES)[:, None], 0.0)
+    points = Points(command, tool, seen, sigma, source=str(measured), row=use + 1)
+    return points, tangent, play
+
+
+def _report(calibration: Calibration, done: Refinement, points: int) -> dict[str, Any]:
+    rows = []
+    for (kind, name), (size, deviations) in done.changes.items():
+        angle = kind == "squareness" or (len(name) == 3 and name[1] in "ABC")
+        rows.append(
+            {
+                "name": name if kind == "mean" else f"{kind} {name}",
+                "changed_um": None if angle else size * UM_PER_MM,
+                "changed_urad": size / RAD_PER_URAD if angle else None,
+                "old_standard_deviations": deviations,
+            }
+        )
+    return {
+        "schema": "olp-refinement-1",
+        "machine": calibration.machine,
+        "points": points,
+        "left_out": len(done.outliers),
+        "rms_before_um": done.before_mm * UM_PER_MM,
+        "rms_expected_um": done.expected_mm * UM_PER_MM,
+        "rms_after_um": done.after_mm * UM_PER_MM,
+        "rms_of_noise_um": done.noise_mm * UM_PER_MM,
+        "chi_square_per_freedom": done.chi_square / done.freedom,
+        "changes": rows,
+    }
+
+
+def _findings(done: Refinement) -> Iterator[Finding]:
+    ratio = done.chi_square / done.freedom
+    if ratio > MISFIT:
+        yield Finding(
+            "OLP839",
+            f"chi-square is {ratio:.1f} a degree of freedom: {done.before_mm * UM_PER_MM:.1f} um rms were "
+            f"found, {done.expected_mm * UM_PER_MM:.1f} um expected",
+        )
+    if done.outliers:
+        rows = ", ".join(f"row {row} ({off:.0f})" for row, off in done.outliers[:_LISTED])
+        yield Finding("OLP835", f"standard deviations off, left out: {rows}", count=len(done.outliers))
+
+
+__all__ = ["RefinedCalibration", "refine_calibration"]

@@ -1,0 +1,308 @@
+"""The gate before deployment: everything that is known against letting a program run, as findings."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from olp.checks import correction as checks
+from olp.checks import motion, state
+from olp.checks.base import finding
+from olp.checks.clearance import Clearances, Solid, clearances
+from olp.checks.model import model_findings
+from olp.compensation.stamp import find_stamp
+from olp.core.errors import OlpError, UsageError, naming
+from olp.core.geometry import PLANES
+from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
+from olp.core.toolpath import Flag
+from olp.core.units import MM_PER_UM, RAD_PER_URAD
+from olp.errormodel.base import Array
+from olp.files.meshes import read_mesh
+from olp.findings.catalogue import CONFIDENCE_CODES, GATE_CODES, Finding
+from olp.program.program import Program
+from olp.program.registry import Options, read
+from olp.proof.proof import Proof
+from olp.workflows.correct import Run, correct_bytes, last_digit_mm, verify_programs
+from olp.workflows.session import Loaded, PathLike, load, setup_of, source_of
+
+#: blocks with the least clearance that a report names
+_NEAREST = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Check:
+    """What a gate found, the report of it ("olp-check-1"), and the clearance of every block where the job has
+    meshes."""
+
+    findings: tuple[Finding, ...]
+    report: dict[str, Any]
+    clearances: Clearances | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Case:
+    """The program as it would run; `run` and `proof` where a nominal one is known. Lines of the proof are
+    those of `data`, the text that was given: the nominal program, `corrected_here`, where that was given
+    alone, else the corrected one."""
+
+    name: str
+    data: bytes
+    written: Program
+    run: Run | None
+    proof: Proof | None
+    loaded: Loaded
+    options: Options
+    checked: str
+    corrected_here: bool = False
+
+    def worded(self, program: Program) -> Program:
+        """A program with its words, which a correction drops early."""
+        if program.words is not None:
+            return program
+        return read(program.data, self.loaded.setup, self.loaded.dialect, self.options)
+
+
+def check(
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    nominal: PathLike | bytes | None = None,
+    tolerance_um: float = 1.0,
+    outside_box: Literal["refuse", "hold"] = "refuse",
+    contour: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
+    date: datetime.date | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Check:
+    """May this program run on this machine?
+
+    With `nominal`, `program` is the correction of it, whoever wrote it, and is proved against it. Alone and
+    without the stamp of a correction it is the nominal program: it is corrected here, and what that gives
+    is checked. Alone and with a stamp it is checked as it is, without what needs the nominal one. Lines are
+    those of `program`. `select` and `ignore` are codes or their beginnings (OLP4). Outside the calibrated
+    box nothing is refused here: that is finding OLP405, or OLP403 with `outside_box` "hold".
+
+    Raises UsageError for a code that does not exist, InputError for what cannot be read, or corrected, at all
+    (ProgramError with its line), and CannotCompute.
+    """
+    codes = chosen(select, ignore)
+    tell = progress or silent
+    setup = setup_of(machine, job)
+    everything = "all" in setup.machine.compensated_by_controller
+    if everything:
+        setup = replace(setup, machine=replace(setup.machine, compensated_by_controller=frozenset()))
+    loaded = load(setup, None, "hold", only_sure=only_sure_components)
+    data, name = source_of(program)
+    with naming(name):
+        loaded = loaded.reading(data, name)
+    outside = "OLP405" if outside_box == "refuse" else "OLP403"
+    options = Options(contour=contour)
+    with naming(name):
+        case = _case(data, name, nominal, loaded, options, tolerance_um, date, outside, tell, within_um)
+        tell("check", 0.8)
+        found = _findings(case, tolerance_um * MM_PER_UM, outside, date, contour)
+        around = _clearances(case, codes, tell)
+    if everything:
+        found.append(finding("OLP410", 'compensated_by_controller is "all"'))
+    if around is not None:
+        found += around.findings(setup.machine.sanity.clearance_mm)
+    kept = tuple(sorted((f for f in found if f.code in codes), key=lambda f: (f.code, f.line or 0)))
+    report = _report(case, kept, codes, date, tolerance_um)
+    if around is not None:
+        report["clearance"] = list(around.nearest(_NEAREST).rows())
+    return Check(kept, report, around)
+
+
+def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
+    """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises
+    UsageError for what begins no code."""
+    for prefix in (*select, *ignore):
+        if not any(code.startswith(prefix.upper()) for code in GATE_CODES):
+            raise UsageError(
+                f"{prefix!r} is no code of a finding, nor how one begins; olp explain lists them all"
+            )
+    wanted, unwanted = (tuple(prefix.upper() for prefix in prefixes) for prefixes in (select, ignore))
+    found = [code for code in GATE_CODES if not wanted or code.startswith(wanted)]
+    return [code for code in found if not (unwanted and code.startswith(unwanted))]
+
+
+def _case(
+    data: bytes, name: str, nominal: PathLike | bytes | None, loaded: Loaded, options: Options,
+    tolerance_um: float, date: datetime.date | None, outside: str, tell: Progress,
+    within_um: float | None,
+) -> _Case:  # fmt: skip
+    tell("read", 0.0)
+    if nominal is None and find_stamp(data) is None:
+        run = correct_bytes(
+            data, name, loaded, tolerance_um=tolerance_um, hold=True, unroll=False, expand=False,
+            clearance=None, contour=options.contour, rapids=False, date=date, tell=tell, outside=outside,
+            within_um=within_um,
+        )  # fmt: skip
+        what = "what olp correct makes of the program"
+        path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
+        proof = replace(run.proof, written=path)
+        return _Case(name, data, run.corrected, run, proof, loaded, options, what, corrected_here=True)
+    written = read(data, loaded.setup, loaded.dialect, options)
+    if nominal is None:
+        what = "the corrected program as it is; what needs the nominal one is left out (--nominal)"
+        return _Case(name, data, written, None, None, loaded, options, what)
+    source, other = source_of(nominal)
+    try:
+        first = read(source, loaded.setup, loaded.dialect, options)
+    except OlpError as error:
+        raise error.in_file(other or "<nominal>") from None
+    run = verify_programs(
+        (first, other), (written, name), loaded, tolerance_um=tolerance_um, contour=options.contour,
+        date=date, within_um=within_um,
+    )  # fmt: skip
+    what = f"the corrected program against the nominal one ({Path(other).name if other else 'stdin'})"
+    proof = replace(
+        run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
+    )
+    return _Case(name, data, written, run, proof, loaded, options, what)
+
+
+def _findings(
+    case: _Case, tolerance_mm: float, outside: str, date: datetime.date | None, contour: bool
+) -> list[Finding]:
+    """All findings. What the run that made the case has found stands; the rest is looked for here."""
+    loaded, run, proof = case.loaded, case.run, case.proof
+    machine, sanity = loaded.setup.machine, loaded.setup.machine.sanity
+    found = [
+        *_stamps(case),
+        *state.temperature_findings(loaded.setup.job, loaded.calibration, sanity),
+        *state.digit_findings(last_digit_mm(case.written, loaded.setup), tolerance_mm),
+    ]
+    if date is None:
+        found.append(finding("OLP408", "no date is given"))
+    path = case.written.toolpath
+    if run is not None and proof is not None and case.corrected_here:
+        found += run.findings
+        path = proof.written
+    else:
+        found += state.travel_findings(path, machine)
+        found += state.box_findings(path, loaded.model.box_mm, outside)
+        found += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
+        found += checks.program_findings(case.written, loaded.setup, contour=contour)
+        found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
+        if run is not None and proof is not None:
+            found += checks.proof_findings(proof, run.passed)
+            found += checks.between_findings(run.nominal, proof, loaded.model)
+            found += _confidence(run)
+    found += state.tool_findings(path, loaded.calibration, sanity)
+    lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD
+    found += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
+    found += motion.reversal_findings(path, loaded.model)
+    speeds = motion.Feeds.of(case.worded(case.written))
+    before = None if run is None else motion.Feeds.of(case.worded(run.nominal))
+    found += (before if before is not None and case.corrected_here else speeds).findings()
+    if speeds.mm_s is not None:
+        found += motion.demand_findings(path, speeds.mm_s, machine)
+    if run is not None and proof is not None and before is not None:
+        correction = _corrections(run.nominal, case.written, proof)
+        found += state.sanity_findings(proof.nominal, correction, sanity)
+        found += motion.low_findings(proof, loaded.model)
+        if speeds.mm_s is not None and before.mm_s is not None:
+            found += motion.changed_findings(proof, before.mm_s, speeds.mm_s)
+        if not case.corrected_here:
+            largest = float(np.sqrt((correction * correction).sum(axis=1)).max(initial=0.0))
+            found += checks.path_mode_findings(case.written, largest)
+    return found
+
+
+def _confidence(run: Run) -> list[Finding]:
+    """What a verification says of uncertainties, with the lines of the corrected program."""
+    proof = run.proof
+    there = dict(zip(proof.nominal.line.tolist(), proof.written.line[proof.groups].tolist(), strict=True))
+    return [
+        replace(
+            found,
+            line=None if found.line is None else there[found.line],
+            lines=tuple(there[line] for line in found.lines),
+        )
+        for found in run.findings
+        if found.code in CONFIDENCE_CODES
+    ]
+
+
+def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | None:
+    """None where there are no meshes, or nobody asks."""
+    setup = case.loaded.setup
+    if not setup.job.meshes or not any(code.startswith("OLP7") for code in codes):
+        return None
+    tell("clearance", 0.9)
+    read = ((mesh, *read_mesh(mesh.file)) for mesh in setup.job.meshes)
+    solids = [
+        Solid(mesh, Path(mesh.file).name, vertices[faces] * mesh.unit_mm) for mesh, vertices, faces in read
+    ]
+    path = case.written.toolpath if case.proof is None else case.proof.written
+    return clearances(path, case.loaded.model, setup, solids)
+
+
+def _corrections(nominal: Program, written: Program, proof: Proof) -> Array:
+    """(n, 3) how far each way-point was moved, 0 where that is not known; of canned cycles the place and
+    the bottom of each hole, for a corrected depth may take other pecks."""
+    out = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
+    out[(proof.nominal.flag & np.uint8(Flag.CYCLE)) != 0] = 0.0
+    for mine, other in zip(nominal.holes, written.holes, strict=False):
+        moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
+        out[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
+    return np.asarray(out, float)
+
+
+def _stamps(case: _Case) -> list[Finding]:
+    """Is the program corrected once, and with this calibration?"""
+    out = []
+    first = find_stamp(case.data)
+    if first is not None and find_stamp(case.data[first.end() :]) is not None:
+        out.append(
+            finding(
+                "OLP311", "the program carries two stamps of a correction", [_line(case.data, first.start())]
+            )
+        )
+    if case.run is not None and not case.corrected_here and find_stamp(case.run.nominal.data) is not None:
+        out.append(finding("OLP311", "the program given as nominal carries the stamp of a correction"))
+    own = case.loaded.digest[:12]
+    if first is not None and not first.group().endswith(own.encode()):
+        what = f"the program says `{first.group().decode()}`, the calibration in force is {own}"
+        out.append(finding("OLP312", what, [_line(case.data, first.start())]))
+    return out
+
+
+def _line(data: bytes, at: int) -> int:
+    return data.count(b"\n", 0, at) + 1
+
+
+def _report(
+    case: _Case, found: tuple[Finding, ...], codes: list[str], date: datetime.date | None, tolerance_um: float
+) -> dict[str, Any]:
+    machine, calibration = case.loaded.setup.machine, case.loaded.calibration
+    return {
+        "schema": "olp-check-1",
+        "program": {
+            "name": Path(case.name).name if case.name else "",
+            "path": case.name,
+            "lines": case.data.count(b"\n") + (not case.data.endswith(b"\n")),
+        },
+        "checked": case.checked,
+        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
+        "calibration": {
+            "measured": calibration.measured,
+            "valid_until": calibration.valid_until,
+            "sha256": case.loaded.digest,
+        },
+        "date": date,
+        "tolerance_um": tolerance_um,
+        "rules": codes,
+        "findings": [f.as_dict() for f in found],
+    }

@@ -1,0 +1,366 @@
+"""One correction of reported results: read, run the model forward, write, report."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from olp.checks import state
+from olp.compensation.stamp import find_stamp, stamp_line, stamped
+from olp.core.errors import AlreadyCorrected, InputError, OlpError, UsageError
+from olp.core.machine import Setup
+from olp.core.units import UM_PER_MM
+from olp.errormodel.base import Array
+from olp.files.point_profile import load_profile
+from olp.findings.catalogue import Finding
+from olp.program.text.delimited import Layout, first_lines, told
+from olp.program.text.numbers import Placing, number, spliced, written
+from olp.results.forward import Forward, forward
+from olp.results.places import place_of, stylus_of
+from olp.results.reported import Reported, Stated
+from olp.results.table import read_table
+from olp.workflows.session import Loaded, PathLike, load, source_of
+
+#: Rounding above this is said; bar of the corrections themselves.
+_ROUNDING_MM = 2e-4
+#: Doubt about the touch above this is a warning.
+_DOUBT_MM = 1e-4
+
+#: where axis positions count, in words
+_COUNTED = {
+    "tip": "axis positions count at the tip: no tool length is active (job_defaults.length_active)",
+    "tool": "axis positions stand off the tip by the length of the tool",
+    "ram": "axis positions count at the end of the ram, from which the stylus leads to the tip",
+}
+
+WHY = (
+    "what a measuring machine reports is where its scales say that the tip is; the tip was there plus the "
+    "error "
+    "of the machine at that axis position and with that stylus",
+    "so the error (actual - commanded) was added to every point; nothing was inverted, and no nominal value, "
+    "tolerance or name was changed",
+)
+DOES_NOT_PROVE = (
+    "that the calibration still describes the machine: measure an artefact of known size, correct its "
+    "results, "
+    "and compare",
+    "anything about the probing system (lobing, wear, wrong tip radius), which is no error of the axes",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultCorrection:
+    """Corrected results: their bytes, the report as a mapping ("olp-results-1"), and the findings."""
+
+    data: bytes
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+
+
+def correct_results(
+    results: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    profile: PathLike | Layout | None = None,
+    frame: str | Mapping[str, str] | None = None,
+    tool: int | Mapping[str, int] | None = None,
+    tip_radius_mm: float | None = None,
+    decimals: int | None = None,
+    outside_box: Literal["refuse", "hold"] = "refuse",
+    date: datetime.date | None = None,
+) -> ResultCorrection:
+    """Correct the points that a measuring machine reported: true = reported + error at the touch.
+
+    `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset that the
+    points are stated in ("machine": axis positions), `tool` the number of the stylus; where a file names
+    several, each is a mapping from the file's names to those of machine and job. `tip_radius_mm` stands for
+    that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
+    Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
+    """
+    data, name = source_of(results)
+    loaded = load(machine, job, outside_box)
+    layout = load_profile(profile).layout if isinstance(profile, str | Path) else profile
+    asked = _Asked(layout, frame, tool, tip_radius_mm, decimals, outside_box == "hold", date)
+    try:
+        return _corrected(data, name, loaded, asked)
+    except OlpError as error:
+        raise error.in_file(name or "<results>") from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a caller of `correct_results` asks for."""
+
+    layout: Layout | None
+    frame: str | Mapping[str, str] | None
+    tool: int | Mapping[str, int] | None
+    tip_radius_mm: float | None
+    decimals: int | None
+    hold: bool
+    date: datetime.date | None
+
+
+def _corrected(data: bytes, name: str, loaded: Loaded, asked: _Asked) -> ResultCorrection:
+    stamp = find_stamp(data)
+    if stamp:
+        raise AlreadyCorrected(
+            f"the results carry the stamp `{stamp.group().decode()}`; correcting them again would add the "
+            "error twice; correct the file as the machine wrote it",
+            line=data.count(b"\n", 0, stamp.start()) + 1,
+        )
+    reported = _read(data, asked.layout)
+    radius = asked.tip_radius_mm if asked.tip_radius_mm is not None else reported.tip_radius_mm
+    reported = replace(
+        reported,
+        frames=_named("frame", reported.frames, asked.frame),
+        tools=_named("tool", reported.tools, asked.tool),
+        tip_radius_mm=radius,
+    )
+    setup = loaded.setup
+    axes = _axes(reported, setup)
+    reported = replace(reported, assumed=(*reported.assumed, _COUNTED[axes]))
+    findings = _already(reported, loaded)
+    own = bool(np.isfinite(reported.stylus_mm).all())
+    places = [place_of(setup, n) for n in reported.frames]
+    styli = [stylus_of(setup, t, own) for t in reported.tools]
+    found = forward(
+        reported, places, styli, loaded.model, axes=axes, hold=asked.hold, payload_kg=setup.job.payload_kg
+    )
+    if radius is None and any(s.radius_mm == 0.0 and any(s.lever_mm) for s in styli):
+        findings.append(
+            Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
+        )
+    text, rounding = _write(reported, found.added_mm, loaded.digest, asked.decimals)
+    turned = sorted(
+        {p.name for p in places if p.touched is not None and not np.allclose(p.rotation, np.eye(3))}
+    )
+    findings += [
+        *_findings(reported, found, rounding, turned),
+        *state.calibration_findings(loaded.calibration, asked.date, setup.machine.sanity.calibration_days),
+    ]
+    outside = ~loaded.model.inside(found.axis_mm).all(axis=1)
+    if outside.any():
+        lines = reported.line[outside].tolist()
+        findings.append(_finding("OLP403", f"{len(lines)} touches lie outside the calibrated box", lines))
+    report = _report(reported, found, loaded, name, text, rounding, findings)
+    return ResultCorrection(text, report, tuple(findings))
+
+
+def _axes(reported: Reported, setup: Setup) -> Literal["tip", "tool", "ram"]:
+    """Where axis positions count. On a machine that takes DMIS programs it is the end of the ram, as
+    there."""
+    if "dmis" in (reported.dialect, setup.machine.controller):
+        return "ram"
+    return "tool" if setup.machine.length_active else "tip"
+
+
+def _named(what: str, told: tuple[Any, ...], given: object) -> tuple[Any, ...]:
+    """The names of machine and job for those of the file."""
+    if given is None:
+        return told
+    if not isinstance(given, Mapping):
+        if len(told) > 1:
+            names = ", ".join(str(name) for name in told)
+            raise UsageError(
+                f"the file names {len(told)} of them ({names}); say which is which, as in --{what} "
+                f"{told[-1]}=.."
+            )
+        return (given,) * len(told)
+    unknown = [name for name in given if name not in {str(t) for t in told}]
+    if unknown:
+        names = ", ".join(str(name) for name in told)
+        raise UsageError(f"--{what} {unknown[0]}=..: the file does not name it; it names {names}")
+    return tuple(given.get(str(name), name) for name in told)
+
+
+def _read(data: bytes, profile: Layout | None) -> Reported:
+    from olp.results.dmis import is_dmis, read_dmis
+
+    if profile is None and is_dmis(data):
+        return read_dmis(data)
+    layout = profile or told(first_lines(data))
+    if layout is None:
+        raise InputError(
+            "does not tell which columns hold X, Y and Z; name them by name or number with --column X=.. "
+            "--column Y=.. --column Z=.., or give a profile with --profile"
+            if data.strip()
+            else "holds no points; expected a table of points, or DMIS output"
+        )
+    return read_table(data, layout)
+
+
+def _already(reported: Reported, loaded: Loaded) -> list[Finding]:
+    """What the file says of compensation that was active; refused where it would be applied twice."""
+    calibration = loaded.calibration
+    out = []
+    for said in reported.stated:
+        _refuse_twice(said, bool(calibration.active_during_measurement), calibration.thermal is not None)
+        out.append(Finding(
+            "OLP625",
+            f"`{said.text}` says that the {said.what} was compensated while measuring; the calibration "
+            "leaves "
+            "that to the control",
+            said.line, (said.line,),
+        ))  # fmt: skip
+    skipped = sorted(loaded.setup.machine.compensated_by_controller)
+    if skipped:
+        out.append(Finding("OLP404", f"left to the control: {', '.join(skipped)}"))
+    return out
+
+
+def _refuse_twice(said: Stated, active: bool, thermal: bool) -> None:
+    if said.what == "geometry" and not active:
+        raise InputError(
+            f"`{said.text}` says that these results are corrected by an error map of the control already, "
+            "and "
+            "the calibration was measured without one (active_during_measurement is empty), so they would be "
+            "corrected twice",
+            line=said.line,
+        )
+    if said.what == "temperature" and thermal:
+        raise InputError(
+            f"`{said.text}` says that these results are compensated for temperature already, and the "
+            "calibration has a table [thermal], so they would be corrected twice; use a calibration "
+            "without it",
+            line=said.line,
+        )
+
+
+def _write(reported: Reported, added_mm: Array, digest: str, decimals: int | None) -> tuple[bytes, float]:
+    """The corrected text, and the largest difference that rounding leaves, in mm."""
+    placing = Placing(reported.data, reported.start, reported.end)
+    edits: list[tuple[int, int, bytes]] = []
+    rounding = 0.0
+    added = added_mm / reported.unit_mm[:, None]
+    for i, row in enumerate(reported.form):
+        for j, form in enumerate(row):
+            value = form.value + float(added[i, j])
+            start, end = int(reported.start[i, j]), int(reported.end[i, j])
+            text, old = written(form, value, decimals, reported.decimal), reported.data[start:end]
+            told = number(text, reported.decimal)
+            kept = form.value if told is None else told.value
+            if kept != form.value and b"$" in old:
+                # a number that goes on in the next line now ends in the first
+                edits.append((start, end, text + old[old.index(b"$") : -len(old.split(b"\n")[-1].lstrip())]))
+            elif kept != form.value:
+                edits.append(placing.place(start, end, text))
+            rounding = max(rounding, abs(kept - value) * float(reported.unit_mm[i]))
+    text = spliced(reported.data, edits)
+    if reported.comment is not None and edits:
+        eol = b"\r\n" if b"\r\n" in reported.data[:4096] else b"\n"
+        text = stamped(text, stamp_line(digest, reported.comment), eol, ())
+    return text, rounding
+
+
+def _finding(code: str, message: str, lines: Sequence[int]) -> Finding:
+    few = tuple(lines[:8])
+    return Finding(code, message, few[0] if few else None, few, max(len(lines), 1))
+
+
+def _findings(reported: Reported, found: Forward, rounding_mm: float, turned: Sequence[str]) -> list[Finding]:
+    out = [Finding("OLP621", said) for said in reported.assumed]
+    by_reason: dict[tuple[str, str], list[int]] = {}
+    for item in reported.carried:
+        by_reason.setdefault((item.name, item.reason), []).append(item.line)
+    for (name, reason), lines in by_reason.items():
+        out.append(_finding("OLP622", f"{name} stays as it was: {reason}", lines))
+    doubt = found.doubt_mm
+    if doubt.any():
+        said = (
+            "which side of the tip touched is not stated, so the error was taken at the reported point; "
+            "that is "
+            f"at most {doubt.max() * UM_PER_MM:.2g} um off"
+        )
+        wrong = doubt > _DOUBT_MM
+        code = "OLP623" if wrong.any() else "OLP621"
+        out.append(_finding(code, said, reported.line[wrong].tolist()))
+    if found.play_mm.any():
+        lines = reported.line[found.play_mm > 0].tolist()
+        what = (
+            "the way of the approach is not known; half the lost motion is up to "
+            f"{found.play_mm.max() * 1e3:.2g} um"
+        )
+        out.append(_finding("OLP103", what, lines))
+    if turned:
+        said = (
+            f"frame {', '.join(turned)} is rotated and was set on the raw machine; only its zero is corrected"
+        )
+        out.append(Finding("OLP624", said))
+    if rounding_mm > _ROUNDING_MM:
+        said = (
+            f"rounding to the digits of the file leaves up to {rounding_mm * UM_PER_MM:.2g} um; see "
+            "--decimals"
+        )
+        out.append(Finding("OLP411", said))
+    if reported.comment is None:
+        out.append(Finding("OLP626", "the profile allows no comment, so no stamp was written"))
+    return out
+
+
+def _report(
+    reported: Reported,
+    found: Forward,
+    loaded: Loaded,
+    name: str,
+    text: bytes,
+    rounding_mm: float,
+    findings: Sequence[Finding],
+) -> dict[str, Any]:
+    """The report ("olp-results-1")."""
+    machine, calibration = loaded.setup.machine, loaded.calibration
+    added = found.added_mm * UM_PER_MM
+    size = np.sqrt((added * added).sum(axis=1))
+    sources = [
+        {"name": source, **_size(part * UM_PER_MM)}
+        for source, part in loaded.model.contributions(found.axis_mm, found.lever_mm, found.play)
+    ]
+    return {
+        "schema": "olp-results-1",
+        "results": {
+            "name": Path(name).name if name else "",
+            "sha256": hashlib.sha256(reported.data).hexdigest(),
+            "dialect": reported.dialect,
+            "points": len(reported),
+            "frames": [frame for frame in reported.frames if frame is not None],
+        },
+        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
+        "calibration": {
+            "measured": calibration.measured,
+            "valid_until": calibration.valid_until,
+            "model": calibration.model,
+            "temperature_degC": calibration.temperature_degC,
+            "sha256": loaded.digest,
+        },
+        "correction": {
+            **_size(added),
+            "max_by_axis_um": np.abs(added).max(axis=0, initial=0.0).tolist(),
+            "rounding_um": rounding_mm * UM_PER_MM,
+        },
+        "sources": sorted(sources, key=lambda s: -float(s["max_um"])),
+        "carried": [
+            {"line": item.line, "name": item.name, "reason": item.reason} for item in reported.carried
+        ],
+        "points": [
+            {"line": line, "name": label, "axis_mm": axis, "added_um": row, "size_um": away}
+            for line, label, axis, row, away in zip(
+                reported.line.tolist(), reported.names, found.axis_mm.tolist(), added.tolist(), size.tolist(),
+                strict=True,
+            )
+        ],
+        "corrected": {"sha256": hashlib.sha256(text).hexdigest()},
+        "findings": [f.as_dict() for f in findings],
+        "why": list(WHY),
+        "does_not_prove": list(DOES_NOT_PROVE),
+    }  # fmt: skip
+
+
+def _size(rows_um: Array) -> dict[str, float]:
+    size = np.sqrt((rows_um * rows_um).sum(axis=1))
+    return {"max_um": float(size.max(initial=0.0)), "rms_um": float(np.sqrt(np.mean(size * size)))}

@@ -1,0 +1,72 @@
+"""How sure a run is: from what was loaded and proved to bands, probabilities, advice and findings."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Any
+
+from olp.core.progress import Progress
+from olp.core.toolpath import Index
+from olp.core.units import MM_PER_UM
+from olp.errormodel.sensitivity import Expansion, Sensitivity
+from olp.errormodel.uncertainty import Uncertainty
+from olp.findings.catalogue import Finding
+from olp.program.program import Program
+from olp.uncertainty.components import components
+from olp.uncertainty.spread import Confidence, Unknowns, confidence, way_points
+from olp.uncertainty.summary import findings, summary
+from olp.workflows.session import Loaded
+
+Assessment = tuple[Confidence, dict[str, Any], list[Finding]]
+
+
+def assess(
+    loaded: Loaded,
+    nominal: Program,
+    corrected: Program,
+    groups: Index,
+    passed: Index,
+    within_um: float,
+    date: datetime.date | None,
+    tell: Progress,
+    *,
+    asked: bool,
+) -> Assessment | None:
+    """The confidence of a proved program, its part of the report, and its findings; None where the
+    calibration states no uncertainty. `asked`: the user named the tolerance `within_um`."""
+    uncertainty = loaded.uncertainty
+    if uncertainty is None:
+        return None
+    unknowns, growth, expansion = unknowns_of(loaded, uncertainty, date)
+    points = way_points(nominal, corrected, groups, passed, loaded.full)
+    found = confidence(unknowns, nominal.toolpath, points, within_um * MM_PER_UM, tell=tell)
+    parts = [
+        c for c in components(loaded.calibration, uncertainty.scaled(growth)) if c.name not in loaded.skip
+    ]
+    said = summary(found, nominal.toolpath, uncertainty, growth, expansion, parts, asked=asked)
+    return found, said, findings(
+        found, growth, expansion, parts, loaded.left_out, asked=asked
+    )  # fmt: skip
+
+
+def unknowns_of(
+    loaded: Loaded, uncertainty: Uncertainty, date: datetime.date | None
+) -> tuple[Unknowns, float, Expansion | None]:
+    """What is not known of the machine on the day `date`, by how much it has grown since measuring, and
+    expansion where temperatures are in question."""
+    measured = loaded.calibration.measured
+    days = None if date is None or measured is None else (date - measured).days
+    growth = uncertainty.growth(days)
+    expansion: Expansion | None = Expansion.of(
+        loaded.calibration, uncertainty, dict(loaded.setup.job.temperatures_degC)
+    )
+    if expansion is not None and not any((*expansion.scale, expansion.workpiece)):
+        expansion = None
+    sensitivity = Sensitivity.of(
+        loaded.calibration,
+        loaded.setup.machine.chain,
+        uncertainty.scaled(growth),
+        skip=loaded.skip,
+        expansion=expansion,
+    )
+    return Unknowns(sensitivity, uncertainty.repeatability_mm), growth, expansion

@@ -1,0 +1,296 @@
+"""Other instruments in the one adjustment: points in the machine's frame, artefacts, a polar station,
+diagonals and ball-bars."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.calibration import FRESH, TOOLS, case, cloud, left
+from judge import simulated
+
+from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.curves import calibration_of
+from olp.calibration.estimator.summary import findings_of, summary
+from olp.calibration.iso230.ballbar import Circles
+from olp.calibration.iso230.diagonals import Diagonal
+from olp.calibration.observations.points import polar_points
+from olp.calibration.observations.readings import Measurements, Points
+from olp.core.errors import ConfigError
+from olp.errormodel.build import build
+from olp.files.measurements.reader import files_of_measurements, load_measurements
+
+UM = 1e-3
+SHIFT, TURN = np.array([0.4, -0.7, 0.2]), np.array([150e-6, -90e-6, 210e-6])
+
+
+def told(found: Fit, code: str) -> list[str]:
+    return [f.message for f in findings_of(found, [(0.0, 0.0, -120.0)], None) if f.code == code]
+
+
+def in_the_frame(machine: simulated.Machine, seed: int, n: int, sigma_um: float) -> Points:
+    """Where the tip is in the machine's frame, whose axes as a whole are shifted and turned about zero."""
+    at, tool, _ = simulated.points(machine, seed, n, 0.0)
+    noise = np.random.default_rng(seed).normal(0.0, sigma_um * UM, at.shape)
+    place = at + tool + machine.error(at, tool) + SHIFT + np.cross(TURN, at + tool) + noise
+    return Points(at, tool, place, sigma_um * UM, source="tcp.csv", known_frame=True)
+
+
+# -- TCP points in the frame of the machine --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("chain", "with_lines"), [("FXYZ", False), ("YFXZ", True), ("ZXFY", False)])
+def test_points_in_the_frame_of_the_machine_show_all_of_the_error(chain: str, with_lines: bool) -> None:
+    """Also the rigid part of it, which the written calibration holds, wherever its datum is."""
+    machine, measurements = case(2, "smooth", chain)
+    lines = measurements if with_lines else Measurements("m")
+    points = in_the_frame(machine, 2, 120, 5.0)
+    found = fit(dataclasses.replace(lines, points=(points,)), chain, datum_mm=(1000.0, 500.0, -200.0))
+    at = np.random.default_rng(2).uniform(found.box_mm[:, 0], found.box_mm[:, 1], (300, 3))
+    model = build(calibration_of(found), chain)
+    for tool in (*TOOLS, *FRESH):
+        true = machine.error(at, np.array(tool)) + SHIFT + np.cross(TURN, at + np.array(tool))
+        assert simulated.rms_um(true) > 500.0
+        rest = true - found.error(at, tool)
+        assert simulated.rms_um(rest) < 11.0
+        assert 0.5 < np.sqrt(np.mean((rest / found.sigma(at, tool)) ** 2)) < 1.6
+        assert np.abs(model.error(at, np.array(tool)) - found.error(at, tool)).max() < 0.6 * UM
+    row = summary(found, calibration_of(found), [])["frame"]
+    assert np.linalg.norm(row["shift_um"]) > 400.0
+
+
+def test_an_unknown_frame_beside_a_known_one_keeps_its_own() -> None:
+    machine = simulated.machine(1, "smooth", "FXYZ")
+    known, other = in_the_frame(machine, 1, 100, 5.0), cloud(machine, 1, 100, 5.0)
+    both = fit(Measurements("m", points=(known, other)), "FXYZ")
+    at = np.random.default_rng(2).uniform(both.box_mm[:, 0], both.box_mm[:, 1], (200, 3))
+    true = machine.error(at, np.array(FRESH[0])) + SHIFT + np.cross(TURN, at + np.array(FRESH[0]))
+    assert simulated.rms_um(true - both.error(at, FRESH[0])) < 6.0
+    assert not told(both, "OLP808")
+
+
+def test_places_far_from_the_frame_are_refused() -> None:
+    points = in_the_frame(simulated.machine(1, "smooth", "FXYZ"), 1, 20, 5.0)
+    measured = points.measured_mm.copy()
+    measured[7, 1] += 25.0
+    with pytest.raises(ConfigError, match="row 8"):
+        dataclasses.replace(points, measured_mm=measured)
+
+
+# -- a ball plate, a space grid --------------------------------------------------------------------------
+
+
+def test_a_ball_plate_in_any_pose_is_a_set_of_points() -> None:
+    """The machine probes the balls of a plate in six poses: the axes stop where the tip, with the machine's
+    errors, is at the ball. Commanded is where they stop, measured what the certificate says."""
+    machine = simulated.machine(3, "smooth", "FXYZ")
+    rng = np.random.default_rng(3)
+    balls = np.array([(x, y, 0.0) for x in np.linspace(0, 800, 6) for y in np.linspace(0, 800, 6)])
+    sets = []
+    for k in range(24):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        vector = np.array(simulated.OFFSETS[k % 3])
+        inner = np.array([[420.0, 2580.0], [420.0, 1580.0], [-580.0, -420.0]])
+        place = (balls - balls.mean(axis=0)) @ turn.T + rng.uniform(inner[:, 0], inner[:, 1])
+        place = place[((place > machine.box[:, 0]) & (place < machine.box[:, 1])).all(axis=1)]
+        own = (place - place[0]) @ turn
+        stop = place - vector
+        for _ in range(6):
+            stop = place - vector - machine.error(stop, vector)
+        own = own + rng.normal(0.0, 0.5 * UM, own.shape)
+        sets.append(Points(stop, vector, own, 0.5 * UM, source=f"pose-{k}.csv"))
+    found = fit(Measurements("m", points=tuple(sets)), "FXYZ")
+    result = left(machine, found, FRESH[0], 400)
+    assert result.before_framed > 40.0
+    assert result.after_framed < 4.0
+    assert not told(found, "OLP808")
+
+
+# -- one polar station -----------------------------------------------------------------------------------
+
+
+def polar_readings(
+    machine: simulated.Machine, seed: int, n: int, sigma_mm: float, sigma_rad: float
+) -> tuple[np.ndarray, ...]:
+    """A tracker 3 m in front of the machine: axis positions, tools, distance, azimuth, elevation."""
+    at, tool, distance, azimuth, elevation = simulated.polar(machine, seed, n, (1500.0, -3000.0, -300.0))
+    rng = np.random.default_rng([seed, 3])
+    return (
+        at, tool, distance + rng.normal(0.0, sigma_mm, n), azimuth + rng.normal(0.0, sigma_rad, n),
+        elevation + rng.normal(0.0, sigma_rad, n),
+    )  # fmt: skip
+
+
+def test_a_polar_station_weighs_distance_and_angles_as_they_are() -> None:
+    """0.5 um along the ray and 10 urad across it: far better than as points of the mean uncertainty, with
+    the stated band."""
+    weighed, alike, z = [], [], []
+    for seed in range(2):
+        machine = simulated.machine(seed, "smooth", "FXYZ")
+        taken = polar_readings(machine, seed, 250, 0.5 * UM, 10e-6)
+        points = polar_points(*taken, sigma_mm=np.array(0.5 * UM), sigma_rad=10e-6, source="polar.csv")
+        plain = dataclasses.replace(points, covariance_mm2=None)
+        for cloud_, out in ((points, weighed), (plain, alike)):
+            found = fit(Measurements("m", points=(cloud_,)), "FXYZ")
+            result = left(machine, found, FRESH[1], 400)
+            out.append(result.after_framed)
+            if cloud_ is points:
+                z.append(result.z)
+                assert not told(found, "OLP808")
+                assert found.chi_square / found.freedom == pytest.approx(1.0, abs=0.2)
+    assert np.median(weighed) < 0.9 * np.median(alike)
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_a_polar_slip_is_named_and_alike_weights_are_points() -> None:
+    machine = simulated.machine(0, "smooth", "FXYZ")
+    at, tool, distance, azimuth, elevation = polar_readings(machine, 0, 150, 5.0 * UM, 2e-6)
+    slipped = distance.copy()
+    slipped[30] += 0.2
+    points = polar_points(at, tool, slipped, azimuth, elevation, sigma_mm=np.array(5 * UM), sigma_rad=2e-6)
+    found = fit(Measurements("m", points=(points,)), "FXYZ")
+    assert [o.row for o in found.outliers] == [31]
+    plain = cloud(machine, 0, 60, 5.0)
+    same = dataclasses.replace(plain, covariance_mm2=np.tile(np.eye(3) * plain.sigma**2, (60, 1, 1)))
+    first, second = (fit(Measurements("m", points=(p,)), "FXYZ") for p in (plain, same))
+    at = machine.box.mean(axis=1)[None] + np.array([[300.0, 200.0, 100.0]])
+    assert first.error(at, FRESH[0]) == pytest.approx(second.error(at, FRESH[0]), abs=1e-7)
+
+
+# -- diagonals and ball-bars -----------------------------------------------------------------------------
+
+LEVER = (0.0, 0.0, -120.0)
+CENTRE = (1500.0, 1000.0, -500.0)
+
+
+def diagonals_of(machine: simulated.Machine, seed: int, count: int = 4) -> tuple[Diagonal, ...]:
+    """The body diagonals, then those of the faces."""
+    (x0, x1), (y0, y1), (z0, z1) = machine.box
+    ends = [
+        ((x0, y0, z0), (x1, y1, z1)), ((x1, y0, z0), (x0, y1, z1)), ((x0, y1, z0), (x1, y0, z1)),
+        ((x1, y1, z0), (x0, y0, z1)),
+        ((x0, y0, -500.0), (x1, y1, -500.0)), ((x0, y1, -500.0), (x1, y0, -500.0)),
+    ]  # fmt: skip
+    return tuple(
+        Diagonal(a, b, *simulated.diagonal(machine, seed, a, b, LEVER), LEVER, source=f"diagonal-{k}.csv")
+        for k, (a, b) in enumerate(ends[:count])
+    )
+
+
+def circles_of(machine: simulated.Machine, seed: int, *, both: bool = True) -> tuple[Circles, ...]:
+    return tuple(
+        Circles(
+            plane, 400.0, CENTRE, *simulated.circles(machine, seed, plane, CENTRE, 400.0, LEVER, both=both),
+            LEVER, sigma=0.2 * UM, source=f"circle-{plane}.csv",
+        )
+        for plane in ("XY", "YZ", "ZX")
+    )  # fmt: skip
+
+
+def no_square(measurements: Measurements) -> Measurements:
+    lines = tuple(dataclasses.replace(line, square=None) for line in measurements.lines)
+    return dataclasses.replace(measurements, lines=lines, squares=())
+
+
+@pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "XYZF"])
+def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
+    """Lines whose straightness was read without a square; zero, centre, radius, servo mismatch and lost
+    motion of the instruments are theirs."""
+    machine, measurements = case(0, "smooth", chain)
+    bare = no_square(measurements)
+    square = left(machine, fit(measurements, chain), TOOLS[0], 400).after_framed
+    alone = fit(bare, chain)
+    assert len(told(alone, "OLP806")) == 3
+    for more in ({"circles": circles_of(machine, 0)}, {"diagonals": diagonals_of(machine, 0)}):
+        found = fit(dataclasses.replace(bare, **more), chain)  # type: ignore[arg-type]
+        assert not told(found, "OLP806") and not told(found, "OLP808")
+        result = left(machine, found, TOOLS[0], 400)
+        assert result.after_framed < max(4.0, 1.5 * square)
+        for name in ("C0Y", "B0Z", "A0Z"):
+            row = found.squareness(name)
+            sigma = float(np.sqrt(row @ found.covariance @ row))
+            assert sigma < 6e-6
+            assert abs(row @ found.theta - machine.square[name]) < 4.0 * sigma + 1e-6
+
+
+def test_a_ball_bar_in_one_direction_leaves_squareness_unseen() -> None:
+    machine, measurements = case(0, "smooth", "FXYZ")
+    bare = no_square(measurements)
+    one_way = fit(dataclasses.replace(bare, circles=circles_of(machine, 0, both=False)), "FXYZ")
+    assert {words.split()[0] for words in told(one_way, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
+
+
+def test_a_diagonal_read_in_the_wrong_sense_does_not_fit() -> None:
+    machine, measurements = case(0, "smooth", "FXYZ")
+    first, *rest = diagonals_of(machine, 0)
+    wrong = dataclasses.replace(first, value=-first.value)
+    found = fit(dataclasses.replace(measurements, diagonals=(wrong, *rest)), "FXYZ")
+    assert told(found, "OLP808")
+
+
+def test_no_uncertainty_is_refused() -> None:
+    machine, measurements = case(0, "smooth", "FXYZ")
+    first = circles_of(machine, 0)[0]
+    with pytest.raises(ConfigError, match="sigma_um"):
+        fit(dataclasses.replace(measurements, circles=(dataclasses.replace(first, sigma=0.0),)), "FXYZ")
+    d = diagonals_of(machine, 0, 1)[0]
+    once = Diagonal(d.start_mm, d.end_mm, d.distance_mm[:42], d.value[:42], d.run[:42], d.direction[:42])
+    with pytest.raises(ConfigError, match="no repeated readings"):
+        fit(dataclasses.replace(measurements, diagonals=(once,)), "FXYZ")
+
+
+# -- files -----------------------------------------------------------------------------------------------
+
+PLAN = 'schema = "olp-measurements-1"\nmachine = "m"\nmeasured = 2026-05-14\ntemperature_degC = 20.0\n'
+PLACES = [(x, y, z) for x in (0, 500) for y in (0, 300) for z in (-100, 0)]
+
+
+def test_tables_of_points_and_polar_stations(tmp_path: Path) -> None:
+    rows = "".join(f"{x},{y},{z},{x}.01,{y},{z - 90}\n" for x, y, z in PLACES)
+    (tmp_path / "t.csv").write_text("X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm\n" + rows)
+    rows = "".join(f"{x},{y},{z},{2000 + x},{x / 100},{y / 100}\n" for x, y, z in PLACES)
+    (tmp_path / "p.csv").write_text("X_mm,Y_mm,Z_mm,distance_mm,azimuth_deg,elevation_deg\n" + rows)
+    tables = (
+        '[[points]]\nfile = "t.csv"\nsigma_um = 8.0\ntool_mm = [0, 0, -90]\nframe = "known"\n'
+        '[[polar]]\nfile = "p.csv"\nsigma_distance_um = 0.5\nsigma_um_m = 0.5\nsigma_angle_urad = 10.0\n'
+        "tool_mm = [0, 0, -90]\n"
+    )
+    plan = tmp_path / "measurements.toml"
+    plan.write_text(PLAN + tables)
+    known, polar = load_measurements([plan]).points
+    assert known.known_frame and not polar.known_frame
+    assert np.linalg.norm(polar.measured_mm[-1]) == pytest.approx(2500.0)
+    assert polar.covariance_mm2 is not None
+    ray = polar.measured_mm[-1] / 2500.0
+    assert np.sqrt(ray @ polar.covariance_mm2[-1] @ ray) == pytest.approx(0.5e-3 + 0.5e-6 * 2500.0)
+    assert np.trace(polar.covariance_mm2[0]) == pytest.approx(2 * 0.02**2 + 0.0015**2)
+    (tmp_path / "p.csv").write_text("X_mm,Y_mm,Z_mm,distance_mm,azimuth_deg,elevation_deg\n1,2,3,0,4,5\n")
+    with pytest.raises(ConfigError, match="line 2: distance_mm = 0"):
+        load_measurements([plan])
+
+
+def test_tables_of_diagonals_and_ball_bars(tmp_path: Path) -> None:
+    """The files that `calibrate diagonals` and `calibrate ballbar` read."""
+    (tmp_path / "d.csv").write_text(
+        "# start_mm = [0, 0, -1000]\n# end_mm = [3000, 2000, 0]\n# tool_mm = [0, 0, -90]\n"
+        "# sense = commanded-minus-actual\n# sigma_um = 0.5\n"
+        "target_mm,run,direction,value_um\n0,1,1,0\n3000,1,1,5\n"
+    )
+    rows = "".join(f"{5 * k},1,1,{k / 10}\n" for k in range(72))
+    (tmp_path / "c.csv").write_text(
+        "# plane = XY\n# radius_mm = 150\n# centre_mm = [1500, 1000, -500]\n# tool_mm = [0, 0, -90]\n"
+        "# sigma_um = 0.2\nangle_deg,run,direction,deviation_um\n" + rows
+    )
+    plan = tmp_path / "measurements.toml"
+    plan.write_text(PLAN + '[[diagonals]]\nfile = "d.csv"\n[[ballbars]]\nfile = "c.csv"\n')
+    found = load_measurements([plan])
+    assert found.diagonals[0].value[1] == -0.005
+    assert found.circles[0].value[10] == pytest.approx(0.001)
+    names = {Path(name).name for name in files_of_measurements([plan])}
+    assert names == {"measurements.toml", "d.csv", "c.csv"}
+    (tmp_path / "d.csv").write_text("target_mm,run,direction,value_um\n0,1,1,0\n")
+    with pytest.raises(ConfigError, match=r"d\.csv.*start_mm"):
+        load_measurements([plan])

@@ -1,0 +1,84 @@
+"""Simulated machines refined by run after run, judged by what a calibration leaves at fresh places."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from dataclasses import dataclass
+
+import numpy as np
+from cases.calibration import TOOLS, case
+from judge import simulated
+
+from olp.calibration.diagnosis.refinement import Refinement, refine
+from olp.calibration.estimator.adjustment import fit
+from olp.calibration.estimator.covariance import covariance_of
+from olp.calibration.estimator.curves import calibration_of
+from olp.calibration.observations.readings import Measurements, Points
+from olp.errormodel.build import build
+from olp.errormodel.calibration import Calibration
+from olp.errormodel.sensitivity import Sensitivity
+from olp.errormodel.uncertainty import Uncertainty
+
+
+def start(seed: int, family: str, quick: bool) -> tuple[simulated.Machine, Calibration, Uncertainty]:
+    """A machine with the calibration that its lines gave, or that of 60 points of 20 um taken in an hour."""
+    machine, measurements = case(seed, family)
+    if quick:
+        measurements = Measurements("simulated", points=(run(machine, 7 * seed, 60, 0.020),))
+    measurements = dataclasses.replace(measurements, measured=datetime.date(2026, 5, 14))
+    found = fit(measurements, machine.chain)
+    calibration = calibration_of(found, None)
+    return machine, calibration, covariance_of(found, calibration)
+
+
+def run(machine: simulated.Machine, seed: int, n: int, sigma: float, tools=simulated.OFFSETS) -> Points:
+    """A run of points with a tracker, somewhere else each time."""
+    at, tool, place = simulated.points(machine, seed, n, sigma, tools)
+    return Points(at, tool, place, sigma)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """rms lengths in um at fresh places in the frame that fits best: what is left, and what is stated of
+    it."""
+
+    left: float
+    stated: float
+
+
+def judge(
+    machine: simulated.Machine, calibration: Calibration, uncertainty: Uncertainty, seed: int
+) -> Judged:
+    rng = np.random.default_rng([seed, 99])
+    box = np.asarray(calibration.box_mm)
+    at = rng.uniform(box[:, 0], box[:, 1], (400, 3))
+    left, stated = [], []
+    model = build(calibration, machine.chain, outside="hold")
+    sensitivity = Sensitivity.of(calibration, machine.chain, uncertainty)
+    for tool in TOOLS:
+        vector = np.array(tool)
+        rest = machine.error(at, vector) - model.error(at, vector)
+        left.append(simulated.rms_um(simulated.off_frame(at + vector, rest)))
+        rows = np.moveaxis(sensitivity.rows(at, vector), 0, 1).astype(float)
+        framed = np.stack(
+            [simulated.off_frame(at + vector, rows[:, :, k]) for k in range(rows.shape[2])], axis=2
+        )
+        stated.append(1e3 * np.sqrt((framed**2).sum(axis=(1, 2)).mean()))
+    return Judged(float(np.mean(left)), float(np.mean(stated)))
+
+
+def turns(
+    seed: int, family: str, *, quick: bool, n: int = 60, sigma: float = 0.008, count: int = 3
+) -> list[Judged]:
+    """What is left before and after each turn."""
+    machine, calibration, uncertainty = start(seed, family, quick)
+    found = [judge(machine, calibration, uncertainty, seed)]
+    machine.half = {}
+    for k in range(count):
+        done: Refinement = refine(
+            calibration, machine.chain, uncertainty, run(machine, 1000 * seed + k, n, sigma)
+        )
+        calibration, uncertainty = done.calibration, done.uncertainty
+        found.append(judge(machine, calibration, uncertainty, seed))
+    return found

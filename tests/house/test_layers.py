@@ -1,0 +1,108 @@
+"""A module imports only from the layers above its own; siblings inside a package are free."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import olp
+
+PACKAGE = Path(olp.__file__).parent
+#: The rooms of the house, the lowest first: a room imports only from rooms above it in this list.
+ROOMS = (
+    *("core", "findings", "program", "errormodel", "compensation", "proof", "clearance", "checks"),
+    *("trajectory", "calibration", "comparison", "uncertainty", "results", "files", "reports"),
+    *("workflows", "review", "cli"),
+)
+ROW = {name: row for row, name in enumerate(ROOMS)}
+FRONT = {"__init__", "__main__"}
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def top(path: Path) -> str:
+    """The module or package directly below `olp` that a file belongs to."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imported(source: str) -> Iterator[tuple[int, str]]:
+    """Line and name of everything of ours that a text imports, also inside functions."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names = [f"{node.module}.{a.name}" for a in node.names] if node.module == "olp" else [node.module]
+        elif isinstance(node, ast.ImportFrom):
+            names = ["olp.(relative)"]
+        else:
+            continue
+        yield from ((node.lineno, name) for name in names if name.split(".")[0] == "olp")
+
+
+def violations(own: str, source: str) -> list[str]:
+    found = []
+    for line, name in imported(source):
+        other = [*name.split("."), "__init__"][1]
+        if other in (own, "__version__") or (other in ROW and ROW[other] < ROW[own]):
+            continue
+        found.append(f"line {line}: {own} (row {ROW[own]}) imports {name}")
+    return found
+
+
+def test_every_module_has_a_row() -> None:
+    assert {top(path) for path in MODULES} - FRONT <= ROW.keys()
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_imports_go_one_way(path: Path) -> None:
+    if top(path) not in FRONT:
+        assert violations(top(path), path.read_text("utf-8")) == []
+
+
+WRONG = ("from olp.cli import main", "import olp.proof.deviation", "from olp import cli", "from . import x")
+RIGHT = ("from olp.core.units import AXES", "import olp.program.registry", "from olp import __version__")
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_an_import_the_wrong_way_is_found(line: str) -> None:
+    assert len(violations("errormodel", f"def late():\n    {line}\n")) == 1
+
+
+@pytest.mark.parametrize("line", RIGHT)
+def test_an_import_the_right_way_is_free(line: str) -> None:
+    assert violations("errormodel", line) == []
+
+
+#: Libraries that are imported inside functions only, and those of them that one layer alone may use.
+ONLY_IN = {"ruckig": "trajectory", "meshcat": "review"}
+LATE = {"scipy", "matplotlib", "trimesh", "rich", *ONLY_IN}
+#: A package that is imported late as a whole (tests/house/test_public_names.py), and what it may import
+#: at once.
+LATE_ITSELF = {"trajectory": {"ruckig", "scipy"}}
+OPENERS = {"open", "read_bytes", "read_text", "write_bytes", "write_text"}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_large_libraries_are_imported_late_and_files_opened_in_one_layer(path: Path) -> None:
+    tree = ast.parse(path.read_text("utf-8"))
+    inside = {id(n) for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)}
+    for node in ast.walk(tree):
+        names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        for library in {name.split(".")[0] for name in names} & LATE:
+            assert ONLY_IN.get(library, top(path)) == top(path), f"line {node.lineno}: {library}"
+            late = id(node) in inside or library in LATE_ITSELF.get(top(path), set())
+            assert late or _for_types(tree, node), f"line {node.lineno}: {library}"
+        if isinstance(node, ast.Call) and top(path) not in ("files", "cli"):
+            function = node.func
+            builtin = isinstance(function, ast.Name) and function.id == "open"
+            method = isinstance(function, ast.Attribute) and function.attr in OPENERS
+            assert not (builtin or method), f"line {node.lineno}: only olp.files opens files"
+
+
+def _for_types(tree: ast.Module, node: ast.AST) -> bool:
+    """The import stands under `if TYPE_CHECKING:`."""
+    blocks = [n for n in ast.walk(tree) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
+    return any(node is inner for block in blocks for inner in ast.walk(block))

@@ -1,0 +1,76 @@
+"""What `olp` shows, and what showing it costs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import olp
+
+ROOT = Path(__file__).resolve().parents[2]
+RUN = "from olp.cli import main\ntry: main({!r})\nexcept SystemExit as end: assert end.code == 0, end.code"
+LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
+PUBLIC = {
+    *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
+    *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
+    *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
+    *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
+    *("refine_calibration", "RefinedCalibration"),
+    *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
+    *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
+    *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),
+    *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
+}
+
+
+def loaded_by(code: str, *names: str) -> set[str]:
+    """Which of `names` a fresh interpreter holds after running `code`."""
+    ask = f"import sys\n{code}\nprint(*sorted({set(names)!r} & sys.modules.keys()))"
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, cwd=ROOT)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_the_visible_names_are_the_promised_ones() -> None:
+    assert set(olp.__all__) == PUBLIC
+    assert set(dir(olp)) == PUBLIC | {"__version__"}
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC))
+def test_every_name_is_there_and_documented(name: str) -> None:
+    value = getattr(olp, name)
+    assert value.__name__ == name
+    assert value.__doc__
+
+
+def test_the_type_checker_sees_the_same_names() -> None:
+    source = (ROOT / "olp" / "__init__.py").read_text("utf-8")
+    assert all(f" import {name} as {name}\n" in source for name in PUBLIC)
+
+
+def test_a_name_that_is_not_there() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'calibrate'"):
+        _ = olp.calibrate
+
+
+@pytest.mark.parametrize(("code", "free_of"), [
+    ("import olp", ("numpy", "pydantic", "click", "rich", *LARGE)),
+    ("import olp; olp.OlpError", ("numpy", "pydantic", "click", "rich", *LARGE)),
+    ("import olp.cli", ("numpy", "pydantic", "rich", *LARGE)),
+    (RUN.format(["--help"]), ("numpy", "pydantic", "rich", *LARGE)),
+    ("import olp; olp.correct", LARGE),
+])  # fmt: skip
+def test_imports_stay_light(code: str, free_of: tuple[str, ...]) -> None:
+    assert loaded_by(code, *free_of) == set()
+
+
+def test_the_probe_sees_what_is_loaded() -> None:
+    assert loaded_by("import numpy", "numpy", "scipy") == {"numpy"}
+
+
+def test_a_correction_needs_no_large_library(tmp_path: Path) -> None:
+    words = ["correct", "-j", "programs/bridge-cmm/job.toml", "-o", str(tmp_path / "out.ngc"), "--force"]
+    assert loaded_by(RUN.format(words), *LARGE) == set()
+    assert (tmp_path / "out.ngc").stat().st_size > 0

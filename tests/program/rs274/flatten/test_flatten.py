@@ -1,0 +1,277 @@
+"""Unrolling of programs: hand-worked expectations, copying of plain bytes, refusals with their lines."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from olp.core.errors import ProgramError, UsageError
+from olp.program.rs274.flatten.unroll import flatten, number_text
+
+
+def lcnc(text: str, **options: object) -> str:
+    return flatten(text.encode(), profile="linuxcnc", **options).decode()  # type: ignore[arg-type]
+
+
+def fanuc(text: str, **options: object) -> str:
+    return flatten(text.encode(), profile="fanuc", **options).decode()  # type: ignore[arg-type]
+
+
+def refusal(text: str, profile: str = "linuxcnc", **options: object) -> ProgramError:
+    with pytest.raises(ProgramError) as caught:
+        flatten(text.encode(), profile=profile, file="p.ngc", **options)  # type: ignore[arg-type]
+    return caught.value
+
+
+@pytest.mark.parametrize("profile", ["linuxcnc", "grbl", "fanuc", "haas"])
+@pytest.mark.parametrize("eol", ["\n", "\r\n", "\r"])
+def test_plain_program_is_copied_byte_for_byte(profile: str, eol: str) -> None:
+    lines = ["%", "N10 g0 X 1 2.5 (Gr\xf6\xdfe) Y-.3", "", "  ;  semi", "/G1X1.F100.", "X2. ,R3", "M30", "%"]
+    data = eol.join(lines).encode("latin-1")
+    assert flatten(data, profile=profile) == data
+    assert flatten(data + eol.encode(), profile=profile) == data + eol.encode()
+
+
+@given(st.binary(max_size=60).filter(lambda b: not set(b) & set(b"#[oO%/mMgG") and b"\x85" not in b))
+def test_text_without_variables_is_never_changed(data: bytes) -> None:
+    assert flatten(data, profile="linuxcnc") == data
+
+
+def test_values_on_a_line_are_read_before_any_is_set() -> None:
+    assert lcnc("#1=3\nG0 X#1 #1=5 Y[#1+1]\nX#1\nM2\n") == "G0 X3 Y4\nX5\nM2\n"
+
+
+def test_number_words_and_comments() -> None:
+    source = "#1=2 (two)\nN5 G1 X [#1 * 3 (in)] (after) ; end\nM2\n"
+    assert lcnc(source) == "(two)\nN5 G1 X 6(in) (after) ; end\nM2\n"
+
+
+def test_block_numbers_stay_on_the_first_visit() -> None:
+    assert lcnc("o1 repeat [2]\nN5 X1\nN6 X[1/3]\no1 endrepeat\nM2\n") == (
+        "N5 X1\nN6 X0.3333333333\nX1\nX0.3333333333\nM2\n"
+    )
+
+
+def test_subprogram_has_its_own_locals_and_returns_a_value() -> None:
+    source = """o100 sub
+#2=7 #31=8 #<own>=1 #<_all>=2
+o100 endsub [#1 * 2]
+#2=1
+o100 call [21]
+X#<_value> Y#2 Z#31 A#<_all>
+M2
+"""
+    assert lcnc(source) == "X42 Y1 Z8 A2\nM2\n"
+
+
+def test_flow_of_linuxcnc() -> None:
+    source = """#1=0
+o1 while [#1 LT 9]
+#1=[#1+1]
+o2 if [#1 EQ 2]
+o1 continue
+o2 elseif [#1 EQ 5]
+o1 break
+o2 else
+X#1
+o2 endif
+o1 endwhile
+o3 do
+X-#1
+#1=[#1-2]
+o3 while [#1 GT 0]
+M2
+"""
+    assert lcnc(source) == "X1\nX3\nX4\nX-5\nX-3\nX-1\nM2\n"
+
+
+def test_external_subprogram_and_computed_label() -> None:
+    files = {"101": b"o101 sub\nX#1\no101 endsub\n", "deep": b"o<deep> sub\nX#5063\no<deep> endsub\n"}
+    assert lcnc("o[100+1] call [4]\nM2\n", subprograms=files.get) == "X4\nM2\n"
+    error = refusal("X1\no<deep> call\nM2\n", subprograms=files.get)
+    assert (error.file, error.line) == ("deep", 2)
+
+
+def test_fanuc_calls_inside_linuxcnc() -> None:
+    source = "O1 (head)\nX1\nM98 P200 L2\nM2\nO200\n#1=3\nG0 X#1\nM99\n"
+    assert lcnc(source) == "O1 (head)\nX1\nG0 X3\nG0 X3\nM2\n"
+
+
+def test_position_parameters_follow_the_program() -> None:
+    source = "G21 G90 G0 X1 Y2\nG91 X1\nG90 Z[#5420 + #<_y>]\nG92 X10\nY#5420\nM2\n"
+    assert lcnc(source) == "G21 G90 G0 X1 Y2\nG91 X1\nG90 Z4\nG92 X10\nY10\nM2\n"
+    assert lcnc("G20 G0 X1\nG21\nY#5420\nM2\n") == "G20 G0 X1\nG21\nY25.4\nM2\n"
+
+
+@pytest.mark.parametrize(
+    "lost", ["G28", "G54", "G10 L2 P1 X1", "G43 H1", "M6", "G38.2 X5", "G53 G0 X1", "M101", "G41 D1 X9"]
+)
+def test_position_is_not_known_after(lost: str) -> None:
+    error = refusal(f"G0 X1 Y2 Z3\n{lost}\nY[#5420]\n")
+    assert error.line == 3
+    assert "position of X" in str(error)
+
+
+def test_block_delete_switch() -> None:
+    source = "#1=1\n/#1=2\n/X#1\nY#1\nM2\n"
+    assert lcnc(source) == "/X2\nY2\nM2\n"
+    assert lcnc(source, block_delete=True) == "Y1\nM2\n"
+
+
+@pytest.mark.parametrize(
+    ("source", "line", "found"),
+    [
+        ("X1\nX#5061\n", 2, "#5061"),
+        ("X1\nX#5221\n", 2, "#5221"),
+        ("#5221=1\n", 1, "#5221"),
+        ("X#5602000\n", 1, "out of range"),
+        ("X#<none>\n", 1, "#<none>"),
+        ("#<_x>=1\n", 1, "#<_x>"),
+        ("o1 while [1]\n#1=1\no1 endwhile\n", 3, "blocks"),
+        ("o1 sub\no1 call\no1 endsub\no1 call\n", 2, "levels deep"),
+        ("o1 if [0]\nX1\n", 1, "label 1"),
+        ("o1 endwhile\n", 1, "no open loop"),
+        ("o9 call\n", 1, "subprogram 9"),
+        ("o1 do\no1 continue\no1 while [0]\n", 2, "CONTINUE"),
+        ("X[1+]\n", 1, "expected a number"),
+        ("#1\n", 1, "without '='"),
+        ("o1 blah\n", 1, "keyword"),
+        ("o1 sub\nM70\no1 endsub\no1 call\n", 2, "M70"),
+        ("G71 Q100 D1\n", 1, "G70"),
+    ],
+)
+def test_refusals_name_the_line(source: str, line: int, found: str) -> None:
+    error = refusal(source, limit=500)
+    assert (error.file, error.line) == ("p.ngc", line)
+    assert found in str(error)
+
+
+def test_unknown_profile() -> None:
+    with pytest.raises(UsageError, match="sinumerik"):
+        flatten(b"", profile="sinumerik")
+
+
+# --- Macro B ----------------------------------------------------------------------------------------------
+
+
+def test_macro_b_loop_goto_and_macro_call() -> None:
+    source = """%
+O1000(MAIN)
+N10 G90 G0 X0 Y0 (go)
+#1=100
+#2=3
+WHILE[#2GT1]DO1
+N20 G1 X[#1*#2] Y#5 Z-#2 F#1
+#2=#2-1
+END1
+IF[#1EQ100]GOTO50
+X999.
+N50 G65 P2000 A1.5 I2. J3. I4. T5
+M98 P2000
+IF[#9 EQ #0]THEN #9=7
+X#9
+M30
+O2000(SUB)
+X#1 Y#4 Z#7
+N7 G0 S#20
+M99
+%
+"""
+    assert fanuc(source) == (
+        "%\nO1000(MAIN)\nN10 G90 G0 X0 Y0 (go)\nN20 G1 X300. Z-3. F100.\nG1 X200. Z-2. F100.\n"
+        "X1.5 Y2. Z4.\nN7 G0 S5\nX100.\nG0\nX7.\nM30\n%\n"
+    )
+
+
+def test_macro_b_goto_searches_from_here_and_then_from_the_start() -> None:
+    source = "O1\n#100=0\nN1 X1.\n#100=#100+1\nIF[#100LT2]GOTO1\nGOTO3\nN2 X9.\nN3 M30\n"
+    assert fanuc(source) == "O1\nN1 X1.\nX1.\nN3 M30\n"
+
+
+def test_subprogram_call_with_the_count_in_p_and_return_to_a_block() -> None:
+    source = "O1\nM98 P20002\nX8.\nN5 X2.\nM30\nO2\nX3.\nM99 P5\n"
+    assert fanuc(source) == "O1\nX3.\nX3.\nN5 X2.\nM30\n"
+
+
+def test_haas_local_subprogram() -> None:
+    source = b"O1\nM97 P100 L2\nM30\nN100 X1.\nM99\n"
+    assert flatten(source, profile="haas") == b"O1\nN100 X1.\nX1.\nM30\n"
+
+
+@pytest.mark.parametrize(
+    ("source", "line", "found"),
+    [
+        ("O1\nX#500\n", 2, "#500"),
+        ("O1\nX#5021\n", 2, "#5021"),
+        ("O1\n#3000=1(STOP)\n", 2, "alarm"),
+        ("O1\n#5221=1.\n", 2, "#5221"),
+        ("O1\nG66 P1\n", 2, "G66"),
+        ("O1\nG65 P2 X5\nM30\nO2\nM99\n", 2, "decimal point"),
+        ("O1\nN1 GOTO1\n", 2, "blocks"),
+        ("O1\nGOTO7\n", 2, "N7"),
+        ("O1\nM98 P2\nM30\nO2\nX1.\n", 5, "no end"),
+        ("O1\nX[ROUND[1.5]]\n", 2, "least increment"),
+        ("O1\n#1=1.5\nG0 T#1\n", 3, "whole number"),
+    ],
+)
+def test_macro_b_refusals(source: str, line: int, found: str) -> None:
+    error = refusal(source, "fanuc", limit=500)
+    assert error.line == line
+    assert found in str(error)
+
+
+def test_cycles_of_a_fanuc_are_written_out() -> None:
+    source = "O1\nG90 G0 X1. Y1. Z5.\nG98 G81 Z-1. R1. F100. (hole)\nG99 X2.\nG80\nM30\n"
+    out = fanuc(source, expand_cycles=True).split("\n")
+    assert [line.split() for line in out] == [
+        ["O1"], ["G90", "G0", "X1.", "Y1.", "Z5."], ["G98", "F100.", "(hole)"],
+        ["G0", "Z1."], ["G1", "Z-1."], ["G0", "Z5."],
+        ["G99"], ["G0", "X2."], ["G0", "Z1."], ["G1", "Z-1."], ["G0", "Z1."], ["G80"], ["M30"], [],
+    ]  # fmt: skip
+
+
+def test_a_frame_or_length_that_begins_in_a_block_leaves_its_own_words_known() -> None:
+    hole = "G98 G81 Z-1. R1. F100.\n"
+    source = f"O1\nG90 G0 G54 X1. Y1.\nG43 H4 Z5.\n{hole}G80 G0 Z9.\n{hole}G80\nM30\n"
+    out = fanuc(source, expand_cycles=True).split("\n")
+    strokes = [line.split()[1] for line in out if line.startswith(("G0 Z", "G1"))]
+    assert strokes == ["Z1.", "Z-1.", "Z5.", "Z1.", "Z-1.", "Z9."]
+    lost = refusal("O1\nG90 G0 X1. Y1. Z5.\nG43 H4\nG98 G81 Z-1. R1. F100.\n", "fanuc", expand_cycles=True)
+    assert lost.line == 4
+    assert "position of Z" in str(lost)
+
+
+@pytest.mark.parametrize(
+    ("block", "found"),
+    [
+        ("G81 Z-1 R1. F1.", "decimal point"),
+        ("G83 Z-1. R1. Q1. F1.", "peck_clearance"),
+        ("G84 Z-1. R1. F1.", "synchronised"),
+        ("G81 Z-1. F1.", "no R word"),
+        ("G81 A5. Z-1. R1. F1.", "moves A"),
+        ("G87 Z-1. R1. F1.\nX#5001", "position of X"),
+    ],
+)
+def test_cycles_that_cannot_be_written_out(block: str, found: str) -> None:
+    error = refusal(f"O1\nG90 G0 X1. Y1. Z5.\n{block}\n", "fanuc", expand_cycles=True)
+    assert found in str(error)
+
+
+def test_cycles_of_linuxcnc_stop_exactly_and_give_the_path_mode_back() -> None:
+    source = "G21 G64 P.01\nG90 G0 X1 Y1 Z5 M3\nG91 G99 G84 X1 Z-1 R-4 F1 P.5\nM2\n"
+    assert lcnc(source, expand_cycles=True).splitlines()[2:] == [
+        "G91 G99 F1", "G61", "G90", "G0 X2", "G0 Z1", "G1 Z0", "M5", "M4", "G4 P0.5", "G1 Z1", "M5", "M3",
+        "G91", "G64 P0.01", "M2",
+    ]  # fmt: skip
+
+
+@given(st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-3 or x == 0))
+def test_number_text_keeps_ten_digits(value: float) -> None:
+    text = number_text(value, "x", "linuxcnc")
+    assert float(text) == pytest.approx(value, rel=1e-9, abs=1e-12)
+    assert "e" not in text
+    assert text == number_text(float(text), "x", "linuxcnc")
+    assert float(number_text(value, "x", "linuxcnc", exact=True)) == value
+    assert "." in number_text(value, "x", "fanuc")
+    assert float(number_text(value, "x", "fanuc")) == pytest.approx(value, abs=0.5001e-4)

@@ -1,0 +1,142 @@
+"""Real programs from the survey: corrected or refused with a line, and judged where LinuxCNC reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from cases.acceptance import allowed_um, judged
+from judge import linuxcnc, machines
+from judge.machines import Recipe
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+
+pytestmark = pytest.mark.corpus
+
+PROFILE_OF = {"gcode_cncjs": "grbl", "gcode_fanuc": "fanuc", "gcode_fanuc_haas_nist": "haas"}
+#: line and reason of texts that the control itself stops at: no corrector can put them right
+NOT_LEGAL = {
+    "cncjs__examples_gcode_Circle_Diamond_Square_Calibration.gcode": (624, "radius"),  # 29.0 and 27.6 mm
+    "cncjs__examples_gcode_full-circle-without-xyz.gcode": (11, "arc"),  # G2 in force, no centre
+}
+FLOW = (b"#", b"[", b"GOTO", b"WHILE")
+
+
+def programs(corpus: Path, folder: str) -> list[Path]:
+    return sorted(path for path in (corpus / folder).iterdir() if path.is_file())
+
+
+def plain(path: Path) -> bool:
+    """Without variables and flow; those need --flatten."""
+    code = b"\n".join(block.split(b"(")[0].split(b";")[0] for block in path.read_bytes().upper().splitlines())
+    return not any(word in code for word in FLOW)
+
+
+@pytest.fixture(scope="module")
+def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Path]]:
+    """A big smooth machine for each control, with tools 1 to 30, and a job that says where the axes start."""
+    out = {}
+    for folder, controller in PROFILE_OF.items():
+        recipe = Recipe(
+            controller=controller,
+            travel=((-3000.0, 3000.0),) * 3,
+            tools={n: {"Z_mm": 100.0 + n, "radius_mm": 3.0} for n in range(1, 31)},
+            work_offsets={
+                f"G{n}": {"X_mm": 5.0 * (n - 54), "Y_mm": 2.0, "Z_mm": -200.0, "set_by": "true"}
+                for n in range(54, 60)
+            },
+        )
+        machine = machines.random_machine(tmp_path_factory.mktemp(folder), 5, recipe)
+        if folder == "gcode_fanuc":
+            # these were written for calculator input: `X0Y50` stands beside `X50.Y0`
+            text = machine.read_text()
+            machine.write_text(text.replace("controller =", 'decimal_point = "calculator"\ncontroller =', 1))
+        job = machine.with_name("job.toml")
+        start = "start_mm = { X = 0.0, Y = 0.0, Z = 100.0 }\n"
+        job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}')
+        out[folder] = (machine, job)
+    return out
+
+
+def test_nine_in_ten_legal_programs_are_corrected(corpus: Path, setups: dict[str, tuple[Path, Path]]) -> None:
+    done, refused = [], {}
+    for folder, (machine, job) in setups.items():
+        for path in filter(plain, programs(corpus, folder)):
+            try:
+                result = olp.correct(path, machine, job)
+            except ProgramError as refusal:
+                assert refusal.line is not None, path.name
+                refused[path.name] = refusal
+                continue
+            moves = result.report["moves"]
+            assert moves["corrected"] + moves["approximated"] + moves["passed"] == moves["total"]
+            done.append(path.name)
+    for name, (line, word) in NOT_LEGAL.items():
+        assert refused.pop(name).line == line
+        assert word
+    assert len(done) >= 0.9 * (len(done) + len(refused)), {
+        name: str(error) for name, error in refused.items()
+    }
+
+
+def test_no_error_no_edit(corpus: Path, tmp_path: Path) -> None:
+    for folder, controller in PROFILE_OF.items():
+        recipe = Recipe(
+            controller=controller,
+            travel=((-3000.0, 3000.0),) * 3,
+            tools={n: {"Z_mm": 100.0 + n} for n in range(1, 31)},
+        )
+        machine = machines.zero_machine(tmp_path / folder, recipe)
+        for path in programs(corpus, folder):
+            try:
+                assert olp.correct(path, machine).data == path.read_bytes(), path.name
+            except OlpError as refusal:
+                assert isinstance(refusal, ProgramError), path.name
+                assert refusal.line is not None, path.name
+
+
+def everything(corpus: Path) -> Iterator[Path]:
+    yield from sorted(path for path in corpus.glob("*/*") if path.is_file() and path.stat().st_size < 300_000)
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "grbl", "fanuc", "haas"])
+def test_no_text_of_any_dialect_crashes(corpus: Path, tmp_path: Path, controller: str) -> None:
+    """Robot languages and part descriptions under a G-code profile are refused, or carried."""
+    machine = machines.shift_machine(tmp_path, recipe=Recipe(controller=controller))
+    for path in everything(corpus):
+        try:
+            olp.correct(path, machine)
+        except OlpError as refusal:
+            assert isinstance(refusal, OlpError)
+            assert str(refusal)
+
+
+@pytest.mark.oracle
+def test_the_judge_agrees_where_it_reads(corpus: Path, setups: dict[str, tuple[Path, Path]]) -> None:
+    wrong, compared = [], 0
+    for folder, (machine, job) in setups.items():
+        for path in programs(corpus, folder):
+            nominal = path.read_bytes()
+            if folder == "gcode_cncjs":
+                nominal = b"G17 G21 G90 G94 G0\n" + nominal
+            if len(nominal) > 1_000_000 or b"G28" in nominal or b"O0" in nominal:
+                continue
+            try:
+                result = olp.correct(nominal, machine, job, expand_cycles=True)
+            except OlpError:
+                continue
+            interpreter = {"start_mm": (0.0, 0.0, 100.0), "find_known": False}
+            if not linuxcnc.accepts(nominal, machine.parent, start_mm=(0.0, 0.0, 100.0)):
+                continue
+            passed = tuple(
+                line for f in result.findings if f.code in ("OLP102", "OLP306") for line in f.lines
+            )
+            found = judged(nominal, result.data, machine.parent, skip_lines=passed, interpreter=interpreter)
+            compared += 1
+            bar = allowed_um(nominal) + 0.02
+            if found.max_um > bar or found.vertex_max_um > bar:
+                wrong.append((path.name, found.max_um, found.vertex_max_um, found.worst_line))
+    assert not wrong
+    assert compared >= 4

@@ -1,0 +1,123 @@
+"""What is packed comes out again: positions to 0.1 um, deviations to 1 nm, texts to the letter."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from judge.unpacker import decoded
+
+from olp.core.errors import CannotCompute
+from olp.review import pack
+from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
+
+TEN_METRES = 10_000.0
+TEXTS = st.lists(st.text(st.characters(exclude_characters="\n", exclude_categories=["Cs"])), min_size=1).map(
+    "\n".join
+)
+
+
+def out(arrays: Arrays, name: str) -> Any:
+    return decoded(arrays.specs, zlib.decompress(arrays.deflated()), name)
+
+
+def rows(most: float, columns: int = 3) -> st.SearchStrategy[np.ndarray]:
+    """Points along an axis, jumps from end to end among them."""
+    row = st.lists(st.floats(-most, most), min_size=columns, max_size=columns)
+    return st.lists(row, max_size=40).map(lambda found: np.array(found, float).reshape(-1, columns))
+
+
+@given(rows(TEN_METRES))
+def test_positions_on_a_long_axis_come_out_to_half_a_step(values: np.ndarray) -> None:
+    arrays = Arrays()
+    arrays.quantised("P", values, POSITION_MM)
+    assert np.abs(out(arrays, "P") - values).max(initial=0.0) <= POSITION_MM / 2 + 1e-11
+
+
+@given(rows(TEN_METRES), st.integers(0, 2**32))
+def test_deviations_do_not_suffer_from_where_they_are(values: np.ndarray, seed: int) -> None:
+    deltas = np.random.default_rng(seed).normal(0.0, 0.05, (3, *values.shape))
+    arrays = Arrays()
+    arrays.quantised("P", values, POSITION_MM)
+    arrays.quantised("a", deltas[0], DEVIATION_MM, keep=True)
+    arrays.quantised("b", deltas[1], DEVIATION_MM, keep=True)
+    arrays.quantised("c", deltas[2], DEVIATION_MM, plus=["a", "b"])
+    for name, delta in zip("abc", deltas, strict=True):
+        assert np.abs(out(arrays, name) - delta).max(initial=0.0) <= DEVIATION_MM / 2 + 1e-15
+
+
+def test_times_may_pass_what_four_bytes_hold() -> None:
+    seconds = np.linspace(0.0, 90_000.0, 4000)
+    arrays = Arrays()
+    arrays.quantised("t", seconds, TIME_S)
+    assert np.abs(out(arrays, "t") - seconds).max() <= TIME_S / 2 + 1e-10
+
+
+def test_neighbours_too_far_apart_are_refused() -> None:
+    with pytest.raises(CannotCompute, match="'t' are too far apart"):
+        Arrays().quantised("t", [0.0, 3000.0], TIME_S)
+
+
+@given(TEXTS)
+def test_texts_come_out_to_the_letter(text: str) -> None:
+    arrays = Arrays()
+    arrays.text("nominal", text)
+    assert "\n".join(out(arrays, "nominal")) == text
+
+
+@given(TEXTS, TEXTS, st.data())
+def test_changed_texts_come_out_to_the_letter(text: str, original: str, data: st.DataObject) -> None:
+    """Whatever lines they are said to resemble."""
+    count = original.count("\n") + 1
+    lines = data.draw(
+        st.lists(st.integers(-1, count - 1), min_size=text.count("\n") + 1, max_size=text.count("\n") + 1)
+    )
+    arrays = Arrays()
+    arrays.text("nominal", original)
+    arrays.patch("corrected", text, "nominal", original, np.array(lines))
+    assert "\n".join(out(arrays, "corrected")) == text
+
+
+def test_a_line_that_is_the_same_costs_no_letters() -> None:
+    text = "\n".join(f"G1 X{k}.5 (naïve 🛠 line)" for k in range(50))
+    arrays = Arrays()
+    arrays.text("nominal", text)
+    arrays.patch("corrected", text, "nominal", text, np.arange(50))
+    assert set(out(arrays, "corrected_middle")) == {""}
+
+
+@pytest.mark.parametrize(
+    ("dtype", "kind"), [("f4", np.float32), ("u4", np.uint32), ("u1", np.uint8)]
+)
+def test_raw_values_come_out_as_they_are(dtype: str, kind: type) -> None:
+    values = np.arange(30).astype(kind).reshape(10, 3)
+    arrays = Arrays()
+    arrays.raw("odd", [1, 2, 3], "u1")
+    arrays.raw("v", values, dtype)
+    assert (out(arrays, "v") == values).all()
+    assert out(arrays, "v").dtype == kind
+
+
+def test_a_stream_of_many_parts_is_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Threads deflate parts of it; any inflater takes the whole."""
+    monkeypatch.setattr(pack, "_CHUNK", 1000)
+    values = np.random.default_rng(0).integers(0, 255, 54_321)
+    arrays = Arrays()
+    arrays.raw("v", values, "u1")
+    assert (out(arrays, "v") == values).all()
+
+
+def test_nothing_is_a_stream_too() -> None:
+    assert zlib.decompress(Arrays().deflated()) == b""
+
+
+@given(st.floats(1e-6, 1e9), st.integers(10, 10_000))
+def test_resolution_shows_as_many_levels_as_asked(peak: float, levels: int) -> None:
+    step = resolution(peak, 1e-4, levels)
+    assert 1e-4 <= step <= 1.0
+    assert step == pytest.approx(10.0 ** round(np.log10(step)))
+    assert step == 1e-4 or peak / step >= levels * (1 - 1e-12)

@@ -1,0 +1,349 @@
+"""The page: one file under a strict policy, in which no program becomes script; its size; what it says."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from judge.machines import random_machine
+from judge.unpacker import Page
+
+import olp
+from olp.core.errors import CannotCompute, InputError, OutsideBox, ProgramError, UsageError
+from olp.findings.catalogue import RULES
+from olp.review import job
+from olp.review import page as pages
+from olp.review.manifest import manifest_of
+
+ROOT = Path(__file__).resolve().parents[2]
+HEAD = b"G21 G17 G90 G94 G54 G64 P0.01 Q0\nG43 H1\nG0 X0 Y0 Z20\n"
+TEXT = HEAD + b"G1 X100 Y50 F600\nG2 X140 Y90 I40 J0\nM2\n"
+HOSTILE = (
+    b"</script><script>window.hacked=1</script>",
+    b"<!-- <script> -->",
+    b"<img src=x onerror=alert(1)>",
+    b"<style>*{display:none}</style>",
+    b"@@DATA@@ @@MODULES@@",
+    b'"}]};alert(1);//',
+    "\u2028alert(1)\u2029".encode(),
+    b"\x00\x07\x1b[2J\x9b\x7f",
+    "\u202e)evil(".encode(),
+    b"&lt;b&gt; &#x3c;script&#x3e;",
+    b"x" * 1_000_000,
+)
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return random_machine(tmp_path_factory.mktemp("m"), 3)
+
+
+@pytest.fixture(scope="module")
+def html(machine: Path) -> bytes:
+    return olp.view(TEXT, machine).html()
+
+
+def policy(page: Page) -> dict[str, str]:
+    found = [
+        a["content"]
+        for tag, a in page.tags
+        if tag == "meta" and a.get("http-equiv") == "Content-Security-Policy"
+    ]
+    assert len(found) == 1
+    return dict(part.split(None, 1) for part in str(found[0]).split(";") if part.strip())
+
+
+# -- one file, no network -------------------------------------------------------------------------------
+
+
+def test_the_policy_lets_nothing_in_or_out(html: bytes) -> None:
+    page = Page(html)
+    assert policy(page) == {
+        "default-src": "'none'", "script-src": "'unsafe-inline'", "style-src": "'unsafe-inline'",
+        "img-src": "data: blob:", "connect-src": "'none'",
+    }  # fmt: skip
+    before = html[: html.index(b"Content-Security-Policy")]
+    assert b"<script" not in before and b"<style" not in before and b"<link" not in before
+
+
+def test_the_page_names_no_other_file(html: bytes) -> None:
+    for tag, attributes in Page(html).tags:
+        for name in ("src", "href", "action", "data", "poster", "srcset"):
+            value = attributes.get(name)
+            assert value is None or value.startswith(("data:", "#")), (tag, name, value)
+
+
+def test_the_page_is_whole(html: bytes) -> None:
+    page = Page(html)
+    assert not re.search(r"@@[A-Z]+@@", page.text)
+    assert any("MeshCat" in script for script in page.scripts)
+    names = (ROOT / "viewer" / "static" / "modules.txt").read_text().split()
+    for name in names:
+        assert (ROOT / "viewer" / "static" / name).read_text() in page.scripts
+    assert b"Permission is hereby granted" in html
+
+
+def test_only_a_live_page_may_ask_and_only_its_own_server(machine: Path) -> None:
+    review = olp.view(TEXT, machine, time=False)
+    page = Page(b"".join(review.parts(live="version")))
+    assert policy(page)["connect-src"] == "'self'"
+    assert page.manifest["live"] == "version"
+    assert Page(review.html()).manifest["live"] is None
+
+
+def test_the_same_job_gives_the_same_page(machine: Path, html: bytes) -> None:
+    assert olp.view(TEXT, machine).html() == html
+
+
+def test_a_digest_changes_with_what_the_page_shows(machine: Path) -> None:
+    digests = {
+        olp.view(text, machine, time=False).scene.digest
+        for text in (TEXT, TEXT.replace(b"100", b"101"), TEXT)
+    }
+    assert len(digests) == 2
+    assert all(re.fullmatch("[0-9a-f]{12}", digest) for digest in digests)
+
+
+def test_a_module_that_would_end_its_element_is_refused(
+    monkeypatch: pytest.MonkeyPatch, machine: Path
+) -> None:
+    monkeypatch.setattr(pages, "_bundle", lambda: ("a='</Script>'", "main.min.js"))
+    with pytest.raises(CannotCompute, match=r"main\.min\.js: holds what would end its script element"):
+        olp.view(TEXT, machine, time=False).html()
+
+
+# -- hostile programs -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("comment", HOSTILE, ids=lambda text: ascii(text[:12]))
+def test_a_hostile_comment_is_text(comment: bytes, machine: Path, html: bytes) -> None:
+    program = HEAD + b"; " + comment + b"\nG1 X100 Y50 F600\nM2\n"
+    page = Page(olp.view(program, machine).html())
+    clean = Page(html)
+    # the same elements and the same scripts as any page has
+    assert [tag for tag, _ in page.tags] == [tag for tag, _ in clean.tags]
+    assert page.scripts == clean.scripts
+    assert "<" not in page.manifest_text
+    line = page.array("text_nominal")[3]
+    assert len(line) < 2100
+    assert all(c.isprintable() or c in "\t�" for c in line)
+    visible = comment.decode("utf-8", "ignore")[:50]
+    if visible.isprintable():
+        assert visible in line
+
+
+def test_hostile_names_are_text(machine: Path, tmp_path: Path, html: bytes) -> None:
+    path = tmp_path / "<img src=x onerror=alert(1)>&'\".ngc"
+    path.write_bytes(TEXT)
+    page = Page(olp.view(path, machine).html())
+    assert [tag for tag, _ in page.tags] == [tag for tag, _ in Page(html).tags]
+    assert page.manifest["program"] == path.name
+    assert path.name in page.text
+
+
+# -- what it says ---------------------------------------------------------------------------------------
+
+
+def test_every_array_that_is_named_is_there(html: bytes) -> None:
+    page = Page(html)
+    manifest = page.manifest
+    count = manifest["samples"]
+    for name in (manifest[key] for key in ("base", "line", "rapid", "time", "way", "axes")):
+        assert len(page.array(name)) == count
+    for layer in manifest["layers"]:
+        assert (layer["delta"] is None) == (layer["name"] == "nominal")
+        assert layer["delta"] is None or page.array(layer["delta"]).shape == page.array(layer["base"]).shape
+    for metric in manifest["metrics"]:
+        for array in metric["by_layer"].values():
+            assert array is None or len(page.array(array)) == count
+    motion = manifest["motion"]
+    columns = [motion[key] for key in ("time", "line", "speed", "feed")]
+    columns += [
+        axis[key] for axis in motion["axes"] for key in ("position", "velocity", "acceleration", "jerk")
+    ]
+    assert len({len(page.array(name)) for name in columns}) == 1
+    for mesh in manifest["meshes"]:
+        faces = page.array(mesh["faces"])
+        assert faces.max() < len(page.array(mesh["vertices"]))
+        assert mesh["path"] == [] or mesh["path"] in [node["path"] for node in manifest["nodes"]]
+
+
+def test_layers_are_the_samples_to_a_nanometre(machine: Path) -> None:
+    review = olp.view(TEXT, machine, time=False)
+    scene, page = review.scene, Page(review.html())
+    origin = np.array(page.manifest["origin_mm"])
+    assert np.abs(page.array("P") + origin - scene.position_mm).max() <= 0.5e-4 + 1e-10
+    axes = page.array("Q") + np.array(page.manifest["axes_origin_mm"])
+    assert np.abs(axes - scene.samples.axis_mm).max() <= 0.5e-4 + 1e-10
+    deltas = {
+        "uncorrected": scene.samples.uncorrected, "corrected": scene.samples.correction,
+        "result": scene.samples.result,
+    }  # fmt: skip
+    for name, delta in deltas.items():
+        assert np.abs(page.array(page.layer(name)["delta"]) - delta).max() <= 0.5e-6 + 1e-12
+    assert np.abs(page.array("t") - scene.time_s).max() <= 0.5e-6 + 1e-9
+    assert np.abs(page.array("s") - scene.samples.way_mm).max() <= 0.5e-3 + 1e-9
+
+
+def test_a_source_shows_what_it_does(machine: Path) -> None:
+    review = olp.view(TEXT, machine, time=False)
+    page = Page(review.html())
+    assert page.manifest["sources"] == [f"source:{name}" for name, _ in review.scene.sources]
+    for name, size in review.scene.sources:
+        metric: dict[str, Any] = next(m for m in page.manifest["metrics"] if m["name"] == f"source:{name}")
+        shown = page.array(metric["by_layer"]["uncorrected"])
+        assert np.abs(shown - size * 1e3).max() <= max(size.max() * 1e3 / 200, 0.001)
+
+
+def test_findings_and_verdict_are_those_of_the_proof(machine: Path) -> None:
+    result = olp.correct(TEXT, machine)
+    page = Page(olp.view(TEXT, machine, correction=result, time=False).html())
+    assert [f["code"] for f in page.manifest["findings"]] == [f.code for f in result.findings]
+    assert all(f["title"] == RULES[f["code"]].title for f in page.manifest["findings"])
+    assert page.manifest["verdict"]["ok"] is result.report["deviation"]["holds"] is True
+    above = olp.correct(TEXT, machine)
+    above.report["deviation"]["holds"] = False
+    assert (
+        Page(olp.view(TEXT, machine, correction=above, time=False).html()).manifest["verdict"]["ok"] is False
+    )
+
+
+def test_numbers_of_the_manifest_are_numbers(html: bytes) -> None:
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    json.loads(Page(html).manifest_text, parse_constant=refuse)
+
+
+# -- size -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("step", "most"), [(0.02, 14.0), (0.005, 9.0)])
+def test_a_point_takes_so_many_bytes(step: float, most: float, machine: Path) -> None:
+    """All layers, sources and times of a smooth path, in base64; four texts and meshes are not counted."""
+    review = olp.view(TEXT, machine, time=False, step_mm=step)
+    arrays = manifest_of(review.scene)[1]
+    assert len(review.scene.samples) > 5000
+    assert len(arrays.encoded()) / len(review.scene.samples) <= most
+
+
+# -- refusals -------------------------------------------------------------------------------------------
+
+
+def test_refusals_name_file_and_line(machine: Path, tmp_path: Path) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_bytes(HEAD + b"G1 X#5 F600\nM2\n")
+    with pytest.raises(ProgramError) as caught:
+        olp.view(part, machine, time=False)
+    assert str(caught.value).startswith(f"{part}:4: ")
+    part.write_bytes(HEAD + b"G1 X9000 F600\nM2\n")
+    with pytest.raises(OutsideBox) as outside:
+        olp.view(part, machine, time=False)
+    assert str(outside.value).startswith(f"{part}:4: ")
+    part.write_bytes(TEXT)
+    other = tmp_path / "other.ngc"
+    other.write_bytes(TEXT.replace(b"X100", b"X130"))
+    with pytest.raises(ProgramError) as foreign:
+        olp.view(part, machine, corrected=other, time=False)
+    assert str(foreign.value).startswith(f"{other}:")
+
+
+def test_a_corrected_program_is_shown_as_it_is(machine: Path) -> None:
+    """Whoever wrote it: the proof is that of a verification."""
+    result = olp.correct(TEXT, machine)
+    ours = olp.view(TEXT, machine, correction=result, time=False).scene
+    theirs = olp.view(TEXT, machine, corrected=result.data, time=False).scene
+    np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
+    raw = olp.view(TEXT, machine, corrected=TEXT, time=False).scene
+    ends = raw.samples.share == 1.0
+    np.testing.assert_allclose(raw.samples.result[ends], raw.samples.uncorrected[ends], atol=1e-12)
+    assert raw.report["deviation"]["holds"] is False
+
+
+def test_a_correction_of_an_unrolled_program_is_shown_beside_it(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (
+        HEAD + b"#1 = 0\no1 while [#1 lt 3]\nG1 X[40 + #1] Y[2 * #1] F600\n#1 = [#1 + 1]\no1 endwhile\nM2\n"
+    )
+    corrected = olp.correct(text, machine, flatten=True)
+    ours = olp.view(text, machine, correction=corrected, flatten=True, time=False).scene
+    calls: list[str] = []
+    for name, what in (("read", job.read), ("load", job.load)):
+
+        def counted(*args: Any, _what: Any = what, _name: str = name, **more: Any) -> Any:
+            calls.append(_name)
+            return _what(*args, **more)
+
+        monkeypatch.setattr(job, name, counted)
+    monkeypatch.setattr("olp.workflows.api.read", None)
+    theirs = olp.view(text, machine, corrected=corrected.data, flatten=True, time=False).scene
+    np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
+    assert theirs.report["deviation"] == ours.report["deviation"]
+    # each text is read once
+    assert sorted(calls) == ["load", "read", "read"]
+
+
+def test_a_page_is_written_whole_and_over_nothing(machine: Path, tmp_path: Path) -> None:
+    review = olp.view(TEXT, machine, time=False)
+    path = tmp_path / "review.html"
+    review.write(path)
+    assert path.read_bytes() == review.html()
+    path.write_bytes(b"mine")
+    with pytest.raises(UsageError, match="--force"):
+        review.write(path)
+    assert path.read_bytes() == b"mine"
+    review.write(path, force=True)
+    assert path.read_bytes() == review.html()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_page_that_cannot_be_made_leaves_no_file(
+    machine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    review = olp.view(TEXT, machine, time=False)
+    monkeypatch.setattr(pages, "_bundle", lambda: ("</script>", "bad.js"))
+    with pytest.raises(CannotCompute):
+        review.write(tmp_path / "review.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_meshcat_the_page_says_what_to_do(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(CannotCompute, match="pip install meshcat"):
+        olp.view(TEXT, machine, time=False).html()
+
+
+def test_a_file_that_is_not_there(machine: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        olp.view(tmp_path / "none.ngc", machine)
+
+
+def test_the_page_colours_by_band_and_by_probability(tmp_path: Path) -> None:
+    machine = random_machine(tmp_path, 3)
+    unknown = Page(olp.view(TEXT, machine, time=False).html())
+    assert {"band", "beyond"}.isdisjoint(m["name"] for m in unknown.manifest["metrics"])
+    calibration = machine.with_name("calibration.toml")
+    square = "[squareness]\nsigma_C0Y_urad = 20.0\n"
+    assert "[squareness]\n" in calibration.read_text()
+    calibration.write_text(calibration.read_text().replace("[squareness]\n", square))
+    review = olp.view(TEXT, machine, within_um=3.0, time=False)
+    sure, page = review.scene.sureness, Page(review.html())
+    assert sure is not None
+    metrics: dict[str, Any] = {m["name"]: m for m in page.manifest["metrics"]}
+    band = page.array(metrics["band"]["by_layer"]["result"])
+    assert sure.band_mm.max() > 1e-3
+    assert np.abs(band - sure.band_mm * 1e3).max() <= max(sure.band_mm.max() * 5.0, 0.001)
+    assert metrics["beyond"]["label"] == "probability beyond 3 µm"
+    for layer in ("uncorrected", "result"):
+        shown = page.array(metrics["beyond"]["by_layer"][layer])
+        assert np.abs(shown - 100.0 * sure.beyond[layer]).max() <= 0.051
+    # what is far off is surely beyond
+    away = np.linalg.norm(review.scene.samples.uncorrected, axis=1) > 3e-3 + 3.0 * sure.band_mm
+    assert away.any() and (sure.beyond["uncorrected"][away] > 0.99).all()
+    # at the touch-off, or where a sure path is right, nothing is beyond
+    assert (sure.beyond["result"][sure.band_mm < 1e-3] < 0.01).all()

@@ -1,0 +1,201 @@
+"""The samples say what the machine would do: held against the judge's own model, the proof, and sums by
+hand."""
+
+from __future__ import annotations
+
+import shutil
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge.machines import Recipe, random_machine, shift_machine, zero_machine
+from judge.model import JudgeModel
+
+import olp
+from olp.core.errors import CannotCompute
+from olp.core.toolpath import Flag, Kind
+from olp.review.job import Review
+
+ROOT = Path(__file__).resolve().parents[2]
+NASTY = ROOT / "programs" / "nasty"
+REFUSED = {"block-delete-depends.ngc"}
+PROGRAMS = sorted(path.name for path in NASTY.glob("*.ngc") if path.name not in REFUSED)
+HEAD = "G21 G17 G90 G94 G54 G64 P0.01 Q0\nG43 H1\nG0 X0 Y0 Z20\n"
+
+
+@cache
+def nasty(name: str) -> Review:
+    return olp.view(NASTY / name, NASTY / "machine.toml", time=False)
+
+
+def viewed(folder: Path, machine: Path, text: str, **options: object) -> Review:
+    path = folder / "part.ngc"
+    path.write_text(HEAD + text)
+    return olp.view(path, machine, time=False, **options)  # type: ignore[arg-type]
+
+
+def size_um(delta: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(delta, axis=1) * 1e3
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_program_is_shown_where_its_words_say(name: str) -> None:
+    """Every way-point of a known position is a sample, and its place is the axis position less frame and
+    length."""
+    scene = nasty(name).scene
+    path, samples = scene.nominal.toolpath, scene.samples
+    ends = np.flatnonzero(samples.share == 1.0)
+    known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))
+    assert samples.move[ends].tolist() == known.tolist()
+    np.testing.assert_array_equal(samples.axis_mm[ends], path.end_mm[known])
+    length = np.array([path.frames[f].length_mm for f in path.frame[known]])
+    np.testing.assert_allclose(
+        scene.position_mm[ends], path.end_mm[known] - length - np.array(scene.frame.origin_mm), atol=1e-12
+    )
+    assert (np.diff(samples.move) >= 0).all()
+    assert (np.diff(samples.move + samples.share) >= 0).all()
+    assert (np.diff(samples.part) >= 0).all()
+    assert (np.diff(samples.way_mm) >= 0).all()
+    assert (np.diff(scene.time_s) >= 0).all()
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_what_is_left_is_what_the_proof_says(name: str) -> None:
+    """On feed moves that the proof judges no sample is farther off than the proof allows; at the ends of
+    moves, the largest is the proof's."""
+    scene = nasty(name).scene
+    path, samples = scene.nominal.toolpath, scene.samples
+    if any(f["code"] in ("OLP102", "OLP103", "OLP306") for f in scene.report["findings"]):
+        pytest.skip("the proof leaves out moves that are shown")
+    plain = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE | Flag.WHOLE | Flag.PASS)) == 0)
+    feed = plain[samples.move]
+    after, before = (size_um(delta)[feed] for delta in (samples.result, samples.uncorrected))
+    deviation = scene.report["deviation"]
+    assert after.max(initial=0.0) <= deviation["allowed_um"] + 1e-3
+    ends = (samples.share == 1.0)[feed]
+    assert before[ends].max(initial=0.0) <= deviation["before"]["waypoints"]["max_um"] + 1e-3
+    assert after[ends].max(initial=0.0) <= deviation["after"]["waypoints"]["max_um"] + 1e-3
+
+
+@pytest.mark.parametrize("name", ["modal.ngc", "planes.ngc", "tool-offset.ngc", "work-offsets.ngc"])
+def test_the_uncorrected_machine_is_the_judges(name: str, tmp_path: Path) -> None:
+    """The error at the nominal axis position, less what the touch-off holds."""
+    folder = tmp_path / "nasty"
+    shutil.copytree(NASTY, folder)
+    for path in (folder / "machine.toml", folder / "calibration.toml"):
+        text = path.read_text().replace("touch_tool = 1", 'set_by = "true"')
+        path.write_text(text.partition("[backlash]")[0])
+    scene = olp.view(folder / name, folder / "machine.toml", time=False).scene
+    judge = JudgeModel(folder / "machine.toml")
+    path, samples = scene.nominal.toolpath, scene.samples
+    for frame in np.unique(path.frame):
+        mine = path.frame[samples.move] == frame
+        error = judge.error_mm(samples.axis_mm[mine], np.array(path.frames[frame].tool_mm))
+        np.testing.assert_allclose(samples.uncorrected[mine], error, atol=1e-7)
+        command = judge.error_mm(samples.command_mm[mine], np.array(path.frames[frame].tool_mm))
+        np.testing.assert_allclose(samples.result[mine], samples.correction[mine] + command, atol=1e-7)
+
+
+def test_no_error_no_deviation(tmp_path: Path) -> None:
+    scene = viewed(tmp_path, zero_machine(tmp_path / "m"), "G1 X100 Y50 F600\nG2 X140 Y90 I40 J0\nM2\n").scene
+    for delta in (scene.samples.uncorrected, scene.samples.correction, scene.samples.result):
+        assert np.abs(delta).max() == 0.0
+    assert scene.sources == ()
+
+
+def test_a_machine_that_is_off_everywhere(tmp_path: Path) -> None:
+    machine = shift_machine(tmp_path / "m", (30.0, -20.0, 10.0))
+    scene = viewed(tmp_path, machine, "G1 X100 Y50 F600\nM2\n").scene
+    np.testing.assert_allclose(
+        scene.samples.uncorrected * 1e3, np.tile([30.0, -20.0, 10.0], (len(scene.samples), 1))
+    )
+    np.testing.assert_allclose(
+        scene.samples.correction * 1e3, np.tile([-30.0, 20.0, -10.0], (len(scene.samples), 1))
+    )
+    assert np.abs(scene.samples.result).max() < 1e-9
+    assert [name for name, _ in scene.sources] == ["EXX", "EYY", "EZZ"]
+    assert [float(part.max()) * 1e3 for _, part in scene.sources] == pytest.approx([30.0, 20.0, 10.0])
+
+
+def test_sources_add_up_to_the_error(tmp_path: Path) -> None:
+    """Each is no more than the whole of them, and no less than what they leave to explain."""
+    machine = random_machine(tmp_path / "m", 5, Recipe(backlash_um={"X": 4.0}, cyclic=True))
+    scene = viewed(tmp_path, machine, "G1 X100 Y50 Z-20 F600\nX-90\nM2\n").scene
+    total = np.sum([part for _, part in scene.sources], axis=0)
+    assert (np.linalg.norm(scene.samples.uncorrected, axis=1) <= total * (1 + 1e-3) + 1e-6).all()
+    sizes = [float(part.max()) for _, part in scene.sources]
+    assert sizes == sorted(sizes, reverse=True)
+    assert {"EXX", "cyclic EXX", "lost motion X"} <= {name for name, _ in scene.sources}
+
+
+def test_between_way_points_the_tip_is_beside_the_path(tmp_path: Path) -> None:
+    """What is left there is how far the path is off, not how far the tip is late."""
+    machine = random_machine(tmp_path / "m", 8)
+    scene = viewed(
+        tmp_path, machine, "G1 X300 Y100 F900\nG3 X300 Y180 I0 J40\nG2 X120 Y180 I-90 J30\nM2\n"
+    ).scene
+    samples, path = scene.samples, scene.nominal.toolpath
+    inner = np.flatnonzero((samples.share[1:-1] < 1.0) & (samples.within[1:-1] < 1.0)) + 1
+    inner = inner[
+        (path.kind[samples.move[inner]] != Kind.RAPID) & (samples.move[inner] == samples.move[inner - 1])
+    ]
+    step = samples.axis_mm[inner + 1] - samples.axis_mm[inner - 1]
+    along = np.einsum("ij,ij->i", samples.result[inner], step) / np.linalg.norm(step, axis=1)
+    # but for what way-points are rounded by
+    ends = np.linalg.norm(samples.result[samples.within == 1.0], axis=1)
+    assert np.abs(along).max() < min(ends.max() + 1e-5, 0.87e-3)
+    assert size_um(samples.result[inner]).max() > 0.05
+
+
+def test_a_program_that_is_left_as_it_is_deviates_as_before(tmp_path: Path) -> None:
+    """On a machine that is off by the same everywhere, on arcs too."""
+    machine = shift_machine(tmp_path / "m", (30.0, -20.0, 10.0))
+    text = HEAD + "G1 X100 Y50 F600\nG2 X140 Y90 I40 J0\nM2\n"
+    samples = olp.view(text.encode(), machine, corrected=text.encode(), time=False).scene.samples
+    np.testing.assert_allclose(samples.result, samples.uncorrected, atol=1e-9)
+    assert not samples.correction.any()
+
+
+def test_chords_of_arcs_are_fine_enough_to_look_round(tmp_path: Path) -> None:
+    machine = zero_machine(tmp_path / "m")
+    scene = viewed(
+        tmp_path, machine, "G1 X0.5 F600\nG2 X0.5 I-0.5\nG2 X0.5 Y200 I0 J100\nM2\n", step_mm=500.0
+    ).scene
+    samples = scene.samples
+    for move in np.flatnonzero(scene.nominal.toolpath.kind == Kind.ARC_CW):
+        turn = np.diff(samples.share[samples.move == move]).max() * np.abs(
+            scene.nominal.toolpath.arcs.sweep_rad[0]
+        )
+        assert turn <= np.pi / 36 + 1e-9
+
+
+def test_the_step_is_what_was_asked_for(tmp_path: Path) -> None:
+    scene = viewed(tmp_path, zero_machine(tmp_path / "m"), "G1 X100 F600\nM2\n", step_mm=0.25).scene
+    feed = scene.nominal.toolpath.kind[scene.samples.move] == Kind.LINE
+    np.testing.assert_allclose(np.diff(scene.samples.way_mm[feed]), 0.25, atol=1e-7)
+
+
+def test_a_gap_is_no_line(tmp_path: Path) -> None:
+    """Behind a tool change nobody knows where the axes stand until they are commanded."""
+    scene = viewed(
+        tmp_path, zero_machine(tmp_path / "m"), "G1 X10 F600\nT2 M6\nG43 H2\nG0 X0 Y0 Z20\nG1 X10\nM2\n"
+    ).scene
+    samples = scene.samples
+    lines = scene.nominal.toolpath.line[samples.move]
+    behind = np.flatnonzero(~samples.joined)
+    assert lines[behind].tolist() == [3, 7]
+
+
+def test_one_work_offset_is_the_frame_and_several_are_the_machine() -> None:
+    assert nasty("modal.ngc").scene.frame.offset == "G54"
+    assert nasty("work-offsets.ngc").scene.frame.offset == "machine"
+    assert nasty("g52.ngc").scene.frame.offset == "machine"
+
+
+def test_a_program_without_positions_has_nothing_to_show(tmp_path: Path) -> None:
+    machine = zero_machine(tmp_path / "m")
+    path = tmp_path / "part.ngc"
+    path.write_text("G21 G90 G54\nG0 Z20\nM2\n")
+    with pytest.raises(CannotCompute, match="nothing to show"):
+        olp.view(path, machine, time=False)

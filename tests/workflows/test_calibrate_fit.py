@@ -1,0 +1,277 @@
+"""`olp calibrate fit` from files: plans, files that describe themselves, refusals, the shipped example."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from judge import simulated
+from judge.model import JudgeModel
+
+import olp
+from olp.cli import main
+from olp.core.errors import ConfigError
+from olp.files.measurements.reader import files_of_measurements, load_measurements
+
+PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
+PLAN = """schema = "olp-measurements-1"
+machine = "m"
+measured = 2026-05-14
+temperature_degC = 20.0
+[defaults]
+sense = "actual-minus-commanded"
+tool_mm = [0.0, 0.0, -120.0]
+line_mm = { X = 1500.0, Y = 700.0, Z = -600.0 }
+"""
+LENGTHS = "target_mm,run,direction,value_um\n0,1,1,0\n100,1,1,2.5\n0,2,1,0.5\n100,2,1,3.5\n"
+ANGLES = LENGTHS.replace("um", "urad")
+
+
+def planned(folder: Path, text: str, **files: str) -> Path:
+    for name, data in files.items():
+        (folder / f"{name}.csv").write_text(data)
+    plan = folder / "measurements.toml"
+    plan.write_text(PLAN + text)
+    return plan
+
+
+def line(file: str, component: str, more: str = "") -> str:
+    return f'[[lines]]\nfile = "{file}.csv"\ncomponent = "{component}"\n{more}\n'
+
+
+# -- plans -----------------------------------------------------------------------------------------------
+
+
+def test_a_plan_says_how_each_line_was_taken(tmp_path: Path) -> None:
+    text = line("exx", "EXX", "sigma_scale_um_m = 0.5\nline_mm = { Y = 100.0 }") + line("eax", "EAX")
+    plan = planned(tmp_path, text, exx=LENGTHS, eax=ANGLES)
+    found = load_measurements([tmp_path])
+    assert (found.machine, str(found.measured), found.temperature_degC) == ("m", "2026-05-14", 20.0)
+    first, second = found.lines
+    assert first.line_mm == (1500.0, 100.0, -600.0)
+    assert first.tool_mm == (0.0, 0.0, -120.0)
+    assert first.sigma_scale == 5e-7
+    assert first.value == pytest.approx([0.0, 0.0025, 0.0005, 0.0035])
+    assert second.value == pytest.approx([0.0, 2.5e-6, 0.5e-6, 3.5e-6])
+    assert first.row.tolist() == [2, 3, 4, 5]
+    names = {Path(name).name for name in files_of_measurements([tmp_path])}
+    assert names == {"measurements.toml", "exx.csv", "eax.csv"}
+    assert load_measurements([plan]).lines[0].value == pytest.approx(first.value)
+
+
+@pytest.mark.parametrize(
+    ("sense", "factor"),
+    [
+        ("actual-minus-commanded", 1),
+        ("commanded-minus-actual", -1),
+        ("table-motion actual-minus-commanded", -1),
+        ("table-motion commanded-minus-actual", 1),
+    ],
+)
+def test_every_sense_becomes_that_of_the_contract(tmp_path: Path, sense: str, factor: int) -> None:
+    planned(tmp_path, line("exx", "EXX", f'sense = "{sense}"'), exx=LENGTHS)
+    (found,) = load_measurements([tmp_path], "XFYZ").lines
+    assert found.value == pytest.approx(factor * np.array([0.0, 2.5, 0.5, 3.5]) * 1e-3)
+
+
+def test_files_that_describe_themselves(tmp_path: Path) -> None:
+    head = (
+        "# machine = m\n# measured = 2026-05-14\n# temperature_degC = 20.5\n# any other comment\n"
+        '# component = "EYX"\n# line_mm = { Y = 1.0, Z = 2.0 }\n# tool_mm = [0, 0, -50]\n'
+        "# sense = actual-minus-commanded\n# square = S\n# square_sigma_urad = 5\n# period_mm = [10.0]\n"
+    )
+    (tmp_path / "a.csv").write_text(head + LENGTHS)
+    found = load_measurements([tmp_path])
+    (one,) = found.lines
+    assert (one.component, one.line_mm, one.tool_mm) == ("EYX", (0.0, 1.0, 2.0), (0.0, 0.0, -50.0))
+    assert found.squares[0].sigma_rad == pytest.approx(5e-6)
+    assert found.periods_mm == ((10.0,), (), ())
+    assert one.row[0] == 13
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (line("exx", "EXX", 'sense = "laser"'), "line 12: lines[0].sense"),
+        (line("ecz", "ECZ", 'instrument = "level"'), "vertical Z, which a level cannot see"),
+        (line("ecx", "ECX", 'instrument = "level"'), "vertical Z, which a level cannot see"),
+        (line("no", "EXX"), "no such file"),
+        (line("ecz", "EXX"), "read in lengths, and the file holds angles"),
+        (line("exx", "EXX", 'square = "S"'), "square belongs to straightness"),
+        (line("exx", "EYX", 'square = "S"'), 'square "S" is not defined'),
+        (line("exx", "EXX", "sigma_urad = 1.0"), "expected sigma_um"),
+        (line("exx", "EXX", 'sense = "table-motion actual-minus-commanded"'), "carries the tool, no table"),
+        (line("exx", "EXX", 'reference = "table"'), "carries the tool, no table"),
+        (line("exx", "EXX", "tool = [0, 0, 0]"), "did you mean tool_mm"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_a_sentence(tmp_path: Path, text: str, words: str) -> None:
+    planned(tmp_path, text, exx=LENGTHS, ecz=ANGLES, ecx=ANGLES)
+    with pytest.raises(ConfigError) as caught:
+        load_measurements([tmp_path], "FXYZ")
+    assert words in str(caught.value)
+
+
+def test_nothing_is_assumed_and_all_problems_come_at_once(tmp_path: Path) -> None:
+    bare = PLAN.partition("[defaults]")[0]
+    (tmp_path / "exx.csv").write_text(LENGTHS)
+    (tmp_path / "eyx.csv").write_text(LENGTHS.replace("100,2,1,3.5", "100,2,0,x"))
+    (tmp_path / "measurements.toml").write_text(bare + line("exx", "EXX") + line("eyx", "EYX"))
+    with pytest.raises(ConfigError) as caught:
+        load_measurements([tmp_path])
+    text = str(caught.value)
+    for words in ("sense is missing", "line_mm.Y, line_mm.Z is missing", "tool_mm is missing"):
+        assert words in text
+    assert "eyx.csv: line 5: direction = 0" in text
+    assert 'line 5: value_um = "x"' in text
+
+
+def test_plan_and_file_must_agree(tmp_path: Path) -> None:
+    told = "# tool_mm = [0, 0, -80]\n"
+    planned(tmp_path, line("exx", "EXX", "tool_mm = [0, 0, -90]"), exx=told + LENGTHS)
+    with pytest.raises(ConfigError, match=r"exx.csv: line 1: tool_mm = .*but the plan says"):
+        load_measurements([tmp_path])
+    planned(tmp_path, line("exx", "EXX"), exx=told + LENGTHS)
+    assert load_measurements([tmp_path]).lines[0].tool_mm == (0.0, 0.0, -80.0)
+
+
+POINTS = "X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm\n" + "".join(
+    f"{x},{y},{z},{y + 7},{x - 3},{1 - z}\n" for x in (0, 500) for y in (0, 300) for z in (-100, 0)
+)
+
+
+def test_points_of_a_tracker(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("# a comment\n" + POINTS)
+    planned(tmp_path, '[[points]]\nfile = "t.csv"\nsigma_um = 8.0\ntool_mm = [0, 0, -90]\n')
+    (found,) = load_measurements([tmp_path]).points
+    assert found.axis_mm.shape == found.measured_mm.shape == (8, 3)
+    assert found.tool_mm[3].tolist() == [0.0, 0.0, -90.0]
+    assert found.sigma == 0.008
+    assert found.row.tolist() == list(range(3, 11))
+
+
+def test_lengths_from_a_station(tmp_path: Path) -> None:
+    rows = [f"{x},{y},{z},{1000 + x},{x / 10},0,-90\n" for x in (0, 500) for y in (0, 300) for z in (-100, 0)]
+    head = "X_mm,Y_mm,Z_mm,length_mm,tool_X_mm,tool_Y_mm,tool_Z_mm\n"
+    (tmp_path / "s.csv").write_text(head + "".join(rows))
+    planned(tmp_path, '[[stations]]\nfile = "s.csv"\nsigma_um = 0.2\nsigma_um_m = 0.3\n')
+    (found,) = load_measurements([tmp_path]).lengths
+    assert found.length_mm[-1] == 1500.0
+    assert found.sigma_mm[-1] == pytest.approx(0.2e-3 + 0.3e-6 * 1500.0)
+    assert found.tool_mm[-1].tolist() == [50.0, 0.0, -90.0]
+
+
+def test_directions_from_pods(tmp_path: Path) -> None:
+    head = "X_mm,Y_mm,Z_mm,azimuth_1_deg,elevation_1_deg,azimuth_2_deg,elevation_2_deg\n"
+    places = [(x, y, z) for x in (0, 500) for y in (0, 300) for z in (-100, 0)]
+    rows = [f"{x},{y},{z},{10 + x / 100},1,{-20 + y / 100},2\n" for x, y, z in places]
+    (tmp_path / "p.csv").write_text(head + "".join(rows))
+    pods = '[[pods]]\nfile = "p.csv"\nsigma_urad = 10.0\n[[pods.baselines]]\nbetween = [1, {}]\n'
+    pods += "length_mm = 4000.0\n"
+    planned(tmp_path, pods.format(2) + "sigma_um = 10.0\n")
+    (found,) = load_measurements([tmp_path]).pods
+    assert np.degrees(found.azimuth_rad[-1]) == pytest.approx([15.0, -17.0])
+    assert np.degrees(found.elevation_rad[-1]) == pytest.approx([1.0, 2.0])
+    assert found.baselines == ((0, 1, 4000.0, 0.01),)
+    planned(tmp_path, pods.format(3) + "sigma_um = 10.0\n")
+    with pytest.raises(ConfigError, match="two of the pods 1 to 2"):
+        load_measurements([tmp_path])
+
+
+@pytest.mark.parametrize(
+    ("change", "more", "words"),
+    [
+        (("measured_X_mm", "seen_X_mm"), "", 'column 4 is "seen_X_mm"'),
+        (("500,0,0,", "500,0,"), "", "line 7: 5 values under 6 columns"),
+        (("500,0,0,", "500,0,x,"), "", 'line 7: Z_mm = "x"'),
+        (("", ""), "sigma_um = 0.0\n", "sigma_um"),
+    ],
+)
+def test_points_that_are_wrong(tmp_path: Path, change: tuple[str, str], more: str, words: str) -> None:
+    (tmp_path / "t.csv").write_text(POINTS.replace(*change) if change[0] else POINTS)
+    planned(tmp_path, '[[points]]\nfile = "t.csv"\n' + (more or "sigma_um = 8.0\n"))
+    with pytest.raises(ConfigError) as caught:
+        load_measurements([tmp_path])
+    assert words in str(caught.value)
+
+
+# -- the example, through the command line ---------------------------------------------------------------
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    done = CliRunner().invoke(main, [str(a) for a in arguments])
+    return done.exit_code, done.output
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("example") / "gantry-lines"
+    shutil.copytree(PROGRAMS / "gantry-lines", folder, ignore=shutil.ignore_patterns("calibration*"))
+    code, output = run(
+        "calibrate", "fit", folder, "-m", folder / "machine.toml", "-o", folder / "calibration.toml"
+    )
+    assert code == 0, output
+    (folder / "told.txt").write_text(output)
+    return folder
+
+
+def test_the_table_says_what_was_found(example: Path) -> None:
+    told = (example / "told.txt").read_text()
+    for words in ("EXX", "Squareness", "Lost motion um", "ezx.csv: row 42", "wrote"):
+        assert words in told
+
+
+def test_the_example_finds_the_errors_that_were_simulated(example: Path) -> None:
+    """The independent judge reads both calibrations; the frame of the machine is nobody's to measure."""
+    true, found = JudgeModel(PROGRAMS / "gantry-plate"), JudgeModel(example)
+    at = np.random.default_rng(3).uniform(found.box[:, 0], found.box[:, 1], (800, 3))
+    for tool in ((0.0, 0.0, -120.0), (80.0, -40.0, -200.0)):
+        before = true.error_mm(at, tool)
+        rest = before - found.error_mm(at, tool)
+        assert simulated.rms_um(simulated.off_frame(at, before)) > 20.0
+        assert simulated.rms_um(simulated.off_frame(at, rest)) < 3.0
+
+
+def test_the_calibration_corrects_a_program(example: Path) -> None:
+    program = PROGRAMS / "gantry-plate" / "plate.ngc"
+    result = olp.correct(program, example / "machine.toml")
+    assert result.report["deviation"]["holds"]
+    assert result.data != program.read_bytes()
+
+
+def test_the_python_way_gives_the_same(example: Path) -> None:
+    fitted = olp.fit_calibration(example, example / "machine.toml")
+    assert fitted.files(example / "calibration.toml") == {
+        path: path.read_bytes() for path in sorted(example.glob("calibration*"), reverse=True)
+    }
+    assert fitted.findings[0].code == "OLP802"
+
+
+def test_json_and_fail_on(example: Path) -> None:
+    code, output = run("calibrate", "fit", example, "--json", "--fail-on", "warning")
+    report = json.loads(output[output.index("{") :])
+    assert code == 1
+    assert report["schema"] == "olp-fit-1"
+    assert report["left_out"] == 1
+    assert {row["name"] for row in report["angular_errors"]} == {f"E{d}{a}" for d in "ABC" for a in "XYZ"}
+    assert report["findings"][0]["lines"] == [42]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("nowhere",), 3, "no such file"),
+        (("-",), 2, "several files"),
+        (("{0}", "-o", "{0}/exx-no/c.toml"), 2, "no folder"),
+        (("{0}", "-o", "{0}/calibration.toml"), 2, "exists already"),
+        (("{0}", "-m", "{1}/haas-mill/machine.toml"), 3, "chain"),
+        (("{0}", "-o", "{0}/eax.csv", "--force"), 2, "input"),
+    ],
+)
+def test_wrong_calls(example: Path, arguments: tuple[str, ...], code: int, words: str) -> None:
+    found, output = run("calibrate", "fit", *(a.format(example, PROGRAMS) for a in arguments))
+    assert (found, words in output) == (code, True), output

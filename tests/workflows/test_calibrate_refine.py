@@ -1,0 +1,204 @@
+"""Calibrations refined by measured runs: laws of the update, three turns, files and the command."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.refine import run, start, turns
+from click.testing import CliRunner
+from judge import simulated
+
+from olp.calibration.diagnosis.refinement import refine
+from olp.calibration.observations.readings import Points
+from olp.cli import main
+from olp.core.errors import ConfigError
+from olp.errormodel.build import build
+from olp.errormodel.sensitivity import Sensitivity
+from olp.files.calibration.covariance import load_uncertainty
+from olp.files.calibration.reader import load_calibration
+from olp.workflows.calibrate_refine import refine_calibration
+
+PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
+
+
+@pytest.mark.parametrize(("seed", "family"), [(0, "smooth"), (0, "rough")])
+def test_three_turns(seed: int, family: str) -> None:
+    found = turns(seed, family, quick=True)
+    left = [one.left for one in found]
+    assert left == sorted(left, reverse=True)
+    assert left[-1] < 0.7 * left[0]
+    stated = [one.stated for one in found]
+    assert stated == sorted(stated, reverse=True)
+
+
+@pytest.fixture(scope="module")
+def begun():
+    machine, calibration, uncertainty = start(1, "smooth", True)
+    machine.half = {}
+    return machine, calibration, uncertainty
+
+
+def test_the_update_is_that_of_bayes(begun) -> None:
+    """Against the textbook form with the gain, and the frame as columns of a large variance."""
+    machine, calibration, uncertainty = begun
+    points = run(machine, 3, 12, 0.01)
+    done = refine(calibration, machine.chain, uncertainty, points)
+    parts = Sensitivity.of(calibration, machine.chain, uncertainty)
+    fresh = run(machine, 4, 9, 0.01)
+
+    def table(p: Points) -> np.ndarray:
+        rows = np.moveaxis(parts.rows(p.axis_mm, p.tool_mm), 0, 1)
+        return rows.reshape(3 * len(p.axis_mm), -1).astype(float)
+
+    old = build(calibration, machine.chain)
+    new = build(done.calibration, machine.chain)
+    h, g = table(points), table(fresh)
+    nominal = points.axis_mm + points.tool_mm + old.error(points.axis_mm, points.tool_mm)
+    a, b = points.measured_mm.mean(axis=0), nominal.mean(axis=0)
+    u, _, v = np.linalg.svd((points.measured_mm - a).T @ (nominal - b))
+    turn = v.T @ np.diag([1, 1, np.sign(np.linalg.det(v.T @ u.T))]) @ u.T
+    misses = ((points.measured_mm - a) @ turn.T + b - nominal).reshape(-1)
+    arm = (points.axis_mm + points.tool_mm - (points.axis_mm + points.tool_mm).mean(axis=0)) / 1000.0
+    frame = np.zeros((len(arm), 3, 6))
+    for k in range(3):
+        frame[:, k, k] = 1.0
+        frame[:, :, 3 + k] = np.cross(np.eye(3)[k], arm)
+    frame = frame.reshape(-1, 6)
+    spread = h @ h.T + 1e2 * frame @ frame.T + 0.01**2 * np.eye(len(h))
+    gained = (g @ h.T @ np.linalg.solve(spread, misses)).reshape(-1, 3)
+    moved = new.error(fresh.axis_mm, fresh.tool_mm) - old.error(fresh.axis_mm, fresh.tool_mm)
+    assert np.abs(moved).max() > 2e-3
+    assert np.allclose(moved, gained, atol=6e-4)
+
+
+def test_what_is_known_exactly_does_not_move(begun) -> None:
+    machine, calibration, uncertainty = begun
+    done = refine(calibration, machine.chain, uncertainty.scaled(1e-6), run(machine, 5, 40, 0.01))
+    for a, b in zip(done.calibration.curves, calibration.curves, strict=True):
+        assert all(np.allclose(a.mean(n), b.mean(n), atol=1e-7) for n in b.names)
+
+
+def test_a_run_that_fits_nothing_is_told_and_widens(begun) -> None:
+    machine, calibration, uncertainty = begun
+    good = refine(calibration, machine.chain, uncertainty.scaled(0.2), run(machine, 6, 40, 0.001))
+    assert good.chi_square / good.freedom > 1.5
+    parts = [Sensitivity.of(calibration, machine.chain, u) for u in (good.uncertainty, uncertainty)]
+    at = simulated.points(machine, 9, 20, 0.0)[0]
+    rms = [float(np.sqrt((p.rows(at, np.zeros(3)) ** 2).sum())) for p in parts]
+    assert rms[0] > 0.05 * rms[1]
+
+
+def test_a_slip_is_left_out(begun) -> None:
+    machine, calibration, uncertainty = begun
+    points = run(machine, 7, 60, 0.005)
+    places = points.measured_mm.copy()
+    places[17] += [0.0, 0.3, 0.0]
+    wrong = dataclasses.replace(points, measured_mm=places)
+    done = refine(calibration, machine.chain, uncertainty, wrong)
+    assert [row for row, _ in done.outliers] == [18]
+    clean = refine(calibration, machine.chain, uncertainty, points)
+    assert done.after_mm == pytest.approx(clean.after_mm, rel=0.1)
+
+
+def test_points_say_nothing_along_their_path(begun) -> None:
+    machine, calibration, uncertainty = begun
+    points = run(machine, 8, 50, 0.005)
+    along = np.tile([1.0, 0.0, 0.0], (50, 1))
+    known = dataclasses.replace(points, measured_mm=_in_machine(machine, points))
+    done = [
+        refine(calibration, machine.chain, uncertainty, p, frame_known=True, along=along)
+        for p in (known, dataclasses.replace(known, measured_mm=known.measured_mm + 0.2 * along))
+    ]
+    for a, b in zip(done[0].calibration.curves, done[1].calibration.curves, strict=True):
+        assert all(np.allclose(a.mean(n), b.mean(n), atol=1e-9) for n in a.names)
+
+
+def _in_machine(machine, points: Points) -> np.ndarray:
+    at, tools = points.axis_mm, points.tool_mm
+    out = at + tools
+    for tool in np.unique(tools, axis=0):
+        own = (tools == tool).all(axis=1)
+        out[own] += machine.error(at[own], tool)
+    return out
+
+
+# -- files and the command -------------------------------------------------------------------------------
+
+
+def call(*words: str):
+    return CliRunner().invoke(main, [*words])
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("refine") / "gantry-lines"
+    shutil.copytree(PROGRAMS / "gantry-lines", folder, ignore=shutil.ignore_patterns("calibration*"))
+    machine = ["-m", str(folder / "machine.toml")]
+    done = call("calibrate", "fit", str(folder), *machine, "-q", "-o", str(folder / "calibration.toml"))
+    assert done.exit_code == 0, done.output
+    return folder
+
+
+def test_the_command_and_a_second_turn_from_its_files(shop: Path, tmp_path: Path) -> None:
+    files = [str(shop / "calibration.toml"), str(shop / "tracker.csv"), "-m", str(shop / "machine.toml")]
+    one, two = tmp_path / "one.toml", tmp_path / "two.toml"
+    before = {p: p.read_bytes() for p in shop.iterdir()}
+    done = call("calibrate", "refine", *files, "-o", str(one), "--json", "--date", "2026-06-01")
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    assert report["schema"] == "olp-refinement-1"
+    assert report["rms_after_um"] < report["rms_before_um"]
+    assert {p: p.read_bytes() for p in shop.iterdir()} == before
+    again = call("calibrate", "refine", str(one), *files[1:], "-o", str(two), "-q")
+    assert again.exit_code == 0, again.output
+    sigma = []
+    for file in (shop / "calibration.toml", one, two):
+        known = load_uncertainty(file, load_calibration(file))
+        assert known is not None
+        sigma.append(np.mean([np.mean(e.sigma**2) for e in known.entries if e.kind == "mean"]))
+    assert sigma[0] > sigma[1] > sigma[2]
+    assert call("calibrate", "refine", *files, "-o", files[0], "--force").exit_code == 2
+
+
+@pytest.mark.slow
+def test_a_run_of_a_corrected_program(shop: Path, tmp_path: Path) -> None:
+    """The plate, corrected by a calibration with a wrong squareness that it thinks uncertain, run on the true
+    machine: the squareness comes back."""
+    plate, machine = PROGRAMS / "gantry-plate" / "plate.ngc", shop / "machine.toml"
+    text = (shop / "calibration.toml").read_text("utf-8")
+    value = load_calibration(shop / "calibration.toml").squareness["C0Y"] * 1e6
+    lines = []
+    for line in text.splitlines():
+        if line.startswith("C0Y_urad"):
+            line = f"C0Y_urad = {value + 40.0}\nsigma_C0Y_urad = 30.0"
+        lines.append(line)
+        if line.startswith("[covariance]"):
+            lines.pop()
+    off = "\n".join(line for line in lines if "npz" not in line)
+    (shop / "off.toml").write_text(off, "utf-8")
+    (shop / "machine-off.toml").write_text(
+        machine.read_text("utf-8").replace('"calibration.toml"', '"off.toml"'), "utf-8"
+    )
+    corrected, measured = tmp_path / "plate.ngc", tmp_path / "measured.csv"
+    done = call("correct", str(plate), "-m", str(shop / "machine-off.toml"), "-o", str(corrected), "-q")
+    assert done.exit_code in (0, 1), done.output
+    true = PROGRAMS / "gantry-plate" / "machine.toml"
+    done = call("simulate", str(corrected), "-m", str(true), "-o", str(measured))
+    assert done.exit_code == 0, done.output
+    found = refine_calibration(
+        shop / "off.toml", measured, machine, program=plate, sigma_um=10.0
+    )
+    new = found.calibration.squareness["C0Y"] * 1e6
+    assert abs(new - value) < 12.0
+    assert found.refinement.after_mm < 0.6 * found.refinement.before_mm
+
+
+def test_a_calibration_without_uncertainty_is_refused(shop: Path) -> None:
+    gantry = PROGRAMS / "gantry-plate"
+    with pytest.raises(ConfigError, match="states no uncertainty"):
+        refine_calibration(gantry / "calibration.toml", shop / "tracker.csv", gantry / "machine.toml")

@@ -1,0 +1,279 @@
+"""The finished chain, judged by LinuxCNC's interpreter and an independent error model."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.acceptance import CUTTING, allowed_um, judged, points
+from judge import linuxcnc, machines, programs
+from judge.linuxcnc import KINDS, CanonMoves
+from judge.machines import CHAINS, Recipe
+from judge.model import JudgeModel
+from judge.programs import FEATURES
+from judge.splitter import chord_count
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+from olp.core.toolpath import Flag, Toolpath
+from olp.files.config import load_setup
+from olp.program.rs274.profiles import PROFILES
+from olp.program.rs274.reader import read
+
+pytestmark = pytest.mark.oracle
+
+#: what the judge's sampling of the path may add
+SLACK_UM = 0.02
+#: the largest difference between directions in the curves of the random machines, in any component at the tip
+DIRECTED_JUMP_UM = 4.0
+MOVING = {
+    "lines",
+    "short",
+    "rapid",
+    "arcs",
+    "planes",
+    "helix",
+    "circle",
+    "radius",
+    "incremental",
+    "frames",
+    "cycles",
+}
+NEAR_MM = 1e-6
+
+
+def draw(seed: int) -> tuple[Recipe, list[str]]:
+    """A machine and the features of a program, all of them over the seeds."""
+    rng = np.random.default_rng(seed + 77)
+    recipe = Recipe(
+        chain=str(rng.choice(CHAINS)),
+        off_datum=bool(rng.random() < 0.5),
+        interpolation=str(rng.choice(["pchip", "linear"])),
+        cyclic=bool(rng.random() < 0.3),
+    )
+    if rng.random() < 0.3:
+        tables = recipe.chain[: recipe.chain.index("F")]
+        recipe = replace(recipe, on_table=tables)
+    features = [name for name in FEATURES if rng.random() < 0.6]
+    if not MOVING & set(features):
+        features.append("lines")
+    kind = rng.random()
+    if kind < 0.25:
+        recipe = replace(
+            recipe, backlash_um={a: float(rng.choice([3.0, 6.0])) for a in "XYZ" if rng.random() < 0.6}
+        )
+    elif kind < 0.35:
+        recipe = replace(recipe, directed="".join(a for a in "XYZ" if rng.random() < 0.5))
+    if recipe.backlash_um or recipe.directed:  # play is unknown after a tool change, and the judge's is not
+        features = [name for name in features if name != "tools"]
+    if rng.random() < 0.4:
+        frames = {name: dict(entry) for name, entry in recipe.work_offsets.items()}
+        frames["G54"]["set_by"] = "touch"
+        if "g10" not in features and rng.random() < 0.5:
+            touch = {"set_by": "touch", "touched_at_mm": {"X": 400.0, "Z": -100.0}, "touch_tool": 2}
+            frames["G55"] |= touch
+        recipe = replace(recipe, work_offsets=frames)
+    return recipe, features
+
+
+def check(seed: int, folder: Path) -> None:
+    recipe, features = draw(seed)
+    path = machines.random_machine(folder, seed, recipe)
+    nominal = programs.random_program(seed, features=features, blocks=3 + seed % 17)
+    whole = seed % 4 == 3 and "tools" not in features and not recipe.backlash_um and not recipe.directed
+    result = olp.correct(nominal, path, expand_cycles=True, split_rapids=whole)
+    found = judged(nominal, result.data, folder, kinds=KINDS if whole else CUTTING)
+    bar = allowed_um(nominal) + SLACK_UM
+    if recipe.directed:
+        # where one axis turns the straightness of another jumps by what depends on direction, and that axis
+        # cannot follow against its own flank: README, honest limits
+        bar += DIRECTED_JUMP_UM
+    assert found.after.judged > 0
+    assert found.max_um <= bar, f"line {found.worst_line}: {features}"
+    assert found.vertex_max_um <= bar
+    if found.before.max_um > 10.0:
+        assert found.after.rms_um < 0.2 * found.before.rms_um
+
+
+@pytest.mark.parametrize("seed", range(1000, 1040))
+def test_the_corrected_path_is_the_nominal_one(tmp_path: Path, seed: int) -> None:
+    check(seed, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(20))
+def test_the_corrected_path_is_the_nominal_one_at_length(tmp_path: Path, block: int) -> None:
+    wrong = []
+    for seed in range(2000 + 20 * block, 2020 + 20 * block):
+        try:
+            check(seed, tmp_path / str(seed))
+        except AssertionError as error:
+            wrong.append((seed, str(error).splitlines()[0]))
+        except OlpError as error:
+            assert isinstance(error, ProgramError), seed
+            assert error.line is not None, seed
+    assert not wrong
+
+
+# -- a shift -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_shift_is_seen_as_that_very_shift(tmp_path: Path, seed: int) -> None:
+    """0.1 mm everywhere; 0.00394 in, the nearest that inches can say."""
+    path = machines.shift_machine(tmp_path)
+    features = [name for name in FEATURES if name not in ("cycles", "style")]
+    nominal = programs.random_program(seed, features=features, blocks=12)
+    corrected = olp.correct(nominal, path).data
+    before, after = (linuxcnc.interpret(text, path, find_known=False) for text in (nominal, corrected))
+    assert len(before) == len(after)
+    step = 0.00394 * 25.4 if b"G20" in nominal else 0.1
+    assert np.abs(before.axis - after.axis - step).max() <= NEAR_MM
+
+
+# -- no more blocks than needed ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_few_blocks_more_than_the_longest_chords(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path = machines.random_machine(tmp_path, seed, Recipe(chain=str(rng.choice(CHAINS)), off_datum=True))
+    low, high = np.array(machines.TRAVEL).T
+    at = rng.uniform(low + 30, high - 30, (7, 3)).round(3)
+    text = programs.polyline_program(at - (250.0, 200.0, -300.0), 3)
+    count = len(points(olp.correct(text, path).data)) - 1
+    model, lever = JudgeModel(path), np.array([0.0, 0.0, -120.0])
+    best = sum(chord_count(a, b, model, lever, 1e-3) for a, b in itertools.pairwise(at))
+    assert best >= 10
+    assert count <= 1.15 * best
+
+
+# -- LinuxCNC's own samples --------------------------------------------------------------------------------
+
+
+@cache
+def samples() -> tuple[Path, ...]:
+    listed = subprocess.run(
+        ["dpkg", "-L", "linuxcnc-uspace", "linuxcnc-doc-en"], capture_output=True, text=True, check=False
+    ).stdout.split()
+    return tuple(path for path in map(Path, listed) if path.suffix == ".ngc" and path.is_file())
+
+
+@pytest.fixture(scope="module")
+def big(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A machine without errors but with a box, offsets and tools for any sample; the job starts at zero."""
+    return spacious(tmp_path_factory.mktemp("big"), (0.0, 0.0, 0.0))
+
+
+def spacious(folder: Path, shift_um: tuple[float, float, float]) -> Path:
+    recipe = Recipe(
+        travel=((-1e5, 1e5),) * 3,
+        tools={n: {"Z_mm": 10.0 + n, "radius_mm": 1.0} for n in range(1, 31)},
+        work_offsets={
+            f"G{n}": {
+                "X_mm": 10.0 * (n - 50),
+                "Y_mm": 5.0 * (n - 50),
+                "Z_mm": -3.0 * (n - 50),
+                "set_by": "true",
+            }
+            for n in range(54, 60)
+        },
+    )
+    path = machines.shift_machine(folder, shift_um, recipe)
+    start = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n"
+    (folder / "job.toml").write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}')
+    return path
+
+
+def reading(text: bytes, path: Path) -> Toolpath:
+    setup = load_setup(path, path.with_name("job.toml"))
+    return read(text, setup, PROFILES["linuxcnc"], words=False).toolpath
+
+
+def difference(path: Toolpath, moves: CanonMoves) -> str:
+    """Where two readings of one program part, moves without a way left out; empty where they agree."""
+    own = (path.flag & np.uint8(Flag.CONTROL)) == 0
+    ours, line = path.end_mm[own], path.line[own]
+    real = moves.pick(moves.kind != linuxcnc.DWELL)
+    theirs = real.axis
+    i = j = 0
+    while i < len(ours) or j < len(theirs):
+        if (
+            i < len(ours)
+            and j < len(theirs)
+            and np.nanmax(np.abs(ours[i] - theirs[j]), initial=0.0) <= NEAR_MM
+        ):
+            i, j = i + 1, j + 1
+        elif j and j < len(theirs) and np.abs(theirs[j] - theirs[j - 1]).max() <= NEAR_MM:
+            j += 1
+        elif i and i < len(ours) and np.abs(ours[i] - ours[i - 1]).max() <= NEAR_MM:
+            i += 1
+        else:
+            return f"line {line[i] if i < len(ours) else '-'}: {ours[i : i + 1]} and {theirs[j : j + 1]}"
+    return ""
+
+
+@pytest.mark.parametrize("unroll", [False, True])
+def test_samples_are_read_as_linuxcnc_reads_them(big: Path, unroll: bool) -> None:
+    wrong, compared, moves = [], 0, 0
+    for sample in samples():
+        nominal = sample.read_bytes()
+        try:
+            ours = reading(olp.flatten(sample, big) if unroll else nominal, big)
+        except ProgramError as refusal:
+            assert refusal.line is not None, sample
+            continue
+        try:
+            theirs = linuxcnc.interpret(nominal, big, find_known=False)
+        except linuxcnc.InterpreterError:
+            continue
+        found = difference(ours, theirs)
+        compared, moves = compared + 1, moves + len(theirs)
+        if found:
+            wrong.append((str(sample), found))
+    assert not wrong
+    assert compared >= (100 if unroll else 5)
+    assert moves >= 1000
+
+
+def test_samples_stay_acceptable_and_shift_exactly(big: Path, tmp_path: Path) -> None:
+    path = spacious(tmp_path, (100.0, 100.0, 100.0))
+    wrong, done = [], 0
+    for sample in samples():
+        try:
+            flat = olp.flatten(sample, big, expand_cycles=True)
+            if not linuxcnc.accepts(flat, big):
+                continue
+            corrected = olp.correct(flat, path, path.with_name("job.toml"))
+        except ProgramError as refusal:
+            assert refusal.line is not None, sample
+            continue
+        if not corrected.report["moves"]["total"]:
+            continue
+        done += 1
+        if not linuxcnc.accepts(corrected.data, big):
+            wrong.append(str(sample))
+    assert not wrong
+    assert done >= 10
+
+
+# -- accepted before, accepted after ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("recipe", [Recipe(), Recipe(backlash_um={"X": 6.0, "Y": 4.0, "Z": 8.0})])
+@pytest.mark.parametrize("seed", range(10))
+def test_what_linuxcnc_took_it_still_takes(tmp_path: Path, seed: int, recipe: Recipe) -> None:
+    path = machines.random_machine(tmp_path, seed, recipe)
+    nominal = programs.random_program(seed, blocks=20)
+    assert linuxcnc.accepts(nominal, path)
+    texts = (
+        olp.correct(nominal, path),
+        olp.correct(nominal, path, expand_cycles=True),
+        olp.correct(nominal, path, split_rapids=True),
+    )
+    assert [linuxcnc.accepts(result.data, path) for result in texts] == [True] * len(texts)

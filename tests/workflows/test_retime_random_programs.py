@@ -1,0 +1,76 @@
+"""Programs re-timed as a user would, and judged: random ones, those shipped, and LinuxCNC's samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from fuzz import retime as retime_fuzz
+from judge import linuxcnc
+from workflows.test_correct_by_interpreter import samples, spacious
+from workflows.test_programs_folder import FOLDER, JOBS
+
+import olp
+from olp.core.errors import ProgramError
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory: pytest.TempPathFactory) -> olp.Setup:
+    return retime_fuzz.setup(tmp_path_factory.mktemp("fuzz"))
+
+
+def faults(seeds: Iterable[int], base: olp.Setup) -> dict[int, tuple[str, ...]]:
+    found = {seed: retime_fuzz.outcome(seed, base).wrong for seed in seeds}
+    return {seed: wrong for seed, wrong in found.items() if wrong}
+
+
+def test_random_programs_keep_every_limit(base: olp.Setup) -> None:
+    # three whose optimum once ran out of digits
+    assert faults([*range(8), 13, 323, 331], base) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(6))
+def test_random_programs_keep_every_limit_at_length(block: int, base: olp.Setup) -> None:
+    """More of them: tests/fuzz/fuzz_retime.py."""
+    assert faults(range(100 + 25 * block, 125 + 25 * block), base) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", JOBS)
+def test_shipped_programs_and_their_corrections_keep_every_limit(name: str) -> None:
+    path = FOLDER / name
+    machine, job = path.with_name("machine.toml"), path.with_name(JOBS[name])
+    setup = olp.load_setup(machine, job)
+    texts = [path.read_bytes()]
+    try:
+        texts.append(olp.correct(path, machine, job).data)
+    except ProgramError as refusal:
+        assert refusal.line is not None
+    for text in texts:
+        assert retime_fuzz.judged(text, setup).wrong == ()
+
+
+@pytest.mark.oracle
+@pytest.mark.slow
+def test_samples_of_linuxcnc_keep_every_limit(tmp_path: Path) -> None:
+    """Flattened, and those that LinuxCNC itself interprets then; a refusal names its line."""
+    path = spacious(tmp_path, (0.0, 0.0, 0.0))
+    setup = olp.load_setup(path, path.with_name("job.toml"))
+    done, wrong = 0, {}
+    for sample in samples():
+        try:
+            flat = olp.flatten(sample, path)
+            linuxcnc.interpret(flat, path, find_known=False)
+            found = retime_fuzz.judged(flat, setup)
+        except linuxcnc.InterpreterError:
+            continue
+        except ProgramError as refusal:
+            assert refusal.line is not None, sample.name
+            continue
+        done += bool(found.verdicts)
+        if found.wrong:
+            wrong[sample.name] = found.wrong
+    assert wrong == {}
+    assert done >= 15
