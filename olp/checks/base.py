@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from olp.core.toolpath import Index, Toolpath
-from olp.errormodel.base import Array, Mask
+from olp.core.arrays import Array, Index, Mask
+from olp.core.toolpath import Toolpath
 from olp.findings.catalogue import Finding
 
 _LISTED = 20

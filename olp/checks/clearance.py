@@ -21,10 +21,11 @@ from olp.clearance.search import CONTACT_MM, Best, search
 from olp.clearance.sweep import CHORD_MM, Ways, ways_of
 from olp.clearance.tree import Tree
 from olp.compensation.plan import zero_shifts
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import rotation_matrix
 from olp.core.machine import Mesh, Setup, WorkOffset
-from olp.core.toolpath import Flag, Index, Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.findings.catalogue import Finding
 

@@ -11,14 +11,13 @@ from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import told_findings
 from olp.compensation.holes import HolePlan
+from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.proof.proof import Proof
-
-Index = npt.NDArray[np.int64]
 
 _SAMPLED = 4096
 _WORST = 5

@@ -9,11 +9,12 @@ import numpy as np
 
 from olp.checks.base import finding, lines_of
 from olp.compensation.plan import targets, zero_shifts
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES, quarter_shares
 from olp.core.machine import Machine
-from olp.core.toolpath import Flag, Index, Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.feeds.moves import Scan, lengths_mm
 from olp.program.feeds.stated import programmed

@@ -7,9 +7,9 @@ import datetime
 import numpy as np
 
 from olp.checks.base import finding, lines_of
+from olp.core.arrays import Array
 from olp.core.machine import Job, Machine, Sanity, Setup
 from olp.core.toolpath import Flag, Toolpath
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
 from olp.proof.proof import ROUNDING_SHARE

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.clearance.distance import Array, Index, Swept, nearest
+from olp.clearance.distance import Swept, nearest
 from olp.clearance.tree import LEAF, Tree, box_distance
+from olp.core.arrays import Array, Index
 
 #: what is nearer than the nearest found so far by less than this is not looked for, in mm
 CLOSE_MM = 1e-4

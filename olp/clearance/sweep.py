@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.clearance.distance import Array, Index, Mask, Swept
+from olp.clearance.distance import Swept
 from olp.clearance.parts import Part
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arc_points
 from olp.core.toolpath import Toolpath
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.clearance.distance import Array, Index
+from olp.core.arrays import Array, Index
 
 #: triangles of a leaf
 LEAF = 4

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from olp.comparison.pairing import FAR, Order, Pairing, coarse, pair, thinned
-from olp.comparison.path import Array, Path
+from olp.comparison.path import Path
+from olp.core.arrays import Array
 from olp.core.rigid_fit import Rigid, fit_path, fit_points
 
 #: places that the search works on, and those of its first steps

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from olp.comparison.pairing import Order, Pairing
-from olp.comparison.path import Array, Index, Mask, Path, Split, split
+from olp.comparison.path import Path, Split, split
+from olp.core.arrays import Array, Index, Mask
 from olp.core.units import UM_PER_MM
 
 #: places along the path at which runs are compared

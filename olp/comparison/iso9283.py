@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.comparison.path import Array
+from olp.core.arrays import Array
 
 POSE_CYCLES = 30
 PATH_CYCLES = 10

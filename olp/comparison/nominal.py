@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from olp.comparison.path import Array, Index, Path
+from olp.comparison.path import Path
 from olp.compensation.plan import targets, zero_shifts
+from olp.core.arrays import Array, Index
 from olp.core.geometry import arc_points
 from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.base import ErrorModel

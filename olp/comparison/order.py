@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.comparison.path import Array, Index
+from olp.core.arrays import Array, Index
 
 Moves = npt.NDArray[np.uint8]
 

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from olp.comparison.order import banded, whole
-from olp.comparison.path import Array, Index, Mask, Path
+from olp.comparison.path import Path
+from olp.core.arrays import Array, Index, Mask
 
 Order = Literal["forward", "backward", "free"]
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Segments this much steeper than level have no left and right; X stands in for the vertical there.
 _UPRIGHT = 0.999

@@ -11,7 +11,8 @@ import numpy as np
 from olp.comparison.aligning import Alignment, align, paired, refit
 from olp.comparison.figures import Run
 from olp.comparison.pairing import Order, pair
-from olp.comparison.path import Array, Path
+from olp.comparison.path import Path
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.rigid_fit import Rigid, fit_path
 from olp.core.units import UM_PER_MM

@@ -15,13 +15,12 @@ import numpy.typing as npt
 
 from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.geometry import PLANES, arc_directions, arc_points
 from olp.core.toolpath import Arcs, Flag, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import steps_needed
-
-Index = npt.NDArray[np.int64]
 
 #: a centre is moved by a millimetre only to gain a micrometre of fit
 _STIFFNESS = 1e-3

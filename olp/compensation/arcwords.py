@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
-from olp.errormodel.base import Array, Mask
 from olp.program.text.edits import EditList, Edits
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from olp.compensation.statements import StatementWriter
     from olp.compensation.writer import Writer
 
-Index = npt.NDArray[np.int64]
 
 _AXES = np.array(PLANES)
 

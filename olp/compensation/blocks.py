@@ -11,15 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.rows import Rows
+from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
-from olp.errormodel.base import Mask
 from olp.program.text.edits import BARE, Edits
 
 if TYPE_CHECKING:
     from olp.compensation.writer import Writer
 
-Index = npt.NDArray[np.int64]
 
 #: M words that act when their block has ended
 _END_M = frozenset({0, 1, 2, 5, 9, 30, 60})

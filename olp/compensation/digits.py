@@ -12,9 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
+from olp.core.arrays import Array, Index, Mask
 
 _POW10 = 10.0 ** np.arange(19)
 _INT10 = 10 ** np.arange(19, dtype=np.int64)

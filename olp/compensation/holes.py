@@ -13,9 +13,10 @@ import numpy as np
 
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
+from olp.core.arrays import Array
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.program.program import Hole, Program
 from olp.program.text.edits import EditList, Edits
 

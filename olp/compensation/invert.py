@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import NotInvertible
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 
 #: A command is good when its error differs from the one it was made with by less than this.
 TOLERANCE_MM = 1e-9

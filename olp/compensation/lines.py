@@ -9,14 +9,13 @@ long as it can be.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.compensation.invert import bent
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 
-Index = npt.NDArray[np.int64]
 Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance

@@ -15,10 +15,11 @@ from olp.compensation.arcs import subdivide_arcs
 from olp.compensation.invert import invert
 from olp.compensation.lines import subdivide_lines
 from olp.compensation.reversal import Reversal, carry_play
+from olp.core.arrays import Array, Mask
 from olp.core.errors import OutsideBox, ProgramError
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag, Frame, Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 
 #: share of the tolerance that chords may use; the rest is for the search's own steps
 CHORD_SHARE = 0.95

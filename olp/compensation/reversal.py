@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.invert import invert
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Flag, Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 
 if TYPE_CHECKING:
     from olp.compensation.plan import Plan
 
-Index = npt.NDArray[np.int64]
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 _NO_TOOL = np.zeros(3)

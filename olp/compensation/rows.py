@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.digits import Digits
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Flag
-from olp.errormodel.base import Array, Mask
 
 if TYPE_CHECKING:
     from olp.compensation.writer import Writer
 
-Index = npt.NDArray[np.int64]
 
 
 @dataclass(slots=True, eq=False)

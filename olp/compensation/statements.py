@@ -20,13 +20,12 @@ from olp.compensation.statement_arcs import FINE_DECIMALS, MOST_DECIMALS, ROW, a
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
 from olp.compensation.wrapping import carded, wrapped
+from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag, Kind
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.program.text.edits import BARE, EditList, Edits, Prefixes, splice
-
-Index = npt.NDArray[np.int64]
 
 CHUNK = 1 << 15
 _POW10 = 10.0 ** np.arange(19)

@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
-from olp.compensation.statements import Index, StatementWriter
+from olp.compensation.statements import StatementWriter
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
-from olp.errormodel.base import Array
 from olp.program.text.edits import Edits
 from olp.program.text.numbers import Number, Placing, number, spliced, written
 

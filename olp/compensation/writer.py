@@ -20,13 +20,12 @@ from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
+from olp.core.arrays import Index, Mask
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag, Frame, Kind
-from olp.errormodel.base import ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.program.text.edits import Edits, Prefixes, splice
-
-Index = npt.NDArray[np.int64]
 
 CHUNK = 1 << 15
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)

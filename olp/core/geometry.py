@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from olp.core.arrays import Array
+
 Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
 
 #: Plane number to (first, second, third) axis, right-handed: G17, G18, G19.

@@ -18,7 +18,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from olp.core.arrays import Array
+
 Index = npt.NDArray[np.intp]
 Kind = Literal["linear", "cubic"]
 

@@ -14,7 +14,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from olp.core.arrays import Array
+
 Column = Array | float
 Kind = Literal["linear", "pchip"]
 

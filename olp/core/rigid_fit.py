@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
-
-Array = npt.NDArray[np.float64]
 
 #: A motion of the whole that moves the points across their path by less than this share of it: noise would
 #: come back a hundredfold.

@@ -9,15 +9,14 @@ from enum import IntEnum, IntFlag
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.geometry import arc_points, quarter_shares
 from olp.core.machine import ZERO, Vector
 
-Array = npt.NDArray[np.float64]
 #: A tool vector in mm, and the payload in kg behind it where there is one.
 Tool = tuple[float, ...]
 #: An axis position in mm, and the tool with which it was touched.
 Touch = tuple[Vector, Tool]
-Index = npt.NDArray[np.int64]
 
 
 class Kind(IntEnum):

@@ -19,11 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+from olp.core.arrays import Array, Mask
 
 
 class ErrorModel(Protocol):

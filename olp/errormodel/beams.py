@@ -16,10 +16,10 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.gridded import COVER_MM, ComponentTable
 
 #: Standard gravity (CGPM 1901), in N per kg.

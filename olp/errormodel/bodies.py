@@ -13,11 +13,11 @@ from typing import Protocol
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.interpolation import Column
 from olp.core.machine import CHAINS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.components import AxisComponents
 

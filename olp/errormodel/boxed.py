@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
-from olp.errormodel.base import Array, Mask
 
 
 def as_points(axis_mm: object, name: str = "axis_mm") -> Array:

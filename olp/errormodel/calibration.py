@@ -14,10 +14,10 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.beams import Beam
 from olp.errormodel.gridded import COVER_MM, ComponentTable, DeviationMap, cover_problems, frozen, refuse
 from olp.errormodel.structure import Structure

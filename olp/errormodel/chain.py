@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.interpolation import Column
-from olp.errormodel.base import Array, Mask
 from olp.errormodel.bodies import CROSS, Body
 from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound

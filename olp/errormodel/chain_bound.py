@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 from olp.errormodel.bodies import Body
 from olp.errormodel.chord import Variation, bins
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.grid_interpolation import Grid
 from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array, Mask
 from olp.errormodel.bodies import CROSS, Levers, levers_of
 from olp.errormodel.boxed import Boxed, as_points, as_tool, payload_of
 from olp.errormodel.components import DIRECTIONS

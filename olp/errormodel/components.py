@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.interpolation import ON_GRID_MM, Column, DenseTable, Interpolant, dense_table
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Cyclic
 from olp.errormodel.chord import Variation
 from olp.errormodel.cyclic import cyclic_value

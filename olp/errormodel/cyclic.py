@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 from olp.errormodel.calibration import Cyclic
 
 

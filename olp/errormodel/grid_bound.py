@@ -14,9 +14,9 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.grid_interpolation import Grid
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.chord import UPPER_MM, bins
 
 

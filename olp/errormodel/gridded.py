@@ -12,12 +12,12 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.grid_interpolation import KINDS
 from olp.core.grid_interpolation import Kind as Interpolation
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: A table may miss a face of the box by rounding of its file, no more.
 COVER_MM = 1e-6

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.grid_interpolation import Grid
 from olp.core.units import AXES
-from olp.errormodel.base import Array, Mask
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import DeviationMap

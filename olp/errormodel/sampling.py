@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel.base import Array, ErrorModel
+from olp.core.arrays import Array
+from olp.errormodel.base import ErrorModel
 
 MOST_STEPS = 1 << 18
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.interpolation import Column
 from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.bodies import Body, build_bodies
 from olp.errormodel.boxed import as_points
 from olp.errormodel.calibration import Calibration, Thermal

@@ -14,10 +14,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.gridded import COVER_MM, ComponentTable, refuse
 
 SHAPES = ("offset", "growth", "bow")

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.units import AXES
-from olp.errormodel.base import Array, Mask
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.calibration import Thermal
 

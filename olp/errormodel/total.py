@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import as_points
 
 

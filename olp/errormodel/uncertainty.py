@@ -15,10 +15,10 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 
 Kind = Literal["mean", "half", "wave", "squareness", "backlash"]

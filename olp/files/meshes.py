@@ -7,13 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import InputError
 from olp.files.write import PathLike, read_bytes
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 def read_mesh(path: PathLike) -> tuple[Array, Index]:

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import InputError
 from olp.files.point_profile import MEASURED, PointProfile, looked_at
 from olp.files.problems import nearest
 from olp.files.write import PathLike, read_bytes
 from olp.program.text.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

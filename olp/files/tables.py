@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES, shifted
 from olp.files.problems import Problem, config_error, nearest
 from olp.files.write import PathLike, read_bytes
 
-Array = npt.NDArray[np.float64]
 #: A data row: its line in the file and the number in each column.
 Row = tuple[int, list[float]]
 

@@ -17,9 +17,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.lexer import WordChunk
-from olp.program.rs274.motion import Mask
 
 _DIRECTIVE = re.compile(rb"([(;])[ \t]*olp[ \t]+([^\r\n]*)", re.IGNORECASE)
 _SWITCH = re.compile(rb"(off|on)\b", re.IGNORECASE)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.toolpath import Frame, Touch, carried
 
-Array = npt.NDArray[np.float64]
 Turn = tuple[Vector, Vector, Vector]
 
 UP: Vector = (0.0, 0.0, 1.0)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index
 from olp.core.toolpath import Toolpath
 from olp.program.dialect import Dialect
 from olp.program.rs274.profiles import Profile
 from olp.program.rs274.state import Capture, PathMode
 
-Index = npt.NDArray[np.int64]
 Small = npt.NDArray[np.int32]
 
 

@@ -9,15 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 from olp.program.dialect import Dialect
 from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
 from olp.program.text.columns import Columns
 from olp.program.text.statements import Chunk, Field, Statement, is_cards
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 _POW10 = 10.0 ** np.arange(19)
 _NONE = (-1, -1, -1)

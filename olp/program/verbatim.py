@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Arcs, Frame, Kind, Toolpath
 from olp.program.dialect import Dialect
@@ -17,7 +18,6 @@ from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Word
 from olp.program.text.numbers import MOST_DECIMALS, number
 
 Small = npt.NDArray[np.int32]
-Index = npt.NDArray[np.int64]
 #: speeds are read, and none is written back
 _UNWRITTEN = StatedFeeds(np.zeros(1, np.int64), np.ones(1, np.int64), np.full(1, -1))
 

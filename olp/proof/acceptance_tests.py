@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from olp.compensation.invert import invert
+from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 
 #: Radius of the circles at most, and their share of the shorter side of the calibrated box.

@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_distance, arc_points, segment_distance
 from olp.core.toolpath import Flag, Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_states
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 
-Index = npt.NDArray[np.int64]
 #: enough for deviations, which are small, and half the memory
 Single = npt.NDArray[np.float32]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.program.program import Program
-from olp.proof.deviation import Index
 
 #: a way-point counts as reached within this where nothing comes nearer; corrections are far smaller
 GATE_MM = 0.05

@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import targets, zero_shifts
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
-from olp.proof.deviation import Deviation, Index, cutting_moves, measure
+from olp.proof.deviation import Deviation, cutting_moves, measure
 from olp.proof.matching import match
 
 #: the proof samples so finely that the error bends by less than this share of the tolerance between samples

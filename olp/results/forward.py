@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import OutsideBox
 from olp.core.machine import Vector
 from olp.core.toolpath import Touch
 from olp.errormodel.base import ErrorModel
 from olp.results.reported import Reported
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 #: Where the touch lies about a tip is tried in these directions where nothing states it.
 _ROUND = np.array([s * np.eye(3)[i] for i in range(3) for s in (1.0, -1.0)])

@@ -12,11 +12,11 @@ from typing import Any, Literal
 import numpy as np
 
 from olp.compensation.plan import targets, zero_shifts
+from olp.core.arrays import Array, Index
 from olp.core.errors import naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import MM_PER_UM
-from olp.errormodel.base import Array
 from olp.files.points import read_points
 from olp.files.write import read_bytes, write_bytes
 from olp.program.program import Program
@@ -28,7 +28,6 @@ from olp.review.measured import Matched, Matcher
 from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, retimed, table
 from olp.review.page import page
-from olp.review.parts import Index
 from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene, Sureness
 from olp.uncertainty.probability import within

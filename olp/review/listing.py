@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array, Index
 from olp.program.program import Program
-from olp.review.parts import Index
 
 Small = npt.NDArray[np.int32]
 Single = npt.NDArray[np.float32]

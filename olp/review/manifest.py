@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.findings.catalogue import RULES
 from olp.proof.deviation import cutting_moves
 from olp.review.listing import largest

@@ -11,13 +11,13 @@ from olp.comparison import runs
 from olp.comparison.figures import Run
 from olp.comparison.nominal import Nominal, nominal_of
 from olp.compensation.plan import zero_shifts
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Setup
 from olp.core.toolpath import Toolpath
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.files.points import Points, row_line
 from olp.findings.catalogue import Finding
-from olp.review.parts import Index
 from olp.review.samples import Samples
 
 #: points farther from their place are left out

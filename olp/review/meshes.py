@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.geometry import rotation_matrix
 from olp.core.machine import Machine, Mesh, Setup
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.files.meshes import read_mesh
 
 #: more faces than this are drawn coarser

@@ -9,14 +9,13 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
-from olp.errormodel.base import Array
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import timing
 from olp.program.program import Program
-from olp.review.parts import Index
 from olp.review.samples import Samples
 from olp.trajectory.from_program import SHORTEST_MM, axis_limits
 from olp.trajectory.motion import Motion

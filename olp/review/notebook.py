@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
-from olp.errormodel.base import Array, Mask
 from olp.review.job import Review
 from olp.review.manifest import LAYERS, MEASURED
 

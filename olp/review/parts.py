@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES, arc_points
 from olp.core.toolpath import Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
-
-Index = npt.NDArray[np.int64]
 
 _STRAIGHT = (Kind.RAPID, Kind.LINE, Kind.PROBE)
 #: samples that are evaluated at once: their temporaries fit the cache

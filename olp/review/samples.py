@@ -13,14 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import zero_shifts
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.toolpath import Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel, Mask
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
-from olp.review.parts import BLOCK, Ends, Index, Parts, error_mm, held_mm, set_beside, set_in_holes
+from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes
 
 #: samples that a path is given unless its length asks for fewer, and the shortest and longest step between
 #: them

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
-from olp.errormodel.base import Array
 from olp.program.program import Program
 from olp.review.listing import Listing
 from olp.review.measured import Matched

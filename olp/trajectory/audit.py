@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
 from olp.trajectory.extremes import largest as extreme
 from olp.trajectory.extremes import nodes
-from olp.trajectory.motion import Array, Motion
-from olp.trajectory.pieces import Mask, Pieces, bernstein, blocks, dot
+from olp.trajectory.motion import Motion
+from olp.trajectory.pieces import Pieces, bernstein, blocks, dot
 from olp.trajectory.route import AxisLimits
 
 #: places looked at for the speed along the path, ends included

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.trajectory.route import Array, AxisLimits
+from olp.core.arrays import Array
+from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 
 #: share of the jerk left that 3 q'' v a may use up

@@ -11,13 +11,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
-from olp.trajectory.route import Array, Index, Route
+from olp.trajectory.route import Route
 from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, Rival, Run, Solver
 from olp.trajectory.speedgrid import bound_s
 

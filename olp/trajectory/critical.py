@@ -12,16 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.trajectory import ramps
 from olp.trajectory.ceilings import ceilings
 from olp.trajectory.growing import Growing
 from olp.trajectory.motion import Motion
-from olp.trajectory.route import Array, AxisLimits, Index
+from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
-
-Mask = npt.NDArray[np.bool_]
 
 #: share of each limit that curvature may use up at full speed: in general, where the first profile holds its
 #: speed, and in a bend between straights, where nothing is left to do but to pass

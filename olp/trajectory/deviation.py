@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import UsageError
-from olp.trajectory.motion import Array, Index, Motion
+from olp.trajectory.motion import Motion
 from olp.trajectory.pieces import Pieces, blocks, dot
 from olp.trajectory.route import Route
 from olp.trajectory.same import groups_of_same

@@ -12,7 +12,7 @@ from math import comb
 
 import numpy as np
 
-from olp.trajectory.route import Array
+from olp.core.arrays import Array
 
 #: what a bound may exceed the value found by, relative, and the cuts after which the bound is taken
 _CLOSE, _CUTS = 1e-8, 40

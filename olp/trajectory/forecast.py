@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.trajectory import ramps
 from olp.trajectory.critical import BY_BEND
-from olp.trajectory.route import Array, AxisLimits, Route
+from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import MOST_WIDTH
 
 _TINY = 1e-300

@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arc_points
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
 from olp.program.program import Program
-from olp.trajectory.route import Array, AxisLimits, Index, Route
-
-Mask = npt.NDArray[np.bool_]
+from olp.trajectory.route import AxisLimits, Route
 
 #: What chords of arcs may take of a tolerance.
 CHORD_SHARE = 0.1

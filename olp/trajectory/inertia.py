@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import Machine
-from olp.trajectory.motion import Array, Index, Motion
+from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits
-
-Mask = npt.NDArray[np.bool_]
 
 #: um per m/s^2 in mm per mm/s^2
 _UNIT = 1e-6

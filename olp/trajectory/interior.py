@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
 
-from olp.trajectory.route import Array, AxisLimits, Index
+from olp.core.arrays import Array, Index
+from olp.trajectory.route import AxisLimits
 
 #: three-point Gauss rule on [0, 1] for the time of a cell
 _GAUSS = 0.5 + 0.5 * np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.trajectory.route import Array, Index
+from olp.core.arrays import Array, Index
 
 
 def deviations(

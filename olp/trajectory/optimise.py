@@ -14,10 +14,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import LinAlgError
 
+from olp.core.arrays import Array, Index
 from olp.trajectory.critical import Profile, Timeline
 from olp.trajectory.interior import Rows, Spline, fits, least_time
 from olp.trajectory.motion import Motion
-from olp.trajectory.route import Array, AxisLimits, Index
+from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 from olp.trajectory.speedgrid import CELL_S, grid, speed_caps
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import UsageError
 from olp.trajectory.growing import Growing
 from olp.trajectory.motion import Motion
@@ -24,10 +24,6 @@ from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.ruckig_moves import solve_all
 from olp.trajectory.same import groups_of_same
 from olp.trajectory.scurve import CRUISE, PHASES, rest_to_rest_s, states
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: overlaps end this part of the first jerk phase early, so that the middle has room
 _ROOM = 0.98

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-import numpy.typing as npt
 
-from olp.trajectory.motion import Array, Index, Motion, derivatives
-
-Mask = npt.NDArray[np.bool_]
+from olp.core.arrays import Array, Index, Mask
+from olp.trajectory.motion import Motion, derivatives
 
 #: pieces in one block: its columns stay in the cache
 _BLOCK = 1 << 12

@@ -14,11 +14,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.progress import Progress
 from olp.trajectory.audit import Audit, Ratios, with_jumps
 from olp.trajectory.contest import contest, fastest, stops_of
-from olp.trajectory.motion import Array, Index, Motion
+from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import needs_stop
 from olp.trajectory.solvers import Run

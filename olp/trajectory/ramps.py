@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from olp.trajectory.route import Array, Index
+from olp.core.arrays import Array, Index
 
 #: below this share of the speed a change of speed is rounding, and is not made
 _NO_CHANGE = 1e-10

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+from olp.core.arrays import Array, Index
 
 
 @dataclass(frozen=True, slots=True, eq=False)

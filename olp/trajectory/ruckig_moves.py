@@ -13,14 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import ruckig
 
+from olp.core.arrays import Array, Mask
 from olp.core.errors import CannotCompute, UsageError
 from olp.trajectory.scurve import PHASES, rest_to_rest_s, states, through_peak
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 #: states that touch a limit exactly fail in up to 9 % of the cases unless the limit is a little wider
 _WIDER = 1.0 + 1e-9

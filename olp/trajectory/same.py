@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+from olp.core.arrays import Array, Index
 
 #: (mm) way-points nearer to the one before are the same
 SAME_MM = 1e-9

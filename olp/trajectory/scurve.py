@@ -12,10 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+from olp.core.arrays import Array, Mask
 
 #: columns of a move: 2 to reach an allowed state, 3 up, the cruise, 3 down, 1 to leave with acceleration
 PHASES = 10

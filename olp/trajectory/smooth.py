@@ -16,13 +16,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.trajectory.kernels import deviations, least_over
-from olp.trajectory.route import Array, AxisLimits, Index, Route
-
-Mask = npt.NDArray[np.bool_]
+from olp.trajectory.route import AxisLimits, Route
 
 #: points closer than this, or this share of the least tolerance, are one, mm
 _SAME_MM, _SAME_SHARE, _SAME_LEAST_MM = 1e-4, 0.02, 1e-9

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.trajectory.critical import Profile, best_profile, driven
 from olp.trajectory.forecast import expected_s
 from olp.trajectory.motion import Motion
 from olp.trajectory.overlap import least_s, overlap
-from olp.trajectory.route import Array, AxisLimits, Route
+from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import SmoothPath, smooth
 
 #: how they are named in a report

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.trajectory import ramps
 from olp.trajectory.ceilings import ceilings
 from olp.trajectory.critical import Profile, Timeline, free_speeds
-from olp.trajectory.route import Array, AxisLimits, Index
+from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 
 #: time of a cell in the closed-form profile, s; of one at full feed, in cells; least share of one; least

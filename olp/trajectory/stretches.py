@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.trajectory.contest import stops_of
-from olp.trajectory.route import Array, AxisLimits, Index, Route
+from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import SOLVERS, Rival
 from olp.trajectory.speedgrid import CELL_S
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.trajectory.plan import Trajectory
-from olp.trajectory.route import Array, Index, Route
+from olp.trajectory.route import Route
 from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
 
 #: lines and places that a report names

@@ -11,11 +11,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from olp.trajectory.motion import Array, Index, Motion
+from olp.core.arrays import Array, Index, Mask
+from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
-
-Mask = npt.NDArray[np.bool_]
 
 #: what a motion can be limited by, in the order of the columns
 LIMITS = (*(f"{axis} {what}" for what in ("velocity", "acceleration", "jerk") for axis in "XYZ"), "feed")

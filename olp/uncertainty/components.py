@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.sensitivity import value_rows
 from olp.errormodel.uncertainty import Entry, Uncertainty

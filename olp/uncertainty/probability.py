@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 #: Directions of half a sphere over which `within` integrates, and how many numbers that may take: with the
 #: most it is right to a part in a thousand, with the fewest to some.

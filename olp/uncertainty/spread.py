@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.compensation.plan import zero_shifts
+from olp.core.arrays import Array, Index
 from olp.core.machine import Vector
 from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Frame, Kind, Toolpath
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.errormodel.sensitivity import Rows, Sensitivity
 from olp.program.program import Program
@@ -28,7 +28,6 @@ from olp.uncertainty.probability import normal, within
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Index = npt.NDArray[np.int64]
 #: Coverage factor of bands: with normal errors about 95 % of a coordinate.
 COVERAGE = 2.0
 #: Draws of the whole calibration for what holds at many way-points at once, and numbers to draw at the most.

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from olp.core.toolpath import Index, Toolpath
+from olp.core.arrays import Array, Index
+from olp.core.toolpath import Toolpath
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.errormodel.sensitivity import Expansion
 from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding

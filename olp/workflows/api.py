@@ -12,11 +12,11 @@ import numpy as np
 from olp.checks import correction as checks
 from olp.compensation.plan import zero_shifts
 from olp.compensation.stamp import find_stamp
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError, OlpError, naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Kind, carried
-from olp.errormodel.base import Array
 from olp.files.config import load_setup as load_setup
 from olp.findings.catalogue import Finding
 from olp.program.registry import Options, read

@@ -17,10 +17,10 @@ from olp.calibration.design.prediction import Planned, Prediction, predict
 from olp.calibration.design.visiting import move_s, order
 from olp.calibration.diagnosis.deciding import offsets
 from olp.calibration.observations.readings import Line
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Machine, Setup, Vector
 from olp.core.units import AXES, MM_PER_UM, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.files.measurements.plan_files import Pass, plan_files
 from olp.findings.catalogue import Finding
 from olp.program.registry import read

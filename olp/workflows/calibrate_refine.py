@@ -15,10 +15,10 @@ from olp.calibration.diagnosis.refinement import Refinement, refine
 from olp.calibration.estimator.covariance import sigmas_at
 from olp.calibration.observations.readings import Points
 from olp.comparison.nominal import nominal_of
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import plays

@@ -16,13 +16,13 @@ from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp
+from olp.core.arrays import Array
 from olp.core.errors import OlpError, UsageError, naming
 from olp.core.geometry import PLANES
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
-from olp.errormodel.base import Array
 from olp.files.meshes import read_mesh
 from olp.findings.catalogue import CONFIDENCE_CODES, GATE_CODES, Finding
 from olp.program.program import Program

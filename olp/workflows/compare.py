@@ -15,7 +15,8 @@ from olp.checks import state
 from olp.comparison import figures, runs
 from olp.comparison.nominal import Nominal, nominal_of
 from olp.comparison.pairing import Order
-from olp.comparison.path import Array, Index, Path
+from olp.comparison.path import Path
+from olp.core.arrays import Array, Index
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent

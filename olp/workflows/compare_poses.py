@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from olp.comparison import iso9283
-from olp.comparison.path import Array, Mask
 from olp.comparison.runs import Align, eaten_finding
+from olp.core.arrays import Array, Mask
 from olp.core.errors import InputError
 from olp.core.rigid_fit import Rigid, fit_frame
 from olp.core.units import UM_PER_MM

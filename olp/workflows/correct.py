@@ -18,12 +18,12 @@ from olp.compensation.plan import Limits, Plan, plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
 from olp.compensation.writing import write
+from olp.core.arrays import Array, Index
 from olp.core.errors import AlreadyCorrected, OlpError, ProgramError, UsageError, naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
-from olp.core.toolpath import Flag, Index, Toolpath
+from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read

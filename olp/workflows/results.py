@@ -13,10 +13,10 @@ import numpy as np
 
 from olp.checks import state
 from olp.compensation.stamp import find_stamp, stamp_line, stamped
+from olp.core.arrays import Array
 from olp.core.errors import AlreadyCorrected, InputError, OlpError, UsageError
 from olp.core.machine import Setup
 from olp.core.units import UM_PER_MM
-from olp.errormodel.base import Array
 from olp.files.point_profile import load_profile
 from olp.findings.catalogue import Finding
 from olp.program.text.delimited import Layout, first_lines, told

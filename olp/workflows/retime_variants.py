@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, OlpError, UsageError, naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress
@@ -23,7 +24,7 @@ from olp.program.rs274.state import PathMode
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
 from olp.trajectory.inertia import Inertial, capped, sure
 from olp.trajectory.plan import Trajectory, plan
-from olp.trajectory.route import Array, AxisLimits, Route
+from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.usage import LineUse, SlowPlaces, usage
 from olp.workflows.session import reading, unrolled
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime
 from typing import Any
 
+from olp.core.arrays import Index
 from olp.core.progress import Progress
-from olp.core.toolpath import Index
 from olp.core.units import MM_PER_UM
 from olp.errormodel.sensitivity import Expansion, Sensitivity
 from olp.errormodel.uncertainty import Uncertainty

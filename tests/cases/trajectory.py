@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from olp.trajectory.motion import Array, Motion
-from olp.trajectory.route import AxisLimits, Index, Route
+from olp.core.arrays import Array, Index
+from olp.trajectory.motion import Motion
+from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.same import groups_of_same
 
 #: samples in one block, and segments that a search looks ahead

@@ -11,8 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.units import AXES
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
 
 

@@ -13,10 +13,11 @@ import numpy as np
 
 from olp.calibration.control_tables.controls import Control, Uncompensated
 from olp.compensation.invert import invert
+from olp.core.arrays import Array
 from olp.core.rigid_fit import fit_points
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.units import UM_PER_MM
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import play_states, plays

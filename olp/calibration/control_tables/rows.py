@@ -10,10 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.core.machine import COMPONENTS, ZERO
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.bodies import Lever, build_bodies
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Reference
 from olp.errormodel.cyclic import cyclic_value

@@ -12,10 +12,10 @@ from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.lengths import Station
 from olp.calibration.observations.pods import Pose
 from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points, Square
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 Scattered = Points | Lengths | Pods
 #: Lines: mm between targets, targets at least, runs there and back.

@@ -19,9 +19,9 @@ from olp.calibration.observations.lines import Noise, line_block, square_names
 from olp.calibration.observations.pods import Pose, pods_block
 from olp.calibration.observations.points import points_block
 from olp.calibration.observations.readings import Measurements
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: Places in the box where the uncertainty is judged, by tool.
 _PLACES = 150

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.machine import Axis
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: Exchanges of two legs are tried so often over all places.
 _ROUNDS = 6

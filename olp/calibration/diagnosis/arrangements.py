@@ -10,8 +10,8 @@ from itertools import combinations
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Curve
 
 

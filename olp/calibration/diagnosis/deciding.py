@@ -9,8 +9,8 @@ import numpy as np
 
 from olp.calibration.diagnosis.doctor import Diagnosis
 from olp.calibration.diagnosis.factors import DECIDED_Z, contributions_of, design_of
+from olp.core.arrays import Array
 from olp.core.machine import Vector
-from olp.errormodel.base import Array
 from olp.errormodel.build import build
 
 #: Places that are tried, and points proposed at most.

@@ -22,9 +22,9 @@ from olp.calibration.diagnosis.factors import (
 )
 from olp.calibration.estimator.parameters import frame_columns
 from olp.calibration.observations.readings import Points
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.uncertainty import Uncertainty, fingerprint

@@ -17,8 +17,9 @@ from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence, sol
 from olp.calibration.estimator.parameters import LEVER_MM, frame_columns
 from olp.calibration.observations.points import deviations
 from olp.calibration.observations.readings import Points
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
-from olp.errormodel.base import Array, ErrorModel
+from olp.errormodel.base import ErrorModel
 
 #: What may have happened to a curve: factor, words, prior probability (either sign alike where signed).
 AS_STATED, FLIPPED = 0.80, 0.10

@@ -15,10 +15,10 @@ from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of,
 from olp.calibration.estimator.parameters import LEVER_MM, frame_columns
 from olp.calibration.estimator.screening import OUTLIER, SHARE
 from olp.calibration.observations.readings import Points
+from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.rigid_fit import fit_frame
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
 from olp.errormodel.sensitivity import Sensitivity, value_rows

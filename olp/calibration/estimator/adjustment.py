@@ -33,11 +33,11 @@ from olp.calibration.observations.radial import (
     radial_block,
 )
 from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: Cells of the spline of a curve: as many as a line has targets between these.
 FEWEST, MOST = 6, 48

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

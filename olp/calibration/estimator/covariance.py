@@ -10,9 +10,9 @@ import numpy as np
 from olp.calibration.estimator.adjustment import Fit
 from olp.calibration.estimator.basis import Kink
 from olp.calibration.estimator.curves import DIGITS
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.uncertainty import Entry, Uncertainty, fingerprint
 

@@ -12,10 +12,10 @@ import numpy as np
 from olp.calibration.estimator.adjustment import Fit
 from olp.calibration.estimator.basis import Kink, Step
 from olp.calibration.estimator.parameters import Place
+from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
 
 #: Interpolation of the grid stays this close to the fitted curve: 0.02 um, 0.02 urad.

@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 #: How far out the sines vanish, in half lengths of the box: near that the process would be held to zero.
 REACH = 2.0

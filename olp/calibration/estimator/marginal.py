@@ -12,7 +12,7 @@ import numpy as np
 
 from olp.calibration.estimator.field import LONGEST, REACH, SHORTEST, Modes
 from olp.calibration.estimator.widened import Reduced
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 Noise = Literal["learnt", "stated"]
 

@@ -2,8 +2,8 @@
 
 The field (a Gaussian process for each of DX, DY, DZ, see `olp.calibration.estimator.field`) joins the
 adjustment as further unknowns. Size and lengths of each process, and by how much noise is larger than stated,
-are those of the largest marginal likelihood. A process stays only where the evidence for it is strong and where it
-foretells readings that it has not seen.
+are those of the largest marginal likelihood. A process stays only where the evidence for it is strong and
+where it foretells readings that it has not seen.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from olp.calibration.estimator.field import REACH, Modes
 from olp.calibration.estimator.marginal import Learnt, Noise, alone_of, learn, log_evidence, part_of
 from olp.calibration.estimator.widened import FOLDS, Adjustment, Reduced, solver_of, straight, wide
 from olp.calibration.observations.readings import Lengths, Pods, Points
+from olp.core.arrays import Array
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: A process is there where the log evidence for it is larger than this: chances of 1 to 3000, and what its
 #: four free numbers gain from noise alone is far below.

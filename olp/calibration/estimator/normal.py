@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 Index = npt.NDArray[np.intp]
 

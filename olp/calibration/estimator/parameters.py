@@ -14,9 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from olp.calibration.estimator.basis import CurveSpace, Wave
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: An angle about a adds sign * angle * lever_k to row i: (i, a, k, sign).
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))

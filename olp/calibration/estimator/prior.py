@@ -13,8 +13,8 @@ from olp.calibration.estimator.normal import Normal, evidence
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
 from olp.calibration.observations.readings import FRAME_MM
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
-from olp.errormodel.base import Array
 
 #: Standard deviation of a squareness and of the pose of a square that nobody knows, rad.
 SQUARE = 1e-3

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.estimator.nonrigid import NonRigid
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.grid_interpolation import Grid
 from olp.core.machine import Vector
 from olp.core.units import UM_PER_MM
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.gridded import DeviationMap
 from olp.findings.catalogue import Finding

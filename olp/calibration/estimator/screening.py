@@ -12,7 +12,7 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Solved, residuals_of
 from olp.calibration.observations.lines import Noise, group_of, noise_of
 from olp.calibration.observations.readings import Lengths, Line, Points
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.
 OUTLIER, SHARE = 6.0, 0.05

@@ -17,7 +17,7 @@ from olp.calibration.estimator.basis import Feature, Kink, Spline, Step, Wave
 from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.observations.lines import Noise, drift_ramps, targets_of
 from olp.calibration.observations.readings import Line
-from olp.errormodel.base import Array
+from olp.core.arrays import Array
 
 #: Candidates for the standard deviation of second differences: mm or rad.
 ROUGHNESS = np.geomspace(1e-7, 1e-1, 37), np.geomspace(1e-10, 1e-4, 37)

@@ -23,9 +23,9 @@ from olp.calibration.estimator.parameters import LEVER_MM, SHEAR
 from olp.calibration.estimator.prior import class_of
 from olp.calibration.estimator.screening import LENGTH, POINT
 from olp.calibration.iso230.diagonals import Diagonal
+from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
 

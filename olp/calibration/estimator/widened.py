@@ -18,10 +18,10 @@ from olp.calibration.observations.lines import line_block, squareness_block
 from olp.calibration.observations.pods import CHUNK, pods_block
 from olp.calibration.observations.points import points_block
 from olp.calibration.observations.radial import radial_block
-from olp.calibration.observations.readings import Index, Lengths, Pods, Points
+from olp.calibration.observations.readings import Lengths, Pods, Points
+from olp.core.arrays import Array, Index
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: Parts into which the points fall for the held-out figure.
 FOLDS = 5

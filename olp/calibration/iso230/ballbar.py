@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.iso230.conventions import LEAN
-from olp.calibration.observations.readings import Array, Index, SquarenessReading
+from olp.calibration.observations.readings import SquarenessReading
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM

@@ -18,7 +18,8 @@ import numpy as np
 
 from olp.calibration.iso230.conventions import AXES_OF, LEAN
 from olp.calibration.iso230.positioning import Statistics, statistics, targets_of
-from olp.calibration.observations.readings import Array, Index, SquarenessReading
+from olp.calibration.observations.readings import SquarenessReading
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.observations.readings import Array
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.units import AXES, UM_PER_MM

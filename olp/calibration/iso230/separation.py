@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from olp.calibration.iso230.go_return import Reversal, reversal_of
 from olp.calibration.iso230.positioning import scale_of, targets_of
-from olp.calibration.observations.readings import Array, Line
+from olp.calibration.observations.readings import Line
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.errormodel.calibration import Cyclic
 from olp.findings.catalogue import Finding

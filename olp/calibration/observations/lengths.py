@@ -14,8 +14,8 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.observations.readings import Lengths
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
-from olp.errormodel.base import Array
 
 CHUNK = 4000
 #: Gauss and Newton have arrived where no station moves by more than this.

@@ -16,9 +16,9 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
 from olp.calibration.observations.readings import Line, SquarenessReading
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 
 #: Targets this close are one.
 SAME_MM = 0.05

@@ -16,9 +16,9 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.observations.readings import Pods
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.rigid_fit import fit_points, rotation_of
-from olp.errormodel.base import Array
 
 CHUNK = 2000
 #: Gauss and Newton have arrived where no pod moves by more than this.

@@ -14,9 +14,9 @@ import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import LEVER_MM, Unknowns, frame_columns
-from olp.calibration.observations.readings import Index, Points
+from olp.calibration.observations.readings import Points
+from olp.core.arrays import Array, Index
 from olp.core.rigid_fit import Rigid, fit_frame
-from olp.errormodel.base import Array
 
 #: Points whose rows are made at once: 30 MB with 600 parameters.
 CHUNK = 2000

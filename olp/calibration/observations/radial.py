@@ -18,8 +18,8 @@ from olp.calibration.iso230.ballbar import PLANES, SKIP_DEG, Circles
 from olp.calibration.iso230.diagonals import Diagonal
 from olp.calibration.observations.lines import Noise, drift_ramps, noise_of
 from olp.calibration.observations.readings import Line
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
-from olp.errormodel.base import Array
 
 CHUNK = 2000
 #: Columns of nuisances whose part of its own is below this share of the largest are combinations of others.

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from olp.calibration.iso230.ballbar import Circles
     from olp.calibration.iso230.diagonals import Diagonal
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 Reference = Literal["functional-point", "table"]
 #: Points in the frame of the machine are nearer than this to where they were commanded.
 FRAME_MM = 10.0

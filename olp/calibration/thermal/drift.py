@@ -20,9 +20,9 @@ import numpy as np
 
 from olp.calibration.thermal.drift_problem import DriftLog as DriftLog
 from olp.calibration.thermal.drift_problem import Problem, rms, thinned
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.structure import SHAPES, Distortion, Sensor, Structure
 from olp.findings.catalogue import Finding
 

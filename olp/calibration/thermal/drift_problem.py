@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.structure import SHAPES, lagged, shapes
 
 Index = npt.NDArray[np.intp]

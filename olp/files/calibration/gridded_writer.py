@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 
+from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.beams import Beam
 from olp.errormodel.gridded import ComponentTable, DeviationMap
 from olp.files.toml_text import toml_lines

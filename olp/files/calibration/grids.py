@@ -6,15 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES
 from olp.files.problems import Problem, config_error, nearest
-from olp.files.tables import Array, Row, headed, rows_of
+from olp.files.tables import Row, headed, rows_of
 from olp.files.write import PathLike, read_bytes
-
-Index = npt.NDArray[np.int64]
 
 MAP_COLUMNS = ("DX_um", "DY_um", "DZ_um")
 SIGMA_COLUMNS = tuple(f"sigma_{name}" for name in MAP_COLUMNS)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES, shifted
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.uncertainty import Uncertainty
 from olp.files.calibration.covariance import covariance_bytes

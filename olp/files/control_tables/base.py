@@ -14,10 +14,10 @@ import numpy as np
 
 from olp.calibration.control_tables.controls import Control
 from olp.calibration.control_tables.rows import Rows
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.calibration import Calibration, Curve, Reference
 from olp.files.problems import Problem, config_error
 from olp.findings.catalogue import Finding

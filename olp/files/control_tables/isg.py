@@ -19,10 +19,10 @@ import numpy as np
 
 from olp.calibration.control_tables.controls import Control, Volumetric
 from olp.calibration.control_tables.rows import MISS_MM, MISS_RAD, along_axes, common_rows, zeroed
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO
 from olp.core.units import AXES
-from olp.errormodel.base import Array
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Reference
 from olp.files.control_tables import base

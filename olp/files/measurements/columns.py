@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.files.measurements.readings import stated_keys
 from olp.files.problems import Problem, config_error, nearest, validate
 from olp.files.schema_base import Table
@@ -19,7 +20,6 @@ from olp.files.tables import decoded
 from olp.files.toml_text import Path
 from olp.files.write import PathLike, read_bytes
 
-Array = npt.NDArray[np.float64]
 T = TypeVar("T", bound=Table)
 
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.files.problems import config_error
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 def columns_as_runs(target: Array, directions: Sequence[int]) -> tuple[Index, Index, Index, Index]:

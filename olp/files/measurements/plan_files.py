@@ -12,9 +12,9 @@ import numpy.typing as npt
 from olp.calibration.design.layout import Scattered, scattered
 from olp.calibration.design.prediction import Planned
 from olp.calibration.observations.readings import Lengths, Line, Points
+from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
-from olp.errormodel.base import Array
 from olp.files.measurements.point_readings import AXIS, LENGTH, MEASURED, TOOL, directions
 from olp.files.starter import PLACEHOLDER_DATE
 from olp.files.toml_text import comment, toml_lines

@@ -21,13 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.units import AXES
 from olp.files.measurements.readings import stated_keys
 from olp.files.problems import Problem, config_error, nearest
 from olp.files.tables import decoded
 from olp.files.write import PathLike, read_bytes
-
-Array = npt.NDArray[np.float64]
 
 AXIS = tuple(f"{axis}_mm" for axis in AXES)
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)

@@ -23,16 +23,13 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.problems import Problem, config_error, nearest
 from olp.files.tables import decoded
 from olp.files.write import PathLike, read_bytes
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 #: What a file may state, and the factor that makes it actual minus commanded of the tool relative to the
 #: workpiece. A table that moves by +1 um too much carries the workpiece along: the tool is 1 um behind.

@@ -13,15 +13,13 @@ from types import MappingProxyType
 from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from olp.core.arrays import Array
 from olp.core.errors import InputError
 from olp.files.measurements.readings import ANGULAR, UNITS, Readings
 from olp.files.schema_base import Table
 from olp.files.write import PathLike, read_bytes
-
-Array = npt.NDArray[np.float64]
 
 RTX = ".rtx"
 MARK = b"HEADER::"

@@ -15,17 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.program.program import ArcText
 from olp.program.rs274.motion import SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE, arc_geometry
 from olp.program.statement_rows import StatementCollector
 from olp.program.text.statements import Field, Statement
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 _GROUP = re.compile(rb"(?i)\(\s*(CIRCLE|CYLNDR|LINE)\s*/([^()]*)\)")
 _AGAIN = re.compile(rb"(?i)2\s*,\s*INTOF\s*,")

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
@@ -23,7 +24,7 @@ from olp.program.apt.table import FREE, TABLE
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.frames import UP
 from olp.program.program import Program
-from olp.program.statement_rows import Array, Index, Mask, Point, Points
+from olp.program.statement_rows import Point, Points
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index, Mask
 from olp.program.described.forms import NUMBERS
 from olp.program.described.language import Rule, UserDialect
-from olp.program.rs274.lexer import Bytes, Index, Mask, numbers, runs
+from olp.program.rs274.lexer import Bytes, numbers, runs
 from olp.program.text.numbers import LONGEST
 
 _DIGITS = b"0123456789."

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup
-from olp.core.toolpath import Array, Flag, Index, Kind
+from olp.core.toolpath import Flag, Kind
 from olp.program.described.language import Rule, UserDialect
 from olp.program.described.lines import Kin, Line, Text, kin_of
 from olp.program.dialect import Dialect, Options

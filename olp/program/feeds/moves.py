@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import MM_PER_INCH
 from olp.program.program import Program, Words
-from olp.program.rs274.motion import Array, Index, Mask
 
 _POW10 = 10.0 ** np.arange(19)
 _PER_MINUTE, _PER_TURN, _INVERSE = 940, 950, 930

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError, UsageError
 from olp.core.toolpath import Flag, Kind
 from olp.program.feeds.moves import Scan, feeds, governing
 from olp.program.program import Program, Statements, Words
-from olp.program.rs274.motion import Array, Index
 
 
 @dataclass(frozen=True, slots=True, eq=False)

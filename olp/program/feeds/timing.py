@@ -14,12 +14,12 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError, UsageError
 from olp.core.toolpath import Kind
 from olp.program.feeds.moves import Scan, numbers
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program, Statements
-from olp.program.rs274.motion import Array, Index, Mask
 
 #: How far a control may round corners where a program does not say: Grbl's default of $11, and what a person
 #: expects of a finishing cut.

@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute, ProgramError
 from olp.program.feeds.moves import lengths_mm, numbers
 from olp.program.feeds.stated import feed_words, programmed
 from olp.program.program import Program, Words
-from olp.program.rs274.motion import Array, Index
 
 Shared = Literal["mean", "least"]
 

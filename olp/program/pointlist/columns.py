@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.program.rs274.lexer import Bytes, Index, Mask, blanked, numbers, runs
+from olp.core.arrays import Index, Mask
+from olp.program.rs274.lexer import Bytes, blanked, numbers, runs
 from olp.program.text.delimited import DELIMITERS, Layout
 from olp.program.text.numbers import LONGEST
 

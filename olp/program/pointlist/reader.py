@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import InputError, ProgramError
 from olp.core.machine import Setup
-from olp.core.toolpath import Array, Flag, Frame, Kind
+from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect, Options, Row, Support
 from olp.program.frames import FrameTable
 from olp.program.places import frame_index

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Arcs, Toolpath
 from olp.program.program import ArcSlots, Hole, Program, Words
 from olp.program.rs274.lexer import WordChunk
-from olp.program.rs274.motion import Array, Index, Mask
 from olp.program.rs274.state import State
 from olp.program.text.columns import Columns
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index, Mask
+
 Bytes = npt.NDArray[np.uint8]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 #: Bytes lexed at a time: the working columns then stay in the second-level cache.
 CHUNK = 1 << 18

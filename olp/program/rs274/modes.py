@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.lexer import WordChunk
-from olp.program.rs274.motion import Array, Index, Mask, modal, values
+from olp.program.rs274.motion import modal, values
 from olp.program.rs274.profiles import CUTTER_COMPENSATION, Act
 from olp.program.rs274.state import State
 

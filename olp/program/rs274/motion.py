@@ -11,13 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.program.rs274.lexer import WordChunk
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 _POW10 = 10.0 ** np.arange(19)
 _AXIS_OF = np.full(256, -1, np.int8)

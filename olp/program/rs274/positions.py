@@ -6,13 +6,12 @@ import textwrap
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.units import AXES
 from olp.program.rs274.profiles import Profile
 
-Array = npt.NDArray[np.float64]
 #: Lines of comments are no longer than some controls take.
 _WIDTH = 68
 #: What every program sets first: mm, absolute, no cycle, no tool length, no cutter compensation.

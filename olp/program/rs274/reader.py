@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
@@ -22,7 +23,7 @@ from olp.program.program import Program
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import PLANE_OF, Context, Modes, check_odd, scaled
-from olp.program.rs274.motion import Array, Blocks, arc_geometry, fill, gather
+from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
 from olp.program.rs274.profiles import CYCLES, PROBES, Profile
 from olp.program.rs274.special_blocks import Singles, event_block
 from olp.program.rs274.state import NAN, Effect, State

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
@@ -19,7 +20,7 @@ from olp.program.program import Hole
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycles import Stroke, hole_moves, levels
 from olp.program.rs274.modes import PLANE_OF, Context, scaled
-from olp.program.rs274.motion import Index, fill
+from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles import CUTTER_COMPENSATION, CYCLES, Act, Profile
 from olp.program.rs274.state import NAN, Effect, State, Word
 

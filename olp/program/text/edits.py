@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index
+
 Bytes = npt.NDArray[np.uint8]
-Index = npt.NDArray[np.int64]
 
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
 #: four digits of text at a time

@@ -16,12 +16,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.lexer import CHUNK, blanked, numbers, runs, slow_number
 
 Bytes = npt.NDArray[np.uint8]
-Index = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EDed][+-]?\d+)?\Z")
 _QUOTED = re.compile(rb"'[^'\r\n]*'")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from olp.comparison.figures import Run
-from olp.comparison.path import Array, Path
+from olp.comparison.path import Path
+from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
 from olp.reports.plots.base import drawn
 from olp.uncertainty.spread import Confidence

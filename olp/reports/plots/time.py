@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import UsageError
 from olp.core.units import AXES
 from olp.reports.plots.base import Format
-from olp.trajectory.motion import Array, Index
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 from olp.trajectory.usage import feeds_of_pieces
