@@ -14,11 +14,11 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.errors import InputError
+from olp.files.columns import place_in
 from olp.files.point_profile import MEASURED, PointProfile, looked_at
-from olp.files.problems import nearest
 from olp.files.write import PathLike, read_bytes
 from olp.program.text.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
-from olp.program.text.rows import Form, decoded, form_of, no_number, place_of
+from olp.program.text.rows import Form, decoded, form_of, no_number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,16 +119,6 @@ def _header(text: str, form: Form, named: bool) -> tuple[int, list[str]]:
         if form.holds(whole):
             return (line, form.cells(whole)) if named else (line - 1, [])
     return len(first), []
-
-
-def place_in(header: Sequence[str], column: str | int, file: str, hint: str = "") -> int:
-    """The index of a column. Raises InputError, with a hint, where no column bears its name."""
-    place = place_of(column, header)
-    if place is None:
-        near = nearest(str(column), header)
-        known = f"did you mean {near}?" if near else f"expected one of {', '.join(header) or 'their numbers'}"
-        raise InputError(f'there is no column "{column}"; {known}{hint}', file=file)
-    return place
 
 
 def _texts(text: str, file: str, profile: PointProfile, skip: int, column: int) -> tuple[str, ...]:

@@ -53,10 +53,13 @@ class Form:
         return bool(line.strip()) and not line.lstrip().startswith(self.comments)
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line, without blanks around them."""
+        """The cells of a line, without blanks around them. Raises InputError where they are none."""
         if self.mark is None:
             return line.split()
-        row = next(csv.reader([line], delimiter=self.mark, skipinitialspace=self.loose))
+        try:
+            row = next(csv.reader([line], delimiter=self.mark, skipinitialspace=self.loose))
+        except csv.Error as error:
+            raise InputError(f"is no table of comma-separated values ({error})") from None
         return [cell.strip() for cell in row]
 
     def rows(self, text: str, behind: int = 0) -> Iterator[tuple[int, list[str]]]:
@@ -64,6 +67,11 @@ class Form:
         for line, whole in self.lines(text):
             if line > behind and self.holds(whole):
                 yield line, self.cells(whole)
+
+
+#: CSV as instruments write it, and CSV as people do
+CSV = Form()
+LOOSE_CSV = Form(loose=True, strict=True)
 
 
 def form_of(layout: Layout) -> Form:
