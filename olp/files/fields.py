@@ -16,7 +16,7 @@ from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
 #: Dialect profiles that can be read and written today.
 CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list")
 #: Dialects that are described by files which come with `olp`.
-SHIPPED = ("kawasaki-as", "val2", "karel", "irl")
+SHIPPED = ("kawasaki-as", "val2", "karel")
 ISO_NAMES = COMPONENTS + SQUARENESS
 SIGN = "actual-minus-commanded"
 
