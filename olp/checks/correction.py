@@ -78,7 +78,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     """Does the control leave the path by more than it is corrected?"""
     out: list[Finding] = []
-    if program.dialect.name != "linuxcnc":
+    if not program.dialect.path_tolerance:
         return out
     if not program.path_modes and len(program.toolpath):
         out.append(

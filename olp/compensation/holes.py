@@ -142,9 +142,7 @@ class _Words:
         words = {k: v for k, v in hole.words.items() if k in "XYZR"} or hole.words
         self.anchor = max(words.values())
         self.new: list[tuple[str, int, int]] = []
-        counter = hole.words.get(
-            "L", hole.words.get("K") if writer.program.dialect.name != "linuxcnc" else None
-        )
+        counter = writer.program.rs274.cycles.counter(hole.words)
         if hole.incremental and hole.repeats > 1 and hole.repeat == 0 and counter is not None:
             edits.add(int(writer.words.number[counter]), int(writer.words.end[counter]), 1, 0)
 
