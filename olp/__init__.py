@@ -104,7 +104,7 @@ _HOME = {
     "InputError": "olp.core.errors",
     "OlpError": "olp.core.errors",
     "ProgramError": "olp.core.errors",
-    "Finding": "olp.findings",
+    "Finding": "olp.findings.catalogue",
     "load_setup": "olp.files.config",
     "evaluate_lines": "olp.workflows.calibrate_evaluate",
     "fit_ballbar": "olp.workflows.calibrate_evaluate",
