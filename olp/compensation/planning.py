@@ -58,7 +58,7 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
 
 
 def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
-    """(n, 3) axes that keep what the program says, and the moves left uncorrected since an axis is unknown."""
+    """(n, 3) axes that keep what the program says, and the moves left uncorrected as an axis is unknown."""
     raw = np.zeros((len(path), 3), bool)
     raw[(path.flag & _UNTOUCHED) != 0] = True
     unknown = np.isnan(path.end_mm)
