@@ -10,7 +10,7 @@ import numpy.typing as npt
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import told_findings
-from olp.compensation.holes import HolePlan
+from olp.compensation.hole_plan import HolePlan
 from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
