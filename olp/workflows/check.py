@@ -24,7 +24,7 @@ from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.meshes import read_mesh
-from olp.findings.catalogue import CONFIDENCE_CODES, GATE_CODES, Finding
+from olp.findings.catalogue import GATE_CODES, RULES, Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.proof import Proof
@@ -231,14 +231,14 @@ def _confidence(run: Run) -> list[Finding]:
             lines=tuple(there[line] for line in found.lines),
         )
         for found in run.findings
-        if found.code in CONFIDENCE_CODES
+        if RULES[found.code].topic == "uncertainty"
     ]
 
 
 def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | None:
     """None where there are no meshes, or nobody asks."""
     setup = case.loaded.setup
-    if not setup.job.meshes or not any(code.startswith("OLP7") for code in codes):
+    if not setup.job.meshes or not any(RULES[code].topic == "clearance" for code in codes):
         return None
     tell("clearance", 0.9)
     read = ((mesh, *read_mesh(mesh.file)) for mesh in setup.job.meshes)
