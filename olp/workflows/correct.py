@@ -14,7 +14,8 @@ from olp.checks import correction as checks
 from olp.checks import state
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
-from olp.compensation.plan import Limits, Plan, plan
+from olp.compensation.plan import Limits, Plan
+from olp.compensation.planning import plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.style import fewest_decimals
 from olp.compensation.writing import write

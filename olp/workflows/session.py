@@ -20,7 +20,7 @@ from olp.files.config import load_setup
 from olp.files.described import described
 from olp.files.write import read_bytes
 from olp.program.dialect import Dialect
-from olp.program.registry import DIALECTS, dialect_of
+from olp.program.registry import DIALECTS, dialect_of, find
 from olp.uncertainty.components import unsure
 
 PathLike = str | Path
@@ -120,7 +120,7 @@ def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
 
 def control_of(setup: Setup) -> Dialect:
     """What the control of a machine reads and writes."""
-    dialect = DIALECTS.get(setup.machine.controller) or described(setup.machine.controller)
+    dialect = find(setup.machine.controller) or described(setup.machine.controller)
     if dialect is None:
         raise ConfigError(
             f"controller {setup.machine.controller!r} has no dialect; expected one of {', '.join(DIALECTS)}"
@@ -135,7 +135,7 @@ def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
     if isinstance(own, Dialect):
         return setup, own
     dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
-    own = None if dialect.name in DIALECTS else dialect
+    own = None if find(dialect.name) is not None else dialect
     return replace(setup, job=replace(setup.job, dialect=dialect.name, described=own)), dialect
 
 
@@ -164,9 +164,8 @@ def unrolled(
     Payloads that the job gives by line become comments first, as lines are others afterwards. Raises
     UsageError for a dialect that has none of them."""
     from olp.program.directives import with_payloads
-    from olp.program.rs274.flatten.unroll import flatten as unroll
 
-    if dialect.family != "rs274":
+    if dialect.unroller is None:
         raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
     data = with_payloads(data, setup.job.payloads, dialect.comment)
     folder = Path(name).parent if name else None
@@ -180,9 +179,7 @@ def unrolled(
                 return read_bytes(candidate)
         return None
 
-    return unroll(
-        data, profile=dialect.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
-    )
+    return dialect.unroller(data, dialect, subprograms=beside, expand_cycles=expand, peck_clearance=clearance)
 
 
 def lever_of(setup: Setup, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ judged only where the layout says that they are joined by straight lines. Only X
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -54,22 +54,10 @@ _SUPPORT = {
 class PointList(Dialect):
     """A list of positions; `layout` None: told from its first rows."""
 
-    family: str = "list"
     layout: Layout | None = None
 
     def rows(self) -> Sequence[Row]:
         return [Row(f"column {k}" if len(k) < 6 else k, what, why) for k, (what, why) in _SUPPORT.items()]
-
-
-POINT_LIST = PointList(
-    name="list", title="list of positions (CSV, TXT)", path_mode="not stated", comment=(b"# ", b"")
-)
-
-
-def with_layout(layout: Layout) -> PointList:
-    """The dialect of lists that are laid out so."""
-    comment = (layout.comment.encode() + b" ", b"")
-    return replace(POINT_LIST, layout=layout, comment=comment, marks=layout.stamp)
 
 
 @dataclass(slots=True)
