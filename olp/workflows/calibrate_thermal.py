@@ -18,7 +18,7 @@ from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.structure import read_drift_log, structure_text
 from olp.files.calibration.writer import in_unit
 from olp.findings.catalogue import Finding
-from olp.workflows.session import PathLike, setup_of
+from olp.workflows.session import PathLike, Session
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,8 @@ def fit_thermal(
     or one for all; default the temperature of the calibration. `sensors` chooses some. Raises InputError,
     ConfigError, and CannotCompute where the logs do not tell enough.
     """
-    described = setup_of(machine, None).machine
+    session = Session.start(machine)
+    described = session.setup.machine
     if described.calibration is None:
         raise ConfigError(
             f"machine {described.name!r} names no calibration; its box_mm and temperature_degC are needed"
