@@ -203,9 +203,11 @@ def _say(call: Given, result: Correction, out: _Outputs, written: Iterable[Path]
 
 def _diff(nominal: bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:
     from olp.cli.diff import render
-    from olp.program.rs274.profiles import PROFILES
+    from olp.program.registry import find
+    from olp.program.rs274.profiles.base import Profile
 
-    profile = PROFILES.get(result.report["program"]["dialect"])
+    dialect = find(result.report["program"]["dialect"])
+    profile = dialect if isinstance(dialect, Profile) else None
     largest_um = float(result.report.get("largest_correction_um", 0.0))
     return render(
         nominal,

@@ -41,7 +41,7 @@ def layout_of(
 
 def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], unit: str | None) -> Given:
     """A call about a list of positions that is laid out as it says; the same call where it says nothing."""
-    from olp.program.pointlist.reader import with_layout
+    from olp.program.pointlist.dialect import with_layout
 
     if profile is None and not columns and unit is None:
         return call

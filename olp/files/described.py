@@ -18,8 +18,9 @@ from olp.files.toml_text import line_of, read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.described.forms import Form, form
 from olp.program.described.language import DOES, Rule, UserDialect
+from olp.program.described.reader import read_described
 from olp.program.dialect import Dialect
-from olp.program.pointlist.reader import with_layout
+from olp.program.pointlist.dialect import with_layout
 
 FOLDER = Path(__file__).parents[1] / "program" / "described" / "shipped"
 
@@ -117,7 +118,8 @@ def load_described(path: PathLike, read: Reader = read_bytes) -> Dialect:
         raise config_error(found, str(path))
     stamp = file.stamp or [file.comments[0] + " ", ""]
     return UserDialect(
-        name=file.name, title=file.title, path_mode=file.path_mode, about=file.about or "",
+        name=file.name, title=file.title, path_mode=file.path_mode, reader=read_described,
+        about=file.about or "",
         comment=(stamp[0].encode(), stamp[1].encode()), statements=tuple(rules), unit=file.unit,
         speed_unit=file.speed_unit,
         comments=tuple(file.comments), quote=file.quote, continuation=file.continuation,

@@ -12,11 +12,12 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, Wit
 from pydantic_core import PydanticCustomError
 
 from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
+from olp.program.registry import DESCRIBED, DIALECTS
 
 #: Dialect profiles that can be read and written today.
-CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list")
+CONTROLLERS = tuple(DIALECTS)
 #: Dialects that are described by files which come with `olp`.
-SHIPPED = ("kawasaki-as", "val2", "karel", "irl")
+SHIPPED = DESCRIBED
 ISO_NAMES = COMPONENTS + SQUARENESS
 SIGN = "actual-minus-commanded"
 

@@ -25,7 +25,7 @@ from olp.files.measurements.plan_files import Pass, plan_files
 from olp.findings.catalogue import Finding
 from olp.program.registry import read
 from olp.program.rs274.positions import positions_program
-from olp.program.rs274.profiles import Profile
+from olp.program.rs274.profiles.base import Profile
 from olp.workflows.session import PathLike, Session
 
 Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
@@ -304,7 +304,6 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
         yield folder / name, data
     profile = _control(plan.setup)
     digits = max(0, math.ceil(-math.log10(min(machine.least_increment_mm)) - 1e-9))
-    ending = "ngc" if machine.controller == "linuxcnc" else "nc"
     for run in chosen.passes:
         notes = [
             f"{machine.name}: {run.words}",
@@ -315,7 +314,7 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
         ]  # fmt: skip
         text = positions_program(profile, run.places_mm, run.wait_s, digits, notes)
         _proved(text, run, plan.setup, digits)
-        yield folder / f"{run.name}.{ending}", text
+        yield folder / f"{run.name}.{profile.written_ending}", text
 
 
 def _control(setup: Setup) -> Profile:

@@ -25,7 +25,7 @@ from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.meshes import read_mesh
 from olp.files.sources import Source, Sources
-from olp.findings.catalogue import CONFIDENCE_CODES, GATE_CODES, Finding
+from olp.findings.catalogue import GATE_CODES, RULES, Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.proof import Proof
@@ -257,7 +257,7 @@ def _confidence(run: Run) -> list[Finding]:
             lines=tuple(there[line] for line in found.lines),
         )
         for found in run.findings
-        if found.code in CONFIDENCE_CODES
+        if RULES[found.code].topic == "uncertainty"
     ]
 
 
@@ -266,7 +266,7 @@ def _clearances(
 ) -> Clearances | None:
     """None where there are no meshes, or nobody asks."""
     setup = case.loaded.setup
-    if not setup.job.meshes or not any(code.startswith("OLP7") for code in codes):
+    if not setup.job.meshes or not any(RULES[code].topic == "clearance" for code in codes):
         return None
     tell("clearance", 0.9)
     read = ((mesh, *read_mesh(mesh.file, sources.read)) for mesh in setup.job.meshes)

@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks import correction as checks
-from olp.compensation.holes import HolePlan
-from olp.compensation.plan import Limits, Plan, plan
+from olp.compensation.hole_plan import HolePlan
+from olp.compensation.plan import Limits, Plan
+from olp.compensation.planning import plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.tally import Tally
 from olp.compensation.writing import write

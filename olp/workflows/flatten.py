@@ -41,9 +41,8 @@ def unrolled(
     are others afterwards. Raises UsageError for a dialect that has none of them.
     """
     from olp.program.directives import with_payloads
-    from olp.program.rs274.flatten.unroll import flatten as unroll
 
-    if dialect.family != "rs274":
+    if dialect.unroller is None:
         raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
     data = with_payloads(program.data, setup.job.payloads, dialect.comment)
 
@@ -56,7 +55,6 @@ def unrolled(
                 return sources.read(candidate)
         return None
 
-    return unroll(
-        data, profile=dialect.name, subprograms=beside, expand_cycles=expand_cycles,
-        peck_clearance=peck_clearance_mm,
-    )  # fmt: skip
+    return dialect.unroller(
+        data, dialect, subprograms=beside, expand_cycles=expand_cycles, peck_clearance=peck_clearance_mm
+    )

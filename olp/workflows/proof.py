@@ -14,7 +14,8 @@ from olp.checks import correction as checks
 from olp.checks import state
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
-from olp.compensation.plan import Limits, plan
+from olp.compensation.plan import Limits
+from olp.compensation.planning import plan
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Index
 from olp.core.errors import OlpError, naming

@@ -137,7 +137,7 @@ def _corrected(
         tip_radius_mm=radius,
     )
     setup = loaded.setup
-    axes = _axes(reported, setup)
+    axes = _axes(reported, loaded)
     reported = replace(reported, assumed=(*reported.assumed, _COUNTED[axes]))
     findings = _already(reported, loaded)
     own = bool(np.isfinite(reported.stylus_mm).all())
@@ -167,12 +167,11 @@ def _corrected(
     return ResultCorrection(text, report, tuple(findings))
 
 
-def _axes(reported: Reported, setup: Setup) -> Literal["tip", "tool", "ram"]:
-    """Where axis positions count. On a machine that takes DMIS programs it is the end of the ram, as
-    there."""
-    if "dmis" in (reported.dialect, setup.machine.controller):
+def _axes(reported: Reported, loaded: Loaded) -> Literal["tip", "tool", "ram"]:
+    """Where axis positions count: as in the programs of the machine."""
+    if reported.axes_at_ram or loaded.dialect.axes_at_ram:
         return "ram"
-    return "tool" if setup.machine.length_active else "tip"
+    return "tool" if loaded.setup.machine.length_active else "tip"
 
 
 def _named(what: str, told: tuple[Any, ...], given: object) -> tuple[Any, ...]:

@@ -21,7 +21,7 @@ from olp.files.config import read_setup
 from olp.files.described import described
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
-from olp.program.registry import DIALECTS, dialect_of
+from olp.program.registry import DIALECTS, dialect_of, find
 from olp.uncertainty.components import unsure
 
 PathLike = str | Path
@@ -98,7 +98,7 @@ class Session:
     def control(self) -> Dialect:
         """What the control of the machine reads and writes."""
         name = self.setup.machine.controller
-        dialect = DIALECTS.get(name) or described(name, read=self.sources.read)
+        dialect = find(name) or described(name, read=self.sources.read)
         if dialect is None:
             raise ConfigError(f"controller {name!r} has no dialect; expected one of {', '.join(DIALECTS)}")
         return dialect
@@ -222,5 +222,5 @@ def _settled(setup: Setup, control: Dialect, program: Source) -> tuple[Setup, Di
     if isinstance(own, Dialect):
         return setup, own
     dialect = dialect_of(setup.job.dialect, control, program.data, program.name)
-    own = None if dialect.name in DIALECTS else dialect
+    own = None if find(dialect.name) is not None else dialect
     return replace(setup, job=replace(setup.job, dialect=dialect.name, described=own)), dialect

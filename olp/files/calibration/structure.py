@@ -6,9 +6,8 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-
-import numpy as np
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
 
 from olp.calibration.thermal.drift import DriftLog
 from olp.core.arrays import Array
@@ -17,11 +16,12 @@ from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES, shifted
 from olp.errormodel.structure import Distortion, Sensor, Structure
 from olp.files.calibration.thermal_schema import DistortionTable, ThermalFile
+from olp.files.columns import Row, Wanted, names, read_sheet
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schema_base import Position
-from olp.files.tables import decoded, headed
 from olp.files.toml_text import comment, line_of, read_toml, toml_lines
 from olp.files.write import PathLike, Reader, read_bytes
+from olp.program.text.rows import LOOSE_CSV
 
 _READING = re.compile(r"(E[A-Z]{2})@([-+]?\d+(?:\.\d+)?)_(um|urad)")
 _DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
@@ -120,83 +120,72 @@ def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:
 
 def parse_drift_log(data: bytes, file: str) -> DriftLog:
     """As `read_drift_log`, from the bytes of the file."""
-    expected = "t_s, NAME_degC ..., EXX@500_um ..."
-    line, header, records = headed(data, file, expected, _header_problems)
-    rows, found = _rows(header, records)
-    placed, wrong = _placed(decoded(data, file))
-    found += wrong
-    if len(rows) < 2 and not found:
-        found.append((line, f"{len(rows)} rows follow the header; expected at least 2"))
+    sheet = read_sheet(data, file, _LOG)
+    placed, wrong = _placed(sheet.text)
+    found = [*sheet.problems, *_time_problems(sheet.rows), *wrong]
+    if len(sheet.rows) < 2 and not found:
+        found.append((sheet.line, f"{len(sheet.rows)} rows follow the header; expected at least 2"))
     if found:
         raise config_error(found, file)
-    table = np.array(rows)
-    sensors = {n.removesuffix("_degC"): table[:, i] for i, n in enumerate(header) if n.endswith("_degC")}
+    columns = sheet.columns
+    sensors = {name.removesuffix("_degC"): columns[name] for name in columns if name.endswith("_degC")}
     readings: dict[tuple[str, float], Array] = {}
-    for i, name in enumerate(header):
+    for name in columns:
         match = _READING.fullmatch(name)
         if match:
-            readings[match[1], float(match[2])] = table[:, i]
+            readings[match[1], float(match[2])] = columns[name]
     line_mm = placed.get("line_mm")
-    return DriftLog(table[:, 0], sensors, readings, line_mm, placed.get("tool_mm", ZERO), file)
+    return DriftLog(columns["t_s"], sensors, readings, line_mm, placed.get("tool_mm", ZERO), file)
 
 
 def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
     problems: list[Problem] = []
     if header[0] != "t_s":
         problems.append((line, f'column 1 is "{header[0]}"; expected t_s, the time in s'))
-    for number, name in enumerate(header[1:], 2):
-        match = _READING.fullmatch(name)
-        if header.index(name) < number - 1:
-            problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
-        elif match:
-            unit = "um" if match[1][1] in AXES else "urad"
-            if match[1] not in COMPONENTS or match[3] != unit:
-                problems.append(
-                    (
-                        line,
-                        f'column {number} is "{name}"; expected an ISO 230-1 name and its unit, {unit} here',
-                    )
-                )
-        elif not (name.endswith("_degC") and len(name) > len("_degC")):
-            problems.append(
-                (
-                    line,
-                    f'column {number} is "{name}"; expected a sensor such as beam_degC, or a reading such as '
-                    "EXX@500_um",
-                )
-            )
+    problems += names(line, header, _column_problem, 2)
     if not problems and not any(name.endswith("_degC") for name in header):
         problems.append((line, "there is no sensor; expected columns such as beam_degC"))
     return problems
 
 
-def _rows(
-    header: Sequence[str], records: Sequence[tuple[int, list[str]]]
-) -> tuple[list[list[float]], list[Problem]]:
-    rows: list[list[float]] = []
-    problems: list[Problem] = []
-    for line, cells in records:
-        if len(cells) != len(header):
-            problems.append(
-                (line, f"{len(cells)} values under {len(header)} columns; expected one value a column")
-            )
-            continue
-        row = []
-        for name, cell in zip(header, cells, strict=True):
-            reading = _READING.fullmatch(name)
-            power = 0 if reading is None else -3 if reading[3] == "um" else -6
-            try:
-                value = math.nan if reading and not cell else shifted(cell, power)
-                good = math.isfinite(value) or (reading is not None and not cell)
-            except ValueError:
-                value, good = math.nan, False
-            if not good:
-                problems.append((line, f'{name} = "{cell}" is no number; expected a finite number'))
-            row.append(value)
-        if rows and not row[0] > rows[-1][0]:
-            problems.append((line, f"t_s = {row[0]:g} comes after {rows[-1][0]:g}; expected ascending times"))
-        rows.append(row)
-    return rows, problems
+def _column_problem(_: int, name: str) -> str | None:
+    """What is wrong with the name of a column behind the time, or None."""
+    match = _READING.fullmatch(name)
+    if match:
+        unit = "um" if match[1][1] in AXES else "urad"
+        right = match[1] in COMPONENTS and match[3] == unit
+        return None if right else f"expected an ISO 230-1 name and its unit, {unit} here"
+    if name.endswith("_degC") and len(name) > len("_degC"):
+        return None
+    return "expected a sensor such as beam_degC, or a reading such as EXX@500_um"
+
+
+def _number(name: str, cell: str) -> tuple[float, str | None]:
+    """The number in a cell; a reading may be empty."""
+    reading = _READING.fullmatch(name)
+    if reading and not cell:
+        return math.nan, None
+    try:
+        value = shifted(cell, 0 if reading is None else -3 if reading[3] == "um" else -6)
+    except ValueError:
+        value = math.nan
+    good = math.isfinite(value)
+    return value, None if good else f'{name} = "{cell}" is no number; expected a finite number'
+
+
+def _time_problems(rows: Sequence[Row]) -> Iterator[Problem]:
+    for (_, before), (line, row) in pairwise(rows):
+        if not row[0] > before[0]:
+            yield line, f"t_s = {row[0]:g} comes after {before[0]:g}; expected ascending times"
+
+
+_LOG = Wanted(
+    "holds no header; expected t_s, NAME_degC ..., EXX@500_um ...",
+    _header_problems,
+    _number,
+    "; expected one value a column",
+    form=LOOSE_CSV,
+)
 
 
 def _placed(text: str) -> tuple[dict[str, Vector], list[Problem]]:

@@ -21,6 +21,7 @@ from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration, Curve, Reference
 from olp.files.problems import Problem, config_error
 from olp.findings.catalogue import Finding
+from olp.program.text.rows import Form
 
 #: "error": a value is actual minus commanded, which the control takes off; "correction": it adds the value.
 Sense = Literal["error", "correction"]
@@ -124,6 +125,12 @@ def signed(values: Array, factor: float) -> Array:
 def text_of(data: bytes) -> str:
     """The text of a table; bytes beyond ASCII stand in comments only and are kept apart."""
     return data.decode("latin-1").removeprefix("\xef\xbb\xbf")
+
+
+def lines(data: bytes, remark: str | None = None) -> Iterator[tuple[int, str]]:
+    """Every line of a table with its number, without blanks around it and without what follows `remark`."""
+    form = Form(None, remark=remark)
+    return ((line, text.strip()) for line, text in form.lines(text_of(data)))
 
 
 def number(cell: str) -> float | None:

@@ -25,8 +25,6 @@ from olp.program.program import Program, Statements
 #: expects of a finishing cut.
 BLEND_MM = 0.01
 
-#: M codes that LinuxCNC carries out along with the motion, without a rest: M62, M63, M67.
-_ALONG = (620, 630, 670)
 #: M codes that take effect after the motion of their block: on all controls, and on ISO controls besides.
 _AFTER = (0, 10, 20, 300, 600)
 _AFTER_ISO = (50, 90)
@@ -159,8 +157,8 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     dwell = np.zeros(len(line) + 1)
     word, at = scan.of_letter(b"M")
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
-    if program.dialect.name == "linuxcnc":
-        at, code = at[~np.isin(code, _ALONG)], code[~np.isin(code, _ALONG)]
+    along = np.isin(code, [10 * m for m in program.rs274.m_with_motion])
+    at, code = at[~along], code[~along]
     late = np.isin(code, _AFTER + _AFTER_ISO if scan.iso else _AFTER)
     rest[np.searchsorted(line, at[late], "right")] = True
     rest[np.searchsorted(line, at[~late], "left")] = True

@@ -17,7 +17,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
-from olp.program.rs274.profiles import CUTTER_COMPENSATION, Act
+from olp.program.rs274.profiles.base import CUTTER_COMPENSATION, Act
 from olp.program.rs274.state import State
 
 Modal = npt.NDArray[np.int16]

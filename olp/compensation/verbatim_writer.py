@@ -3,34 +3,38 @@ of a statement where its move is split."""
 
 from __future__ import annotations
 
+import sys
+from typing import ClassVar
+
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
-from olp.compensation.stamp import stamped
-from olp.compensation.statements import StatementWriter
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Index
 from olp.core.errors import ProgramError
-from olp.program.text.edits import Edits
 from olp.program.text.numbers import Number, Placing, number, spliced, written
 
+#: Bytes of the text from a place up to another, and what comes there.
+Replacement = tuple[int, int, bytes]
 
-class LetteredWriter(StatementWriter):
-    """As `StatementWriter`, for numbers that keep their own form; one number may be that of several moves."""
 
-    def text(self) -> bytes:
-        self.replaced: list[tuple[int, int, bytes]] = []
-        if len(self.words.start):
-            self._edits(0, len(self.plan))
-        else:
+class VerbatimWriter(PointWriter):
+    """A writer of numbers that keep their own form; one number may be that of several moves."""
+
+    #: A number may be that of moves far apart.
+    chunk: ClassVar[int] = sys.maxsize
+
+    def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
+        if not len(self.words.start):
             # nothing but moves that the text says no place of
             self.parts[:] = 1
-        if not self.replaced:
-            return self.program.data
-        text = spliced(self.program.data, self.replaced)
-        return stamped(text, self.stamp, self.program.eol(1), ()) if self.stamp else text
+            return None
+        self._digits(rows)
+        replacements = [*self._changes(rows), *self._insertions(rows)]
+        return spliced(self.program.data, replacements) if replacements else None
 
-    def _changes(self, rows: Rows) -> list[Edits]:
+    def _changes(self, rows: Rows) -> list[Replacement]:
         """Numbers of the statements that are there."""
         head = np.flatnonzero(rows.head)
         slot = self.program.slot[rows.move[head]]
@@ -41,15 +45,17 @@ class LetteredWriter(StatementWriter):
             said = np.flatnonzero(slot[:, axis] >= 0)
             for row, word in zip(head[said].tolist(), slot[said, axis].tolist(), strict=True):
                 self._share(rows, new, row, axis, word)
+        changes: list[Replacement] = []
         for word, (row, axis, _) in new.items():
             if rows.write[row, axis]:
                 start, end = int(self.words.number[word]), int(self.words.end[word])
-                self.replaced.append(placing.place(start, end, self._number(rows, row, axis, word)))
-        self.tally.changed_words = len(self.replaced)
-        return []
+                changes.append(placing.place(start, end, self._number(rows, row, axis, word)))
+        self.tally.changed_words = len(changes)
+        return changes
 
-    def _insertions(self, rows: Rows) -> list[Edits]:
+    def _insertions(self, rows: Rows) -> list[Replacement]:
         """Later parts of a move that was split: its statement again, with other numbers."""
+        insertions: list[Replacement] = []
         for row in np.flatnonzero(~rows.head).tolist():
             move = int(rows.move[row])
             begin, end = int(self.statements.begin[move]), int(self.statements.end[move])
@@ -60,21 +66,15 @@ class LetteredWriter(StatementWriter):
                 start, stop = int(self.words.number[word]) - begin, int(self.words.end[word]) - begin
                 edits.append((start, stop, self._number(rows, row, axis, word)))
             text = self.program.eol(line) + spliced(self.program.data[begin:end], edits)
-            at = self._line_end(end)
-            self.replaced.append((at, at, text))
+            place = self._line_end(end)
+            insertions.append((place, place, text))
             self.tally.inserted_blocks += 1
-        return []
+        return insertions
 
     def _line_end(self, at: int) -> int:
         """The end of the line in which a byte stands: what is inserted comes behind a comment."""
         ends = self.program.line_end
         return int(ends[min(int(np.searchsorted(ends, at)), len(ends) - 1)])
-
-    def fewest(self, unit: Array) -> Index:
-        """(n, 3) the fewest decimals of numbers in units (n,), which are any here."""
-        finest = self.finest
-        known = {u: [max(self.style.least(axis, u), finest) for axis in range(3)] for u in set(unit.tolist())}
-        return np.array([known[u] for u in unit.tolist()], np.int64).reshape(-1, 3)
 
     def _share(
         self, rows: Rows, new: dict[int, tuple[int, int, int]], row: int, axis: int, word: int

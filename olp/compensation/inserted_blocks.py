@@ -1,24 +1,19 @@
 """Inserted blocks: the later parts of subdivided moves, and words of the old block that change with them.
 
-Each part is a line of its own behind the block, or in front of it to take up lost motion before an arc.
+Each part is a line of its own behind the block, or in front of it to take up backlash before an arc.
 """
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.rows import Rows
+from olp.compensation.writer import Writer
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
-from olp.program.text.edits import BARE, Edits
-
-if TYPE_CHECKING:
-    from olp.compensation.writer import Writer
-
+from olp.program.text.edits import BARE, EditList, Edits
 
 #: M words that act when their block has ended
 _END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
@@ -27,8 +22,8 @@ _END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
 def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
     """New blocks for the later parts of subdivided moves; plain words, modal codes hold."""
     line_no = writer.path.line[rows.move[tails]]
-    arc = np.isin(writer.path.kind[rows.move[tails]], (Kind.ARC_CW, Kind.ARC_CCW))
-    straight = ~arc | writer.plan.take_up[rows.first + tails]
+    arc = rows.arc[tails]
+    straight = ~arc | rows.take_up[tails]
     before = rows.before[tails]
     place = np.where(
         before, writer.program.line_start[line_no - 1], writer.program.line_end[line_no - 1]
@@ -36,7 +31,7 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
     lead = _leads(writer, line_no, arc & straight, before)
     write = rows.write[tails]
     first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
-    out: list[Edits] = []
+    columns: list[Edits] = []
     for axis in range(3):
         chosen = np.flatnonzero(write[:, axis] & straight)
         letter = b"XYZ"[axis : axis + 1]
@@ -48,7 +43,7 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
         }
         prefix[begins] = [starts[int(p)] for p in lead[chosen[begins]]]
         row = tails[chosen]
-        out.append(
+        columns.append(
             Edits(
                 place[chosen], place[chosen], rows.mantissa[row, axis], rows.decimals[row, axis], prefix,
                 (row * 8 + 16 + axis).astype(np.int32),
@@ -57,27 +52,28 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
     empty = (first_axis < 0) & straight
     # a part whose rounded end is where it began needs no block
     np.subtract.at(writer.parts, rows.move[tails[empty]], 1)
+    edits = EditList(writer.prefixes)
     for i in np.flatnonzero(before & ~empty).tolist():
-        at, tail, line = int(place[i]), int(tails[i]), int(line_no[i])
+        start, tail, line = int(place[i]), int(tails[i]), int(line_no[i])
         _check_take_up(writer, rows, tail)
         suffix = _feed_of(writer, line) + writer.program.eol(line)
-        out.append(writer.one(at, at, BARE, 0, suffix, rows.serial(tail) + 5))
+        edits.add(start, start, BARE, 0, suffix, rows.serial(tail) + 5)
         if rows.head[tail + 1]:
-            out += _arc_word(writer, rows, tail + 1)
+            _arc_word(writer, rows, tail + 1, edits)
     writer.tally.inserted_blocks += int((~empty).sum())
-    out += _inverse_time(writer, rows, tails)
-    out += _end_words(writer, rows, tails[~before])
-    return out
+    _inverse_time(writer, rows, tails, edits)
+    _end_words(writer, rows, tails[~before], edits)
+    return [*columns, edits.done()]
 
 
 def _leads(writer: Writer, line_no: npt.NDArray[np.int32], turning: Mask, before: Mask) -> Index:
-    """Prefix of the first word of each inserted block: line end, `/` and, to take up lost motion at an
+    """Prefix of the first word of each inserted block: line end, `/` and, to take up backlash at an
     arc, G1."""
     prefixes = writer.prefixes
     lines, which = np.unique(line_no, return_inverse=True)
     table = np.zeros((len(lines), 3), np.int64)
     for i, line in enumerate(lines.tolist()):
-        start = writer.block_start(line)
+        start = writer.style.block_start(line)
         deleted = start[len(writer.program.eol(line)) :]
         table[i] = (prefixes(start), prefixes(start + b"G1 "), prefixes(deleted + b"G1 "))
     return np.asarray(table[which, np.where(before, 2, np.where(turning, 1, 0))], np.int64)
@@ -100,7 +96,7 @@ def _feed_of(writer: Writer, line: int) -> bytes:
     return b" " + writer.program.data[int(writer.words.start[index]) : int(writer.words.end[index])]
 
 
-def _arc_word(writer: Writer, rows: Rows, row: int) -> list[Edits]:
+def _arc_word(writer: Writer, rows: Rows, row: int, edits: EditList) -> None:
     """G2 or G3 for an arc block that relied on the modal code which the block before it changed."""
     move = int(rows.move[row])
     line = int(writer.path.line[move])
@@ -110,17 +106,16 @@ def _arc_word(writer: Writer, rows: Rows, row: int) -> list[Edits]:
         writer.words.letter[i] == 71 and writer.words.mantissa[i] == code and not writer.words.decimals[i]
         for i in index
     ):
-        return []
+        return
     slot = writer.program.slot[move]
     first = [int(writer.words.start[s]) for s in slot if s >= 0]
-    at = min(first or [int(writer.words.start[i]) for i in index if writer.words.letter[i] != ord("N")])
-    return [writer.one(at, at, BARE, 0, b"G%d " % code, rows.serial(row - 1) + 6)]
+    start = min(first or [int(writer.words.start[i]) for i in index if writer.words.letter[i] != ord("N")])
+    edits.add(start, start, BARE, 0, b"G%d " % code, rows.serial(row - 1) + 6)
 
 
-def _inverse_time(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
+def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
     """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
     timed = np.flatnonzero((rows.flag[tails] & np.uint8(Flag.INVERSE_TIME)) != 0)
-    out = []
     for move in np.unique(rows.move[tails[timed]]).tolist():
         part = np.flatnonzero(rows.move == move)
         line = int(writer.path.line[move])
@@ -142,13 +137,11 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
             else:
                 start = end = place
                 prefix, order = b" F", rows.serial(row) + 5
-            out.append(writer.one(start, end, int(feeds[i]), decimals, prefix, order))
-    return out
+            edits.add(start, end, int(feeds[i]), decimals, prefix, order)
 
 
-def _end_words(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
+def _end_words(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
     """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last."""
-    out = []
     for move in np.unique(rows.move[tails]).tolist():
         line = int(writer.path.line[move])
         moved = [
@@ -158,9 +151,8 @@ def _end_words(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
         ]  # fmt: skip
         if not moved:
             continue
-        at = int(writer.program.line_end[line - 1])
+        place = int(writer.program.line_end[line - 1])
         for k, i in enumerate(moved):
             start, end = int(writer.words.start[i]), int(writer.words.end[i])
-            out.append(writer.one(start, end, BARE, 0, b"", 0))
-            out.append(writer.one(at, at, BARE, 0, b" " + writer.program.data[start:end], 2**30 + k))
-    return out
+            edits.add(start, end, BARE, 0)
+            edits.add(place, place, BARE, 0, b" " + writer.program.data[start:end], 2**30 + k)

@@ -1,4 +1,4 @@
-"""Dialect profiles of the RS-274 family: what each word of a control means to the path.
+"""What a profile of the RS-274 family is: what each word of a control means to the path.
 
 One table per profile decides for the interpreter, the support matrix of `olp inspect` and the
 documentation alike. G codes are keyed by ten times their number (G5.1 is 51).
@@ -6,11 +6,13 @@ documentation alike. G codes are keyed by ten times their number (G5.1 is 51).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from enum import IntEnum
 
 from olp.program.dialect import Dialect, Row, Support
+from olp.program.rs274.cycles import CycleRules
+from olp.program.rs274.flatten.language import Language
 
 
 class Act(IntEnum):
@@ -32,21 +34,47 @@ _SUPPORT = {Act.CARRY: Support.CARRIED, Act.REFUSE: Support.REFUSED, Act.MOTION:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile(Dialect):
-    """One control's reading of word-address text."""
+    """One control's reading of word-address text.
 
-    family: str = "rs274"
+    - `codes` and `refusals`: what becomes of each G code, and why it is refused; `harmless_m` are the M codes
+      that leave the axes where they are.
+    - `motion`, `initial_retract`: G codes that are in force at the start (None: none).
+    - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
+      100 mm/min all the same.
+    - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
+      `g10_adds`: in G91 G10 L2 adds to the offset.
+    - `cycles_apart`: canned cycles and G80 are a modal group of their own, as on ISO controls, which also
+      take the time of a dwell from X, rest before and after a G0, and stop at each block in G61.
+    - `m61_sets_tool`: M61 Q says which tool is in the spindle. `length_of_spindle_tool`: G43 without H takes
+      the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
+    - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
+      G21. `m_with_motion`: M codes carried out along with the motion, without a rest.
+    - `cycles`, `language`: how canned cycles are made, and parametric programs are written.
+    - `written_ending`: the ending of files that are written for the control.
+    """
+
     first: tuple[bytes, ...] = (b"%", b"O|:")
+    payload_comments: bool = True
+    written_ending: str = "nc"
     codes: Mapping[int, Act]
     refusals: Mapping[int, str]
     harmless_m: frozenset[int]
-    #: X100 means 100 least increments, not 100 mm
-    increments_without_point: bool
-    #: G codes that are in force at the start
-    motion: int | None
-    #: G52 writes the same offset as G92
-    g52_is_g92: bool
-    #: canned cycles and G80 are a modal group of their own
-    cycles_apart: bool
+    motion: int | None = None
+    initial_retract: int
+    increments_without_point: bool = False
+    feed_without_point: bool = False
+    g52_is_g92: bool = False
+    g10_offsets: int = 6
+    g10_adds: bool = False
+    cycles_apart: bool = False
+    m61_sets_tool: bool = False
+    length_of_spindle_tool: bool = False
+    lengths_along_z: bool = False
+    feed_words_end: bool = False
+    feed_before_unit: bool = False
+    m_with_motion: frozenset[int] = frozenset()
+    cycles: CycleRules
+    language: Language
 
     def dwell_s(self, number: float, *, pointed: bool) -> float:
         """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
@@ -63,7 +91,8 @@ class Profile(Dialect):
         ]
 
 
-_REFUSE = {
+#: Why codes are refused, where a control has no other reason.
+REFUSALS: Mapping[int, str] = {
     50: "G5 is a spline or a high-speed mode of this control",
     51: "G5.1 is a spline or a smoothing mode",
     52: "G5.2 is a NURBS block",
@@ -102,7 +131,9 @@ CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
 PROBES = frozenset({382, 383, 384, 385})
 
 
-def _codes(*, carry: set[int], extra: dict[int, Act], without: set[int]) -> dict[int, Act]:
+def g_codes(*, carry: set[int], extra: dict[int, Act], without: Set[int] = frozenset()) -> dict[int, Act]:
+    """The table of a control: the usual codes, those whose bytes it carries, those it has besides or treats
+    in another way, without those it does not have."""
     codes = dict.fromkeys((0, 10, 20, 30, 800, *CYCLES, *PROBES), Act.MOTION)
     codes |= dict.fromkeys((330, 331, 760, 870, 880), Act.REFUSE)
     codes |= dict.fromkeys((170, 180, 190), Act.PLANE)
@@ -112,85 +143,11 @@ def _codes(*, carry: set[int], extra: dict[int, Act], without: set[int]) -> dict
     codes |= dict.fromkeys((40, 100, 200, 210, 280, 300, 430, 490, 520, 530, 610, 640, 920), Act.EVENT)
     codes |= dict.fromkeys(range(540, 600, 10), Act.EVENT)
     codes |= dict.fromkeys((400, 960, 970, *carry), Act.CARRY)
-    codes |= dict.fromkeys((code for code in _REFUSE), Act.REFUSE)
+    codes |= dict.fromkeys(REFUSALS, Act.REFUSE)
     codes |= extra
     return {code: act for code, act in codes.items() if code not in without}
 
 
-_EVENTS_LINUXCNC = dict.fromkeys((431, 432, 591, 592, 593, 611, 921, 922, 923), Act.EVENT)
-_ARC_DISTANCE = dict.fromkeys((901, 911), Act.ARC_DISTANCE)
-_ISO_M = frozenset({0, 1, 2, 3, 4, 5, 7, 8, 9, 19, 30, 48, 49})
-
-LINUXCNC = Profile(
-    name="linuxcnc",
-    title="LinuxCNC and other RS274/NGC interpreters",
-    codes=_codes(carry={80}, extra=_EVENTS_LINUXCNC | _ARC_DISTANCE, without=set()),
-    refusals=_REFUSE,
-    harmless_m=_ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
-    increments_without_point=False,
-    motion=None,
-    g52_is_g92=True,
-    path_mode="G64 without tolerance, LinuxCNC's default",
-    inch_decimals=5,
-    free_digits=1,
-    cycles_apart=False,
-)
-GRBL = Profile(
-    name="grbl",
-    title="Grbl 1.1 and its descendants",
-    codes=_codes(
-        carry=set(),
-        extra={431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE},
-        without={330, 331, 520, 300, 960, 970, 730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890}
-        | {950, 980, 990, 430, 640, 281, 301, 411, 421, 410, 420},
-    ),
-    refusals=_REFUSE,
-    harmless_m=_ISO_M | {56},
-    increments_without_point=False,
-    motion=0,
-    g52_is_g92=False,
-    path_mode="junction deviation of the control ($11)",
-    inch_decimals=5,
-    free_digits=1,
-    cycles_apart=False,
-)
-_ISO_CARRY = {50, 51, 80, 90, 110, 150, 500, 501, 620, 630, 670, 690, 691, 131, 231, 250}
-FANUC = Profile(
-    name="fanuc",
-    title="Fanuc and compatible ISO controls (system A words of mills)",
-    codes=_codes(
-        carry=_ISO_CARRY - {50},
-        extra={440: Act.EVENT, 541: Act.EVENT, 921: Act.REFUSE, 51: Act.CARRY},
-        without=set(),
-    ),
-    refusals=_REFUSE | {921: "G92.1 presets offsets that are not known off line"},
-    harmless_m=_ISO_M | {10, 11, 29, 13, 88, 89},
-    increments_without_point=True,
-    motion=None,
-    g52_is_g92=False,
-    path_mode="cutting mode G64 of the control, unless a smoothing mode is on",
-    inch_decimals=4,
-    free_digits=0,
-    cycles_apart=True,
-)
-HAAS = Profile(
-    name="haas",
-    title="Haas mills",
-    codes=_codes(
-        carry=(_ISO_CARRY - {50, 51, 110}) | {1030, 1870},
-        extra={440: Act.EVENT, 541: Act.EVENT, 921: Act.REFUSE, 1540: Act.EVENT}
-        | dict.fromkeys(range(1100, 1300, 10), Act.EVENT),
-        without=set(),
-    ),
-    refusals=_REFUSE | {921: "G92.1 is not a code of this control"},
-    harmless_m=_ISO_M | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
-    increments_without_point=True,
-    motion=None,
-    g52_is_g92=False,
-    path_mode="the control's own smoothing (G187)",
-    inch_decimals=4,
-    free_digits=0,
-    cycles_apart=True,
-)
-
-PROFILES: Mapping[str, Profile] = {p.name: p for p in (LINUXCNC, FANUC, GRBL, HAAS)}
+#: M codes of ISO 6983 that leave the axes where they are.
+ISO_M = frozenset({0, 1, 2, 3, 4, 5, 7, 8, 9, 19, 30, 48, 49})
+ARC_DISTANCE: Mapping[int, Act] = dict.fromkeys((901, 911), Act.ARC_DISTANCE)
