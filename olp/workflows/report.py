@@ -36,7 +36,7 @@ def comparison(
     result: Comparison, session: Session | None, name: str, date: datetime.date | None
 ) -> bytes:
     """The report of a comparison in the form that `name` ends in."""
-    from olp.reports import documents as report_document
+    from olp.reports import document_comparison as report_document
     from olp.reports.plots import path as plots_path
 
     report = dict(result.report)
@@ -74,7 +74,7 @@ def correction(
 ) -> bytes:
     """The report of a correction in the form that `name` ends in; `nominal` is what was corrected, unrolled
     where that was asked for."""
-    from olp.reports import documents as report_document
+    from olp.reports import document_correction as report_document
 
     report = dict(result.report) | {"test_paths": _tests(session)}
     if FilePath(name).suffix.lower() == ".json":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,13 +21,13 @@ from olp.program.registry import Options, read
 from olp.program.rs274.state import PathMode
 from olp.reports.plots.base import Format as Picture
 from olp.trajectory.from_program import axis_limits
-from olp.trajectory.inertia import Inertial, compliance_of
+from olp.trajectory.inertia import compliance_of
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
-from olp.trajectory.summary import MOST, compare, summary
 from olp.trajectory.usage import LineUse, SlowPlaces
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
 from olp.workflows.flatten import unrolled
+from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
 
 Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
@@ -252,7 +251,7 @@ def run(
 ) -> Retiming:
     """As `retime`, in a session."""
     setup, most_um = session.setup, options.max_inertial_um
-    proved = None if proof is None else _proved(proof, setup)
+    stated = None if proof is None else proved(proof, setup)
     tell = progress or silent
     tell("read", 0.0)
     case = _case(session, program, options)
@@ -263,12 +262,12 @@ def run(
         found = planned(case, limits, tell)
     else:
         found = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
-    report = _report(case, found, compliance, most_um)
+    report = report_of(case, found, compliance, most_um)
     if other is not None:
-        report["nominal"] = _against(found, planned(other, found.limits, tell, "nominal"), other)
-    if proved is not None:
+        report["nominal"] = against(found, planned(other, found.limits, tell, "nominal"), other)
+    if stated is not None:
         moving = sum(report["budget_um"].values())
-        report["proof"] = proved | {"at_most_um": proved["path_max_um"] + moving}
+        report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
         report["blend_study"] = blend_study(case, found, FACTORS, tell)
     # the motion keeps to the box of its way-points, so commands within travel are motion within travel
@@ -303,74 +302,3 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
             file=program.name or None,
         )
     return case
-
-
-def _against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
-    """The times of the nominal program, in all and by line."""
-    rows = compare((before.case.legs, before.lines), (found.case.legs, found.lines))
-    return {
-        "program": other.name,
-        "duration_s": before.duration_s,
-        "lines_correspond": rows is not None,
-        "differences": []
-        if rows is None
-        else [row for row in rows[:MOST] if row["nominal_s"] != row["corrected_s"]],
-    }
-
-
-def _proved(proof: Mapping[str, Any], setup: Setup) -> dict[str, Any]:
-    """What the proof of a correction leaves, in um. Raises UsageError for what is no such report, or is of
-    another machine."""
-    try:
-        if proof["schema"] != "olp-report-1":
-            raise KeyError(proof["schema"])
-        machine, left = str(proof["machine"]["name"]), float(proof["deviation"]["path_max_um"])
-        budget = {str(key): float(value) for key, value in proof["budget_um"].items()}
-        program = str(proof["program"]["name"])
-        if not all(map(math.isfinite, (left, *budget.values()))):
-            raise ValueError(left)
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise UsageError(
-            'the proof is no report of a correction; expected one of schema "olp-report-1", as olp correct '
-            "and olp verify write"
-        ) from None
-    if machine != setup.machine.name:
-        raise UsageError(f"the proof is for machine {machine!r}, and this one is {setup.machine.name!r}")
-    return {"program": program, "budget_um": budget, "path_max_um": left}
-
-
-def _report(case: Case, found: Plan, compliance: Any, max_inertial_um: float | None) -> dict[str, Any]:
-    limits = found.limits
-    report: dict[str, Any] = {
-        "schema": "olp-retime-1",
-        "program": case.name,
-        "machine": case.setup.machine.name,
-        "waypoints": sum(map(len, case.legs)),
-        "pieces": sum(len(t.motion) for t in found.trajectories),
-        "path": case.tolerances(),
-        "budget_um": {"blending": found.blending_mm * 1e3, "chords_of_arcs": case.chords_mm() * 1e3},
-        "untimed": case.untimed(),
-        "limits": {
-            "velocity_mm_s": limits.velocity.tolist(),
-            "acceleration_mm_s2": limits.acceleration.tolist(),
-            "jerk_mm_s3": limits.jerk.tolist(),
-        },
-        "stretches": [
-            {"first_line": int(leg.line.min()), "last_line": int(leg.line.max()), "duration_s": t.duration_s}
-            for leg, t in zip(case.legs, found.trajectories, strict=True)
-        ],
-    } | summary(found.trajectories, found.lines, found.slow)
-    if compliance.any():
-        parts = [Inertial.of(t.motion, compliance) for t in found.trajectories]
-        most = max(parts, key=lambda p: p.most_mm, default=None)
-        whole = max(found.duration_s, 1e-300)
-        square = sum(p.rms_mm**2 * t.duration_s for p, t in zip(parts, found.trajectories, strict=True))
-        report["budget_um"]["inertial"] = most.most_mm * 1e3 if most else 0.0
-        report["inertial"] = {
-            "max_um": most.most_mm * 1e3 if most else 0.0,
-            "rms_um": (square / whole) ** 0.5 * 1e3,
-            "across_path_max_um": max((p.across_mm for p in parts), default=0.0) * 1e3,
-            "line": most.line if most else None,
-            "allowed_um": max_inertial_um,
-        }
-    return report

@@ -1,0 +1,157 @@
+"""Sections that documents of a correction and of a comparison share."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator, Mapping
+
+from olp.findings.catalogue import RULES
+from olp.reports.document import Block, Grid, Notice, Pairs, Paragraph, Plot, Section
+from olp.reports.report import Report, by_severity, number
+
+Plots = Mapping[str, bytes]
+MOST_SOURCES, MOST_POSES = 24, 60
+
+
+def subtitle_of(name: str, report: Report, date: datetime.date | None) -> str:
+    """What a document is about, and its day."""
+    machine = (report.get("machine") or {}).get("name", "")
+    return ", ".join(v for v in (name, machine, date.isoformat() if date else "") if v)
+
+
+def footer_of(version: str) -> str:
+    """The last line of a document."""
+    return (
+        f"Written by olp {version}. Deviations are distances of the tool tip from the nominal path, unless "
+        "said otherwise; error = actual minus commanded."
+    )
+
+
+def machine_rows(report: Report) -> list[tuple[str, str]]:
+    """Machine and control."""
+    machine = report.get("machine") or {}
+    if not machine:
+        return []
+    return [
+        ("Machine", str(machine.get("name", ""))),
+        ("Axes, workpiece to tool", str(machine.get("chain", ""))),
+        ("Numerical controller", str(machine.get("controller", ""))),
+        ("Scope", "three linear axes, quasi-static errors; forces and dynamics are no part of it"),
+    ]
+
+
+def calibration_blocks(report: Report, date: datetime.date | None) -> list[Block]:
+    """How the errors were determined."""
+    calibration = report.get("calibration") or {}
+    if not calibration:
+        return [Pairs([])]
+    measured, until = calibration.get("measured"), calibration.get("valid_until")
+    age = "not stated: no date was given"
+    if date is not None and isinstance(measured, datetime.date):
+        days = (date - measured).days
+        age = f"{days} days on {date.isoformat()}"
+        if isinstance(until, datetime.date):
+            left = (until - date).days
+            age += f", {left} days valid" if left >= 0 else f", expired {-left} days ago"
+    temperature = calibration.get("temperature_degC")
+    return [Pairs([
+        ("Measured", date_text(measured)), ("Valid until", date_text(until)), ("Age", age),
+        ("Model", str(calibration.get("model", ""))),
+        ("Temperature", "" if temperature is None else f"{temperature:g} degC"),
+        ("SHA-256", str(calibration.get("sha256", ""))),
+    ])]  # fmt: skip
+
+
+def date_text(value: object) -> str:
+    """A day, or that there is none."""
+    return value.isoformat() if isinstance(value, datetime.date) else str(value or "not stated")
+
+
+def path_plot_blocks(plots: Plots) -> Iterator[Block]:
+    """Plots along the path, those that there are."""
+    captions = {
+        "picture": "The path in plan view, coloured by its distance from the nominal one.",
+        "along": "Distance from the nominal path along it; rapids and gaps are left out.",
+        "histogram": "How far points of the path are from the nominal one.",
+        "components": "Deviation normal (level, to the left of travel) and binormal (up) along the path.",
+    }
+    yield from (Plot(plots[name], text) for name, text in captions.items() if name in plots)
+
+
+def test_sections(report: Report, plots: Plots) -> Iterator[Section]:
+    """Circle and diagonals that can be measured next day."""
+    tests = report.get("test_paths")
+    if not tests:
+        return
+    blocks: list[Block] = [Paragraph(
+        "What a ball-bar should show in the middle of the calibrated volume, before and after "
+        "correction: circular deviation G in both directions and hysteresis H (ISO 230-4). A result far "
+        "from it says that the calibration no longer describes the machine, or that dynamics add to it."
+    )]  # fmt: skip
+    if "circles" in plots:
+        blocks.append(Plot(plots["circles"], "Predicted circles, counter-clockwise, deviations magnified."))
+    rows = []
+    for circle in tests["circles"]:
+        a, b = circle["before"], circle["after"]
+        cells = [number(side[key]) for key in ("G_ccw_um", "G_cw_um", "H_um") for side in (a, b)]
+        rows.append([f"{circle['plane']}, radius {circle['radius_mm']:g} mm", *cells])
+    header = ["in um", *(f"{k} {w}" for k in ("G ccw", "G cw", "H") for w in ("before", "after"))]
+    blocks.append(Grid(header, rows))
+    yield Section("Predicted circular tests, ISO 230-4", blocks, 2)
+    diagonals = tests["diagonals"]
+    blocks = [Paragraph(
+        "What a laser along the body diagonals of the calibrated volume should show: systematic deviation of "
+        "positioning E and reversal B of each diagonal, as ISO 230-6 asks."
+    )]  # fmt: skip
+    if "diagonals" in plots:
+        blocks.append(
+            Plot(plots["diagonals"], "Predicted deviation of positioning along the body diagonals.")
+        )
+    rows = [
+        [
+            f"{row['name']}, {row['length_mm']:.0f} mm",
+            *(number(row[side][key]) for key in ("E_um", "B_um") for side in ("before", "after")),
+        ]
+        for row in diagonals["rows"]
+    ]
+    worst = [number(diagonals[side][key]) for key in ("E_um", "B_um") for side in ("before", "after")]
+    blocks.append(Grid(["in um", "E before", "E after", "B before", "B after"], [*rows, ["largest", *worst]]))
+    yield Section("Predicted body diagonals, ISO 230-6", blocks, 2)
+
+
+def notice_blocks(report: Report) -> Iterator[Block]:
+    """Findings, the worst first."""
+    found = by_severity(report.get("findings") or ())
+    for f in found:
+        rule = RULES[f["code"]]
+        lines = f["lines"][:8]
+        place = (
+            f" Lines {', '.join(map(str, lines))}{' and more' if f['count'] > len(lines) else ''}."
+            if lines
+            else ""
+        )
+        message = f"{f['message'][:1].upper()}{f['message'][1:]}.{place}"
+        yield Notice(f["severity"], f["code"], rule.title, message, rule.remedy)
+    if not found:
+        yield Paragraph("None.")
+
+
+def documentation_blocks(report: Report, version: str, date: datetime.date | None) -> Iterator[Block]:
+    """Digests and versions that the document rests on."""
+    rows = [("Software", f"olp {version}"), ("Date", date_text(date))]
+    for key, title in (
+        ("program", "Nominal program"),
+        ("nominal", "Nominal path"),
+        ("corrected", "Corrected program"),
+    ):
+        part = report.get(key)
+        if part:
+            said = (part.get("name"), f"{part['lines']} lines" if "lines" in part else "")
+            rows.append((title, ", ".join(str(v) for v in said if v)))
+            rows.append(("SHA-256", part["sha256"]))
+    for key, title in (("measured_before", "Measured before"), ("measured", "Measured")):
+        for part in report.get(key) or ():
+            rows.append((title, f"{part['name']}, {part['points']} points"))
+            rows.append(("SHA-256", part["sha256"]))
+    rows.append(("Conventions", "mm, s, rad, degC; names of errors after ISO 230-1"))
+    yield Pairs(rows)
