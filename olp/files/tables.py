@@ -17,7 +17,7 @@ from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES, shifted
 from olp.files.problems import Problem, config_error, nearest
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 #: A data row: its line in the file and the number in each column.
 Row = tuple[int, list[float]]
@@ -44,14 +44,14 @@ class CurveTable:
     sigma: Mapping[str, Array]
 
 
-def read_curves(path: PathLike) -> CurveTable:
+def read_curves(path: PathLike, read: Reader = read_bytes) -> CurveTable:
     """Read a curve file.
 
     Header `X_mm[, direction], EXX_um, EBX_urad ...[, sigma_EXX_um]`, then one row a position. Lines that
     start with `#` and empty lines are skipped. Raises InputError where the file cannot be read, and
     ConfigError with every problem and its line where the table is wrong.
     """
-    return parse_curves(read_bytes(path), str(path))
+    return parse_curves(read(path), str(path))
 
 
 def parse_curves(data: bytes, file: str) -> CurveTable:

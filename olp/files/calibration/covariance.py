@@ -24,7 +24,7 @@ from olp.files.problems import validate
 from olp.files.schemas import CalibrationFile, CovarianceTable
 from olp.files.tables import parse_curves
 from olp.files.toml_text import read_toml
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 SCHEMA = "olp-covariance-1"
 _ARRAYS = {
@@ -33,18 +33,20 @@ _ARRAYS = {
 }  # fmt: skip
 
 
-def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | None:
+def load_uncertainty(
+    path: PathLike, calibration: Calibration, read: Reader = read_bytes
+) -> Uncertainty | None:
     """What is known of the uncertainty of a calibration that was read from `path`; None where nothing is.
 
     The file that [covariance] names wins over sigma columns and keys. Raises InputError where a file cannot
     be read, ConfigError where it is no covariance, or that of another calibration.
     """
-    values, lines = read_toml(read_bytes(path), str(path))
+    values, lines = read_toml(read(path), str(path))
     file = validate(CalibrationFile, values, lines, str(path))
     stated = file.covariance or CovarianceTable()
     if stated.file is not None:
         named = FilePath(path).parent / stated.file
-        found: Uncertainty | None = parse_covariance(read_bytes(named), str(named))
+        found: Uncertainty | None = parse_covariance(read(named), str(named))
         if found is not None and found.fingerprint != fingerprint(calibration):
             raise ConfigError(
                 f"is the covariance of another calibration than {FilePath(path).name}: that has been changed "
@@ -53,7 +55,7 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
                 file=str(named),
             )
     else:
-        found = _of_sigmas(file, FilePath(path).parent, calibration)
+        found = _of_sigmas(file, FilePath(path).parent, calibration, read)
     repeatability = calibration.repeatability_mm or ZERO
     if found is None and (any(repeatability) or stated.temperature_K):
         found = Uncertainty((), fingerprint(calibration), "nothing is known of the calibration itself")
@@ -67,10 +69,12 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
     )
 
 
-def _of_sigmas(file: CalibrationFile, folder: FilePath, calibration: Calibration) -> Uncertainty | None:
+def _of_sigmas(
+    file: CalibrationFile, folder: FilePath, calibration: Calibration, read: Reader
+) -> Uncertainty | None:
     curves = {}
     for table in file.curves:
-        data = read_bytes(folder / table.file)
+        data = read(folder / table.file)
         # most files have none, and need not be read twice
         if b"sigma_" in data:
             sigma = parse_curves(data, table.file).sigma

@@ -12,7 +12,7 @@ from olp.core.machine import COMPONENTS
 from olp.core.units import AXES
 from olp.files.problems import Problem, config_error, nearest
 from olp.files.tables import Row, headed, rows_of
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 MAP_COLUMNS = ("DX_um", "DY_um", "DZ_um")
 SIGMA_COLUMNS = tuple(f"sigma_{name}" for name in MAP_COLUMNS)
@@ -32,26 +32,26 @@ class GridTable:
     columns: Mapping[str, Array]
 
 
-def read_map(path: PathLike) -> GridTable:
+def read_map(path: PathLike, read: Reader = read_bytes) -> GridTable:
     """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, a row a node in any order, and standard
     uncertainties `sigma_DX_um, sigma_DY_um, sigma_DZ_um` where they are stated; the columns DX, sigma_DX ..
     of the result are in mm.
 
     Raises InputError where the file cannot be read, ConfigError with every problem and its line.
     """
-    table = _parse(read_bytes(path), str(path), _map_problems)
+    table = _parse(read(path), str(path), _map_problems)
     return GridTable(
         table.arguments, table.knots_mm, {n.removesuffix("_um"): v for n, v in table.columns.items()}
     )
 
 
-def read_component_grid(path: PathLike) -> GridTable:
+def read_component_grid(path: PathLike, read: Reader = read_bytes) -> GridTable:
     """Read component errors of one axis per kg: one to three columns of axis positions (`Y_mm`, `Z_mm`), then
     `EZY_um_kg`, `EAY_urad_kg` ...; the columns of the result are in mm/kg and rad/kg by ISO 230-1 name.
 
     Raises as `read_map`.
     """
-    table = _parse(read_bytes(path), str(path), _component_problems)
+    table = _parse(read(path), str(path), _component_problems)
     return GridTable(table.arguments, table.knots_mm, {n[:3]: v for n, v in table.columns.items()})
 
 

@@ -24,7 +24,7 @@ from olp.files.schema_base import Position
 from olp.files.schemas import CalibrationFile, CurveTable, CyclicTable, ThermalTable
 from olp.files.tables import read_curves
 from olp.files.toml_text import Path, dotted, line_of, read_toml
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 #: The workpiece's size holds at this temperature (ISO 1) where the job states none.
 REFERENCE_DEGC = 20.0
@@ -34,11 +34,11 @@ T = TypeVar("T", CurveTable, MapTable, ComplianceTable)
 V = TypeVar("V")
 
 
-def files_beside(path: PathLike) -> list[FilePath]:
+def files_beside(path: PathLike, read: Reader = read_bytes) -> list[FilePath]:
     """The files that a calibration file names, as far as it can be read; its loader says what is wrong with
     it."""
     try:
-        values = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        values = tomllib.loads(read(path).decode("utf-8-sig"))
         names = [t["file"] for name in ("curves", "maps", "compliance") for t in values.get(name, ())]
         structure = values.get("thermal", {}).get("structure")
         covariance = values.get("covariance", {}).get("file")
@@ -49,26 +49,32 @@ def files_beside(path: PathLike) -> list[FilePath]:
 
 
 def load_calibration(
-    path: PathLike, machine: Machine | None = None, temperatures_degC: Mapping[str, float] | None = None
+    path: PathLike,
+    machine: Machine | None = None,
+    temperatures_degC: Mapping[str, float] | None = None,
+    read: Reader = read_bytes,
 ) -> Calibration:
     """The calibration of an olp-calibration-1 file.
 
     With `machine` it must belong to that machine. `temperatures_degC` are the job's: a scale that they
     leave out is at the calibration's temperature, the workpiece at 20 degC. Raises InputError where the
-    file cannot be read, and ConfigError with all problems of it and of its curve files.
+    file cannot be read, and ConfigError with all problems of it and of its curve files. `read` opens every
+    file.
     """
-    values, lines = read_toml(read_bytes(path), str(path))
+    values, lines = read_toml(read(path), str(path))
     file = validate(CalibrationFile, values, lines, str(path))
     found = [(line_of(key, lines), sentence) for key, sentence in _mismatches(file, machine)]
     errors: list[ConfigError] = []
 
-    def each(name: str, tables: Sequence[T], make: Callable[[FilePath, T, Vector], V]) -> tuple[V, ...]:
+    def each(
+        name: str, tables: Sequence[T], make: Callable[[FilePath, T, Vector, Reader], V]
+    ) -> tuple[V, ...]:
         """What the tables [[name]] and their files hold."""
         made = []
         for index, table in enumerate(tables):
             key: Path = (name, index, "file")
             try:
-                made.append(make(FilePath(path).parent / table.file, table, file.datum_mm))
+                made.append(make(FilePath(path).parent / table.file, table, file.datum_mm, read))
             except ConfigError as error:
                 errors.append(error)
             except InputError as error:
@@ -82,7 +88,7 @@ def load_calibration(
     if file.thermal is not None and file.thermal.structure is not None:
         key = ("thermal", "structure")
         try:
-            structure = load_structure(FilePath(path).parent / file.thermal.structure, file.machine)
+            structure = load_structure(FilePath(path).parent / file.thermal.structure, file.machine, read)
         except ConfigError as error:
             errors.append(error)
         except InputError as error:
@@ -147,8 +153,8 @@ def _mismatches(file: CalibrationFile, machine: Machine | None) -> Iterator[tupl
         )
 
 
-def _curve(path: FilePath, table: CurveTable, datum_mm: Vector) -> Curve:
-    columns = read_curves(path)
+def _curve(path: FilePath, table: CurveTable, datum_mm: Vector, read: Reader) -> Curve:
+    columns = read_curves(path, read)
     both = columns.forward is not None
     try:
         return Curve(
@@ -171,8 +177,8 @@ def _line(stated: Position, datum_mm: Vector) -> Vector:
     return _vector([datum if at is None else at for at, datum in zip(stated.values, datum_mm, strict=True)])
 
 
-def _map(path: FilePath, table: MapTable, datum_mm: Vector) -> DeviationMap:
-    grid = read_map(path)
+def _map(path: FilePath, table: MapTable, datum_mm: Vector, read: Reader) -> DeviationMap:
+    grid = read_map(path, read)
     order = [grid.arguments.index(axis) for axis in AXES]
     values = np.stack([grid.columns[f"D{axis}"].transpose(order) for axis in AXES], axis=-1)
     sigma = None
@@ -194,8 +200,8 @@ def _map(path: FilePath, table: MapTable, datum_mm: Vector) -> DeviationMap:
         raise error.in_file(str(path)) from None
 
 
-def _compliance(path: FilePath, table: ComplianceTable, datum_mm: Vector) -> ComponentTable:
-    grid = read_component_grid(path)
+def _compliance(path: FilePath, table: ComplianceTable, datum_mm: Vector, read: Reader) -> ComponentTable:
+    grid = read_component_grid(path, read)
     try:
         return ComponentTable(
             axis=next(iter(grid.columns))[2],

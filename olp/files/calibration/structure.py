@@ -21,16 +21,16 @@ from olp.files.problems import Problem, config_error, validate
 from olp.files.schema_base import Position
 from olp.files.tables import decoded, headed
 from olp.files.toml_text import comment, line_of, read_toml, toml_lines
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 _READING = re.compile(r"(E[A-Z]{2})@([-+]?\d+(?:\.\d+)?)_(um|urad)")
 _DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
 
 
-def load_structure(path: PathLike, machine: str | None = None) -> Structure:
+def load_structure(path: PathLike, machine: str | None = None, read: Reader = read_bytes) -> Structure:
     """The structure of an olp-thermal-1 file. Raises InputError where it cannot be read, ConfigError with all
     problems."""
-    values, lines = read_toml(read_bytes(path), str(path))
+    values, lines = read_toml(read(path), str(path))
     file = validate(ThermalFile, values, lines, str(path))
     if machine is not None and file.machine != machine:
         sentence = f'machine = "{file.machine}" is not the name in the machine file; expected "{machine}"'
@@ -108,14 +108,14 @@ def structure_text(
     return ("\n".join(lines) + "\n").encode()
 
 
-def read_drift_log(path: PathLike) -> DriftLog:
+def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:
     """A log: `t_s`, sensors `NAME_degC`, and readings of drift `EXX@500_um` (component @ axis position in
     mm); a reading may be empty. Comment lines `# tool_mm = [0, 0, -120]` and `# line_mm = [0, 500, -300]` say
     with what and where it was read.
 
     Raises InputError where it cannot be read, ConfigError with every problem and its line.
     """
-    return parse_drift_log(read_bytes(path), str(path))
+    return parse_drift_log(read(path), str(path))
 
 
 def parse_drift_log(data: bytes, file: str) -> DriftLog:
