@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.machine import COMPONENTS
+from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple, refusal
 from olp.files.calibration.gridded_schema import BeamTable, ComplianceTable, MapTable
 from olp.files.fields import (
     CONTROLLERS,
@@ -20,19 +21,12 @@ from olp.files.fields import (
     Chain,
     Compliance,
     Controller,
-    Interval,
     IsoNames,
-    NotNegative,
     OffsetName,
-    Positive,
     ProgramDialect,
     Sign,
-    Text,
     ToolNumber,
-    Triple,
-    refusal,
 )
-from olp.files.schema_base import Position, Table
 
 
 class AxisTable(Table):

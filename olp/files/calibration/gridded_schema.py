@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from olp.files.fields import Positive, Text, Triple, refusal
-from olp.files.schema_base import Position, Table
+from olp.core.schema import Position, Positive, Table, Text, Triple, refusal
 
 
 class MapTable(Table):

@@ -11,6 +11,7 @@ import numpy as np
 
 from olp.core.errors import ConfigError, InputError
 from olp.core.machine import SQUARENESS, Machine, Vector
+from olp.core.schema import Position
 from olp.core.units import AXES, shifted
 from olp.errormodel.beams import Beam, tube_mm4
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
@@ -20,7 +21,6 @@ from olp.files.calibration.gridded_schema import BeamTable, ComplianceTable, Map
 from olp.files.calibration.grids import read_component_grid, read_map
 from olp.files.calibration.structure import load_structure
 from olp.files.problems import config_error, validate
-from olp.files.schema_base import Position
 from olp.files.schemas import CalibrationFile, CurveTable, CyclicTable, ThermalTable
 from olp.files.tables import read_curves
 from olp.files.toml_text import Path, dotted, line_of, read_toml

@@ -14,11 +14,11 @@ from olp.calibration.thermal.drift import DriftLog
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
+from olp.core.schema import Position
 from olp.core.units import AXES, shifted
 from olp.errormodel.structure import Distortion, Sensor, Structure
 from olp.files.calibration.thermal_schema import DistortionTable, ThermalFile
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Position
 from olp.files.tables import decoded, headed
 from olp.files.toml_text import comment, line_of, read_toml, toml_lines
 from olp.files.write import PathLike, Reader, read_bytes

@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.machine import COMPONENTS
-from olp.files.fields import Interval, Text, Triple, refusal
-from olp.files.schema_base import Position, Table
+from olp.core.schema import Interval, Position, Table, Text, Triple, refusal
 
 Range = Annotated[tuple[float, float], Field(strict=False)]
 
