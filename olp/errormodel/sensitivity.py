@@ -20,8 +20,9 @@ from olp.core.units import AXES
 from olp.errormodel.bodies import Body, build_bodies
 from olp.errormodel.boxed import as_points
 from olp.errormodel.calibration import Calibration, Thermal
-from olp.errormodel.thermal import REFERENCE_DEGC
-from olp.errormodel.uncertainty import EXPANSION_PER_K, Entry, Uncertainty
+from olp.errormodel.entry import Entry
+from olp.errormodel.sources.expansion import REFERENCE_DEGC
+from olp.errormodel.uncertainty import EXPANSION_PER_K, Uncertainty
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

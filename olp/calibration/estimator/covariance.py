@@ -14,7 +14,8 @@ from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.uncertainty import Entry, Uncertainty, fingerprint
+from olp.errormodel.entry import Entry
+from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
 #: Positions of a curve in each cell of its spline: between them its factor is straight.
 _PER_CELL = 3

@@ -12,15 +12,28 @@ support):
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
+from olp.core.schema import Positive, refusal
 from olp.core.units import AXES
 from olp.errormodel.gridded import COVER_MM, ComponentTable
+from olp.errormodel.sources.base import (
+    ErrorSource,
+    Frame,
+    Reading,
+    Schema,
+    Writing,
+    floats,
+    line_at,
+    line_key,
+)
+from olp.errormodel.sources.compliance import OnLine
 
 #: Standard gravity (CGPM 1901), in N per kg.
 GRAVITY_N_KG = 9.80665
@@ -109,3 +122,103 @@ class Beam:
             tool_mm=self.tool_mm,
             name=f"beam of axis {self.axis}",
         )
+
+
+class BeamTable(OnLine):
+    axis: Literal["X", "Y", "Z"] = Field(description="the axis that moves the load along the beam")
+    support: Literal["simple", "fixed", "cantilever"] = Field(
+        description='"simple" (rests on both ends), "fixed" (clamped at both ends), or "cantilever" '
+        "(clamped at "
+        "the first end of span_mm; a ram that comes out farther)"
+    )
+    span_mm: Annotated[tuple[float, float], Field(strict=False)] = Field(
+        description="the axis positions at which the load stands over the two supports, [first, second] in mm"
+    )
+    youngs_modulus_GPa: Positive = Field(description="Young's modulus of the beam, in GPa: 210 for steel")
+    second_moment_mm4: Positive | None = Field(
+        default=None, description="the second moment of area of the section, in mm4"
+    )
+    section_mm: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
+        default=None,
+        validate_default=True,
+        description="a rectangular tube instead: [width, height in the direction of bending, wall] in mm",
+    )
+    direction: Literal["+X", "-X", "+Y", "-Y", "+Z", "-Z"] = Field(
+        default="-Z", description='where the weight pulls, "-Z" if left out'
+    )
+
+    @field_validator("span_mm")
+    @classmethod
+    def _not_empty(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[0] == value[1]:
+            raise refusal("= is empty; expected the axis positions of two different ends, in mm")
+        return value
+
+    @field_validator("section_mm")
+    @classmethod
+    def _one_of_two(
+        cls, value: tuple[float, float, float] | None, info: ValidationInfo
+    ) -> tuple[float, float, float] | None:
+        if "second_moment_mm4" not in info.data:
+            return value
+        if (value is None) == (info.data["second_moment_mm4"] is None):
+            raise refusal("or second_moment_mm4: expected exactly one of the two")
+        if value is not None and 2.0 * value[2] > min(value[:2]):
+            raise refusal(f"has a wall of {value[2]:g} mm; expected at most half of width and height")
+        return value
+
+    @field_validator("direction")
+    @classmethod
+    def _across(cls, value: str, info: ValidationInfo) -> str:
+        if value[1] == info.data.get("axis"):
+            raise refusal(f'= "{value}" is along the beam; expected a direction across it')
+        return value
+
+
+class Beams(ErrorSource[list[BeamTable], tuple[Beam, ...]]):
+    """Tables [[compliance_beam]]."""
+
+    key, field = "compliance_beam", "beams"
+    schema: Schema = (
+        list[BeamTable],
+        Field(default=[], description="tables [[compliance_beam]], beams that bend under the payload"),
+    )
+
+    def read(self, stated: list[BeamTable], found: Reading) -> tuple[Beam, ...]:
+        return tuple(_beam(table, found.datum_mm) for table in stated)
+
+    def write(self, values: tuple[Beam, ...], out: Writing) -> None:
+        for beam in values:
+            out.table(
+                "[[compliance_beam]]",
+                {
+                    "axis": beam.axis,
+                    "support": beam.support,
+                    "span_mm": floats(beam.span_mm),
+                    "youngs_modulus_GPa": beam.youngs_modulus_GPa,
+                    "second_moment_mm4": beam.second_moment_mm4,
+                    "direction": beam.direction,
+                    "line_mm": line_key(beam.line_mm, beam.axis),
+                    "tool_mm": floats(beam.tool_mm),
+                },
+            )
+
+    def loads(self, values: tuple[Beam, ...], frame: Frame) -> list[ComponentTable]:
+        return [beam.table(frame.box_mm, frame.chain) for beam in values]
+
+
+def _beam(table: BeamTable, datum_mm: Vector) -> Beam:
+    second_moment = table.second_moment_mm4
+    if second_moment is None:
+        assert table.section_mm is not None
+        second_moment = tube_mm4(*table.section_mm)
+    return Beam(
+        axis=table.axis,
+        support=table.support,
+        span_mm=table.span_mm,
+        youngs_modulus_GPa=table.youngs_modulus_GPa,
+        second_moment_mm4=second_moment,
+        direction=table.direction,
+        line_mm=line_at(table.line_mm, datum_mm),
+        tool_mm=table.tool_mm,
+    )

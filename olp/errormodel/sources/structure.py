@@ -8,17 +8,24 @@ growth, and a bow. (Indirect compensation: see J. Mayr et al., Thermal issues in
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
-from olp.core.units import AXES
+from olp.core.schema import Interval, Position, Table, Text, Triple, refusal
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import COVER_MM, ComponentTable, refuse
+from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Writing, floats, vector
+from olp.errormodel.sources.expansion import Thermal, write_table
 
 SHAPES = ("offset", "growth", "bow")
 
@@ -199,3 +206,211 @@ class Structure:
     def components(self) -> Sequence[str]:
         """The components that it holds."""
         return sorted({d.component for d in self.distortions})
+
+
+Range = Annotated[tuple[float, float], Field(strict=False)]
+
+
+class SensorTable(Table):
+    name: Text = Field(description="the name of the sensor, as in logs and job files")
+    reference_degC: float = Field(description="what it says where its part distorts nothing, in degC")
+    range_degC: Range = Field(
+        description="the structure temperatures that were identified, [min, max] in degC"
+    )
+    lag_s: float = Field(
+        default=0.0,
+        description="how slowly the structure follows the sensor, in s; below 0 the sensor is behind it",
+    )
+
+
+class DistortionTable(Table):
+    component: Literal[COMPONENTS] = Field(  # type: ignore[valid-type]
+        description='the ISO 230-1 name of a component error, such as "EXX"'
+    )
+    sensor: Text = Field(description="the sensor of the part that causes it")
+    span_mm: Interval = Field(description="the axis positions that the shapes span, [min, max] in mm")
+    offset_um_K: float | None = Field(default=None, description="the same all along the axis, in um per K")
+    growth_um_m_K: float | None = Field(
+        default=None, description="growth from the middle of the span, in um per m and K"
+    )
+    bow_um_K: float | None = Field(
+        default=None, description="a parabola, 0 at both ends of the span, its middle in um per K"
+    )
+    offset_urad_K: float | None = Field(
+        default=None, description="the same all along the axis, in urad per K"
+    )
+    growth_urad_m_K: float | None = Field(
+        default=None, description="growth from the middle of the span, in urad per m and K"
+    )
+    bow_urad_K: float | None = Field(
+        default=None,
+        validate_default=True,
+        description="a parabola, 0 at both ends of the span, its middle in urad per K",
+    )
+    line_mm: Position | None = Field(
+        default=None, description="where the other axes stood while measuring; the datum if left out"
+    )
+    tool_mm: Triple = Field(
+        default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"
+    )
+
+    @field_validator("bow_urad_K")
+    @classmethod
+    def _unit_fits(cls, value: float | None, info: ValidationInfo) -> float | None:
+        component = info.data.get("component")
+        if component is None:
+            return value
+        angular = component[1] in "ABC"
+        stated = {**info.data, "bow_urad_K": value}
+        wrong = [
+            key
+            for key, number in stated.items()
+            if number is not None and key.endswith("_K") and ("_urad" in key) != angular
+        ]
+        if wrong:
+            raise refusal(
+                f"or another key ({wrong[0]}) is of the wrong unit for {component}; expected keys in "
+                f"{'urad' if angular else 'um'}"
+            )
+        return value
+
+
+class ThermalFile(Table):
+    """olp-thermal-1: sensors, the structure behind them, and how it distorts."""
+
+    schema_: Literal["olp-thermal-1"] = Field(alias="schema", description='the format, "olp-thermal-1"')
+    machine: Text = Field(description="the name in the machine file that this belongs to")
+    sensors: list[SensorTable] = Field(description="tables [[sensors]]")
+    distortions: list[DistortionTable] = Field(default=[], description="tables [[distortions]]")
+
+
+class ThermalStructure(ErrorSource[str | None, Structure | None]):
+    """An olp-thermal-1 file, which the key `structure` of the table [thermal] names."""
+
+    key = field = "structure"
+
+    def stated(self, file: Any) -> str | None:
+        found: str | None = None if file.thermal is None else file.thermal.structure
+        return found
+
+    def named(self, values: Mapping[str, Any]) -> list[str]:
+        name = values.get("thermal", {}).get("structure")
+        return [name] if name else []
+
+    def read(self, stated: str | None, found: Reading) -> Structure | None:
+        if stated is None:
+            return None
+        make = lambda file: structure_of(found.document(file, ThermalFile))  # noqa: E731
+        return found.one(("thermal", "structure"), stated, make)
+
+    def write(self, values: Structure | None, out: Writing) -> None:
+        if values is None:
+            return
+        if out.find("[thermal]") is None:
+            write_table(Thermal(), out)
+        table = out.find("[thermal]")
+        assert table is not None
+        table["structure"] = out.document("thermal", structure_tables(values, out.machine))
+
+    def models(self, values: Structure | None, frame: Frame) -> list[ErrorModel]:
+        tables = () if values is None else values.tables(hold=frame.hold)
+        if not tables:
+            return []
+        return [
+            GridErrors.of(
+                "thermal", tables, frame.chain, frame.datum_mm, frame.box_mm, hold=frame.hold,
+                tool_terms=frame.tool_terms,
+            )
+        ]  # fmt: skip
+
+    def inspect(self, values: Structure | None, frame: Frame) -> dict[str, Any]:
+        if values is None:
+            return {}
+        sensors = [
+            {
+                "name": s.name,
+                "reference_degC": s.reference_degC,
+                "lowest_degC": s.range_degC[0],
+                "highest_degC": s.range_degC[1],
+                "lag_s": s.lag_s,
+            }
+            for s in values.sensors
+        ]
+        distortions = []
+        for d in values.distortions:
+            unit, scale = ("urad", 1.0 / RAD_PER_URAD) if d.component[1] in "ABC" else ("um", UM_PER_MM)
+            distortions.append(
+                {
+                    "name": f"{d.component} by {d.sensor}",
+                    f"offset_{unit}_K": d.offset * scale,
+                    f"growth_{unit}_m_K": d.growth * scale * 1e3,
+                    f"bow_{unit}_K": d.bow * scale,
+                }
+            )
+        return {"sensors": sensors, "distortions": distortions}
+
+
+def structure_of(file: ThermalFile) -> Structure:
+    """The values of an olp-thermal-1 file. Raises ConfigError."""
+    return Structure(
+        tuple(Sensor(s.name, s.reference_degC, s.range_degC, s.lag_s) for s in file.sensors),
+        tuple(_distortion(d) for d in file.distortions),
+    )
+
+
+def _distortion(table: DistortionTable) -> Distortion:
+    unit, power = ("urad", -6) if table.component[1] in "ABC" else ("um", -3)
+
+    def of(shape: str, more: int = 0) -> float:
+        value = getattr(table, shape.format(unit))
+        return 0.0 if value is None else shifted(value, power + more)
+
+    return Distortion(
+        component=table.component,
+        sensor=table.sensor,
+        span_mm=table.span_mm,
+        offset=of("offset_{}_K"),
+        growth=of("growth_{}_m_K", -3),
+        bow=of("bow_{}_K"),
+        line_mm=None if table.line_mm is None else _line(table.line_mm, table.component),
+        tool_mm=table.tool_mm,
+    )
+
+
+def _line(stated: Position, component: str) -> Vector:
+    """Where the other axes stood; that of the component's own axis does not matter."""
+    missing = [a for a, at in zip(AXES, stated.values, strict=True) if at is None and a != component[2]]
+    if missing:
+        raise ConfigError(f"line_mm of {component} names no {missing[0]}; expected where each axis stood")
+    return vector([0.0 if at is None else at for at in stated.values])
+
+
+def structure_tables(structure: Structure, machine: str) -> Iterator[tuple[str, dict[str, object]]]:
+    """Header and keys of each table of an olp-thermal-1 file that reads back the same; the first has no
+    header."""
+    yield "", {"schema": "olp-thermal-1", "machine": machine}
+    for sensor in structure.sensors:
+        yield (
+            "[[sensors]]",
+            {
+                "name": sensor.name,
+                "reference_degC": sensor.reference_degC,
+                "range_degC": list(sensor.range_degC),
+                "lag_s": sensor.lag_s,
+            },
+        )
+    for d in structure.distortions:
+        unit, power = ("urad", -6) if d.component[1] in "ABC" else ("um", -3)
+        yield (
+            "[[distortions]]",
+            {
+                "component": d.component,
+                "sensor": d.sensor,
+                "span_mm": floats(d.span_mm),
+                f"offset_{unit}_K": in_unit(d.offset, power),
+                f"growth_{unit}_m_K": in_unit(d.growth, power - 3),
+                f"bow_{unit}_K": in_unit(d.bow, power),
+                "line_mm": None if d.line_mm is None else dict(zip(AXES, map(float, d.line_mm), strict=True)),
+                "tool_mm": None if d.tool_mm == ZERO else floats(d.tool_mm),
+            },
+        )
