@@ -36,11 +36,10 @@ Model = Literal["rigid-body", "huddersfield"]
 class Calibration:
     """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y, B0Z,
     A0Z in rad, `backlash_mm` the constant lost motion per axis. Several curves of one axis hold different
-    components. `repeatability_mm` is the
-    standard deviation of each axis at one place, None where nobody stated it. `compliance` tables and
-    `beams` act per kg of payload beyond `payload_kg`, which was on the machine while measuring. `more` holds
-    the values of sources without a field of their own, by their key. Raises ConfigError with every problem
-    found."""
+    components. `repeatability_mm` is the standard deviation of each axis at one place, None where nobody
+    stated it. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`, which was on the
+    machine while measuring. `more` holds key and values of each source without a field of its own. Raises
+    ConfigError with every problem found."""
 
     machine: str
     box_mm: Array
@@ -61,12 +60,11 @@ class Calibration:
     measured: datetime.date | None = None
     valid_until: datetime.date | None = None
     active_during_measurement: frozenset[str] = frozenset()
-    more: Mapping[str, Any] = field(default_factory=dict)
+    more: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "box_mm", frozen(self.box_mm))
         object.__setattr__(self, "squareness", MappingProxyType(dict(self.squareness)))
-        object.__setattr__(self, "more", MappingProxyType(dict(self.more)))
         problems = self._own_problems()
         if not problems:
             problems = self._curve_problems() + self._grid_problems()
@@ -186,11 +184,12 @@ class Calibration:
 
     def sources(self) -> Iterator[tuple[ErrorSource[Any, Any], Any]]:
         """Every source with its values; one without a field is left out where nothing is stated of it."""
+        more = dict(self.more)
         for source in SOURCES:
             if source.field:
                 yield source, getattr(self, source.field)
-            elif source.key in self.more:
-                yield source, self.more[source.key]
+            elif source.key in more:
+                yield source, more[source.key]
 
     def frame(self, chain: str, *, hold: bool = False) -> Frame:
         """What the models of the sources count on, on a chain such as "FXYZ"."""

@@ -12,7 +12,7 @@ from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Table
 from olp.core.units import AXES, UM_PER_MM, in_unit, shifted
 from olp.errormodel.entry import Entry, alone
-from olp.errormodel.sources.base import ErrorSource, Reading, Schema, Sigmas, Writing, digits, vector
+from olp.errormodel.sources.base import ErrorSource, Example, Reading, Schema, Sigmas, Writing, digits, vector
 
 
 class BacklashTable(Table):
@@ -29,6 +29,11 @@ class Backlash(ErrorSource[BacklashTable, Vector]):
 
     key, field = "backlash", "backlash_mm"
     schema: Schema = (BacklashTable, Field(default_factory=BacklashTable, description="the table [backlash]"))
+
+    def example(self, by: float) -> Example:
+        lost = {"X": 6.0 * by, "Z": 9.0 * by}
+        lines = (f"{a}_um = {b}\nsigma_{a}_um = {0.1 * b}\n" for a, b in lost.items())
+        return Example("[backlash]\n" + "".join(lines))
 
     def read(self, stated: BacklashTable, found: Reading) -> Vector:
         return vector([shifted(getattr(stated, f"{axis}_um"), -3) for axis in AXES])

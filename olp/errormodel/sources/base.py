@@ -9,7 +9,7 @@ through `Writing`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -148,18 +148,34 @@ class Frame:
     loads: tuple[ComponentTable, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Example:
+    """Tables of calibration.toml, the files that they name, and temperatures of sensors that a job states."""
+
+    tables: str
+    files: Mapping[str, str] = field(default_factory=dict)
+    sensors_degC: Mapping[str, float] = field(default_factory=dict)
+
+
 class ErrorSource(Generic[Stated, Values]):
     """One kind of error. What a source leaves out does what is said here: nothing.
 
     `key` is its key in calibration.toml and `schema` that key's type and pydantic field; `field` the field of
     `Calibration` that holds its values, "" for `Calibration.more`. `correctable` is False for what is random:
-    it has no model.
+    it has no model. `covered` is False where no covariance speaks of its numbers: then they are no part of
+    the fingerprint, and a covariance holds whatever becomes of them.
     """
 
     key: str
     field: str = ""
     schema: Schema | None = None
     correctable: bool = True
+    covered: bool = True
+
+    def example(self, by: float) -> Example:
+        """What it looks like on a machine with axes X 0 to 400, Y 0 to 300 and Z -200 to 0 mm, with `by`
+        times the error, 0 or above. A standard uncertainty that it states is a tenth of the value."""
+        raise NotImplementedError
 
     def stated(self, file: Any) -> Stated:
         """Its tables in a file that has been read."""

@@ -25,6 +25,7 @@ from olp.core.units import AXES
 from olp.errormodel.gridded import COVER_MM, ComponentTable
 from olp.errormodel.sources.base import (
     ErrorSource,
+    Example,
     Frame,
     Reading,
     Schema,
@@ -183,6 +184,14 @@ class Beams(ErrorSource[list[BeamTable], tuple[Beam, ...]]):
         list[BeamTable],
         Field(default=[], description="tables [[compliance_beam]], beams that bend under the payload"),
     )
+    covered = False
+
+    def example(self, by: float) -> Example:
+        # no beam is stiff beyond reason
+        modulus = 210.0 / max(by, 1e-30)
+        table = '[[compliance_beam]]\naxis = "X"\nsupport = "simple"\nspan_mm = [-100.0, 500.0]\n'
+        table += "section_mm = [40.0, 60.0, 5.0]\ntool_mm = [0.0, 0.0, -80.0]\n"
+        return Example(f"{table}youngs_modulus_GPa = {modulus}\n")
 
     def read(self, stated: list[BeamTable], found: Reading) -> tuple[Beam, ...]:
         return tuple(_beam(table, found.datum_mm) for table in stated)

@@ -6,6 +6,7 @@ Their model (`olp.errormodel.grid_errors`) evaluates those of beams as well: bot
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import ComponentTable, grid_rows
 from olp.errormodel.sources.base import (
     ErrorSource,
+    Example,
     Frame,
     Reading,
     Schema,
@@ -60,6 +62,14 @@ class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]])
         list[ComplianceTable],
         Field(default=[], description="tables [[compliance]], errors per kg of payload"),
     )
+    covered = False
+
+    def example(self, by: float) -> Example:
+        text = "Y_mm,Z_mm,EZY_um_kg,EAY_urad_kg\n"
+        for number, (y, z) in enumerate(product((0.0, 100.0, 300.0), (-200.0, 0.0))):
+            text += f"{y},{z},{-by * (0.5 + 0.1 * number)},{by * (1.0 + number)}\n"
+        table = '[[compliance]]\nfile = "calibration-load.csv"\nline_mm = { X = 200.0 }\n'
+        return Example(table, {"calibration-load.csv": text})
 
     def named(self, values: Mapping[str, Any]) -> list[str]:
         return files_of_tables(values, self.key)

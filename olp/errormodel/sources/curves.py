@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -22,6 +23,7 @@ from olp.errormodel.entry import Entry, alone
 from olp.errormodel.gridded import frozen, refuse
 from olp.errormodel.sources.base import (
     ErrorSource,
+    Example,
     Frame,
     Reading,
     Schema,
@@ -132,6 +134,19 @@ class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
 
     key = field = "curves"
     schema: Schema = (list[CurveTable], Field(default=[], description="tables [[curves]]"))
+
+    def example(self, by: float) -> Example:
+        x = "X_mm,EXX_um,EYX_um,ECX_urad,sigma_EXX_um,sigma_EYX_um,sigma_ECX_urad\n"
+        for q, *row in ((0.0, 3.0, 1.0, 20.0), (200.0, 8.0, 2.0, 45.0), (400.0, 5.0, 6.0, 30.0)):
+            x += ",".join(repr(value) for value in (q, *(by * v for v in row), *(0.1 * by * v for v in row)))
+            x += "\n"
+        y = "Y_mm,direction,EYY_um,EAY_urad,sigma_EYY_um,sigma_EAY_urad\n"
+        for d, q in product((1, -1), (0.0, 300.0)):
+            y += f"{q},{d},{by * (2.0 + d)},{by * 10.0},{by * 0.2},{by * 1.0}\n"
+        straight = 'interpolation = "linear"\n'
+        tables = f'[[curves]]\nfile = "calibration-x.csv"\nline_mm = {{ Y = 50.0, Z = -20.0 }}\n{straight}'
+        tables += f'[[curves]]\nfile = "calibration-y.csv"\nreference = "table"\n{straight}'
+        return Example(tables, {"calibration-x.csv": x, "calibration-y.csv": y})
 
     def named(self, values: Mapping[str, Any]) -> list[str]:
         return files_of_tables(values, self.key)

@@ -19,7 +19,7 @@ from olp.core.machine import COMPONENTS, Vector
 from olp.core.schema import Positive, Table, refusal
 from olp.core.units import RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.errormodel.gridded import refuse
-from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Schema, Writing, digits
+from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +83,11 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
 
     key = field = "cyclic"
     schema: Schema = (list[CyclicTable], Field(default=[], description="tables [[cyclic]]"))
+
+    def example(self, by: float) -> Example:
+        screw = f'[[cyclic]]\ncomponent = "EXX"\nperiod_mm = 10.0\namplitude_um = {2.0 * by}\n'
+        roll = f'[[cyclic]]\ncomponent = "EAZ"\nperiod_mm = 40.0\namplitude_urad = {15.0 * by}\n'
+        return Example(f"{screw}{roll}phase_rad = 0.7\n")
 
     def read(self, stated: list[CyclicTable], found: Reading) -> tuple[Cyclic, ...]:
         return tuple(

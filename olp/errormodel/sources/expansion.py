@@ -18,7 +18,7 @@ from olp.core.schema import Table, Text, Triple
 from olp.core.units import AXES, in_unit, shifted
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points
-from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Schema, Writing, floats, vector
+from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, floats, vector
 
 #: ISO 1: geometrical product specifications hold at this temperature.
 REFERENCE_DEGC = 20.0
@@ -123,6 +123,12 @@ class ScaleExpansion(ErrorSource[ThermalTable | None, Thermal | None]):
 
     key = field = "thermal"
     schema: Schema = (ThermalTable | None, Field(default=None, description="the table [thermal]"))
+    covered = False
+
+    def example(self, by: float) -> Example:
+        scales = f"X_scale_um_m_K = {11.0 * by}\nZ_scale_um_m_K = {8.0 * by}\n"
+        part = f"workpiece_um_m_K = {23.0 * by}\nclamped_at_mm = [0.0, 10.0, -50.0]\n"
+        return Example(f"[thermal]\n{scales}{part}")
 
     def read(self, stated: ThermalTable | None, found: Reading) -> Thermal | None:
         if stated is None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +23,16 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import frozen, grid_rows, knot_problems, refuse
-from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Schema, Writing, files_of_tables, floats
+from olp.errormodel.sources.base import (
+    ErrorSource,
+    Example,
+    Frame,
+    Reading,
+    Schema,
+    Writing,
+    files_of_tables,
+    floats,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,6 +164,14 @@ class Maps(ErrorSource[list[MapTable], tuple[DeviationMap, ...]]):
         list[MapTable],
         Field(default=[], description="tables [[maps]], measured deviations of the tip"),
     )
+    covered = False
+
+    def example(self, by: float) -> Example:
+        text = "X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um\n"
+        for number, (x, y, z) in enumerate(product((0.0, 150.0, 400.0), (0.0, 300.0), (-200.0, 0.0))):
+            text += f"{x},{y},{z},{by * number},{by * (number % 5)},{by * (7.0 - number)}\n"
+        table = '[[maps]]\nfile = "calibration-map.csv"\nkind = "residual"\ninterpolation = "cubic"\n'
+        return Example(table, {"calibration-map.csv": text})
 
     def named(self, values: Mapping[str, Any]) -> list[str]:
         return files_of_tables(values, self.key)

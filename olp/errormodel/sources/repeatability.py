@@ -10,7 +10,7 @@ from pydantic import Field
 from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Table
 from olp.core.units import AXES, UM_PER_MM, in_unit, shifted
-from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Schema, Writing, vector
+from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, vector
 
 
 class RepeatabilityTable(Table):
@@ -32,6 +32,10 @@ class Repeatability(ErrorSource[RepeatabilityTable | None, Vector | None]):
             "removes",
         ),
     )
+    covered = False
+
+    def example(self, by: float) -> Example:
+        return Example(f"[repeatability]\nX_um = {0.8 * by}\nY_um = {0.5 * by}\n")
 
     def read(self, stated: RepeatabilityTable | None, found: Reading) -> Vector | None:
         if stated is None:

@@ -14,7 +14,7 @@ from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.schema import NotNegative, Table
 from olp.core.units import RAD_PER_URAD, in_unit, shifted
 from olp.errormodel.entry import Entry, alone
-from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Schema, Sigmas, Writing, digits
+from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Sigmas, Writing, digits
 
 #: Angles C0Y, B0Z, A0Z in rad.
 Angles = Mapping[str, float]
@@ -44,6 +44,11 @@ class Squareness(ErrorSource[SquarenessTable, Angles]):
         SquarenessTable,
         Field(default_factory=SquarenessTable, description="the table [squareness]"),
     )
+
+    def example(self, by: float) -> Example:
+        angles = {"C0Y": 40.0 * by, "B0Z": 25.0 * by, "A0Z": 60.0 * by}
+        lines = (f"{n}_urad = {v}\nsigma_{n}_urad = {0.1 * v}\n" for n, v in angles.items())
+        return Example("[squareness]\n" + "".join(lines))
 
     def read(self, stated: SquarenessTable, found: Reading) -> Angles:
         return {name: shifted(getattr(stated, f"{name}_urad"), -6) for name in SQUARENESS}

@@ -24,7 +24,7 @@ from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import COVER_MM, ComponentTable, refuse
-from olp.errormodel.sources.base import ErrorSource, Frame, Reading, Writing, floats, vector
+from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Writing, floats, vector
 from olp.errormodel.sources.expansion import Thermal, write_table
 
 SHAPES = ("offset", "growth", "bow")
@@ -288,6 +288,17 @@ class ThermalStructure(ErrorSource[str | None, Structure | None]):
     """An olp-thermal-1 file, which the key `structure` of the table [thermal] names."""
 
     key = field = "structure"
+    covered = False
+
+    def example(self, by: float) -> Example:
+        file = 'schema = "olp-thermal-1"\nmachine = "example"\n[[sensors]]\nname = "beam"\n'
+        file += "reference_degC = 20.0\nrange_degC = [15.0, 30.0]\nlag_s = 600.0\n"
+        file += '[[distortions]]\ncomponent = "EYY"\nsensor = "beam"\nspan_mm = [0.0, 300.0]\n'
+        file += f"offset_um_K = {1.5 * by}\ngrowth_um_m_K = {8.0 * by}\n"
+        file += '[[distortions]]\ncomponent = "EBX"\nsensor = "beam"\nspan_mm = [0.0, 400.0]\n'
+        file += f"offset_urad_K = {0.5 * by}\nbow_urad_K = {4.0 * by}\n"
+        name = "calibration-thermal.toml"
+        return Example(f'[thermal]\nstructure = "{name}"\n', {name: file}, {"beam": 24.0})
 
     def stated(self, file: Any) -> str | None:
         found: str | None = None if file.thermal is None else file.thermal.structure

@@ -70,7 +70,7 @@ def load_calibration(
             measured=file.measured,
             valid_until=file.valid_until,
             active_during_measurement=file.active_during_measurement,
-            more={source.key: found for source, found in values.items() if not source.field and found},
+            more=tuple((source.key, found) for source, found in values.items() if not source.field and found),
             **{source.field: found for source, found in values.items() if source.field},
         )
     except ConfigError as error:
