@@ -15,8 +15,10 @@ from dataclasses import dataclass, replace
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.entry import CELLS, Entry, Kind
+from olp.errormodel.entry import Entry
 from olp.errormodel.sources.base import Sigmas, digits
+from olp.errormodel.sources.curves import CELLS
+from olp.errormodel.sources.registry import NUMBERS
 
 #: What a report says of uncertainties from sigma columns.
 SIGMA_COLUMNS = (
@@ -48,6 +50,11 @@ class Uncertainty:
     temperature_K: float = 0.0
 
     def __post_init__(self) -> None:
+        for entry in self.entries:
+            if entry.kind not in NUMBERS or not NUMBERS[entry.kind].fits(entry):
+                raise ConfigError(
+                    f"covariance of {entry.kind} {entry.name}: expected finite numbers at ascending positions"
+                )
         seen: set[tuple[str, str, float]] = set()
         for entry in self.entries:
             key = (entry.kind, entry.name, entry.period_mm)
@@ -61,7 +68,7 @@ class Uncertainty:
     def rank(self) -> int:
         return int(self.entries[0].factor.shape[1]) if self.entries else 0
 
-    def find(self, kind: Kind, name: str) -> Entry | None:
+    def find(self, kind: str, name: str) -> Entry | None:
         return next((e for e in self.entries if e.kind == kind and e.name == name), None)
 
     def scaled(self, by: float) -> Uncertainty:

@@ -63,7 +63,7 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
         own = slice(at, at + len(table))
         at = own.stop
         variance = fit.between_targets(name, q) if kind == "mean" else np.zeros(len(table))
-        entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))  # type: ignore[arg-type]
+        entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))
     kinds = {
         "lines": fit.lines,
         "points": fit.points,

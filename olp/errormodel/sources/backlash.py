@@ -8,10 +8,11 @@ from typing import Any
 
 from pydantic import Field
 
+from olp.core.interpolation import Column
 from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Table
 from olp.core.units import AXES, UM_PER_MM, in_unit, shifted
-from olp.errormodel.entry import Entry, alone
+from olp.errormodel.entry import Entry, Numbers, Place, alone
 from olp.errormodel.sources.base import ErrorSource, Example, Reading, Schema, Sigmas, Writing, digits, vector
 
 
@@ -24,10 +25,22 @@ class BacklashTable(Table):
     sigma_Z_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Z_um, in um")
 
 
+class LostMotion(Numbers):
+    """That of one axis."""
+
+    kind = "backlash"
+    names = tuple(AXES)
+
+    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+        if place.play is not None:
+            yield place.axis, -0.5 * place.play
+
+
 class Backlash(ErrorSource[BacklashTable, Vector]):
     """The table [backlash]; values are lost motions in mm."""
 
     key, field = "backlash", "backlash_mm"
+    numbers = (LostMotion(),)
     schema: Schema = (BacklashTable, Field(default_factory=BacklashTable, description="the table [backlash]"))
 
     def example(self, by: float) -> Example:

@@ -19,7 +19,7 @@ from olp.core.machine import Vector
 from olp.core.schema import Position, Table
 from olp.core.units import AXES
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.entry import Entry
+from olp.errormodel.entry import Entry, Numbers
 from olp.errormodel.gridded import ComponentTable
 
 #: The tables of a source in calibration.toml, and its values.
@@ -163,7 +163,8 @@ class ErrorSource(Generic[Stated, Values]):
     `key` is its key in calibration.toml and `schema` that key's type and pydantic field; `field` the field of
     `Calibration` that holds its values, "" for `Calibration.more`. `correctable` is False for what is random:
     it has no model. `covered` is False where no covariance speaks of its numbers: then they are no part of
-    the fingerprint, and a covariance holds whatever becomes of them.
+    the fingerprint, and a covariance holds whatever becomes of them. `numbers` are the kinds of
+    numbers that a covariance may hold of it.
     """
 
     key: str
@@ -171,6 +172,7 @@ class ErrorSource(Generic[Stated, Values]):
     schema: Schema | None = None
     correctable: bool = True
     covered: bool = True
+    numbers: tuple[Numbers, ...] = ()
 
     def example(self, by: float) -> Example:
         """What it looks like on a machine with axes X 0 to 400, Y 0 to 300 and Z -200 to 0 mm, with `by`

@@ -16,10 +16,11 @@ from pydantic import Field
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
+from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.schema import Position, Table, Text, Triple
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit_text
-from olp.errormodel.entry import Entry, alone
+from olp.errormodel.entry import Entry, Numbers, Place, Slot, alone, component_acts
 from olp.errormodel.gridded import frozen, refuse
 from olp.errormodel.sources.base import (
     ErrorSource,
@@ -38,6 +39,9 @@ from olp.errormodel.sources.base import (
 
 Reference = Literal["functional-point", "table"]
 Interpolation = Literal["linear", "pchip"]
+#: A curve of which only standard uncertainties are known is independent from one of so many equal parts of it
+#: to the next: the cautious side, as then nothing of it cancels in a touch-off elsewhere.
+CELLS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,10 +133,61 @@ class CurveTable(Table):
     interpolation: Literal["linear", "pchip"] = Field(default="pchip", description='"linear" or "pchip"')
 
 
+class Mean(Numbers):
+    """Values of a component error at positions; between them straight lines."""
+
+    kind = "mean"
+    names = COMPONENTS
+
+    def count(self, entry: Entry) -> int:
+        x = entry.position_mm
+        good = len(x) >= 2 and np.isfinite(x).all() and not np.any(np.diff(x) <= 0.0)
+        return len(x) if good else 0
+
+    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+        yield from component_acts(entry.name, 1.0, place)
+
+    def weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
+        x = entry.position_mm
+        i = np.clip(np.searchsorted(x, q, side="right") - 1, 0, len(x) - 2).astype(np.int32)
+        share = (np.clip(q, x[0], x[-1]) - x[i]) / (x[i + 1] - x[i])
+        yield i, 1.0 - share
+        yield i + 1, share
+
+    def parts(self, entry: Entry) -> int:
+        return _cells(entry) + 1
+
+    def part_weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
+        """As stated at every position, wherever in a cell that is."""
+        x, cells = entry.position_mm, _cells(entry)
+        sigma = np.interp(q, x, entry.rest)
+        at = np.clip((q - x[0]) / (x[-1] - x[0]), 0.0, 1.0) * cells
+        cell = np.minimum(at.astype(np.int32), cells - 1)
+        share = at - cell
+        size = sigma / np.sqrt(share**2 + (1.0 - share) ** 2)
+        yield cell, size * (1.0 - share)
+        yield cell + 1, size * share
+
+
+class Half(Mean):
+    """Half differences of both directions: they act with the play."""
+
+    kind = "half"
+
+    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+        if place.play is not None:
+            yield from component_acts(entry.name, place.play, place)
+
+
+def _cells(entry: Entry) -> int:
+    return min(CELLS, max(len(entry.position_mm) - 1, 0))
+
+
 class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
     """Tables [[curves]], each with a CSV file."""
 
     key = field = "curves"
+    numbers = (Mean(), Half())
     schema: Schema = (list[CurveTable], Field(default=[], description="tables [[curves]]"))
 
     def example(self, by: float) -> Example:

@@ -15,9 +15,11 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.arrays import Array
+from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.schema import Positive, Table, refusal
 from olp.core.units import RAD_PER_URAD, UM_PER_MM, in_unit, shifted
+from olp.errormodel.entry import Entry, Numbers, Place, Slot, component_acts
 from olp.errormodel.gridded import refuse
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, digits
 
@@ -78,10 +80,33 @@ class CyclicTable(Table):
         return urad
 
 
+class Wave(Numbers):
+    """The sine and the cosine part of one period."""
+
+    kind = "wave"
+    names = COMPONENTS
+
+    def count(self, entry: Entry) -> int:
+        return 2 if entry.period_mm > 0.0 else 0
+
+    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+        yield from component_acts(entry.name, 1.0, place)
+
+    def weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
+        angle = q * (2.0 * np.pi / entry.period_mm)
+        yield np.zeros(len(q), np.int32), np.sin(angle)
+        yield np.ones(len(q), np.int32), np.cos(angle)
+
+    def part_weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
+        for part, (number, weight) in enumerate(self.weights(entry, q)):
+            yield number, entry.rest[part] * weight
+
+
 class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
     """Tables [[cyclic]]."""
 
     key = field = "cyclic"
+    numbers = (Wave(),)
     schema: Schema = (list[CyclicTable], Field(default=[], description="tables [[cyclic]]"))
 
     def example(self, by: float) -> Example:

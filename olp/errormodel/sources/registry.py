@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from olp.errormodel.entry import Numbers
 from olp.errormodel.sources.backlash import Backlash
 from olp.errormodel.sources.base import ErrorSource
 from olp.errormodel.sources.beams import Beams
@@ -28,3 +29,6 @@ SOURCES: tuple[ErrorSource[Any, Any], ...] = (
     ScaleExpansion(),
     ThermalStructure(),
 )
+
+#: The kinds of numbers that a covariance may hold, by name.
+NUMBERS: dict[str, Numbers] = {numbers.kind: numbers for source in SOURCES for numbers in source.numbers}

@@ -10,14 +10,18 @@ from typing import Any
 
 from pydantic import Field
 
+from olp.core.interpolation import Column
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.schema import NotNegative, Table
 from olp.core.units import RAD_PER_URAD, in_unit, shifted
-from olp.errormodel.entry import Entry, alone
+from olp.errormodel.entry import Entry, Numbers, Place, alone
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Sigmas, Writing, digits
 
 #: Angles C0Y, B0Z, A0Z in rad.
 Angles = Mapping[str, float]
+
+#: Row and sign of what an angle adds, times the distance of its axis from the datum.
+_SHEAR = {"C0Y": (0, -1.0), "B0Z": (0, 1.0), "A0Z": (1, -1.0)}
 
 
 def shears(angles: Angles, skip: frozenset[str]) -> dict[str, Vector]:
@@ -36,10 +40,22 @@ class SquarenessTable(Table):
     sigma_A0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of A0Z, in urad")
 
 
+class Tilt(Numbers):
+    """One angle."""
+
+    kind = "squareness"
+    names = SQUARENESS
+
+    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+        row, sign = _SHEAR[entry.name]
+        yield row, sign * (place.q - place.datum_mm)
+
+
 class Squareness(ErrorSource[SquarenessTable, Angles]):
     """The table [squareness]."""
 
     key = field = "squareness"
+    numbers = (Tilt(),)
     schema: Schema = (
         SquarenessTable,
         Field(default_factory=SquarenessTable, description="the table [squareness]"),

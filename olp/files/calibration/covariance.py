@@ -16,10 +16,10 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from olp.core.errors import ConfigError
-from olp.core.machine import ZERO
+from olp.core.machine import COMPONENTS, ZERO
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.entry import KINDS, Entry
-from olp.errormodel.sources.registry import SOURCES
+from olp.errormodel.entry import Entry
+from olp.errormodel.sources.registry import NUMBERS, SOURCES
 from olp.errormodel.uncertainty import Uncertainty, fingerprint, of_sigmas
 from olp.files.calibration.reader import CalibrationReading
 from olp.files.calibration.schema import covariance_of
@@ -117,8 +117,10 @@ def parse_covariance(data: bytes, file: str) -> Uncertainty:
         for k, last in enumerate(ends):
             own = slice(last - int(count[k]), last)
             kind = str(found["kind"][k])
-            if kind not in KINDS:
-                raise ConfigError(f"kind '{kind}'; expected one of {', '.join(KINDS)}")
+            if kind not in NUMBERS:
+                # those of component errors first
+                known = sorted(NUMBERS, key=lambda name: NUMBERS[name].names != COMPONENTS)
+                raise ConfigError(f"kind '{kind}'; expected one of {', '.join(known)}")
             position = found["position_mm"][own].astype(float) if kind in ("mean", "half") else np.zeros(0)
             entries.append(
                 Entry(
