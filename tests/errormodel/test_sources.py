@@ -16,7 +16,7 @@ from olp.core.machine import CHAINS
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.sensitivity import Sensitivity
+from olp.errormodel.sensitivity import Sensitivity, value_rows
 from olp.errormodel.sources.registry import SOURCES
 from olp.errormodel.uncertainty import Uncertainty, fingerprint
 from olp.files.calibration.covariance import load_uncertainty
@@ -220,6 +220,11 @@ def test_its_uncertainty_acts_as_a_difference_of_its_values_does(
     difference = 0.5 * (more.error(POINTS, TOOL, play) - less.error(POINTS, TOOL, play))
     np.testing.assert_allclose(rows[:, :, 0].T, difference, atol=2e-6)
     assert np.abs(difference).max() > 1e-4
+    for entry, alone in zip(together, entries, strict=True):
+        # of its own it is as large: everywhere where it is one number, else at its positions
+        q = alone.position_mm if len(alone.rest) > 1 else POINTS[:, "XYZ".index(alone.name[-1])]
+        size = np.linalg.norm(value_rows(alone, q), axis=1)
+        np.testing.assert_allclose(size, np.abs(value_rows(entry, q)[:, 0]), rtol=1e-12)
 
 
 @each

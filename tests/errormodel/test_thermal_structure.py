@@ -21,7 +21,8 @@ from olp.cli import main
 from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Thermal
-from olp.errormodel.sources.structure import Distortion, Sensor, Structure, lagged, shapes
+from olp.errormodel.distortion import lagged, shapes
+from olp.errormodel.sources.structure import Distortion, Sensor, Structure
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.structure import load_structure, parse_drift_log, structure_text
 from olp.files.calibration.writer import calibration_files

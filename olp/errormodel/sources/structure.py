@@ -22,12 +22,11 @@ from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.schema import Interval, Position, Table, Text, Triple, refusal
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.errormodel.base import ErrorModel
+from olp.errormodel.distortion import lagged, shapes
 from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import COVER_MM, ComponentTable, refuse
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Writing, floats, vector
 from olp.errormodel.sources.expansion import Thermal, write_table
-
-SHAPES = ("offset", "growth", "bow")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,32 +56,6 @@ class Distortion:
     bow: float = 0.0
     line_mm: Vector | None = None
     tool_mm: Vector = ZERO
-
-
-def shapes(span_mm: tuple[float, float], q: Array) -> Array:
-    """(n, 3) offset, growth and bow at axis positions q (n,)."""
-    middle, half = 0.5 * (span_mm[0] + span_mm[1]), 0.5 * (span_mm[1] - span_mm[0])
-    u = q - middle
-    return np.stack([np.ones_like(u), u, 1.0 - (u / half) ** 2], axis=1)
-
-
-def lagged(time_s: Array, temperature_degC: Array, lag_s: float) -> Array:
-    """(n,) structure temperature behind a sensor (n,), exact for a sensor that changes linearly between its
-    readings; it starts settled. A negative lag is a lead: the sensor is behind its part by so much, and the
-    rise of the sensor over its own lag is added to it."""
-    if lag_s == 0.0:
-        return temperature_degC
-    if lag_s < 0.0:
-        return 2.0 * temperature_degC - lagged(time_s, temperature_degC, -lag_s)
-    step = np.diff(time_s)
-    keep = np.exp(-step / lag_s)
-    rate = np.diff(temperature_degC) / step
-    # theta - T + lag * rate decays; so theta(end) = T(end) - lag rate + keep (theta - T(start) + lag rate)
-    drive = temperature_degC[1:] - lag_s * rate - keep * (temperature_degC[:-1] - lag_s * rate)
-    out = [float(temperature_degC[0])]
-    for k, d in zip(keep.tolist(), drive.tolist(), strict=True):
-        out.append(k * out[-1] + d)
-    return np.array(out)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
