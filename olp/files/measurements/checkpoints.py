@@ -21,12 +21,11 @@ from pydantic import Field
 from olp.calibration.observations.readings import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
+from olp.core.schema import NotNegative, Positive, Table, Triple
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Positive, Triple
 from olp.files.measurements.point_readings import DEVIATION, MEASURED, PointReadings, parse_point_readings
 from olp.files.measurements.reader import PER_UNIT, load_measurements
 from olp.files.problems import config_error, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import Path
 from olp.files.write import PathLike, read_bytes
 
