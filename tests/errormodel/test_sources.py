@@ -23,8 +23,8 @@ from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import files_beside, load_calibration
 from olp.files.calibration.schema import CalibrationFile
 from olp.files.calibration.writer import calibration_files
-from olp.files.config import load_setup
 from olp.files.write import write_files
+from olp.workflows.session import Session
 
 NAMES = {source.key: source for source in SOURCES}
 each = pytest.mark.parametrize("key", NAMES)
@@ -230,7 +230,7 @@ def test_its_uncertainty_acts_as_a_difference_of_its_values_does(
 @each
 def test_inspect_tells_it(key: str, tmp_path: Path) -> None:
     without, once, twice = (
-        machine_summary(load_setup(folder_of(tmp_path / str(n), k, by) / "machine.toml"))
+        machine_summary(Session.start(folder_of(tmp_path / str(n), k, by) / "machine.toml"))
         for n, (k, by) in enumerate(((None, 0.0), (key, 1.0), (key, 2.0)))
     )
     assert (once != without and twice != once) == (key not in NOT_SHOWN)
