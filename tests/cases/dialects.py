@@ -157,3 +157,8 @@ CASES = {
         support=frozenset({"corrected", "carried", "refused"}),
     ),
 }  # fmt: skip
+#: Named frames of the test's machines.
+FRAMES = {
+    name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
+    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3")
+}

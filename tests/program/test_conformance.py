@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.acceptance import points, unstamped
-from cases.dialects import CASES, RS274, Case
+from cases.dialects import CASES, FRAMES, RS274, Case
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from judge import machines
@@ -34,10 +34,6 @@ SLACK_MM = 1e-6
 OFFSET = np.array([250.0, 200.0, -300.0])
 LEVER = np.array([0.0, 0.0, -120.0])
 HALF_DIGIT = 0.5e-3 + SLACK_MM
-FRAMES = {
-    name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
-    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3")
-}
 
 
 def recipe(case: Case, **more: object) -> Recipe:

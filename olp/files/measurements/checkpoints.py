@@ -20,13 +20,12 @@ from pydantic import Field
 from olp.calibration.observations.readings import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
+from olp.core.schema import NotNegative, Positive, Table, Triple
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Positive, Triple
 from olp.files.measurements.point_readings import DEVIATION, MEASURED, parse_point_readings
 from olp.files.measurements.reader import PER_UNIT, load_measurements
 from olp.files.measurements.stated import stated_as
 from olp.files.problems import config_error
-from olp.files.schema_base import Table
 from olp.files.write import PathLike, read_bytes
 
 MACHINE = "machine"

@@ -32,6 +32,7 @@ from olp.calibration.observations.readings import (
 )
 from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Vector
+from olp.core.schema import Position
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.files.columns import decoded
 from olp.files.measurements.instruments import read_circles, read_diagonal
@@ -59,7 +60,6 @@ from olp.files.measurements.schemas import (
 )
 from olp.files.measurements.stated import Said, stated_as, stated_keys
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Position
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 

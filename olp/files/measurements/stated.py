@@ -7,8 +7,8 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from typing import TypeVar
 
+from olp.core.schema import Table
 from olp.files.problems import config_error, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import Path
 
 T = TypeVar("T", bound=Table)
