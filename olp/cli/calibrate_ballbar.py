@@ -35,7 +35,7 @@ def command(
     from olp.calibration.iso230.squareness import readings_toml
     from olp.cli.outline import outline
     from olp.reports.plots import calibration as plots_calibration
-    from olp.workflows.calibrate_evaluate import fit_ballbar
+    from olp.workflows.calibrate_ballbar import fit_ballbar
 
     kind = plot_kind(plot)
     fits = fit_ballbar(files, skip_deg=skip_deg)

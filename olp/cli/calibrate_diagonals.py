@@ -33,7 +33,7 @@ def command(
     # start_mm, # end_mm, # tool_mm, # sense."""
     from olp.calibration.iso230.squareness import readings_toml
     from olp.cli.outline import outline
-    from olp.workflows.calibrate_evaluate import fit_diagonals
+    from olp.workflows.calibrate_diagonals import fit_diagonals
 
     found = fit_diagonals(files, dict(_known(item) for item in known))
     findings = list(found.findings)

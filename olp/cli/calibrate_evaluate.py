@@ -42,7 +42,7 @@ def command(
     DATA are plans (measurements.toml), folders and files as olp calibrate fit takes them."""
     from olp.files.measurements.reader import files_of_measurements
     from olp.reports import calibration as report_calibration
-    from olp.workflows import report_lines
+    from olp.workflows import calibrate_report
     from olp.workflows.calibrate_evaluate import evaluate_lines
 
     kind = plot_kind(plot)
@@ -54,7 +54,7 @@ def command(
     result = found.as_dict()
     files: dict[str, bytes] = {}
     if report_file is not None and report_file != STREAM:
-        files[report_file] = report_lines.evaluation(found, report_file, date.date() if date else None)
+        files[report_file] = calibrate_report.evaluation(found, report_file, date.date() if date else None)
     if plot is not None:
         files |= numbered(plot, report_calibration.plots_of(found, cast(Any, kind)))
     text = report_calibration.to_text(found)

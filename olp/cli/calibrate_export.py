@@ -52,7 +52,7 @@ def command(
     The figures stand next to those of a corrected program, so that either can be chosen.
     """
     from olp.files.write import write_files
-    from olp.workflows.calibrate_tables import compare_tables, export_table
+    from olp.workflows.calibrate_export import compare_tables, export_table
 
     if compare == (kind is not None):
         raise UsageError("give either --format with -o, or --compare")
@@ -84,7 +84,7 @@ def command(
 
 def _put(report: dict[str, Any], as_json: bool) -> None:
     from olp.reports.report import table, to_json
-    from olp.workflows.calibrate_tables import left_lines
+    from olp.workflows.calibrate_export import left_lines
 
     if as_json:
         put(to_json(report))

@@ -82,7 +82,7 @@ def command(
     files: dict[Path, bytes] = {} if output is None else fitted.files(output)
     curves = len(files) - 1
     if report_file is not None:
-        from olp.workflows.report_lines import fit as fit_report
+        from olp.workflows.calibrate_report import fit as fit_report
 
         files[Path(report_file)] = fit_report(fitted, report_file, None)
     write_files(files, force=force, inputs=inputs)

@@ -57,7 +57,7 @@ def command(
     from olp.cli.outline import outline
     from olp.files.measurements.reader import files_of_measurements
     from olp.reports.plots import calibration as plots_calibration
-    from olp.workflows.calibrate_evaluate import go_return
+    from olp.workflows.calibrate_go_return import go_return
 
     kind = plot_kind(plot)
     found = go_return(data, machine)
@@ -81,9 +81,9 @@ def command(
 
 def _program(machine: str, axis: str, count: int, over_mm: float, feed: float, runs: int) -> str:
     from olp.calibration.iso230.go_return import program
-    from olp.files.config import load_setup
+    from olp.workflows.session import Session
 
-    described = load_setup(machine, None).machine
+    described = Session.start(machine).setup.machine
     low, high = described.axes[axis].travel_mm
     # a whole increment inside the travel, and no equal steps: a screw's pitch would hide in them
     targets = np.linspace(low + 2.0 * over_mm, high - 2.0 * over_mm, count)

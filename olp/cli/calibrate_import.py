@@ -83,7 +83,7 @@ def command(
     The calibration holds the errors that the table corrects, actual minus commanded.
     """
     from olp.files.write import write_files
-    from olp.workflows.calibrate_tables import import_table
+    from olp.workflows.calibrate_import import import_table
 
     inputs = files_of(table, machine)
     refuse_early([output], inputs, force=force)

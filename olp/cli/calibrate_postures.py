@@ -44,7 +44,7 @@ def command(
     point on the one point, a row a posture."""
     from olp.calibration.iso230 import postures
     from olp.cli.outline import outline
-    from olp.workflows.calibrate_evaluate import fit_postures
+    from olp.workflows.calibrate_postures import fit_postures
 
     if program is not None:
         if file is not None or tools is None or point is None:

@@ -44,12 +44,12 @@ def command(
     target = None if output in (None, STREAM) else output
     if target is None and as_json:
         raise UsageError("both the structure and --json would go to stdout; name a file for it with -o")
-    setup, inputs = machine_given(machine, None)
+    session, inputs = machine_given(machine, None)
     refuse_early(files_of(target), (*inputs, *logs), force=force)
     from olp.files.write import write_bytes
     from olp.workflows.calibrate_thermal import fit_thermal
 
-    result = fit_thermal(logs, setup, reference_degC=_reference(reference), sensors=sensors)
+    result = fit_thermal(logs, session.setup, reference_degC=_reference(reference), sensors=sensors)
     if target is None:
         put(result.data)
     else:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
@@ -17,6 +16,7 @@ from olp.cli.common import (
     fail_on_option,
     files_of,
     given,
+    options_of,
     outside_box_option,
     put,
     refuse_early,
@@ -66,19 +66,12 @@ def command(
     machine: str | None,
     job: str | None,
     nominal: str | None,
-    select: tuple[str, ...],
-    ignore: tuple[str, ...],
-    fail_on: str,
     form: str,
+    fail_on: str,
     output: str,
-    date: datetime.date | None,
-    tolerance_um: float,
-    outside_box: Literal["refuse", "hold"],
-    within_um: float | None,
-    only_sure_components: bool,
     clearances: str | None,
-    contour: bool,
     force: bool,
+    **words: Any,
 ) -> None:
     """May this program run on this machine? A gate before deployment.
 
@@ -97,23 +90,12 @@ def command(
 
     from olp.files.write import write_files
     from olp.reports.check import FORMATS, to_csv
-    from olp.workflows.check import check
+    from olp.workflows import check
 
-    with progress(form != "text") as show, naming("<stdin>" if call.program == STREAM else ""):
-        result = check(
-            source(call.program),
-            call.setup,
-            nominal=None if nominal is None else source(nominal),
-            tolerance_um=tolerance_um,
-            outside_box=outside_box,
-            contour=contour,
-            within_um=within_um,
-            only_sure_components=only_sure_components,
-            date=date,
-            select=select,
-            ignore=ignore,
-            progress=show,
-        )
+    options = options_of(check.CheckOptions, words)
+    other = None if nominal is None else source(call.session.sources, nominal)
+    with progress(form != "text") as show, naming(call.stream):
+        result = check.run(call.session, call.source, options, nominal=other, progress=show)
     parts = {output: FORMATS[form](result.report, fail_on).encode()}
     if clearances is not None and result.clearances is not None:
         parts[clearances] = to_csv(result.clearances.rows())

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime
+import inspect
 import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,6 +20,8 @@ from olp.findings.rule import Severity
 
 if TYPE_CHECKING:
     from olp.core.machine import Setup
+    from olp.files.sources import Source, Sources
+    from olp.workflows.session import Session
 
 STREAM = "-"
 FINDINGS_EXIT = 1
@@ -26,6 +29,7 @@ REPORT_ENDINGS = (".html", ".json", ".md")
 PLOT_ENDINGS = (".svg", ".png")
 
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 
 class Length(click.FloatRange):
@@ -159,44 +163,54 @@ def proof_options(function: F) -> F:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a call is about: the program (a path or `-`), machine and job, and every file that it reads."""
+    """What a call is about: the program (a path or `-`) and its source, machine and job, and every file that
+    it reads."""
 
     program: str
-    setup: Setup
+    source: Source
+    session: Session
     inputs: tuple[str, ...]
+
+    @property
+    def setup(self) -> Setup:
+        return self.session.setup
+
+    @property
+    def stream(self) -> str:
+        """What errors call the program where it comes from stdin, else ""."""
+        return "<stdin>" if self.program == STREAM else ""
 
 
 def given(program: str | None, machine: str | None, job: str | None) -> Given:
     """Program and machine file: the command line's, else the job's. Raises UsageError, InputError."""
-    setup, inputs = machine_given(machine, job)
-    program = program if program is not None else setup.job.program
+    session, inputs = machine_given(machine, job)
+    program = program if program is not None else session.setup.job.program
     if program is None:
         raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
-    return Given(program, setup, (*files_of(program), *inputs))
+    return Given(program, source(session.sources, program), session, (*files_of(program), *inputs))
 
 
-def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
-    """Machine and job, and the files that describe them. Raises UsageError, InputError."""
-    from olp.files.calibration.reader import files_beside
-    from olp.files.config import load_setup
+def machine_given(machine: str | None, job: str | None) -> tuple[Session, tuple[str, ...]]:
+    """A session of machine and job, and the files that describe them. Raises UsageError, InputError."""
+    from olp.workflows.session import Session
 
-    setup = load_setup(machine, job)
-    dialect = click.get_current_context().meta.get(_DIALECT)
-    if dialect is not None:
-        from olp.files.described import described
-
-        setup = replace(setup, job=replace(setup.job, dialect=dialect, described=described(dialect)))
+    session = Session.start(machine, job, dialect=click.get_current_context().meta.get(_DIALECT))
+    setup = session.setup
     meshes = (mesh.file for mesh in setup.job.meshes)
     named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
-    inputs = files_of(*named, *meshes)
-    if setup.machine.calibration is not None:
-        inputs += [str(file) for file in files_beside(setup.machine.calibration)]
-    return setup, tuple(inputs)
+    return session, (*files_of(*named, *meshes), *session.beside_calibration())
 
 
-def source(name: str) -> str | bytes:
-    """A program for the library: its path, or the bytes of stdin for `-`."""
-    return sys.stdin.buffer.read() if name == STREAM else name
+def source(sources: Sources, name: str) -> Source:
+    """A program for a session: a file, or stdin for `-`."""
+    from olp.files.sources import Source
+
+    return Source.stream(sys.stdin.buffer.read) if name == STREAM else sources.source(name)
+
+
+def options_of(kind: type[T], words: Mapping[str, Any]) -> T:
+    """A value, such as the options of a workflow, of the words of a call that it has by their names."""
+    return kind(**{key: words[key] for key in inspect.signature(kind).parameters if key in words})
 
 
 def files_of(*names: str | None) -> list[str]:

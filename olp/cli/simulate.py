@@ -13,7 +13,6 @@ from olp.cli.common import (
     put,
     refuse_early,
     setup_options,
-    source,
     talk,
 )
 
@@ -44,9 +43,10 @@ def command(
     refuse_early(files_of(output), call.inputs, force=force)
 
     from olp.files.write import write_bytes
-    from olp.workflows import api
+    from olp.workflows import simulate
 
-    result = api.simulate(source(call.program), call.setup, step_mm=step_mm, contour=contour)
+    options = simulate.SimulateOptions(step_mm=step_mm, contour=contour)
+    result = simulate.run(call.session, call.source, options)
     data = result.to_csv()
     if output == STREAM:
         put(data)

@@ -16,7 +16,7 @@ from olp.core.arrays import Array
 from olp.core.errors import InputError
 from olp.files.columns import place_in
 from olp.files.point_profile import MEASURED, PointProfile, looked_at
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
 from olp.program.text.rows import Form, decoded, form_of, no_number
 
@@ -41,13 +41,15 @@ class Points:
         return len(self.points_mm)
 
 
-def read_points(path: PathLike, profile: PointProfile | None = None) -> Points:
+def read_points(
+    path: PathLike, profile: PointProfile | None = None, read: Reader = read_bytes
+) -> Points:
     """The points of a file; without a profile its layout is told from its first rows.
 
     Raises InputError where the file cannot be read, its layout cannot be told, or a row is wrong, with the
     line.
     """
-    return parse_points(read_bytes(path), str(path), profile)
+    return parse_points(read(path), str(path), profile)
 
 
 def row_line(points: Points, row: int) -> int:

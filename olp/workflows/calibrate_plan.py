@@ -26,7 +26,7 @@ from olp.findings.catalogue import Finding
 from olp.program.registry import read
 from olp.program.rs274.positions import positions_program
 from olp.program.rs274.profiles.base import Profile
-from olp.workflows.session import PathLike, control_of, setup_of
+from olp.workflows.session import PathLike, Session
 
 Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
 INSTRUMENTS: tuple[Instrument, ...] = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
@@ -104,7 +104,7 @@ def plan_measurements(
     coordinate, `periods_mm` those of screws and scales by axis. Raises UsageError, ConfigError and
     CannotCompute.
     """
-    setup = setup_of(machine, None)
+    setup = Session.start(machine).setup
     described = setup.machine
     box = _box(described, box_mm)
     reflectors = list(tools) or _reflectors(described)
@@ -319,7 +319,7 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
 
 def _control(setup: Setup) -> Profile:
     """What the control reads. Raises CannotCompute where no program of positions is written for it."""
-    control = control_of(setup)
+    control = Session(setup).control()
     if not isinstance(control, Profile):
         raise CannotCompute(
             f"no programs of positions are written for {control.title}; take the points from the CSV files, "

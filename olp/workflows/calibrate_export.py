@@ -1,8 +1,7 @@
-"""Compensation tables of controls: read into a calibration, written from one, and what each would leave."""
+"""`calibrate export`: a calibration as the compensation table of a control, and what each would leave."""
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,33 +14,23 @@ from olp.calibration.control_tables.residuals import CORRECT, Left, along, in_bo
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.machine import Machine, Setup
 from olp.core.progress import silent
-from olp.core.units import AXES
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Reference
 from olp.files.calibration.reader import load_calibration
-from olp.files.calibration.writer import calibration_files
-from olp.files.control_tables.base import Exported, Given, Imported, Sense
+from olp.files.control_tables.base import Exported, Given, Sense
 from olp.files.control_tables.registry import FORMATS, format_named, read_table, write_table
+from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
 from olp.program.registry import read
 from olp.reports.report import number
-from olp.workflows.correct import correct_bytes
-from olp.workflows.session import Loaded, PathLike, load, setup_of, source_of
+from olp.workflows.control_table import given_of
+from olp.workflows.correct import CorrectOptions, corrected
+from olp.workflows.session import Loaded, PathLike, Session
 
 #: Points over the box, and the seed of their places: figures of two calls can be compared.
 POINTS, SEED = 4000, 1
 _MAIN = Path("table")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TableImport:
-    """A calibration read from a table, the files that hold it, and what was found on the way."""
-
-    calibration: Calibration
-    files: Mapping[Path, bytes]
-    findings: tuple[Finding, ...]
-    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,41 +42,6 @@ class TableExport:
     findings: tuple[Finding, ...]
     notes: tuple[str, ...]
     report: dict[str, Any]
-
-
-def import_table(
-    table: PathLike,
-    kind: str,
-    target: PathLike = "calibration.toml",
-    machine: PathLike | Setup | None = None,
-    *,
-    sense: Sense | None = None,
-    measured: datetime.date | None = None,
-    axis: str | None = None,
-    comp_type: int | None = None,
-    axis_names: Mapping[str, str] | None = None,
-    reference: Reference | None = None,
-    chain: str | None = None,
-) -> TableImport:
-    """Read the table of a control as a calibration; `kind` names the format, such as "isg".
-
-    The calibration holds what the table says, actual minus commanded, whatever the sense of the format. Its
-    date is `measured`; tables state none. Raises UsageError for what has to be stated, and InputError with
-    file and line.
-    """
-    described = setup_of(machine, None).machine if machine is not None else None
-    given = _given(described, chain, sense, axis, comp_type, axis_names, reference, None)
-    if measured is None:
-        raise UsageError("a table does not say when the machine was measured; give the date with --measured")
-    given = replace(given, measured=measured)
-    found: Imported = read_table(Path(table), kind, given)
-    notes = (
-        f"Read from {Path(table).name}, a table of the format {format_named(kind).title}.",
-        "These are the errors that the table corrects: while it is active, correct only the rest.",
-        *found.notes,
-    )
-    files = calibration_files(found.calibration, Path(target), notes=notes)
-    return TableImport(found.calibration, files, found.findings, found.notes)
 
 
 def export_table(
@@ -111,7 +65,7 @@ def export_table(
     figures are of the table as it is written, read back. Raises UsageError, InputError.
     """
     source = _source(machine, job, calibration, chain)
-    given = _given(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
+    given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
     form = format_named(kind)
     written = write_table(source.rest, kind, Path(target), given)
     control = _control(written, kind, given, source)
@@ -139,7 +93,7 @@ def compare_tables(
     controls: dict[str, Control] = {}
     said: dict[str, list[dict[str, object]]] = {}
     for key, form in FORMATS.items():
-        given = _given(
+        given = given_of(
             source.machine, chain, form.sense or "error", None, None, None,
             reference or "functional-point", most_rows,
         )  # fmt: skip
@@ -159,6 +113,7 @@ def compare_tables(
 class _Source:
     """What a table is made of: `rest` is the calibration without what the control corrects already."""
 
+    sources: Sources
     machine: Machine | None
     loaded: Loaded | None
     chain: str
@@ -177,15 +132,17 @@ def _source(
         raise UsageError(
             "name either a machine file with -m, whose calibration is taken, or a calibration with -c"
         )
+    sources = Sources()
     if calibration is not None:
-        alone = load_calibration(calibration)
+        alone = load_calibration(calibration, read=sources.read)
         model = build(alone, chain or "FXYZ", outside="hold")
         return _Source(
-            None, None, chain or "FXYZ", alone, model, np.zeros((1, 3)), np.full(3, 1e-3), frozenset(), ()
-        )
+            sources, None, None, chain or "FXYZ", alone, model, np.zeros((1, 3)), np.full(3, 1e-3),
+            frozenset(), (),
+        )  # fmt: skip
     if chain is not None:
         raise UsageError("--chain goes with -c; the machine file states its own chain")
-    loaded = load(setup_of(machine, job), None, "hold")
+    loaded = Session.start(machine, job, sources=sources).loaded("hold")
     described = loaded.setup.machine
     skip = described.compensated_by_controller - loaded.calibration.active_during_measurement
     findings = []
@@ -194,7 +151,7 @@ def _source(
         findings.append(Finding("OLP876", message, count=len(skip)))
     levers = {tool.lever_mm for tool in described.tools.values() if tool.lever_mm is not None}
     return _Source(
-        described, loaded, described.chain, _without(loaded.calibration, skip), loaded.model,
+        sources, described, loaded, described.chain, _without(loaded.calibration, skip), loaded.model,
         np.array(sorted(levers) or [(0.0, 0.0, 0.0)]), np.array(described.least_increment_mm),
         described.compensated_by_controller, tuple(findings),
     )  # fmt: skip
@@ -215,25 +172,6 @@ def _without(calibration: Calibration, skip: frozenset[str]) -> Calibration:
         squareness={n: 0.0 if n in skip else v for n, v in calibration.squareness.items()},
         cyclic=tuple(c for c in calibration.cyclic if c.component not in skip),
     )
-
-
-def _given(
-    machine: Machine | None,
-    chain: str | None,
-    sense: Sense | None,
-    axis: str | None,
-    comp_type: int | None,
-    names: Mapping[str, str] | None,
-    reference: Reference | None,
-    most: int | None,
-) -> Given:
-    travel = None if machine is None else np.array([machine.axes[a].travel_mm for a in AXES])
-    return Given(
-        machine="machine" if machine is None else machine.name,
-        chain=chain or ("FXYZ" if machine is None else machine.chain),
-        travel_mm=travel, sense=sense, axis=axis, kind=comp_type, names=dict(names or {}),
-        reference=reference, most=most,
-    )  # fmt: skip
 
 
 def _control(written: Exported, kind: str, given: Given, source: _Source) -> Control:
@@ -271,31 +209,27 @@ def _along(
     loaded = source.loaded
     if loaded is None:
         raise UsageError("a program is read with its machine; name the machine file with -m")
-    data, name = source_of(program)
-    file = name or "<program>"
-    try:
-        loaded = loaded.reading(data, name)
-        path = read(data, loaded.setup, loaded.dialect, words=False).toolpath
-    except OlpError as error:
-        raise error.in_file(file) from None
+    text = source.sources.source(program)
+    text.load()
+    with text.errors("<program>"):
+        loaded = loaded.reading(text)
+        path = read(text.data, loaded.setup, loaded.dialect, words=False).toolpath
     places = along(path, box, source.chain)
     if places.counted is None or not places.counted.any():
-        raise InputError("has no cutting move whose axes are all known", file=file)
+        raise InputError("has no cutting move whose axes are all known", file=text.name or "<program>")
     out: dict[str, Any] = {
-        "name": Path(name).name if name else "",
+        "name": text.short,
         "points": int(places.counted.sum()),
         "left": _figures(left_by(source.model, controls, places)),
         "refused": None,
     }
     try:
-        run = correct_bytes(
-            data, name, loaded, tolerance_um=1.0, hold=True, unroll=False, expand=False, clearance=None,
-            contour=False, rapids=False, date=None, tell=silent,
-        )  # fmt: skip
+        options = CorrectOptions(outside_box="hold")
+        run = corrected(source.sources, text, loaded, options, silent)
         after = run.report["deviation"]["after"]["between"]
         out["left"][CORRECT] = {**after, "rms_in_frame_um": None}
     except OlpError as error:
-        out["refused"] = str(error.in_file(file))
+        out["refused"] = str(error.in_file(text.name or "<program>"))
         out["left"][CORRECT] = dict.fromkeys(("rms_um", "max_um", "rms_in_frame_um"))
     return out
 

@@ -15,30 +15,33 @@ from olp.comparison.nominal import nominal_of
 from olp.comparison.pairing import pair
 from olp.comparison.path import Path
 from olp.core.errors import CannotCompute
-from olp.core.machine import Setup
 from olp.core.toolpath import carried
+from olp.files.sources import Source
 from olp.program.registry import Options, read
 from olp.proof.acceptance_tests import predicted
-from olp.reports.document import Document, to_html, to_markdown
+from olp.reports.document import in_form
 from olp.reports.report import to_json
-from olp.workflows import api
 from olp.workflows.compare import Comparison
+from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.results import ResultCorrection
-from olp.workflows.session import lever_of, load
+from olp.workflows.session import Session
+from olp.workflows.simulate import SimulateOptions, simulated
 
 #: points of a predicted path in a picture, about
 _POINTS = 120_000
 _STEP_MM = 0.5
 
 
-def comparison(result: Comparison, setup: Setup | None, name: str, date: datetime.date | None) -> bytes:
+def comparison(
+    result: Comparison, session: Session | None, name: str, date: datetime.date | None
+) -> bytes:
     """The report of a comparison in the form that `name` ends in."""
     from olp.reports import documents as report_document
     from olp.reports.plots import path as plots_path
 
     report = dict(result.report)
-    if setup is not None:
-        report["test_paths"] = _tests(setup)
+    if session is not None:
+        report["test_paths"] = _tests(session)
     if FilePath(name).suffix.lower() == ".json":
         return to_json(report)
     plots: dict[str, bytes] = {}
@@ -52,7 +55,7 @@ def comparison(result: Comparison, setup: Setup | None, name: str, date: datetim
         plots = _path_plots(result.path, runs, tolerance) | {
             "components": plots_path.components(result.path, runs)
         }
-    return _written(
+    return in_form(
         report_document.comparison(report, plots | _test_plots(report, name), __version__, date), name
     )
 
@@ -63,44 +66,35 @@ def results(result: ResultCorrection, name: str, date: datetime.date | None) -> 
 
     if FilePath(name).suffix.lower() == ".json":
         return to_json(result.report)
-    return _written(report_results.to_document(result.report, __version__, date), name)
+    return in_form(report_results.to_document(result.report, __version__, date), name)
 
 
 def correction(
-    result: api.Correction,
-    nominal: bytes,
-    setup: Setup,
-    name: str,
-    date: datetime.date | None,
-    *,
-    contour: bool,
+    result: Correction, nominal: Source, session: Session, options: CorrectOptions, name: str
 ) -> bytes:
-    """The report of a correction in the form that `name` ends in; `nominal` is what was corrected."""
+    """The report of a correction in the form that `name` ends in; `nominal` is what was corrected, unrolled
+    where that was asked for."""
     from olp.reports import documents as report_document
 
-    report = dict(result.report) | {"test_paths": _tests(setup)}
+    report = dict(result.report) | {"test_paths": _tests(session)}
     if FilePath(name).suffix.lower() == ".json":
         return to_json(report)
     plots: dict[str, bytes] = {}
     if FilePath(name).suffix.lower() == ".html":
-        plots = _predicted_plots(result, nominal, setup, contour)
+        plots = _predicted_plots(result, nominal, session, options.contour)
         if result.confidence is not None and len(result.confidence):
             from olp.reports.plots import path as plots_path
 
             plots = plots | {"bands": plots_path.bands(result.confidence)}
-    return _written(
-        report_document.correction(report, plots | _test_plots(report, name), __version__, date), name
+    return in_form(
+        report_document.correction(report, plots | _test_plots(report, name), __version__, options.date), name
     )
 
 
-def _written(document: Document, name: str) -> bytes:
-    return to_html(document) if FilePath(name).suffix.lower() == ".html" else to_markdown(document)
-
-
-def _tests(setup: Setup) -> dict[str, Any]:
-    loaded = load(setup, None, "hold")
+def _tests(session: Session) -> dict[str, Any]:
+    loaded, setup = session.loaded("hold"), session.setup
     digit = max(setup.machine.least_increment_mm)
-    tool = carried(lever_of(setup, None), setup.job.payload_kg)
+    tool = carried(session.lever(None), setup.job.payload_kg)
     return predicted(loaded.model, np.array(tool, float), digit)
 
 
@@ -126,19 +120,22 @@ def _path_plots(path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float 
     }
 
 
-def _predicted_plots(result: api.Correction, nominal: bytes, setup: Setup, contour: bool) -> dict[str, bytes]:
+def _predicted_plots(
+    result: Correction, nominal: Source, session: Session, contour: bool
+) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
-    loaded = load(setup, None, "hold").reading(nominal, str(result.report["program"]["name"]))
-    setup = loaded.setup
-    program = read(nominal, setup, loaded.dialect, Options(contour=contour), words=False)
+    loaded = session.loaded("hold").reading(nominal)
+    program = read(nominal.data, loaded.setup, loaded.dialect, Options(contour=contour), words=False)
     try:
         path = nominal_of(program.toolpath, loaded.model, "tip").path
     except CannotCompute:
         return {}
     step = max(_STEP_MM, path.length_mm / _POINTS)
     runs: dict[str, Sequence[Run]] = {}
-    for side, text in (("before", nominal), ("after", result.data)):
-        points = api.simulate(text, setup, step_mm=step, contour=contour).points_mm
+    options = SimulateOptions(step_mm=step, contour=contour)
+    corrected = session.sources.source(result.data)
+    for side, text in (("before", session.sources.source(nominal.data)), ("after", corrected)):
+        points = simulated(text, loaded, options).points_mm
         # what the plots leave out is what has no place, such as a tool change
         reach = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
         runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)

@@ -6,27 +6,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from olp.core.arrays import Array
-from olp.core.errors import CannotCompute, OlpError, UsageError, naming
+from olp.core.errors import CannotCompute, OlpError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
 from olp.program.feeds.moves import lengths_mm
-from olp.program.feeds.timing import BLEND_MM, PathControl, path_modes
+from olp.program.feeds.timing import PathControl, path_modes
 from olp.program.feeds.words import Shared, check_feeds, write_feeds
 from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.program.rs274.state import PathMode
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
 from olp.trajectory.inertia import Inertial, capped, sure
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.usage import LineUse, SlowPlaces, usage
-from olp.workflows.session import reading, unrolled
 
 #: plans that a bound on the inertial deviation may take before it is made sure of
 _TRIALS = 3
@@ -49,34 +46,6 @@ class Case:
     block_delete: bool
     contour: bool
     legs: tuple[Route, ...]
-
-    @staticmethod
-    def of(
-        data: bytes, name: str, setup: Setup, *, blend_mm: float | None = None, contour: bool = False,
-        block_delete: bool = False, flatten: bool = False,
-    ) -> Case:  # fmt: skip
-        """Raises ProgramError with its file and line; CannotCompute where nothing of it can be timed."""
-        stated = setup.machine.blend_mm
-        with naming(name):
-            setup, dialect = reading(setup, data, name)
-            text = unrolled(data, name, setup, dialect, False) if flatten else data
-            program = read(text, setup, dialect, Options(block_delete=block_delete, contour=contour))
-            if setup.machine.path_mode == "exact-stop" and blend_mm is None:
-                # a mode of line 0 holds from the start
-                program = replace(program, path_modes=(PathMode(0, "G61.1"), *program.path_modes))
-            case = Case(
-                Path(name).name if name else "", setup, program,
-                next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
-                "the call" if blend_mm is not None else "the machine file" if stated else "the default",
-                block_delete, contour, (),
-            ).driven()  # fmt: skip
-        if not case.legs and case.untimed()["moves"]:
-            raise CannotCompute(
-                "no move of the program begins and ends at known positions of all axes, so nothing can be "
-                "timed; give start_mm in the job file, or command X, Y and Z first",
-                file=name or None,
-            )
-        return case
 
     def rewritten(self, data: bytes) -> Case:
         """Another text in place of this one's, read in the same way. Raises ProgramError."""
