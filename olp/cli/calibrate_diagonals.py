@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from olp.cli.instruments import end, ending_options
+from olp.cli.options import output_option
 from olp.core.errors import UsageError
 from olp.core.units import RAD_PER_URAD
 
@@ -17,7 +18,7 @@ from olp.core.units import RAD_PER_URAD
     "--known", multiple=True, metavar="NAME=VALUE,SIGMA",
     help="What another instrument gave: SX, SY, SZ in um/m, C0Y, B0Z, A0Z in urad, with uncertainty.",
 )  # fmt: skip
-@click.option("-o", "--output", metavar="OUT.toml", help="Write [[squareness]] for a plan of measurements.")
+@output_option("OUT.toml", "Write [[squareness]] for a plan of measurements.")
 @ending_options
 def command(
     files: tuple[str, ...],

@@ -6,16 +6,15 @@ from typing import Any
 
 import click
 
-from olp.cli.common import Length, files_of
+from olp.cli.common import files_of
 from olp.cli.instruments import end, ending_options
+from olp.cli.options import Length, machine_option
 from olp.core.errors import UsageError
 
 
 @click.command("postures")
 @click.argument("file", required=False)
-@click.option(
-    "-m", "--machine", metavar="machine.toml", help="Its tools, and its calibration, taken out first."
-)
+@machine_option("Its tools, and its calibration, taken out first.")
 @click.option("--reference", metavar="TOOL", help="The tool whose vector is right.")
 @click.option(
     "--program", metavar="OUT.ngc", help="Write the program of the test instead (--tools, --point)."

@@ -9,21 +9,25 @@ import click
 
 from olp.cli.common import (
     STREAM,
-    confidence_options,
-    contour_option,
-    date_option,
     exit_for,
-    fail_on_option,
     files_of,
     given,
     options_of,
-    outside_box_option,
     put,
     refuse_early,
     refuse_twice,
-    setup_options,
     source,
     talk,
+)
+from olp.cli.options import (
+    confidence_options,
+    contour_option,
+    date_option,
+    fail_on_option,
+    force_option,
+    output_option,
+    outside_box_option,
+    setup_options,
     tolerance_option,
 )
 from olp.cli.progress import progress
@@ -53,14 +57,14 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     show_default=True,
     help="SARIF 2.1.0 and JUnit XML are for pipelines.",
 )
-@click.option("-o", "--output", metavar="OUT", default=STREAM, help="Default: stdout.")
+@output_option("OUT", "Default: stdout.", default=STREAM)
 @date_option()
 @tolerance_option
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options
 @click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
 @contour_option
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@force_option("the output file")
 def command(
     program: str | None,
     machine: str | None,

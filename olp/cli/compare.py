@@ -12,13 +12,8 @@ import click
 
 from olp.cli.common import (
     STREAM,
-    Length,
-    contour_option,
-    date_option,
     exit_for,
-    fail_on_option,
     files_of,
-    json_option,
     machine_given,
     options_of,
     put,
@@ -26,10 +21,20 @@ from olp.cli.common import (
     refuse_stream,
     refuse_twice,
     report_ending,
-    report_option,
-    setup_options,
     source,
     talk,
+)
+from olp.cli.options import (
+    Length,
+    contour_option,
+    date_option,
+    fail_on_option,
+    force_option,
+    json_option,
+    output_option,
+    quiet_option,
+    report_option,
+    setup_options,
 )
 from olp.cli.progress import progress
 from olp.core.errors import UsageError
@@ -76,18 +81,18 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 )
 @click.option("--tolerance-um", type=Length(), help="Exit with 1 where the measured path is farther off.")
 @click.option("--add-errors", is_flag=True, help="Move axis positions of a log by the machine's errors.")
-@click.option("-o", "--output", metavar="OUT.csv", help="Deviation of every point.")
+@output_option("OUT.csv", "Deviation of every point.")
 @click.option(
     "--part-frame", metavar="FILE.toml", help="Work offset from three or more poses, for the job file."
 )
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
-@report_option
+@report_option()
 @contour_option
 @date_option("measurement")
-@json_option
+@json_option()
 @fail_on_option
-@click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
-@click.option("--force", is_flag=True, help="Overwrite output files.")
+@quiet_option("No report and no progress; the exit code tells.")
+@force_option()
 def command(
     nominal: str, measured: tuple[str, ...], machine: str | None, job: str | None, **words: Any
 ) -> None:

@@ -13,23 +13,28 @@ import click
 from olp.cli.common import (
     STREAM,
     Given,
-    confidence_options,
     exit_for,
     files_of,
     given,
     options_of,
-    outside_box_option,
-    proof_options,
     put,
     refuse_early,
     refuse_twice,
     report_ending,
-    report_option,
-    setup_options,
     talk,
-    unroll_options,
 )
 from olp.cli.layouts import with_layout_of
+from olp.cli.options import (
+    confidence_options,
+    force_option,
+    output_option,
+    outside_box_option,
+    proof_options,
+    quiet_option,
+    report_option,
+    setup_options,
+    unroll_options,
+)
 from olp.cli.progress import Report, progress
 from olp.cli.results import Asked, default_output
 from olp.cli.results import run as run_results
@@ -49,13 +54,13 @@ LAST_DIGITS_UM = 10.0
 @click.command("correct")
 @click.argument("program", required=False)
 @setup_options
-@click.option("-o", "--output", metavar="OUT", help="Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
+@output_option("OUT", "Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
 @unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
-@report_option
+@report_option()
 @click.option(
     "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
 )
@@ -75,8 +80,8 @@ LAST_DIGITS_UM = 10.0
 )
 @click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
-@click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
-@click.option("--force", is_flag=True, help="Overwrite output files.")
+@quiet_option("No report and no progress; the exit code tells.")
+@force_option()
 def command(program: str | None, machine: str | None, job: str | None, **words: Any) -> None:
     """Correct a program with the machine's calibrated errors, and prove it.
 

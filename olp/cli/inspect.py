@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import (
-    files_of,
-    machine_given,
-    plot_ending,
-    put,
-    refuse_early,
-    setup_options,
-    source,
-    talk,
-)
+from olp.cli.common import files_of, machine_given, plot_ending, put, refuse_early, source, talk
+from olp.cli.options import force_option, json_option, plot_option, setup_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -32,9 +24,9 @@ if TYPE_CHECKING:
     "--at", type=(float, float, float), metavar="X Y Z", help="Say the error at an axis position in mm."
 )
 @click.option("--tool", type=int, help="Tool number for --at. Default: the tool at the start.")
-@click.option("--plot", metavar="FILE", help="Draw the curves of the calibration, as .svg or .png.")
-@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-@click.option("--force", is_flag=True, help="Overwrite the plot.")
+@plot_option("Draw the curves of the calibration, as .svg or .png.")
+@json_option("Print as JSON.")
+@force_option("the plot")
 def command(
     file: str | None,
     machine: str | None,

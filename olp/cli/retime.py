@@ -11,24 +11,31 @@ import click
 
 from olp.cli.common import (
     STREAM,
-    Length,
-    contour_option,
     exit_for,
-    fail_on_option,
     files_of,
-    flatten_option,
     given,
-    json_option,
     options_of,
     plot_ending,
     put,
     refuse_early,
     refuse_stream,
     refuse_twice,
-    setup_options,
     silence_stdout,
     source,
     talk,
+)
+from olp.cli.options import (
+    Length,
+    contour_option,
+    fail_on_option,
+    flatten_option,
+    force_option,
+    json_option,
+    output_option,
+    plot_option,
+    quiet_option,
+    report_option,
+    setup_options,
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import InputError, OlpError, UsageError, naming
@@ -45,7 +52,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.command("retime")
 @click.argument("program", required=False)
 @setup_options
-@click.option("-o", "--output", metavar="OUT", help="The trajectory; - is stdout. Default: the report alone.")
+@output_option("OUT", "The trajectory; - is stdout. Default: the report alone.")
 @click.option(
     "--format",
     "kind",
@@ -67,7 +74,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.option("--proof", metavar="report.json", help="Set the budget beside that of the correction's report.")
 @click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
 @click.option("--slow", metavar="FILE.csv", help="Write the places below half of the feed.")
-@click.option("--plot", metavar="FILE", help="Draw the motion and its limits over time, as .svg or .png.")
+@plot_option("Draw the motion and its limits over time, as .svg or .png.")
 @click.option(
     "--plot-span", type=(float, float), metavar="FROM TO", help="Seconds of the motion that --plot draws."
 )
@@ -83,11 +90,11 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
 @flatten_option
-@click.option("--report", "report_file", metavar="report.json", help="Also write the report as JSON.")
-@json_option
+@report_option("report.json", 'Also write the report as JSON.')
+@json_option()
 @fail_on_option
-@click.option("-q", "--quiet", is_flag=True, help="No report and no progress.")
-@click.option("--force", is_flag=True, help="Overwrite output files.")
+@quiet_option("No report and no progress.")
+@force_option()
 def command(program: str | None, machine: str | None, job: str | None, **words: Any) -> None:
     """Re-time a program: every axis inside its limits of velocity, acceleration and jerk.
 

@@ -6,17 +6,8 @@ from typing import Any
 
 import click
 
-from olp.cli.common import (
-    STREAM,
-    confidence_options,
-    exit_for,
-    given,
-    options_of,
-    proof_options,
-    put,
-    setup_options,
-    source,
-)
+from olp.cli.common import STREAM, exit_for, given, options_of, put, source
+from olp.cli.options import confidence_options, proof_options, setup_options
 from olp.core.errors import UsageError
 
 

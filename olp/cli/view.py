@@ -8,20 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import (
-    STREAM,
+from olp.cli.common import STREAM, files_of, given, options_of, put, refuse_early, source, talk
+from olp.cli.options import (
     Length,
     confidence_options,
     contour_option,
-    files_of,
-    given,
-    options_of,
+    force_option,
+    output_option,
     outside_box_option,
-    put,
-    refuse_early,
+    quiet_option,
     setup_options,
-    source,
-    talk,
     tolerance_option,
     unroll_options,
 )
@@ -41,7 +37,7 @@ if TYPE_CHECKING:
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
 )
-@click.option("-o", "--output", metavar="review.html", help="Default: PROGRAM.review.html beside PROGRAM.")
+@output_option("review.html", "Default: PROGRAM.review.html beside PROGRAM.")
 @click.option(
     "--live", is_flag=True, help="Serve the page on this machine, until Ctrl-C, and keep it up to date."
 )
@@ -61,8 +57,8 @@ if TYPE_CHECKING:
     type=Length(),
     help="Distance between points of the path. Default: about 100,000 points in all.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no talk.")
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@quiet_option("No progress and no talk.")
+@force_option("the output file")
 def command(
     program: str | None,
     machine: str | None,
