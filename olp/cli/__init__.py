@@ -9,10 +9,10 @@ import os
 
 import click
 
-from olp import __version__
 from olp.cli.common import silence_stdout, talk
 from olp.cli.late import LateGroup
 from olp.core.errors import OlpError
+from olp.core.version import __version__
 
 #: Verb to what it does. Kept here so that `olp --help` imports no verb.
 VERBS = {

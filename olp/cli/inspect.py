@@ -104,26 +104,20 @@ def _calibration(session: Session) -> Calibration:
 
 
 def machine_summary(session: Session) -> dict[str, Any]:
-    """Axes, chain, calibration and the size of each of the 21 errors, with units in the keys."""
-    from olp.cli.inspect_parts import grid_summary
-    from olp.core.machine import COMPONENTS, SQUARENESS
-    from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+    """Axes, chain, calibration and what each of its error sources says, with units in the keys."""
+    from olp.core.units import AXES
 
     setup = session.setup
     calibration, described = _calibration(session), setup.machine
-    position, angular = (
-        [_size(calibration, name, unit, scale) for name in COMPONENTS if name[1] in senses]
-        for senses, unit, scale in (("XYZ", "um", UM_PER_MM), ("ABC", "urad", 1.0 / RAD_PER_URAD))
-    )
-    cyclic_position, cyclic_angular = (
-        [
-            {"name": term.component, "period_mm": term.period_mm, f"amplitude_{unit}": term.amplitude * scale}
-            for term in calibration.cyclic
-            if term.component[1] in senses
-        ]
-        for senses, unit, scale in (("XYZ", "um", UM_PER_MM), ("ABC", "urad", 1.0 / RAD_PER_URAD))
-    )
-    return {
+    axes: dict[str, dict[str, Any]] = {
+        name: {
+            "travel_mm": list(axis.travel_mm),
+            "calibrated_mm": calibration.box_mm[AXES.index(name)].tolist(),
+            "least_increment_mm": axis.least_increment_mm,
+        }
+        for name, axis in described.axes.items()
+    }
+    summary: dict[str, Any] = {
         "machine": {
             "name": described.name,
             "chain": described.chain,
@@ -139,31 +133,12 @@ def machine_summary(session: Session) -> dict[str, Any]:
             "temperature_degC": calibration.temperature_degC,
             "datum_mm": list(calibration.datum_mm),
         },
-        "axes": {
-            name: {
-                "travel_mm": list(axis.travel_mm),
-                "calibrated_mm": calibration.box_mm[AXES.index(name)].tolist(),
-                "least_increment_mm": axis.least_increment_mm,
-                "lost_motion_um": calibration.backlash_mm[AXES.index(name)] * UM_PER_MM,
-            }
-            for name, axis in described.axes.items()
-        },
-        "position_errors": position,
-        "angular_errors": angular,
-        "squareness": {
-            f"{name}_urad": calibration.squareness.get(name, 0.0) / RAD_PER_URAD for name in SQUARENESS
-        },
-        "cyclic_position_errors": cyclic_position,
-        "cyclic_angular_errors": cyclic_angular,
-    } | grid_summary(calibration, described.chain)
-
-
-def _size(calibration: Calibration, name: str, unit: str, scale: float) -> dict[str, Any]:
-    """Largest absolute value and range; the points hold both, interpolation stays between them."""
-    values = [
-        value
-        for curve in calibration.curves_of(name[2])
-        if name in curve.names
-        for value in (curve.mean(name) * scale).tolist()
-    ] or [0.0]
-    return {"name": name, f"max_{unit}": max(map(abs, values)), f"range_{unit}": max(values) - min(values)}
+        "axes": axes,
+    }
+    frame = calibration.frame(described.chain)
+    # what no correction removes stands last
+    for kind, values in sorted(calibration.sources(), key=lambda pair: not pair[0].correctable):
+        for name, axis in axes.items():
+            axis |= kind.inspect_axis(values, name)
+        summary |= kind.inspect(values, frame)
+    return summary

@@ -12,7 +12,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
-from olp.core.geometry import PLANES
+from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import Flag
 
 _AXES = np.array(PLANES)
@@ -116,10 +116,8 @@ def _check_sweep(
     line: npt.NDArray[np.int32],
 ) -> None:
     """A tiny arc must not turn into a whole circle, nor the other way round, by rounding."""
-    rows = np.arange(len(start))
-    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
-    a0 = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
-    a1 = np.arctan2(end[rows, second] - centre[rows, second], end[rows, first] - centre[rows, first])
+    (x0, y0), (x1, y1) = arms(start, centre, plane), arms(end, centre, plane)
+    a0, a1 = np.arctan2(y0, x0), np.arctan2(y1, x1)
     turn = np.where(sweep > 0, a1 - a0, a0 - a1) % (2 * np.pi)
     turn[turn < 1e-9] = 2 * np.pi
     off = np.abs(np.abs(sweep) - turn)

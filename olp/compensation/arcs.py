@@ -17,7 +17,7 @@ from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
-from olp.core.geometry import PLANES, arc_directions, arc_points
+from olp.core.geometry import PLANES, arc_directions, arc_points, arms
 from olp.core.toolpath import Arcs, Flag, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import steps_needed
@@ -62,7 +62,7 @@ def subdivide_arcs(
     band: float,
 ) -> Cuts:
     """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis
-    has lost motion (`turning`), also where that axis turns round."""
+    has backlash (`turning`), also where that axis turns round."""
     arcs = path.arcs
     if not len(arcs):
         return no_cuts()
@@ -119,10 +119,12 @@ def _ends(path: Toolpath, target: Array, arc: Index) -> tuple[Array, Array]:
     """Targets at the start and the end of arcs; the start lies in the frame of the arc's own move."""
     move = path.arcs.move[arc]
     shift = target[move] - path.end_mm[move]
-    start = (
-        np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm)) + shift
-    )
-    return start, target[move]
+    return _starts(path, move) + shift, target[move]
+
+
+def _starts(path: Toolpath, move: Index) -> Array:
+    """(n, 3) where moves begin as the program says."""
+    return np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,10 +150,8 @@ def sample_groups(
     start, end = _ends(path, target, pieces.arc)
     axes = _AXES[arcs.plane[pieces.arc]]
     rows = np.arange(len(pieces))
-    centre = arcs.centre_mm[pieces.arc]
-    radius = np.hypot(
-        *(path.end_mm[arcs.move[pieces.arc]][rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))
-    )
+    finish = path.end_mm[arcs.move[pieces.arc]]
+    radius = np.hypot(*arms(finish, arcs.centre_mm[pieces.arc], arcs.plane[pieces.arc]))
     share = pieces.end - pieces.begin
     delta = np.abs(end - start) * share[:, None]
     for i in (0, 1):
@@ -266,22 +266,13 @@ def fit(
 
 
 def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask, band: float) -> Pieces:
-    """Cut arcs where an axis with lost motion turns round, unless it goes on by less than the band."""
+    """Cut arcs where an axis with backlash turns round, unless it goes on by less than the band."""
     arcs = path.arcs
-    rows = np.arange(len(pieces))
     axes = _AXES[arcs.plane[pieces.arc]]
-    before = np.where(
-        (arcs.move[pieces.arc] > 0)[:, None],
-        path.end_mm[np.maximum(arcs.move[pieces.arc] - 1, 0)],
-        path.start_mm,
-    )
-    centre = arcs.centre_mm[pieces.arc]
-    angle = np.arctan2(
-        before[rows, axes[:, 1]] - centre[rows, axes[:, 1]],
-        before[rows, axes[:, 0]] - centre[rows, axes[:, 0]],
-    )
+    start = _starts(path, arcs.move[pieces.arc])
+    along, across = arms(start, arcs.centre_mm[pieces.arc], arcs.plane[pieces.arc])
+    angle, radius = np.arctan2(across, along), np.hypot(along, across)
     sweep = arcs.sweep_rad[pieces.arc]
-    radius = np.hypot(*(before[rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1)))
     arc, begin, end = [], [], []
     for i in range(len(pieces)):
         shares = {0.0, 1.0}

@@ -26,7 +26,7 @@ class BlockWriter(Writer):
 
     def __init__(self, task: Task) -> None:
         super().__init__(task)
-        self._hole_words = HoleWords(self)
+        self._hole_words = HoleWords(self.program.holes)
         self._next_capture = 0
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
@@ -34,7 +34,7 @@ class BlockWriter(Writer):
         columns = self._columns(rows)
         for a, b in pairwise(self._breaks(rows)):
             if rows.flag[a] & np.uint8(Flag.CYCLE):
-                edits += self._hole_words.edits(rows, a, b)
+                edits += self._hole_words.edits(self, rows, a, b)
             else:
                 self._digits(rows, columns, a, b)
         self._after_block_delete(rows)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from olp.compensation.rows import Rows
@@ -16,31 +18,29 @@ class HoleWords:
     """Words of the holes of one program, in the order of its rows. A block of a series inherits R and Z of
     the block before, as they are written."""
 
-    def __init__(self, writer: Writer) -> None:
-        self.writer = writer
-        holes = writer.program.holes
+    def __init__(self, holes: Sequence[Hole]) -> None:
         self._hole_of = {m: i for i, hole in enumerate(holes) for m in range(hole.first, hole.last)}
         self._series, self._initial = -1, 0.0
         self._inherited: dict[str, float] = {}
 
-    def edits(self, rows: Rows, a: int, b: int) -> list[Edits]:
+    def edits(self, writer: Writer, rows: Rows, a: int, b: int) -> list[Edits]:
         """Edits of the cycle block whose moves are rows a..b, and the positions after it.
 
         Repeats of a block in G91 share its words but not their corrections: they are written out, one block a
         hole.
         """
-        holes = self.writer.program.holes
-        edits = EditList(self.writer.prefixes)
+        holes = writer.program.holes
+        edits = EditList(writer.prefixes)
         first, last = int(rows.move[a]), int(rows.move[b - 1])
         index = self._hole_of[first]
         while index < len(holes) and holes[index].first <= last:
             hole = holes[index]
-            self._hole(rows, index, a + hole.first - first, a + hole.last - first, edits)
+            self._hole(writer, rows, index, a + hole.first - first, a + hole.last - first, edits)
             index += 1
         return [edits.done()]
 
-    def _hole(self, rows: Rows, index: int, a: int, b: int, edits: EditList) -> None:
-        writer, plan = self.writer, self.writer.holes
+    def _hole(self, writer: Writer, rows: Rows, index: int, a: int, b: int, edits: EditList) -> None:
+        plan = writer.holes
         hole = plan.holes[index]
         if b <= a:
             return

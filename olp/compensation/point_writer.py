@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.digits import AxisRows, incremental
+from olp.compensation.digits import INT10, POW10, AxisRows, incremental
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Task, Writer
 from olp.core.arrays import Array, Index, Mask
@@ -16,8 +16,6 @@ from olp.program.text.numbers import MOST_DECIMALS
 
 #: digits of inserted numbers, where the program itself has as many
 FINE_DECIMALS = 6
-_POW10 = 10.0 ** np.arange(19)
-_INT10 = 10 ** np.arange(19, dtype=np.int64)
 _BYPASS = np.uint8(Flag.CONTROL | Flag.PASS)
 
 
@@ -56,17 +54,17 @@ class PointWriter(Writer):
         word = np.where(given, self.words.mantissa[slot], 0)
         decimals = np.minimum(np.maximum(own, self.fewest[frame]), MOST_DECIMALS)
         with np.errstate(invalid="ignore"):
-            wanted = np.rint(local * _POW10[decimals])
+            wanted = np.rint(local * POW10[decimals])
         unknown = np.isnan(wanted)
         mantissa = np.where(unknown, 0.0, wanted).astype(np.int64)
         more = decimals - own
         same = mantissa == np.where(
-            more >= 0, word * _INT10[np.maximum(more, 0)],
-            np.rint(word / _POW10[np.maximum(-more, 0)]).astype(np.int64),
+            more >= 0, word * INT10[np.maximum(more, 0)],
+            np.rint(word / POW10[np.maximum(-more, 0)]).astype(np.int64),
         )  # fmt: skip
         counting = (rows.flag & np.uint8(Flag.INCREMENTAL)) != 0
         held = raw.any(axis=1) | ((rows.flag & _BYPASS) != 0) | ~(self.program.slot[move] >= 0).any(axis=1)
-        written = np.where(unknown, local, mantissa / _POW10[decimals])
+        written = np.where(unknown, local, mantissa / POW10[decimals])
         # a number that stays says what the program says, to the last bit
         nominal = self.path.end_mm[move]
         rows.emitted[:] = np.where(held[:, None], nominal, self.placed(written, frame))

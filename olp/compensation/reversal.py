@@ -48,7 +48,7 @@ class Reversal:
 
 
 def carry_play(
-    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool = True
+    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool
 ) -> Plan:
     """The plan with play: commands lead by half the backlash, and where an axis turns round in a feed
     move, a row that only takes it up comes first; without `insert` not before moves that are never split.

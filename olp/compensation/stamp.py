@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from olp import __version__
+from olp.core.version import __version__
 
 _STAMP = re.compile(rb"olp-corrected [0-9a-f]{12}")
 

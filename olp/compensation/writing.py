@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.block_writer import BlockWriter
+from olp.compensation.digits import INT10
 from olp.compensation.hole_plan import HolePlan
 from olp.compensation.plan import Plan
 from olp.compensation.statement_writer import StatementWriter
@@ -19,8 +20,6 @@ from olp.core.units import MM_PER_INCH
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.program.text.numbers import Placing
-
-_POW10 = 10 ** np.arange(19, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,8 +77,8 @@ def _plain(program: Program, plan: Plan) -> bool:
         return False
     text = np.frombuffer(program.data, np.uint8)
     size = np.abs(words.mantissa)
-    whole = size // _POW10[words.decimals]
-    length = 1 + (whole[:, None] >= _POW10[1:10]).sum(axis=1) + (words.mantissa < 0)
+    whole = size // INT10[words.decimals]
+    length = 1 + (whole[:, None] >= INT10[1:10]).sum(axis=1) + (words.mantissa < 0)
     length += np.where(words.decimals > 0, words.decimals + 1, 0)
     # zero behind a minus, which rounding leaves
     length += (size == 0) & (text[words.number] == ord("-"))

@@ -35,12 +35,18 @@ def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Arr
     return out
 
 
+def arms(point: Array, centre: Array, plane: Plane) -> tuple[Array, Array]:
+    """How far points (n, 3) are from centres along the first and second axis of their planes, (n,) each."""
+    rows = np.arange(len(point))
+    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
+    return point[rows, first] - centre[rows, first], point[rows, second] - centre[rows, second]
+
+
 def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quarter: int) -> Array:
     """(n,) share of each arc at which it first passes a multiple of a right angle, counted in `quarter`; NaN
     where it does not."""
-    rows = np.arange(len(start))
-    first, second = (_AXES[plane][:, i] for i in range(2))
-    begin = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
+    along, across = arms(start, centre, plane)
+    begin = np.arctan2(across, along)
     turn = np.mod((quarter * np.pi / 2 - begin) * np.sign(sweep), 2 * np.pi)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = turn / np.abs(sweep)
@@ -88,8 +94,8 @@ def arc_directions(
     """(n, 3) sign of each axis' motion at shares (n,) of arcs."""
     rows = np.arange(len(start))
     first, second, third = (_AXES[plane][:, i] for i in range(3))
-    angle = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
-    angle = angle + share * sweep
+    along, across = arms(start, centre, plane)
+    angle = np.arctan2(across, along) + share * sweep
     out = np.zeros((len(start), 3))
     out[rows, first] = -np.sin(angle) * np.sign(sweep)
     out[rows, second] = np.cos(angle) * np.sign(sweep)

@@ -10,10 +10,10 @@ from typing import Literal
 from pydantic import Field
 
 from olp.core.errors import ConfigError
-from olp.files.fields import SHIPPED, Text
+from olp.core.schema import Table, Text
+from olp.files.fields import SHIPPED
 from olp.files.point_profile import PointProfile
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import line_of, read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.described.forms import Form, form

@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from olp.core.errors import UsageError
-from olp.files.fields import NotNegative, Positive, Text
+from olp.core.schema import NotNegative, Positive, Table, Text
 from olp.files.problems import nearest, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.delimited import ROLES, Layout, mapping, told

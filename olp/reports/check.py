@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from olp import __version__
+from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
 from olp.reports.report import Report, findings_text, number, pairs, printable, table, to_json

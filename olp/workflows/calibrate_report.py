@@ -6,9 +6,9 @@ from __future__ import annotations
 import datetime
 from pathlib import Path as FilePath
 
-from olp import __version__
 from olp.calibration.iso230.evaluation import Evaluated, evaluate_all
 from olp.core.errors import ConfigError
+from olp.core.version import __version__
 from olp.reports import calibration as report_calibration
 from olp.reports.calibration import FitSummary
 from olp.reports.document import in_form

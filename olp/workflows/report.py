@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from olp import __version__
 from olp.comparison.figures import Run
 from olp.comparison.nominal import nominal_of
 from olp.comparison.pairing import pair
 from olp.comparison.path import Path
 from olp.core.errors import CannotCompute
 from olp.core.toolpath import carried
+from olp.core.version import __version__
 from olp.files.sources import Source
 from olp.program.registry import Options, read
 from olp.proof.acceptance_tests import predicted

@@ -13,6 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from olp.program import registry
+from olp.program.rs274.profiles.base import Profile
+
 NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
 Lines = list[str]
 
@@ -70,7 +73,8 @@ def _rs274(name: str) -> Case:
     )  # fmt: skip
 
 
-RS274 = ("linuxcnc", "grbl", "fanuc", "haas")
+#: A control of this family needs no case of its own.
+RS274 = tuple(name for name, d in registry.DIALECTS.items() if isinstance(d, Profile))
 CASES = {
     **{name: _rs274(name) for name in RS274},
     "apt": Case(

@@ -19,10 +19,11 @@ import olp
 from olp.cli import main
 from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import CHAINS
-from olp.errormodel.beams import Beam, tube_mm4
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
-from olp.errormodel.gridded import ComponentTable, DeviationMap
+from olp.errormodel.gridded import ComponentTable
+from olp.errormodel.sources.beams import Beam, tube_mm4
+from olp.errormodel.sources.maps import DeviationMap
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.write import write_files

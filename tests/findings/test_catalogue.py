@@ -79,9 +79,8 @@ def test_a_code_in_a_call_is_seen_and_one_in_a_sentence_is_not() -> None:
 
 def test_a_gate_looks_for_what_a_program_shows() -> None:
     assert {"OLP101", "OLP331", "OLP431", "OLP701"} <= set(GATE_CODES)
-    assert {rule.topic for rule in RULES.values() if not rule.gate} == {
-        *("calibration", "comparison", "control_tables", "measurements", "planning", "results", "thermal")
-    }
+    others = ("calibration", "comparison", "control_tables", "measurements", "planning", "results", "thermal")
+    assert all(not rule.gate for rule in RULES.values() if rule.topic in others)
 
 
 @pytest.mark.parametrize("path", sorted(TABLES.glob("*.py")), ids=lambda path: path.stem)

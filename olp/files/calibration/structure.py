@@ -6,22 +6,24 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from typing import TypeVar
 
 from olp.calibration.thermal.drift import DriftLog
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
+from olp.core.schema import Table
 from olp.core.units import AXES, shifted
-from olp.errormodel.structure import Distortion, Sensor, Structure
-from olp.files.calibration.thermal_schema import DistortionTable, ThermalFile
+from olp.errormodel.sources.structure import Structure, ThermalFile, structure_of, structure_tables
 from olp.files.columns import Row, Wanted, names, read_sheet
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Position
-from olp.files.toml_text import comment, line_of, read_toml, toml_lines
+from olp.files.toml_text import comment, line_of, read_toml, toml_document
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.rows import LOOSE_CSV
+
+T = TypeVar("T", bound=Table)
 
 _READING = re.compile(r"(E[A-Z]{2})@([-+]?\d+(?:\.\d+)?)_(um|urad)")
 _DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
@@ -30,82 +32,28 @@ _DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
 def load_structure(path: PathLike, machine: str | None = None, read: Reader = read_bytes) -> Structure:
     """The structure of an olp-thermal-1 file. Raises InputError where it cannot be read, ConfigError with all
     problems."""
-    values, lines = read_toml(read(path), str(path))
-    file = validate(ThermalFile, values, lines, str(path))
-    if machine is not None and file.machine != machine:
-        sentence = f'machine = "{file.machine}" is not the name in the machine file; expected "{machine}"'
-        raise config_error([(line_of(("machine",), lines), sentence)], str(path))
     try:
-        return Structure(
-            tuple(Sensor(s.name, s.reference_degC, s.range_degC, s.lag_s) for s in file.sensors),
-            tuple(_distortion(d) for d in file.distortions),
-        )
+        return structure_of(read_document(path, ThermalFile, machine, read))
     except ConfigError as error:
         raise error.in_file(str(path)) from None
 
 
-def _distortion(table: DistortionTable) -> Distortion:
-    unit, power = ("urad", -6) if table.component[1] in "ABC" else ("um", -3)
-
-    def of(shape: str, more: int = 0) -> float:
-        value = getattr(table, shape.format(unit))
-        return 0.0 if value is None else shifted(value, power + more)
-
-    return Distortion(
-        component=table.component,
-        sensor=table.sensor,
-        span_mm=table.span_mm,
-        offset=of("offset_{}_K"),
-        growth=of("growth_{}_m_K", -3),
-        bow=of("bow_{}_K"),
-        line_mm=None if table.line_mm is None else _vector(table.line_mm, table.component),
-        tool_mm=table.tool_mm,
-    )
+def read_document(path: PathLike, schema: type[T], machine: str | None, read: Reader) -> T:
+    """A TOML file by its schema, whose key `machine` must be that of the machine file. Raises InputError,
+    ConfigError."""
+    values, lines = read_toml(read(path), str(path))
+    file = validate(schema, values, lines, str(path))
+    named = getattr(file, "machine", None)
+    if machine is not None and named != machine:
+        sentence = f'machine = "{named}" is not the name in the machine file; expected "{machine}"'
+        raise config_error([(line_of(("machine",), lines), sentence)], str(path))
+    return file
 
 
-def _vector(stated: Position, component: str) -> Vector:
-    """Where the other axes stood; that of the component's own axis does not matter."""
-    missing = [a for a, at in zip(AXES, stated.values, strict=True) if at is None and a != component[2]]
-    if missing:
-        raise ConfigError(f"line_mm of {component} names no {missing[0]}; expected where each axis stood")
-    x, y, z = (0.0 if at is None else at for at in stated.values)
-    return (x, y, z)
-
-
-def structure_text(
-    structure: Structure, machine: str, in_unit: Callable[[float, int], float], notes: Sequence[str] = ()
-) -> bytes:
-    """An olp-thermal-1 file that reads back the same; `in_unit` states a number in units of ten to a power,
-    notes become comments."""
-    lines = [line for note in notes for line in comment(note)]
-    lines += toml_lines({"schema": "olp-thermal-1", "machine": machine})
-    for sensor in structure.sensors:
-        lines += ["", "[[sensors]]"]
-        lines += toml_lines(
-            {
-                "name": sensor.name,
-                "reference_degC": sensor.reference_degC,
-                "range_degC": list(sensor.range_degC),
-                "lag_s": sensor.lag_s,
-            }
-        )
-    for d in structure.distortions:
-        unit, power = ("urad", -6) if d.component[1] in "ABC" else ("um", -3)
-        line = None if d.line_mm is None else dict(zip(AXES, map(float, d.line_mm), strict=True))
-        lines += ["", "[[distortions]]"]
-        lines += toml_lines(
-            {
-                "component": d.component,
-                "sensor": d.sensor,
-                "span_mm": [float(v) for v in d.span_mm],
-                f"offset_{unit}_K": in_unit(d.offset, power),
-                f"growth_{unit}_m_K": in_unit(d.growth, power - 3),
-                f"bow_{unit}_K": in_unit(d.bow, power),
-                "line_mm": line,
-                "tool_mm": None if d.tool_mm == ZERO else [float(v) for v in d.tool_mm],
-            }
-        )
-    return ("\n".join(lines) + "\n").encode()
+def structure_text(structure: Structure, machine: str, notes: Sequence[str] = ()) -> bytes:
+    """An olp-thermal-1 file that reads back the same; notes become comments."""
+    above = "".join(f"{line}\n" for note in notes for line in comment(note))
+    return (above + toml_document(structure_tables(structure, machine))).encode()
 
 
 def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:

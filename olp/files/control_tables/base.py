@@ -35,7 +35,7 @@ _IN_TABLES = frozenset(
     {
         "machine", "box_mm", "model", "datum_mm", "curves", "squareness", "backlash_mm", "cyclic",
         "temperature_degC", "measured", "valid_until", "active_during_measurement", "repeatability_mm",
-        "payload_kg",
+        "payload_kg", "more",
     }
 )  # fmt: skip
 
@@ -244,6 +244,7 @@ def not_held(
     others = [
         f.name for f in fields(calibration) if f.name not in _IN_TABLES and _states(calibration, f.name)
     ]
+    others += [key for key, _ in calibration.more]
     if others:
         parts.append(f"no table holds what the calibration states of {', '.join(others)}")
     if parts:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -12,11 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.schema import Table
 from olp.files.columns import Wanted, decoded, finite, missing, read_sheet
-from olp.files.measurements.readings import stated_keys
-from olp.files.problems import Problem, config_error, nearest, validate
-from olp.files.schema_base import Table
-from olp.files.toml_text import Path
+from olp.files.measurements.stated import stated_as, stated_keys
+from olp.files.problems import Problem, config_error, nearest
 from olp.files.write import PathLike, read_bytes
 
 T = TypeVar("T", bound=Table)
@@ -46,7 +44,8 @@ def read_columns(
     """
     file = str(path)
     data = read_bytes(path)
-    stated = _stated(decoded(data, file), model, file)
+    # what it states is judged before its columns
+    keys = stated_as(dict(stated_keys(decoded(data, file))), model, file)
     known = (*needed, *words, *optional)
 
     def header_problems(line: int, header: Sequence[str]) -> list[Problem]:
@@ -75,7 +74,7 @@ def read_columns(
     texts = {
         name: tuple(cells[sheet.header.index(name)] for _, cells in sheet.records) for name in words
     }
-    return Columns(file, numbers, texts, sheet.lines), stated
+    return Columns(file, numbers, texts, sheet.lines), keys
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:
@@ -87,16 +86,3 @@ def _number(name: str, cell: str) -> tuple[float, str | None]:
     elif name == "run" and (value != int(value) or value < 1):
         said = f"run = {cell}; expected a whole number from 1"
     return value, said
-
-
-def _stated(text: str, model: type[T], file: str) -> T:
-    """The comments of a file as a table; words need no quotes there."""
-    values: dict[str, object] = {}
-    places: dict[Path, int] = {}
-    for key, (written, line) in stated_keys(text):
-        try:
-            values[key] = tomllib.loads(f"value = {written}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[key] = written
-        places[(key,)] = line
-    return validate(model, values, places, file)

@@ -13,13 +13,12 @@ from olp.calibration.iso230.diagonals import Diagonal
 from olp.calibration.iso230.postures import Postures, turn_of
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
+from olp.core.schema import NotNegative, Positive, Table, Text, Triple
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Positive, Text, Triple
 from olp.files.measurements.columns import read_columns
 from olp.files.measurements.readings import SENSES
 from olp.files.measurements.schemas import Sense
 from olp.files.problems import config_error
-from olp.files.schema_base import Table
 from olp.files.write import PathLike
 
 PER_UNIT = 1e-6

@@ -27,13 +27,12 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.errors import InputError
 from olp.core.machine import COMPONENTS
+from olp.core.schema import Table, Text, refusal
 from olp.files.columns import decoded, place_in
-from olp.files.fields import Text, refusal
 from olp.files.measurements.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.measurements.readings import ANGULAR, SENSES, UNITS, Readings, parse_readings
 from olp.files.measurements.renishaw import MARK, RTX, RecordingTable, line_of_recording, parse_rtx, read_rtx
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
 from olp.program.text.delimited import DELIMITERS, MM

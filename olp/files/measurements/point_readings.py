@@ -22,7 +22,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array
 from olp.core.units import AXES
 from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
-from olp.files.measurements.readings import stated_keys
+from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
 

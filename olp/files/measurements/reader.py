@@ -32,6 +32,7 @@ from olp.calibration.observations.readings import (
 )
 from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Vector
+from olp.core.schema import Position
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.files.columns import decoded
 from olp.files.measurements.instruments import read_circles, read_diagonal
@@ -43,7 +44,7 @@ from olp.files.measurements.point_readings import (
     directions,
     read_point_readings,
 )
-from olp.files.measurements.readings import Readings, check_component, parse_readings, stated_keys
+from olp.files.measurements.readings import Readings, check_component, parse_readings
 from olp.files.measurements.schemas import (
     InstrumentTable,
     LineKeys,
@@ -57,8 +58,8 @@ from olp.files.measurements.schemas import (
     Stated,
     StationTable,
 )
+from olp.files.measurements.stated import Said, stated_as, stated_keys
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Position
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 
@@ -382,17 +383,9 @@ def _alone(path: FilePath, found: _Gathered) -> None:
             found.errors.append(config_error([(places.get("square"), sentence)], str(path)))
 
 
-def _stated(keys: Mapping[str, tuple[str, int]], file: str) -> tuple[Stated, dict[str, int]]:
-    """The typed comments of a file, and their lines; words need no quotes there."""
-    values: dict[str, object] = {}
-    places: dict[Path, int] = {}
-    for key, (text, line) in keys.items():
-        try:
-            values[key] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[key] = text
-        places[(key,)] = line
-    return validate(Stated, values, places, file), {str(key[0]): line for key, line in places.items()}
+def _stated(keys: Mapping[str, Said], file: str) -> tuple[Stated, dict[str, int]]:
+    """The typed comments of a file, and their lines."""
+    return stated_as(keys, Stated, file), {key: line for key, (_, line) in keys.items()}
 
 
 # -- one line --------------------------------------------------------------------------------------------

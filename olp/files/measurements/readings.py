@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -26,6 +26,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
+from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
 
@@ -55,7 +56,6 @@ UNITS: Mapping[str, float] = MappingProxyType(
 )
 ANGULAR = frozenset({"rad", "mrad", "urad", "arcsec", "um/m", "mm/m"})
 
-_KEY = re.compile(r"#+\s*([A-Za-z_]\w*)\s*=\s*(\S.*?)\s*$")
 _HEADER = ("target_mm", "run", "direction")
 _VALUES = {"value_um": "um", "value_urad": "urad"}
 
@@ -123,14 +123,6 @@ def parse_readings(data: bytes, file: str) -> Readings:
         unit in ANGULAR,
         MappingProxyType(keys),
     )
-
-
-def stated_keys(text: str) -> Iterator[tuple[str, tuple[str, int]]]:
-    """(key, (value as written, line)) of each comment `# key = value`."""
-    for number, line in enumerate(text.splitlines(), 1):
-        found = _KEY.fullmatch(line.strip())
-        if found:
-            yield found[1], (found[2], number)
 
 
 def check_component(readings: Readings, component: str) -> None:

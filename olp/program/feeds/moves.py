@@ -32,7 +32,6 @@ class Scan:
     line: Index
     code: Index
     code_line: Index
-    iso: bool
 
     @staticmethod
     def of(program: Program, words: Words, *, block_delete: bool) -> Scan:
@@ -46,8 +45,7 @@ class Scan:
         word, line = word[active], line[active]
         g = words.letter[word] == ord("G")
         code = np.rint(numbers(words, word[g]) * 10).astype(np.int64)
-        # axis words of ISO controls have increments, and so have their times
-        return Scan(program, words, word, line, code, line[g], program.rs274.cycles_apart)
+        return Scan(program, words, word, line, code, line[g])
 
     def of_letter(self, letter: bytes) -> tuple[Index, Index]:
         """Indices and lines of the words of a letter."""

@@ -77,7 +77,7 @@ class Modes:
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = (*_CLAIMS, 40) if profile.cycles_apart else _CLAIMS
+        self._claims = (*_CLAIMS, 40) if profile.axis_dwell else _CLAIMS
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act

@@ -281,7 +281,7 @@ class State:
 
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
         """G4: ISO controls take its time from X, too; RS-274 from P alone, so that axis words still move."""
-        if not self.profile.cycles_apart:
+        if not self.profile.axis_dwell:
             return Effect()
         if any(a in by_letter for a in "YZ") or any(
             w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()

@@ -1,10 +1,34 @@
-"""What every table of a file is, and positions of axes."""
+"""What every table of a file is, positions of axes, and numbers with limits; as pydantic models.
+
+Only what reads or writes files loads this, never `import olp`.
+"""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+
+def refusal(sentence: str) -> PydanticCustomError:
+    """An error whose sentence is complete: it is shown after the key path as it stands."""
+    return PydanticCustomError("olp", "{sentence}", {"sentence": sentence})
+
+
+def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < pair[1]:
+        raise refusal(
+            f"= [{pair[0]:g}, {pair[1]:g}] mm is empty; expected [min, max] in mm with min below max"
+        )
+    return pair
+
+
+Interval = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ascending)]
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Text = Annotated[str, Field(min_length=1)]
 
 
 class Table(BaseModel):

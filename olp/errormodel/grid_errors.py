@@ -1,7 +1,7 @@
 """Component errors of one axis over a grid, to first order: by load (times a mass) or by temperature.
 
 E += w S and eps += w s at the axis positions of the grid, with w = m - m_cal of the payload in kg, or 1. The
-angles act on the levers of `bodies`, as those of a curve that was measured on the same line do; products of
+angles act on the levers of `levers`, as those of a curve that was measured on the same line do; products of
 these angles with other errors are left out (60 urad times 0.1 mm are 6 nm).
 """
 
@@ -16,11 +16,10 @@ from olp.core.arrays import Array, Mask
 from olp.core.grid_interpolation import Grid
 from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.errormodel.bodies import CROSS, Levers, levers_of
 from olp.errormodel.boxed import Boxed, as_points, as_tool, payload_of
-from olp.errormodel.components import DIRECTIONS
 from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import ComponentTable
+from olp.errormodel.levers import CROSS, DIRECTIONS, Levers, levers_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
