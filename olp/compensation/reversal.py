@@ -47,9 +47,7 @@ class Reversal:
         return Reversal(axes, band_mm) if axes.any() else None
 
 
-def carry_play(
-    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool
-) -> Plan:
+def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool) -> Plan:
     """The plan with play: commands lead by half the backlash, and where an axis turns round in a feed
     move, a row that only takes it up comes first; without `insert` not before moves that are never split.
 
