@@ -15,7 +15,7 @@ from olp.calibration.estimator.adjustment import Fit
 from olp.calibration.iso230.conventions import angle_words
 from olp.calibration.iso230.evaluation import Evaluated
 from olp.calibration.iso230.positioning import Evaluation, scale_of
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration

@@ -15,6 +15,7 @@ from olp.calibration.iso230.evaluation import Evaluated, evaluate_all
 from olp.calibration.iso230.go_return import Reversal, reversal_of
 from olp.calibration.iso230.positioning import Zone
 from olp.calibration.iso230.postures import PostureFit
+from olp.calibration.observations.circles import SKIP_DEG
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
 from olp.files.measurements.instruments import read_circles, read_diagonal, read_postures
@@ -41,7 +42,7 @@ def evaluate_lines(
     return evaluate_all(found, zone)
 
 
-def fit_ballbar(sources: Sequence[PathLike], *, skip_deg: float = ballbar.SKIP_DEG) -> tuple[CircleFit, ...]:
+def fit_ballbar(sources: Sequence[PathLike], *, skip_deg: float = SKIP_DEG) -> tuple[CircleFit, ...]:
     """Squareness, scale and servo mismatch and lost motion from circles, a file each. Raises InputError,
     ConfigError."""
     return tuple(ballbar.fit(read_circles(source), skip_deg=skip_deg) for source in sources)

@@ -15,7 +15,7 @@ from olp.calibration.estimator.curves import calibration_of, sigmas_of
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import map_findings, map_summary, residual_map
 from olp.calibration.estimator.summary import findings_of, summary
-from olp.calibration.observations.readings import MapWish, Measurements
+from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.progress import Progress

@@ -16,7 +16,7 @@ from olp.calibration.design import layout
 from olp.calibration.design.prediction import Planned, Prediction, predict
 from olp.calibration.design.visiting import move_s, order
 from olp.calibration.diagnosis.deciding import offsets
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Machine, Setup, Vector

@@ -21,7 +21,7 @@ from judge import simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.nonrigid import nonrigid
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 
 SEEDS = 12
 

@@ -33,7 +33,7 @@ from judge import simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
 from olp.errormodel.gridded import DeviationMap

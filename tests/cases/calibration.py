@@ -9,7 +9,11 @@ import numpy as np
 from judge import simulated
 
 from olp.calibration.estimator.adjustment import Fit
-from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points, Square
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
 #: tools of the judgement: the one measured with, and one that no line has seen

@@ -14,7 +14,8 @@ from olp.calibration.diagnosis.refinement import Refinement, refine
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of
-from olp.calibration.observations.readings import Measurements, Points
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.sensitivity import Sensitivity

@@ -19,7 +19,8 @@ from olp.calibration.design import layout
 from olp.calibration.design.prediction import predict
 from olp.calibration.design.visiting import move_s, order
 from olp.calibration.estimator.adjustment import fit
-from olp.calibration.observations.readings import Measurements, Points
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Axis

@@ -9,9 +9,11 @@ import numpy as np
 
 from olp.calibration.design.prediction import Planned
 from olp.calibration.iso230.separation import aliased
-from olp.calibration.observations.lengths import Station
-from olp.calibration.observations.pods import Pose
-from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points, Square
+from olp.calibration.observations.lengths import Lengths, Station
+from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.pods import Pods, Pose
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import Vector

@@ -16,9 +16,9 @@ from olp.calibration.estimator.prior import POSE, Prior
 from olp.calibration.estimator.summary import squareness_unseen, unseen
 from olp.calibration.observations.lengths import Station, lengths_block
 from olp.calibration.observations.lines import Noise, line_block, square_names
+from olp.calibration.observations.measurements import Measurements
 from olp.calibration.observations.pods import Pose, pods_block
 from olp.calibration.observations.points import points_block
-from olp.calibration.observations.readings import Measurements
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES

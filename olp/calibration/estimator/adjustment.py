@@ -18,21 +18,21 @@ from olp.calibration.estimator.parameters import CROSS, LEVER_MM, Parameters, Pl
 from olp.calibration.estimator.prior import POSE, Prior
 from olp.calibration.estimator.screening import Outlier, screened, slips_of, without
 from olp.calibration.estimator.smoothing import Shape, shape_of
-from olp.calibration.iso230.ballbar import Circles
-from olp.calibration.iso230.diagonals import Diagonal
 from olp.calibration.iso230.separation import aliased
-from olp.calibration.observations.lengths import STILL_MM, Station, first_station, lengths_block
-from olp.calibration.observations.lines import Noise, line_block, square_names, squareness_block, targets_of
-from olp.calibration.observations.pods import STILL_MM as POD_STILL_MM
-from olp.calibration.observations.pods import Pose, first_poses, pods_block
-from olp.calibration.observations.points import points_block
-from olp.calibration.observations.radial import (
-    circle_places,
+from olp.calibration.observations.circles import Circles, circle_block, circle_places
+from olp.calibration.observations.diagonals import (
+    Diagonal,
+    diagonal_block,
     diagonal_places,
     noise_of_diagonal,
-    radial_block,
 )
-from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points
+from olp.calibration.observations.lengths import STILL_MM, Lengths, Station, first_station, lengths_block
+from olp.calibration.observations.lines import Line, Noise, line_block, square_names, targets_of
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.pods import STILL_MM as POD_STILL_MM
+from olp.calibration.observations.pods import Pods, Pose, first_poses, pods_block
+from olp.calibration.observations.points import Points, points_block
+from olp.calibration.observations.squareness import squareness_block
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -318,7 +318,9 @@ def _fit(
             for taken in radial
         ]
         of_radial = [
-            radial_block(taken, parameters, noise)
+            diagonal_block(taken, parameters, noise)
+            if isinstance(taken, Diagonal)
+            else circle_block(taken, parameters)
             for taken, noise in zip(radial, noises_of_radial, strict=True)
         ]
         tell("adjustment", 0.5)

@@ -19,7 +19,9 @@ from olp.calibration.estimator.adjustment import Fit, LengthsResult, PodsResult,
 from olp.calibration.estimator.field import REACH, Modes
 from olp.calibration.estimator.marginal import Learnt, Noise, alone_of, learn, log_evidence, part_of
 from olp.calibration.estimator.widened import FOLDS, Adjustment, Reduced, solver_of, straight, wide
-from olp.calibration.observations.readings import Lengths, Pods, Points
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES

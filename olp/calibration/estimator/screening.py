@@ -10,8 +10,9 @@ from typing import TypeVar
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Solved, residuals_of
-from olp.calibration.observations.lines import Noise, group_of, noise_of
-from olp.calibration.observations.readings import Lengths, Line, Points
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line, Noise, group_of, noise_of
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 
 #: A reading whose residual is so many standard deviations is left out, at most this share of a line.

@@ -22,7 +22,7 @@ from olp.calibration.estimator.curves import half_of, joints_of, sigma_of
 from olp.calibration.estimator.parameters import LEVER_MM, SHEAR
 from olp.calibration.estimator.prior import class_of
 from olp.calibration.estimator.screening import LENGTH, POINT
-from olp.calibration.iso230.diagonals import Diagonal
+from olp.calibration.observations.diagonals import Diagonal
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM

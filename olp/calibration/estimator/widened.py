@@ -9,16 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import Fit, LengthsResult, PodsResult, PointsResult
+from olp.calibration.estimator.adjustment import Fit, LengthsResult, PodsResult, PointsResult, RadialResult
 from olp.calibration.estimator.field import Modes
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of
 from olp.calibration.estimator.parameters import Parameters
-from olp.calibration.observations.lengths import lengths_block
-from olp.calibration.observations.lines import line_block, squareness_block
-from olp.calibration.observations.pods import CHUNK, pods_block
-from olp.calibration.observations.points import points_block
-from olp.calibration.observations.radial import radial_block
-from olp.calibration.observations.readings import Lengths, Pods, Points
+from olp.calibration.observations.circles import circle_block
+from olp.calibration.observations.diagonals import Diagonal, diagonal_block
+from olp.calibration.observations.lengths import Lengths, lengths_block
+from olp.calibration.observations.lines import line_block
+from olp.calibration.observations.pods import CHUNK, Pods, pods_block
+from olp.calibration.observations.points import Points, points_block
+from olp.calibration.observations.squareness import squareness_block
 from olp.core.arrays import Array, Index
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
@@ -123,7 +124,7 @@ class Adjustment:
         for reading in fit.measurements.squareness:
             other.add(squareness_block(reading, fit.parameters))
         for radial in fit.radial:
-            other.add(radial_block(radial.taken, fit.parameters, radial.noise))
+            other.add(_radial(radial, fit.parameters))
         fit.prior.push(other)
         self.lines = other.H
         self.prior = np.diag(nuisance)
@@ -201,11 +202,17 @@ class Adjustment:
             results.append(dataclasses.replace(old, residual=residual, chi_square=square))
         others = [line_block(r.line, fit.parameters, r.noise) for r in fit.lines]
         others += [squareness_block(r, fit.parameters) for r in fit.measurements.squareness]
-        others += [radial_block(r.taken, fit.parameters, r.noise) for r in fit.radial]
+        others += [_radial(r, fit.parameters) for r in fit.radial]
         for block in others:
             _, residual, sigma = residuals_of(block, x)
             chi_square += float(np.sum((residual / sigma) ** 2))
         return results, chi_square
+
+
+def _radial(result: RadialResult, parameters: Parameters) -> Block:
+    if isinstance(result.taken, Diagonal):
+        return diagonal_block(result.taken, parameters, result.noise)
+    return circle_block(result.taken, parameters)
 
 
 def _table(chunk: Chunk, use: np.ndarray) -> Array:

@@ -7,19 +7,61 @@ first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import Unknowns
-from olp.calibration.observations.readings import Lengths
-from olp.core.arrays import Array
-from olp.core.errors import CannotCompute
+from olp.core.arrays import Array, Index
+from olp.core.errors import CannotCompute, ConfigError
 
 CHUNK = 4000
 #: Gauss and Newton have arrived where no station moves by more than this.
 STILL_MM = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lengths:
+    """Lengths that a tracking interferometer read from one station, whose place and dead length nobody knows.
+
+    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
+    point to the reflector, `length_mm` (n,) the readings, `sigma_mm` (n,) or one number their standard
+    uncertainty, `sigma_scale` that of their common scale (mm/mm). Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    length_mm: Array
+    sigma_mm: Array
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        length = np.array(self.length_mm, float)
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "length_mm": length,
+            "sigma_mm": np.array(np.broadcast_to(self.sigma_mm, length.shape), float),
+            "row": np.array(self.row, np.int64) if len(self.row) else np.arange(1, len(axis) + 1),
+        }
+        if length.shape != (len(axis),) or axis.shape[1:] != (3,) or len(axis) < 5:
+            raise ConfigError(
+                f"{length.size} lengths; expected at least 5 from a station, each with three axis positions",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()):
+            raise ConfigError("a length is not finite; leave the row out", file=self.source or None)
+        if not np.all(columns["sigma_mm"] > 0.0):
+            raise ConfigError(
+                "the uncertainty of the lengths is not stated; expected sigma_um", file=self.source or None
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Lines, squares and values of squareness as rows of the adjustment.
+"""Lines and squares as rows of the adjustment.
 
 A line's zero is not known, nor is the slope of a straightness: that of the line it was read against. Two
 lines that were read against the legs of one square share one such slope and the square's own error. A
@@ -9,23 +9,108 @@ of time, linear during each run.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
-from olp.calibration.observations.readings import Line, SquarenessReading
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
+from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES
 
+Reference = Literal["functional-point", "table"]
 #: Targets this close are one.
 SAME_MM = 0.05
 #: No instrument reads better than this: 10 nm, 10 nrad.
 LEAST = 1e-5, 1e-8
 #: What an instrument may drift in a run where one run alone cannot tell: 2 um, 2 urad.
 DRIFT = 2e-3, 2e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """One component error read at targets along one axis, rows in the order of time.
+
+    `component` is an ISO 230-1 name such as EXX (positioning), EYX (straightness) or EBX (angle); the moving
+    axis is its last letter. `target_mm` (n,) axis positions, `value` (n,) in mm or rad, `run` (n,) from 1,
+    `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` is where the other axes
+    stood (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference` "table"
+    the reflector stayed fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
+    straightness. Straightness lines that name the same `square` were read against its two legs.
+    `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
+    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 is not known: the spread of the runs
+    tells. `source` is the file and `row` (n,) the line of each reading in it. Raises ConfigError.
+    """
+
+    component: str
+    target_mm: Array
+    value: Array
+    run: Index
+    direction: Index
+    line_mm: Vector
+    tool_mm: Vector = ZERO
+    reference: Reference = "functional-point"
+    square: str | None = None
+    sigma: float = 0.0
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    instrument: str = ""
+
+    def __post_init__(self) -> None:
+        if not len(self.row):
+            object.__setattr__(self, "row", np.arange(1, len(self.target_mm) + 1))
+        for name, kind in (
+            ("target_mm", float),
+            ("value", float),
+            ("run", np.int64),
+            ("direction", np.int64),
+            ("row", np.int64),
+        ):
+            column = np.array(getattr(self, name), dtype=kind)
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+        label = f"line {self.component}"
+        n = len(self.target_mm)
+        if self.component not in COMPONENTS:
+            raise ConfigError(
+                f"{label}: expected an ISO 230-1 name such as EXX, EYX or EBX", file=self.source
+            )
+        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction, self.row)):
+            raise ConfigError(
+                f"{label}: {n} readings; expected at least 2, each with all columns", file=self.source
+            )
+        if not (np.isfinite(self.target_mm).all() and np.isfinite(self.value).all()):
+            raise ConfigError(f"{label}: a reading is not finite; leave the row out", file=self.source)
+        if not np.isin(self.direction, (-1, 1)).all():
+            raise ConfigError(f"{label}: a direction is neither +1 nor -1", file=self.source)
+
+    @property
+    def axis(self) -> int:
+        """0, 1, 2 for a line along X, Y, Z."""
+        return AXES.index(self.component[2])
+
+    @property
+    def quantity(self) -> Literal["positioning", "straightness", "angle"]:
+        if self.component[1] in "ABC":
+            return "angle"
+        return "positioning" if self.component[1] == self.component[2] else "straightness"
+
+
+@dataclass(frozen=True, slots=True)
+class Square:
+    """An optical or mechanical square that two straightness lines share.
+
+    `error_rad` is by how much the angle between its legs, both along + of their axes, differs from 90 degrees
+    (more is +), as its certificate says; `sigma_rad` its standard uncertainty.
+    """
+
+    name: str
+    error_rad: float = 0.0
+    sigma_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,22 +241,3 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
     rows, columns = gathered(parts, n)
     chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
     return Block.of(chunk, columns, np.array(precision), line.source or line.component)
-
-
-def squareness_block(reading: SquarenessReading, parameters: Parameters) -> Block:
-    """A value of squareness: minus or plus the sum of the mean slopes of both lines."""
-    earlier, later, sign = SHEAR[reading.component]
-    parts = []
-    for moving, along, span in ((earlier, later, reading.span_mm[0]), (later, earlier, reading.span_mm[1])):
-        q = np.linspace(*span, 101)
-        weight = (q - q.mean()) / float(((q - q.mean()) ** 2).sum())
-        position = np.tile(np.array(reading.line_mm), (len(q), 1))
-        position[:, moving] = q
-        for axis in range(3):
-            for part, values in parameters.displacement(along, axis, position, np.array(reading.tool_mm)):
-                parts.append((part, sign * (weight @ values)[None, :]))
-    parts.append((parameters.slices[reading.component], np.ones((1, 1))))
-    rows, columns = gathered(parts, 1)
-    sigma = max(reading.sigma_rad, LEAST[1])
-    chunk = Chunk(rows, np.array([reading.value_rad]), np.array([sigma]), np.zeros((1, 0)))
-    return Block.of(chunk, columns, np.zeros(0), reading.source or reading.component)

@@ -15,9 +15,8 @@ import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import Unknowns
-from olp.calibration.observations.readings import Pods
 from olp.core.arrays import Array
-from olp.core.errors import CannotCompute
+from olp.core.errors import CannotCompute, ConfigError
 from olp.core.rigid_fit import fit_points, rotation_of
 
 CHUNK = 2000
@@ -28,6 +27,57 @@ LEVER_MM = 1000.0
 _STEPS, _AROUND = 30, (-0.7, 0.5, 1.7)
 #: A pose whose directions miss the nominal points by more than this (rad) is no pose.
 _FOUND_RAD = 2e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pods:
+    """Directions in which pods or theodolites saw the reflector, each in its own frame that nobody knows.
+
+    `axis_mm` (n, 3) and `tool_mm` (n, 3) or (3,) as for Points; `azimuth_rad` and `elevation_rad` (n, k) of k
+    pods, `sigma` the standard uncertainty of an angle in rad. `baselines` are known distances: (pod, pod from
+    0, mm, standard uncertainty in mm); without one nobody knows the scale. Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    azimuth_rad: Array
+    elevation_rad: Array
+    sigma: float
+    baselines: tuple[tuple[int, int, float, float], ...] = ()
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "azimuth_rad": np.array(self.azimuth_rad, float),
+            "elevation_rad": np.array(self.elevation_rad, float),
+        }
+        shape = columns["azimuth_rad"].shape
+        if (
+            len(shape) != 2
+            or shape[0] != len(axis)
+            or shape != columns["elevation_rad"].shape
+            or len(axis) < 6
+        ):
+            raise ConfigError(
+                f"{len(axis)} points of pods; expected at least 6, each with both angles of every pod",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()) or not self.sigma > 0.0:
+            raise ConfigError(
+                "an angle is not finite, or sigma is not above 0; leave such rows out",
+                file=self.source or None,
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+    @property
+    def count(self) -> int:
+        """How many pods."""
+        return int(self.azimuth_rad.shape[1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.units import MM_PER_UM

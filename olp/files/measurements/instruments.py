@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from olp.calibration.iso230.ballbar import Circles
-from olp.calibration.iso230.diagonals import Diagonal
 from olp.calibration.iso230.postures import Postures, turn_of
+from olp.calibration.observations.circles import Circles
+from olp.calibration.observations.diagonals import Diagonal
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
 from olp.core.units import MM_PER_UM

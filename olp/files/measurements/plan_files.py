@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from olp.calibration.design.layout import Scattered, scattered
 from olp.calibration.design.prediction import Planned
-from olp.calibration.observations.readings import Lengths, Line, Points
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM

@@ -17,19 +17,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.calibration.iso230.ballbar import Circles
-from olp.calibration.iso230.diagonals import Diagonal
-from olp.calibration.observations.points import polar_points
-from olp.calibration.observations.readings import (
-    Lengths,
-    Line,
-    MapWish,
-    Measurements,
-    Pods,
-    Points,
-    Square,
-    SquarenessReading,
-)
+from olp.calibration.observations.circles import Circles
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.measurements import MapWish, Measurements
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points, polar_points
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Vector
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD

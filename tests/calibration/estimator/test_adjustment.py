@@ -16,8 +16,9 @@ from olp.calibration.estimator.basis import CurveSpace, Kink, Spline, Step
 from olp.calibration.estimator.curves import calibration_of, sigmas_of
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of, solve
 from olp.calibration.estimator.summary import findings_of, unseen
-from olp.calibration.observations.lines import drift_ramps, group_of, noise_of
-from olp.calibration.observations.readings import Line, Measurements, SquarenessReading
+from olp.calibration.observations.lines import Line, drift_ramps, group_of, noise_of
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.build import build
 from olp.findings.catalogue import Finding

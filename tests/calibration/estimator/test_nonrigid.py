@@ -19,7 +19,8 @@ from olp.calibration.estimator.marginal import log_evidence
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import residual_map
 from olp.calibration.estimator.widened import Adjustment
-from olp.calibration.observations.readings import MapWish, Measurements, Points
+from olp.calibration.observations.measurements import MapWish, Measurements
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import CannotCompute
 from olp.errormodel.build import build

@@ -14,7 +14,7 @@ from judge import nullspace, simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.summary import scale_unseen, scales_open, squareness_unseen, unseen
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 
 ORDERS = ["".join(order) for order in permutations("XYZ")]
 CHAINS = [order[:k] + "F" + order[k:] for k in range(4) for order in ORDERS]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from olp.calibration.iso230 import ballbar, diagonals, postures
+from olp.calibration.observations.diagonals import Diagonal
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
 from olp.files.measurements.instruments import read_circles, read_diagonal, read_postures
@@ -99,7 +100,7 @@ def test_without_repetition_an_uncertainty_must_be_stated() -> None:
         postures.fit(bare)
     assert postures.fit(once).sigma_mm["left"] == pytest.approx([2**0.5 * 1e-6] * 3)
     two, way = np.array([0.0, 100.0]), np.ones(2, int)
-    plain = diagonals.Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), way, way)
+    plain = Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), way, way)
     with pytest.raises(ConfigError, match="nothing is repeated"):
         diagonals.fit([plain])
 

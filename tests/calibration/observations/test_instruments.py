@@ -14,10 +14,10 @@ from judge import simulated
 from olp.calibration.estimator.adjustment import Fit, fit
 from olp.calibration.estimator.curves import calibration_of
 from olp.calibration.estimator.summary import findings_of, summary
-from olp.calibration.iso230.ballbar import Circles
-from olp.calibration.iso230.diagonals import Diagonal
-from olp.calibration.observations.points import polar_points
-from olp.calibration.observations.readings import Measurements, Points
+from olp.calibration.observations.circles import Circles
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points, polar_points
 from olp.core.errors import ConfigError
 from olp.errormodel.build import build
 from olp.files.measurements.reader import files_of_measurements, load_measurements
