@@ -230,6 +230,7 @@ def _mapped(work: Adjustment, learnt: Learnt, found: NonRigid, processes: tuple[
     results, chi_square = work.left(whole)
     prior = work.believed(learnt.coordinates, learnt.log_variance(modes), learnt.noise)
     readings = work.count + sum(len(r.line.value) for r in fit.lines) + len(fit.measurements.squareness)
+    readings += sum(len(r.residual) for r in fit.radial)
     used = len(x) - float(np.einsum("ij,ji->", covariance, prior))
     whole, joint = change @ whole, change @ joint @ change.T
     moved = dataclasses.replace(
