@@ -18,7 +18,9 @@ from olp.calibration.iso230.postures import PostureFit
 from olp.calibration.observations.circles import SKIP_DEG
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
-from olp.files.measurements.instruments import read_circles, read_diagonal, read_postures
+from olp.files.measurements.instruments.ballbars import read_circles
+from olp.files.measurements.instruments.diagonals import read_diagonal
+from olp.files.measurements.postures import read_postures
 from olp.files.measurements.reader import load_measurements
 from olp.workflows.session import load, setup_of
 

@@ -26,7 +26,7 @@ def start(seed: int, family: str, quick: bool) -> tuple[simulated.Machine, Calib
     """A machine with the calibration that its lines gave, or that of 60 points of 20 um taken in an hour."""
     machine, measurements = case(seed, family)
     if quick:
-        measurements = Measurements("simulated", points=(run(machine, 7 * seed, 60, 0.020),))
+        measurements = Measurements("simulated", (run(machine, 7 * seed, 60, 0.020),))
     measurements = dataclasses.replace(measurements, measured=datetime.date(2026, 5, 14))
     found = fit(measurements, machine.chain)
     calibration = calibration_of(found, None)

@@ -12,7 +12,8 @@ import numpy as np
 
 from olp.calibration.estimator.normal import Block
 from olp.calibration.estimator.parameters import Unknowns
-from olp.calibration.observations.radial import along_block
+from olp.calibration.observations.base import Noise, Observation
+from olp.calibration.observations.radial import AlongState, along_block
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
@@ -30,7 +31,7 @@ _NUISANCE = [k for k, name in enumerate(UNKNOWNS) if name not in ("scale", "squa
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Circles:
+class Circles(Observation):
     """Radial readings of circles about one centre, in one set-up.
 
     `angle_rad` (n,) from the first axis of `plane` toward the second, `value` (n,) radius less `radius_mm`
@@ -72,6 +73,31 @@ class Circles:
     def names(self) -> tuple[str, str]:
         first, second, _ = PLANES[self.plane]
         return AXES[first], AXES[second]
+
+    def reach(self, axis: int) -> Array:
+        return np.asarray(circle_places(self)[:, axis])
+
+    def start(self, noise: Noise | None = None) -> CirclesState:
+        return CirclesState(self, Noise(self.sigma, 0.0, None))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CirclesState(AlongState):
+    """Circles in an adjustment. One row a reading away from the reversals."""
+
+    observation: Circles
+    noise: Noise
+
+    @property
+    def name(self) -> str:
+        return f"circle {self.observation.plane}"
+
+    @property
+    def count(self) -> int:
+        return int(circle_used(self.observation).sum())
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return circle_block(self.observation, parameters)
 
 
 def columns(circles: Circles) -> Array:

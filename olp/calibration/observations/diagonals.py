@@ -12,15 +12,17 @@ import numpy as np
 from olp.calibration.estimator.normal import Block
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.iso230.positioning import Statistics, statistics, targets_of
-from olp.calibration.observations.lines import Line, Noise, drift_ramps, noise_of
-from olp.calibration.observations.radial import along_block
+from olp.calibration.observations.base import Noise, Observation, scatter_words
+from olp.calibration.observations.lines import Line, drift_ramps, noise_of
+from olp.calibration.observations.radial import AlongState, along_block
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
+from olp.core.units import UM_PER_MM
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Diagonal:
+class Diagonal(Observation):
     """Readings along the straight line between two axis positions, rows in the order of time.
 
     `distance_mm` (n,) from the start, `value` (n,) actual minus commanded along the line in mm, `run` and
@@ -96,6 +98,35 @@ class Diagonal:
         bow = float(np.sqrt(means @ means / (len(target) - 2))) if len(target) > 2 else 0.0
         apart = float(np.sqrt(((target - target.mean()) ** 2).sum()))
         return slope, max(max(noise, self.sigma) / np.sqrt(spread), bow / apart)
+
+    def reach(self, axis: int) -> Array:
+        return np.asarray(diagonal_places(self)[:, axis])
+
+    def start(self, noise: Noise | None = None) -> DiagonalState:
+        return DiagonalState(self, noise_of_diagonal(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiagonalState(AlongState):
+    """A diagonal in an adjustment, with the noise of its readings. One row a reading."""
+
+    observation: Diagonal
+    noise: Noise
+
+    @property
+    def name(self) -> str:
+        return f"diagonal {self.observation.name}"
+
+    @property
+    def count(self) -> int:
+        return len(self.observation.value)
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return diagonal_block(self.observation, parameters, self.noise)
+
+    def scatter(self) -> str | None:
+        taken = self.observation
+        return scatter_words(taken.source or "diagonal", self.noise, taken.sigma, "um", UM_PER_MM)
 
 
 def diagonal_places(diagonal: Diagonal) -> Array:

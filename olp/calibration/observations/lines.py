@@ -8,14 +8,27 @@ of time, linear during each run.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
+from olp.calibration.observations.base import (
+    OUTLIER,
+    SHARE,
+    Noise,
+    Observation,
+    Outlier,
+    Screened,
+    State,
+    rms,
+    scatter_words,
+    unit_of,
+)
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -31,7 +44,7 @@ DRIFT = 2e-3, 2e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class Line(Observation):
     """One component error read at targets along one axis, rows in the order of time.
 
     `component` is an ISO 230-1 name such as EXX (positioning), EYX (straightness) or EBX (angle); the moving
@@ -99,6 +112,60 @@ class Line:
             return "angle"
         return "positioning" if self.component[1] == self.component[2] else "straightness"
 
+    def reach(self, axis: int) -> Array:
+        return self.target_mm if axis == self.axis else np.zeros(0)
+
+    def screened(self) -> Screened:
+        """Without readings far outside the spread of their repetitions, and the noise of the others. Raises
+        ConfigError where neither repetitions nor the line tell the noise."""
+        return _screened(self)
+
+    def start(self, noise: Noise | None = None) -> LineState:
+        return LineState(self, noise or noise_of(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineState(State):
+    """A line in an adjustment, with the noise of its readings. One row a reading."""
+
+    noun = "lines"
+    observation: Line
+    noise: Noise
+
+    @property
+    def section(self) -> str:
+        return "lines_of_angles" if self.observation.quantity == "angle" else "lines_of_lengths"
+
+    @property
+    def component(self) -> str:
+        return self.observation.component
+
+    @property
+    def label(self) -> str:
+        return self.observation.source or self.observation.component
+
+    @property
+    def count(self) -> int:
+        return len(self.observation.value)
+
+    def block(self, parameters: Parameters, theta: Array) -> Block:
+        return line_block(self.observation, parameters, self.noise)
+
+    def scatter(self) -> str | None:
+        return scatter_words(self.label, self.noise, self.observation.sigma, *unit_of(self.component))
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        unit, scale = unit_of(self.component)
+        return {
+            "name": self.component,
+            "file": self.observation.source,
+            "readings": self.count,
+            f"sigma_reading_{unit}": self.noise.sigma * scale,
+            f"drift_a_run_{unit}": self.noise.drift * scale,
+            f"residual_{unit}": rms(residual) * scale,
+            "chi_square_per_reading": chi_square / self.count,
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Square:
@@ -111,16 +178,6 @@ class Square:
     name: str
     error_rad: float = 0.0
     sigma_rad: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Standard deviation of a reading about its drift, and that of the drift over one run; mm or rad.
-    `spread` is what the runs themselves show, None without repeated readings."""
-
-    sigma: float
-    drift: float
-    spread: float | None
 
 
 def noise_of(line: Line) -> Noise:
@@ -241,3 +298,51 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
     rows, columns = gathered(parts, n)
     chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
     return Block.of(chunk, columns, np.array(precision), line.source or line.component)
+
+
+def _screened(line: Line) -> Screened:
+    outliers: list[Outlier] = []
+    noise = noise_of(line)
+    use = np.ones(len(line.value), bool)
+    for _ in range(max(1, int(SHARE * len(use)))):
+        some = _part(line, use)
+        noise = noise_of(some)
+        rest = _about_group(some)
+        worst = int(np.argmax(np.abs(rest)))
+        if abs(rest[worst]) <= OUTLIER * noise.sigma:
+            break
+        k = int(np.flatnonzero(use)[worst])
+        use[k] = False
+        off = float(abs(rest[worst]) / noise.sigma)
+        outliers.append(Outlier(line.source, int(line.row[k]), line.component, float(line.value[k]), off))
+    return Screened(_part(line, use), noise, tuple(outliers))
+
+
+def _part(line: Line, use: np.ndarray) -> Line:
+    if use.all():
+        return line
+    columns = ("target_mm", "value", "run", "direction", "row")
+    return dataclasses.replace(line, **{name: getattr(line, name)[use] for name in columns})
+
+
+def _about_group(line: Line) -> Array:
+    """(n,) deviation from the others of the same target and direction, freed of the level of its run; zero
+    where fewer than three were read."""
+    group = group_of(line)
+    rest = line.value.copy()
+    for _ in range(3):
+        for labels in (group, line.run - line.run.min()):
+            rest -= _medians(rest, labels)[labels]
+    counts = np.bincount(group)[group]
+    return np.where(counts >= 3, rest, 0.0)
+
+
+def _medians(values: Array, labels: np.ndarray) -> Array:
+    """Median of the values of each label from 0."""
+    ordered = values[np.lexsort((values, labels))]
+    counts = np.bincount(labels)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    last = len(ordered) - 1
+    below, above = starts + np.maximum(counts - 1, 0) // 2, starts + counts // 2
+    middle = 0.5 * (ordered[np.minimum(below, last)] + ordered[np.minimum(above, last)])
+    return np.asarray(np.where(counts > 0, middle, 0.0))

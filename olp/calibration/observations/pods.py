@@ -7,17 +7,26 @@ points and follow by Gauss and Newton.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.normal import Block, Chunk, residuals_of
 from olp.calibration.estimator.parameters import Unknowns
-from olp.core.arrays import Array
+from olp.calibration.observations.base import (
+    Advance,
+    Noise,
+    Outlier,
+    Scattered,
+    ScatteredState,
+)
+from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.rigid_fit import fit_points, rotation_of
+from olp.core.units import RAD_PER_URAD
 
 CHUNK = 2000
 #: Gauss and Newton have arrived where no pod moves by more than this.
@@ -30,7 +39,7 @@ _FOUND_RAD = 2e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pods:
+class Pods(Scattered):
     """Directions in which pods or theodolites saw the reflector, each in its own frame that nobody knows.
 
     `axis_mm` (n, 3) and `tool_mm` (n, 3) or (3,) as for Points; `azimuth_rad` and `elevation_rad` (n, k) of k
@@ -79,6 +88,9 @@ class Pods:
         """How many pods."""
         return int(self.azimuth_rad.shape[1])
 
+    def start(self, noise: Noise | None = None) -> PodsState:
+        return PodsState(self, first_poses(self))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
@@ -92,13 +104,57 @@ class Pose:
         return Pose(self.place_mm + step[:3], self.rotation @ rotation_of(-step[3:] / LEVER_MM))
 
 
-def first_poses(pods: Pods) -> list[Pose]:
+@dataclass(frozen=True, slots=True, eq=False)
+class PodsState(ScatteredState):
+    """Directions in an adjustment, and the poses of their pods. Two rows (rad) of each point and pod, then
+    one (mm) of each baseline."""
+
+    noun = "directions"
+    tally = ""
+    observation: Pods
+    poses: tuple[Pose, ...]
+
+    @property
+    def section(self) -> str:
+        return "sets_of_pods"
+
+    @property
+    def label(self) -> str:
+        return self.observation.source or "pods"
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return pods_block(self.observation, parameters, theta, self.poses)
+
+    def step(self, block: Block, theta: Array) -> Advance:
+        values = residuals_of(block, theta)[0].reshape(-1, 6)
+        return Advance(values, bool(np.abs(values[:, :3]).max() < STILL_MM))
+
+    def moved(self, step: Advance, slips: Sequence[Outlier]) -> PodsState:
+        moved = [pose.moved(turn) for pose, turn in zip(self.poses, step.values, strict=True)]
+        return PodsState(self.observation, tuple(moved))
+
+    def spread_over_rows(self, places: Index) -> Index:
+        pods = self.observation
+        parts = [np.repeat(places[start : start + CHUNK], 2) for start in range(0, len(places), CHUNK)]
+        whole = [np.tile(part, pods.count) for part in parts]
+        return np.concatenate([*whole, np.zeros(len(pods.baselines), np.int64)])
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        return {
+            "name": self.label,
+            "directions": 2 * self.observation.azimuth_rad.size,
+            "sigma_urad": self.observation.sigma / RAD_PER_URAD,
+            "chi_square_per_reading": chi_square / len(residual),
+        }
+
+
+def first_poses(pods: Pods) -> tuple[Pose, ...]:
     """Poses from the nominal points, as if the machine had no errors. Raises CannotCompute."""
     tip = pods.axis_mm + pods.tool_mm
-    return [_resected(tip, pods, k) for k in range(pods.count)]
+    return tuple(_resected(tip, pods, k) for k in range(pods.count))
 
 
-def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: list[Pose]) -> Block:
+def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: Sequence[Pose]) -> Block:
     """The directions of all pods and the distances between them, linearised where the machine's errors are
     `theta`. Six unknowns a pod: shift, and turn times LEVER_MM."""
     size, unknowns = parameters.size, 6 * pods.count

@@ -8,16 +8,28 @@ probed are such points too: commanded is where it found them, measured where its
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import LEVER_MM, Unknowns, frame_columns
+from olp.calibration.observations.base import (
+    Advance,
+    Noise,
+    Outlier,
+    Scattered,
+    ScatteredState,
+    rms,
+    slips_of,
+    without,
+)
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.rigid_fit import Rigid, fit_frame
+from olp.core.units import UM_PER_MM
 
 #: Points in the frame of the machine are nearer than this to where they were commanded.
 FRAME_MM = 10.0
@@ -30,7 +42,7 @@ STEEP = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Points:
+class Points(Scattered):
     """Places of the reflector as one set-up of a tracker (or any instrument of coordinates) saw them.
 
     `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
@@ -88,6 +100,47 @@ class Points:
         for name, column in columns.items():
             column.flags.writeable = False
             object.__setattr__(self, name, column)
+
+    @property
+    def framed(self) -> bool:
+        return self.known_frame
+
+    def start(self, noise: Noise | None = None) -> PointsState:
+        return PointsState(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointsState(ScatteredState):
+    """Points in an adjustment: no unknowns but those that the rows eliminate. Three rows a point."""
+
+    noun = "points"
+    tally = "points"
+    observation: Points
+
+    @property
+    def section(self) -> str:
+        return "sets_of_points"
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return points_block(self.observation, parameters)
+
+    def slips(self, block: Block, theta: Array, settled: bool) -> Sequence[Outlier]:
+        return slips_of(block, theta, self.observation.source, self.observation.row, "point")
+
+    def moved(self, step: Advance, slips: Sequence[Outlier]) -> PointsState:
+        return PointsState(without(self.observation, self.observation.row, slips))
+
+    def spread_over_rows(self, places: Index) -> Index:
+        return np.repeat(places, 3)
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        return {
+            "name": self.label,
+            "points": self.count,
+            "sigma_coordinate_um": self.observation.sigma * UM_PER_MM,
+            "residual_um": rms(residual) * UM_PER_MM,
+            "chi_square_per_coordinate": chi_square / (3 * self.count),
+        }
 
 
 def points_block(points: Points, parameters: Unknowns) -> Block:

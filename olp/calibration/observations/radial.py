@@ -2,17 +2,55 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import Unknowns
+from olp.calibration.observations.base import Noise, State, rms
 from olp.core.arrays import Array
+from olp.core.units import UM_PER_MM
 
 CHUNK = 2000
 #: Columns of nuisances whose part of its own is below this share of the largest are combinations of others.
 _RANK = 1e-7
+
+
+class AlongState(State):
+    """Readings along one known direction within an adjustment."""
+
+    __slots__ = ()
+    noun = "diagonals and circles"
+    noise: Noise
+
+    @property
+    def section(self) -> str:
+        return "diagonals_and_circles"
+
+    @property
+    def label(self) -> str:
+        return self.observation.source or "diagonals"
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What it is called in the report."""
+
+    @abstractmethod
+    def block(self, parameters: Unknowns, theta: Array) -> Block: ...
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "file": self.observation.source,
+            "readings": len(residual),
+            "sigma_reading_um": self.noise.sigma * UM_PER_MM,
+            "residual_um": rms(residual) * UM_PER_MM,
+            "chi_square_per_reading": chi_square / len(residual),
+        }
 
 
 def along_block(

@@ -8,6 +8,8 @@ import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
+from olp.calibration.observations.base import Noise, Observation, State
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 
@@ -16,7 +18,7 @@ LEAST_RAD = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class SquarenessReading:
+class SquarenessReading(Observation):
     """The squareness of two axes as some instrument gave it, already in the contract's sense.
 
     `component` is C0Y, B0Z or A0Z; `value_rad` the lean of the mean line of the later axis against that of
@@ -39,6 +41,26 @@ class SquarenessReading:
             )
         if not np.isfinite(self.value_rad):
             raise ConfigError(f"squareness {self.component} is not finite", file=self.source)
+
+    def reach(self, axis: int) -> Array:
+        return np.zeros(0)
+
+    def start(self, noise: Noise | None = None) -> SquarenessState:
+        return SquarenessState(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SquarenessState(State):
+    """A value of squareness in an adjustment: one row, no unknowns of its own."""
+
+    observation: SquarenessReading
+
+    @property
+    def count(self) -> int:
+        return 1
+
+    def block(self, parameters: Parameters, theta: Array) -> Block:
+        return squareness_block(self.observation, parameters)
 
 
 def squareness_block(reading: SquarenessReading, parameters: Parameters) -> Block:

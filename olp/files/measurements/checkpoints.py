@@ -23,8 +23,9 @@ from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.units import MM_PER_UM
 from olp.files.fields import NotNegative, Positive, Triple
+from olp.files.measurements.instruments.base import PER_UNIT
 from olp.files.measurements.point_readings import DEVIATION, MEASURED, PointReadings, parse_point_readings
-from olp.files.measurements.reader import PER_UNIT, load_measurements
+from olp.files.measurements.reader import load_measurements
 from olp.files.problems import config_error, validate
 from olp.files.schema_base import Table
 from olp.files.toml_text import Path
@@ -60,7 +61,7 @@ def load_checkpoints(
     """
     source = FilePath(path)
     if source.is_dir() or source.suffix.lower() == ".toml":
-        found = load_measurements([source]).points
+        found = load_measurements([source]).of(Points)
         if len(found) != 1:
             raise ConfigError(
                 f"holds {len(found)} sets of points; expected one; name its file", file=str(path)

@@ -11,7 +11,9 @@ from olp.calibration.iso230 import ballbar, diagonals, postures
 from olp.calibration.observations.diagonals import Diagonal
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
-from olp.files.measurements.instruments import read_circles, read_diagonal, read_postures
+from olp.files.measurements.instruments.ballbars import read_circles
+from olp.files.measurements.instruments.diagonals import read_diagonal
+from olp.files.measurements.postures import read_postures
 
 POINT = np.array([400.0, 300.0, -500.0])
 
