@@ -25,50 +25,50 @@ if TYPE_CHECKING:
     from olp.review.job import Review as Review
     from olp.review.job import view as view
     from olp.review.notebook import add_layers as add_layers
-    from olp.workflows.api import Correction as Correction
-    from olp.workflows.api import Simulation as Simulation
-    from olp.workflows.api import Verification as Verification
-    from olp.workflows.api import correct as correct
-    from olp.workflows.api import error_at as error_at
-    from olp.workflows.api import flatten as flatten
-    from olp.workflows.api import inspect as inspect
-    from olp.workflows.api import simulate as simulate
-    from olp.workflows.api import verify as verify
+    from olp.workflows.calibrate_ballbar import fit_ballbar as fit_ballbar
+    from olp.workflows.calibrate_diagonals import fit_diagonals as fit_diagonals
     from olp.workflows.calibrate_doctor import CalibrationDiagnosis as CalibrationDiagnosis
     from olp.workflows.calibrate_doctor import diagnose_calibration as diagnose_calibration
     from olp.workflows.calibrate_evaluate import evaluate_lines as evaluate_lines
-    from olp.workflows.calibrate_evaluate import fit_ballbar as fit_ballbar
-    from olp.workflows.calibrate_evaluate import fit_diagonals as fit_diagonals
-    from olp.workflows.calibrate_evaluate import fit_postures as fit_postures
-    from olp.workflows.calibrate_evaluate import go_return as go_return
+    from olp.workflows.calibrate_export import TableExport as TableExport
+    from olp.workflows.calibrate_export import compare_tables as compare_tables
+    from olp.workflows.calibrate_export import export_table as export_table
     from olp.workflows.calibrate_fit import FittedCalibration as FittedCalibration
     from olp.workflows.calibrate_fit import fit_calibration as fit_calibration
+    from olp.workflows.calibrate_go_return import go_return as go_return
+    from olp.workflows.calibrate_import import TableImport as TableImport
+    from olp.workflows.calibrate_import import import_table as import_table
     from olp.workflows.calibrate_plan import MeasurementPlan as MeasurementPlan
     from olp.workflows.calibrate_plan import plan_measurements as plan_measurements
+    from olp.workflows.calibrate_postures import fit_postures as fit_postures
     from olp.workflows.calibrate_refine import RefinedCalibration as RefinedCalibration
     from olp.workflows.calibrate_refine import refine_calibration as refine_calibration
-    from olp.workflows.calibrate_tables import TableExport as TableExport
-    from olp.workflows.calibrate_tables import TableImport as TableImport
-    from olp.workflows.calibrate_tables import compare_tables as compare_tables
-    from olp.workflows.calibrate_tables import export_table as export_table
-    from olp.workflows.calibrate_tables import import_table as import_table
     from olp.workflows.calibrate_thermal import ThermalFitting as ThermalFitting
     from olp.workflows.calibrate_thermal import fit_thermal as fit_thermal
     from olp.workflows.check import Check as Check
     from olp.workflows.check import check as check
     from olp.workflows.compare import Comparison as Comparison
     from olp.workflows.compare import compare as compare
+    from olp.workflows.correct import Correction as Correction
+    from olp.workflows.correct import correct as correct
+    from olp.workflows.flatten import flatten as flatten
+    from olp.workflows.inspect import error_at as error_at
+    from olp.workflows.inspect import inspect as inspect
     from olp.workflows.results import ResultCorrection as ResultCorrection
     from olp.workflows.results import correct_results as correct_results
     from olp.workflows.retime import Retiming as Retiming
     from olp.workflows.retime import retime as retime
+    from olp.workflows.simulate import Simulation as Simulation
+    from olp.workflows.simulate import simulate as simulate
+    from olp.workflows.verify import Verification as Verification
+    from olp.workflows.verify import verify as verify
 
 _HOME = {
     "Check": "olp.workflows.check",
-    "Correction": "olp.workflows.api",
+    "Correction": "olp.workflows.correct",
     "check": "olp.workflows.check",
-    "Simulation": "olp.workflows.api",
-    "Verification": "olp.workflows.api",
+    "Simulation": "olp.workflows.simulate",
+    "Verification": "olp.workflows.verify",
     "compare": "olp.workflows.compare",
     "Comparison": "olp.workflows.compare",
     "FittedCalibration": "olp.workflows.calibrate_fit",
@@ -79,15 +79,15 @@ _HOME = {
     "refine_calibration": "olp.workflows.calibrate_refine",
     "MeasurementPlan": "olp.workflows.calibrate_plan",
     "plan_measurements": "olp.workflows.calibrate_plan",
-    "correct": "olp.workflows.api",
-    "compare_tables": "olp.workflows.calibrate_tables",
-    "export_table": "olp.workflows.calibrate_tables",
-    "import_table": "olp.workflows.calibrate_tables",
-    "TableExport": "olp.workflows.calibrate_tables",
-    "TableImport": "olp.workflows.calibrate_tables",
-    "error_at": "olp.workflows.api",
-    "flatten": "olp.workflows.api",
-    "inspect": "olp.workflows.api",
+    "correct": "olp.workflows.correct",
+    "compare_tables": "olp.workflows.calibrate_export",
+    "export_table": "olp.workflows.calibrate_export",
+    "import_table": "olp.workflows.calibrate_import",
+    "TableExport": "olp.workflows.calibrate_export",
+    "TableImport": "olp.workflows.calibrate_import",
+    "error_at": "olp.workflows.inspect",
+    "flatten": "olp.workflows.flatten",
+    "inspect": "olp.workflows.inspect",
     "retime": "olp.workflows.retime",
     "Review": "olp.review.job",
     "view": "olp.review.job",
@@ -95,8 +95,8 @@ _HOME = {
     "Retiming": "olp.workflows.retime",
     "ResultCorrection": "olp.workflows.results",
     "correct_results": "olp.workflows.results",
-    "simulate": "olp.workflows.api",
-    "verify": "olp.workflows.api",
+    "simulate": "olp.workflows.simulate",
+    "verify": "olp.workflows.verify",
     "fit_thermal": "olp.workflows.calibrate_thermal",
     "ThermalFitting": "olp.workflows.calibrate_thermal",
     "CannotCompute": "olp.core.errors",
@@ -104,13 +104,13 @@ _HOME = {
     "InputError": "olp.core.errors",
     "OlpError": "olp.core.errors",
     "ProgramError": "olp.core.errors",
-    "Finding": "olp.findings",
+    "Finding": "olp.findings.catalogue",
     "load_setup": "olp.files.config",
     "evaluate_lines": "olp.workflows.calibrate_evaluate",
-    "fit_ballbar": "olp.workflows.calibrate_evaluate",
-    "fit_diagonals": "olp.workflows.calibrate_evaluate",
-    "fit_postures": "olp.workflows.calibrate_evaluate",
-    "go_return": "olp.workflows.calibrate_evaluate",
+    "fit_ballbar": "olp.workflows.calibrate_ballbar",
+    "fit_diagonals": "olp.workflows.calibrate_diagonals",
+    "fit_postures": "olp.workflows.calibrate_postures",
+    "go_return": "olp.workflows.calibrate_go_return",
 }
 
 __all__ = sorted(_HOME)

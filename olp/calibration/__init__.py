@@ -1,0 +1,1 @@
+"""Measurements to a calibration: instruments, one adjustment, evaluation, diagnosis, design."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import told_findings
-from olp.compensation.holes import HolePlan
+from olp.compensation.hole_plan import HolePlan
 from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -78,7 +78,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     """Does the control leave the path by more than it is corrected?"""
     out: list[Finding] = []
-    if program.dialect.name != "linuxcnc":
+    if not program.dialect.path_tolerance:
         return out
     if not program.path_modes and len(program.toolpath):
         out.append(

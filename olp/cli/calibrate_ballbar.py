@@ -7,16 +7,17 @@ from typing import Any, cast
 import click
 
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
+from olp.cli.options import output_option, plot_option
 
 
 @click.command("ballbar")
 @click.argument("files", nargs=-1, required=True)
-@click.option("-o", "--output", metavar="OUT.toml", help="Write [[squareness]] for a plan of measurements.")
+@output_option("OUT.toml", "Write [[squareness]] for a plan of measurements.")
 @click.option(
     "--skip-deg", type=click.FloatRange(0.0, 30.0), default=2.5, show_default=True,
     help="Leave out readings this near to where an axis turns round.",
 )  # fmt: skip
-@click.option("--plot", metavar="FILE", help="Draw every circle, as FILE-<plane>.svg or .png.")
+@plot_option("Draw every circle, as FILE-<plane>.svg or .png.")
 @ending_options
 def command(
     files: tuple[str, ...],
@@ -35,7 +36,7 @@ def command(
     from olp.calibration.iso230.squareness import readings_toml
     from olp.cli.outline import outline
     from olp.reports.plots import calibration as plots_calibration
-    from olp.workflows.calibrate_evaluate import fit_ballbar
+    from olp.workflows.calibrate_ballbar import fit_ballbar
 
     kind = plot_kind(plot)
     fits = fit_ballbar(files, skip_deg=skip_deg)

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from olp.cli.instruments import end, ending_options
+from olp.cli.options import output_option
 from olp.core.errors import UsageError
 from olp.core.units import RAD_PER_URAD
 
@@ -17,7 +18,7 @@ from olp.core.units import RAD_PER_URAD
     "--known", multiple=True, metavar="NAME=VALUE,SIGMA",
     help="What another instrument gave: SX, SY, SZ in um/m, C0Y, B0Z, A0Z in urad, with uncertainty.",
 )  # fmt: skip
-@click.option("-o", "--output", metavar="OUT.toml", help="Write [[squareness]] for a plan of measurements.")
+@output_option("OUT.toml", "Write [[squareness]] for a plan of measurements.")
 @ending_options
 def command(
     files: tuple[str, ...],
@@ -33,7 +34,7 @@ def command(
     # start_mm, # end_mm, # tool_mm, # sense."""
     from olp.calibration.iso230.squareness import readings_toml
     from olp.cli.outline import outline
-    from olp.workflows.calibrate_evaluate import fit_diagonals
+    from olp.workflows.calibrate_diagonals import fit_diagonals
 
     found = fit_diagonals(files, dict(_known(item) for item in known))
     findings = list(found.findings)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import (
-    STREAM,
+from olp.cli.common import STREAM, exit_for, files_of, put_report, refuse_early, talk
+from olp.cli.options import (
     Length,
-    exit_for,
     fail_on_option,
-    files_of,
+    force_option,
     json_option,
-    put_report,
-    refuse_early,
-    talk,
+    machine_option,
+    output_option,
+    quiet_option,
 )
 from olp.core.errors import UsageError
 
@@ -21,19 +20,17 @@ from olp.core.errors import UsageError
 @click.command("doctor")
 @click.argument("calibration", metavar="CALIBRATION")
 @click.argument("points", metavar="POINTS.csv")
-@click.option("-m", "--machine", metavar="machine.toml", required=True, help="The machine file.")
-@click.option(
-    "-o", "--output", metavar="NEW.toml", help="Write the calibration with what is decided put right."
-)
+@machine_option(required=True)
+@output_option("NEW.toml", "Write the calibration with what is decided put right.")
 @click.option("--sigma-um", type=Length(), help="Standard uncertainty of a coordinate, if the file has none.")
 @click.option(
     "--tool", type=(float, float, float), metavar="X Y Z",
     help="Vector from the gauge point to the reflector in mm, if the file has none.",
 )  # fmt: skip
-@json_option
+@json_option()
 @fail_on_option
-@click.option("-q", "--quiet", is_flag=True, help="No table; the exit code tells.")
-@click.option("--force", is_flag=True, help="Overwrite the new calibration and its curves.")
+@quiet_option("No table; the exit code tells.")
+@force_option("the new calibration and its curves")
 def command(
     calibration: str,
     points: str,

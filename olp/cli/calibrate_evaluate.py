@@ -9,22 +9,19 @@ import click
 
 from olp.cli.common import STREAM, files_of, refuse_early, report_ending
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
+from olp.cli.options import day_option, machine_option, plot_option, report_option
 
 
 @click.command("evaluate")
 @click.argument("data", nargs=-1, required=True)
-@click.option(
-    "-m", "--machine", metavar="machine.toml", help="Check what files say of tables with its chain."
-)
+@machine_option("Check what files say of tables with its chain.")
 @click.option(
     "--zone", type=click.Choice(["least-squares", "minimum-zone"]), default="least-squares",
     show_default=True, help="Reference line of straightness.",
 )  # fmt: skip
-@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
-@click.option("--plot", metavar="FILE", help="Draw every line, as FILE-<plot>.svg or .png.")
-@click.option(
-    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="The day of the report."
-)
+@report_option()
+@plot_option("Draw every line, as FILE-<plot>.svg or .png.")
+@day_option("The day of the report.")
 @ending_options
 def command(
     data: tuple[str, ...],
@@ -32,7 +29,7 @@ def command(
     zone: str,
     report_file: str | None,
     plot: str | None,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     force: bool,
@@ -42,7 +39,7 @@ def command(
     DATA are plans (measurements.toml), folders and files as olp calibrate fit takes them."""
     from olp.files.measurements.reader import files_of_measurements
     from olp.reports import calibration as report_calibration
-    from olp.workflows import report_lines
+    from olp.workflows import calibrate_report
     from olp.workflows.calibrate_evaluate import evaluate_lines
 
     kind = plot_kind(plot)
@@ -54,7 +51,7 @@ def command(
     result = found.as_dict()
     files: dict[str, bytes] = {}
     if report_file is not None and report_file != STREAM:
-        files[report_file] = report_lines.evaluation(found, report_file, date.date() if date else None)
+        files[report_file] = calibrate_report.evaluation(found, report_file, date)
     if plot is not None:
         files |= numbered(plot, report_calibration.plots_of(found, cast(Any, kind)))
     text = report_calibration.to_text(found)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.calibrate_import import table_options
-from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, setup_options, talk
+from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
+from olp.cli.options import fail_on_option, json_option, output_option, setup_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -19,15 +20,12 @@ if TYPE_CHECKING:
 @setup_options
 @click.option("-c", "--calibration", metavar="FILE", help="A calibration alone, without a machine.")
 @click.option("--format", "kind", metavar="FORMAT", help="One of: olp calibrate formats.")
-@click.option("-o", "--output", metavar="FILE", help="The table; further files stand beside it.")
+@output_option("FILE", "The table; further files stand beside it.")
 @click.option("--compare", is_flag=True, help="Write nothing: what every format would leave, side by side.")
 @click.option("--program", metavar="PROGRAM", help="Say what is left along this program as well.")
 @click.option("--most-rows", type=click.IntRange(min=2), help="Rows that the control takes in one table.")
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-@click.option(
-    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
-    help="Exit with 1 where a finding is at least this severe.",
-)  # fmt: skip
+@json_option()
+@fail_on_option
 @table_options
 def command(
     machine: str | None,
@@ -52,7 +50,7 @@ def command(
     The figures stand next to those of a corrected program, so that either can be chosen.
     """
     from olp.files.write import write_files
-    from olp.workflows.calibrate_tables import compare_tables, export_table
+    from olp.workflows.calibrate_export import compare_tables, export_table
 
     if compare == (kind is not None):
         raise UsageError("give either --format with -o, or --compare")
@@ -84,7 +82,7 @@ def command(
 
 def _put(report: dict[str, Any], as_json: bool) -> None:
     from olp.reports.report import table, to_json
-    from olp.workflows.calibrate_tables import left_lines
+    from olp.workflows.calibrate_export import left_lines
 
     if as_json:
         put(to_json(report))

@@ -10,40 +10,44 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, exit_for, files_of, put, refuse_early, report_ending, talk
+from olp.cli.options import (
+    day_option,
+    fail_on_option,
+    force_option,
+    json_option,
+    machine_option,
+    output_option,
+    quiet_option,
+    report_option,
+)
 from olp.cli.progress import progress
 from olp.core.errors import UsageError
 
 
 @click.command("fit")
 @click.argument("data", nargs=-1, required=True)
-@click.option("-o", "--output", metavar="calibration.toml", help="Where to write; curves go beside it.")
-@click.option("-m", "--machine", metavar="machine.toml", help="The machine file: chain, travel, tools.")
+@output_option("calibration.toml", "Where to write; curves go beside it.")
+@machine_option("The machine file: chain, travel, tools.")
 @click.option(
     "--datum", type=(float, float, float), metavar="X Y Z",
     help="Axis position where the curves are zero. Default: the place in the box nearest to zero.",
 )  # fmt: skip
-@click.option(
-    "--valid-until", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
-    help="The last day of the calibration's validity.",
-)  # fmt: skip
+@day_option("The last day of the calibration's validity.", "--valid-until")
 @click.option(
     "--map/--no-map", "map_", default=None,
     help="Also map what no rigid bodies make, where points show it. Default: as the plan says ([map]).",
 )  # fmt: skip
-@click.option("--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md.")
-@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
-@click.option(
-    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
-    help="Exit with 1 where a finding is at least this severe.",
-)  # fmt: skip
-@click.option("-q", "--quiet", is_flag=True, help="No table and no progress.")
-@click.option("--force", is_flag=True, help="Overwrite the calibration and its curves.")
+@report_option()
+@json_option("Print what was found as JSON.")
+@fail_on_option
+@quiet_option("No table and no progress.")
+@force_option("the calibration and its curves")
 def command(
     data: tuple[str, ...],
     output: str | None,
     machine: str | None,
     datum: tuple[float, float, float] | None,
-    valid_until: datetime.datetime | None,
+    valid_until: datetime.date | None,
     map_: bool | None,
     report_file: str | None,
     as_json: bool,
@@ -75,14 +79,14 @@ def command(
             [Path(name) for name in data],
             machine,
             datum_mm=datum,
-            valid_until=valid_until.date() if valid_until else None,
+            valid_until=valid_until,
             map=map_,
             progress=tell,
         )
     files: dict[Path, bytes] = {} if output is None else fitted.files(output)
     curves = len(files) - 1
     if report_file is not None:
-        from olp.workflows.report_lines import fit as fit_report
+        from olp.workflows.calibrate_report import fit as fit_report
 
         files[Path(report_file)] = fit_report(fitted, report_file, None)
     write_files(files, force=force, inputs=inputs)

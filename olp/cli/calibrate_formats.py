@@ -5,10 +5,11 @@ from __future__ import annotations
 import click
 
 from olp.cli.common import put
+from olp.cli.options import json_option
 
 
 @click.command("formats")
-@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON.")
+@json_option("Print the list as JSON.")
 def command(as_json: bool) -> None:
     """List the tables of controls that can be read and written: sense, what each holds, how far verified."""
     from olp.files.control_tables.registry import FORMATS

@@ -7,18 +7,17 @@ from typing import Any, cast
 import click
 import numpy as np
 
-from olp.cli.common import Length, files_of
+from olp.cli.common import files_of
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
+from olp.cli.options import Length, machine_option, output_option, plot_option
 from olp.core.errors import UsageError
 
 
 @click.command("go-return")
 @click.argument("data", nargs=-1)
-@click.option("-m", "--machine", metavar="machine.toml", help="Chain, and travel for --program.")
-@click.option("-o", "--output", metavar="OUT.toml", help="Write [backlash] for calibration.toml.")
-@click.option(
-    "--plot", metavar="FILE", help="Draw the reversal along each axis, as FILE-reversal.svg or .png."
-)
+@machine_option("Chain, and travel for --program.")
+@output_option("OUT.toml", "Write [backlash] for calibration.toml.")
+@plot_option("Draw the reversal along each axis, as FILE-reversal.svg or .png.")
 @click.option("--program", metavar="OUT.ngc", help="Write the program of the test instead (-m, --axis).")
 @click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="The axis of the program.")
 @click.option("--count", type=click.IntRange(min=1), default=10, show_default=True, help="Targets of it.")
@@ -57,7 +56,7 @@ def command(
     from olp.cli.outline import outline
     from olp.files.measurements.reader import files_of_measurements
     from olp.reports.plots import calibration as plots_calibration
-    from olp.workflows.calibrate_evaluate import go_return
+    from olp.workflows.calibrate_go_return import go_return
 
     kind = plot_kind(plot)
     found = go_return(data, machine)
@@ -81,9 +80,9 @@ def command(
 
 def _program(machine: str, axis: str, count: int, over_mm: float, feed: float, runs: int) -> str:
     from olp.calibration.iso230.go_return import program
-    from olp.files.config import load_setup
+    from olp.workflows.session import Session
 
-    described = load_setup(machine, None).machine
+    described = Session.start(machine).setup.machine
     low, high = described.axes[axis].travel_mm
     # a whole increment inside the travel, and no equal steps: a screw's pitch would hide in them
     targets = np.linspace(low + 2.0 * over_mm, high - 2.0 * over_mm, count)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.common import files_of, refuse_early, talk
+from olp.cli.options import day_option, force_option, machine_option, output_option
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def axis_names(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -
 def table_options(function: Any) -> Any:
     """What reading and writing of tables have in common."""
     for option in (
-        click.option("--force", is_flag=True, help="Overwrite output files."),
+        force_option(),
         click.option("--chain", metavar="FXYZ", help="Axes from workpiece to tool; without -m."),
         click.option(
             "--reference", type=click.Choice(["functional-point", "table"]),
@@ -52,16 +53,9 @@ def table_options(function: Any) -> Any:
 @click.command("import")
 @click.argument("table")
 @click.option("--format", "kind", required=True, metavar="FORMAT", help="One of: olp calibrate formats.")
-@click.option("-m", "--machine", metavar="machine.toml", help="The machine file: its name, chain and travel.")
-@click.option(
-    "-o", "--output", default="calibration.toml", show_default=True, metavar="FILE", help="The calibration."
-)
-@click.option(
-    "--measured",
-    type=click.DateTime(["%Y-%m-%d"]),
-    metavar="YYYY-MM-DD",
-    help="When the machine was measured.",
-)
+@machine_option("The machine file: its name, chain and travel.")
+@output_option("FILE", "The calibration.", default="calibration.toml", show_default=True)
+@day_option("When the machine was measured.", "--measured")
 @click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="Axis of a file that names none.")
 @table_options
 def command(
@@ -69,7 +63,7 @@ def command(
     kind: str,
     machine: str | None,
     output: str,
-    measured: datetime.datetime | None,
+    measured: datetime.date | None,
     axis: str | None,
     sense: Sense | None,
     comp_type: int | None,
@@ -83,12 +77,12 @@ def command(
     The calibration holds the errors that the table corrects, actual minus commanded.
     """
     from olp.files.write import write_files
-    from olp.workflows.calibrate_tables import import_table
+    from olp.workflows.calibrate_import import import_table
 
     inputs = files_of(table, machine)
     refuse_early([output], inputs, force=force)
     found = import_table(
-        table, kind, output, machine, sense=sense, measured=measured.date() if measured else None, axis=axis,
+        table, kind, output, machine, sense=sense, measured=measured, axis=axis,
         comp_type=comp_type, axis_names=names, reference=reference, chain=chain,
     )  # fmt: skip
     write_files(found.files, force=force, inputs=inputs)

@@ -6,15 +6,16 @@ import datetime
 
 import click
 
-from olp.cli.common import (
+from olp.cli.common import exit_for, files_of, put_report, refuse_early, talk
+from olp.cli.options import (
     Length,
-    exit_for,
+    day_option,
     fail_on_option,
-    files_of,
+    force_option,
     json_option,
-    put_report,
-    refuse_early,
-    talk,
+    machine_option,
+    output_option,
+    quiet_option,
 )
 from olp.core.errors import UsageError
 
@@ -22,7 +23,7 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 
 
 @click.command("plan")
-@click.option("-m", "--machine", metavar="machine.toml", required=True, help="The machine file.")
+@machine_option(required=True)
 @click.option(
     "--uncertainty-um", type=Length(), default=5.0, show_default=True,
     help="What a correction may leave: rms length over the box, best-fit frame.",
@@ -45,14 +46,12 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 @click.option("--period-z", type=Length(), multiple=True, help="The same of Z.")
 @click.option("--dwell-s", type=Length(), help="Time of a reading; default by instrument.")
 @click.option("--settle-s", type=Length(), default=1.0, show_default=True, help="Time to settle before it.")
-@click.option("-o", "--output", metavar="FOLDER", help="Write the plan, CSV files to fill in, and programs.")
-@click.option(
-    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD", help="Day of measuring, for the plan."
-)
-@json_option
+@output_option("FOLDER", "Write the plan, CSV files to fill in, and programs.")
+@day_option("Day of measuring, for the plan.")
+@json_option()
 @fail_on_option
-@click.option("-q", "--quiet", is_flag=True, help="No table.")
-@click.option("--force", is_flag=True, help="Overwrite files in FOLDER.")
+@quiet_option("No table.")
+@force_option("files in FOLDER")
 def command(
     machine: str,
     uncertainty_um: float,
@@ -67,7 +66,7 @@ def command(
     dwell_s: float | None,
     settle_s: float,
     output: str | None,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -99,7 +98,7 @@ def command(
         points=points,
     )
     if output is not None:
-        files = plan.files(output, date.date() if date else None)
+        files = plan.files(output, date)
         refuse_early([str(name) for name in files], files_of(machine), force=force)
         write_files(files, force=force, inputs=files_of(machine))
         talk(f"wrote {len(files)} files to {output}")

@@ -6,16 +6,15 @@ from typing import Any
 
 import click
 
-from olp.cli.common import Length, files_of
+from olp.cli.common import files_of
 from olp.cli.instruments import end, ending_options
+from olp.cli.options import Length, machine_option
 from olp.core.errors import UsageError
 
 
 @click.command("postures")
 @click.argument("file", required=False)
-@click.option(
-    "-m", "--machine", metavar="machine.toml", help="Its tools, and its calibration, taken out first."
-)
+@machine_option("Its tools, and its calibration, taken out first.")
 @click.option("--reference", metavar="TOOL", help="The tool whose vector is right.")
 @click.option(
     "--program", metavar="OUT.ngc", help="Write the program of the test instead (--tools, --point)."
@@ -44,7 +43,7 @@ def command(
     point on the one point, a row a posture."""
     from olp.calibration.iso230 import postures
     from olp.cli.outline import outline
-    from olp.workflows.calibrate_evaluate import fit_postures
+    from olp.workflows.calibrate_postures import fit_postures
 
     if program is not None:
         if file is not None or tools is None or point is None:

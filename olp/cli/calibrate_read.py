@@ -5,12 +5,13 @@ from __future__ import annotations
 import click
 
 from olp.cli.common import put, talk
+from olp.cli.options import json_option
 
 
 @click.command("read")
 @click.argument("file")
 @click.option("--profile", metavar="FILE.toml", help="How the file is laid out (olp-line-profile-1).")
-@click.option("--json", "as_json", is_flag=True, help="Print the readings as JSON.")
+@json_option("Print the readings as JSON.")
 def command(file: str, profile: str | None, as_json: bool) -> None:
     """Show what is understood of an instrument's FILE: one row a reading, and what was assumed.
 

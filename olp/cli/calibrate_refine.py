@@ -6,17 +6,16 @@ import datetime
 
 import click
 
-from olp.cli.common import (
-    STREAM,
+from olp.cli.common import STREAM, exit_for, files_of, put_report, refuse_early, talk
+from olp.cli.options import (
     Length,
-    exit_for,
+    day_option,
     fail_on_option,
-    files_of,
+    force_option,
     json_option,
-    put_report,
-    refuse_early,
+    output_option,
+    quiet_option,
     setup_options,
-    talk,
 )
 from olp.core.errors import UsageError
 
@@ -25,7 +24,7 @@ from olp.core.errors import UsageError
 @click.argument("calibration", metavar="CALIBRATION")
 @click.argument("measured", metavar="MEASURED.csv")
 @setup_options
-@click.option("-o", "--output", metavar="NEW.toml", required=True, help="Where to write; never in place.")
+@output_option("NEW.toml", "Where to write; never in place.", required=True)
 @click.option(
     "--program", metavar="NOMINAL", help="MEASURED are tip positions along a corrected run of this program."
 )
@@ -34,14 +33,11 @@ from olp.core.errors import UsageError
     "--tool", type=(float, float, float), metavar="X Y Z",
     help="Vector from the gauge point to the reflector in mm, if the file has none.",
 )  # fmt: skip
-@click.option(
-    "--date", type=click.DateTime(["%Y-%m-%d"]), metavar="YYYY-MM-DD",
-    help="Day of the run: the new calibration's date of measuring. Default: the old one's.",
-)  # fmt: skip
-@json_option
+@day_option("Day of the run: the new calibration's date of measuring. Default: the old one's.")
+@json_option()
 @fail_on_option
-@click.option("-q", "--quiet", is_flag=True, help="No table; the exit code tells.")
-@click.option("--force", is_flag=True, help="Overwrite the new calibration and its files.")
+@quiet_option("No table; the exit code tells.")
+@force_option("the new calibration and its files")
 def command(
     calibration: str,
     measured: str,
@@ -51,7 +47,7 @@ def command(
     program: str | None,
     sigma_um: float | None,
     tool: tuple[float, float, float] | None,
-    date: datetime.datetime | None,
+    date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -82,7 +78,7 @@ def command(
 
     found = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=tool,
-        date=date.date() if date else None,
+        date=date,
     )  # fmt: skip
     files = found.files(output)
     write_files(files, force=force, inputs=inputs)

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from olp.cli.common import put
+from olp.cli.options import json_option
 from olp.core.errors import UsageError
 from olp.core.units import RAD_PER_URAD
 
@@ -20,7 +21,7 @@ from olp.core.units import RAD_PER_URAD
     "--frame", "frames", multiple=True, metavar="NAME=PP,NP,SIDE",
     help="Diagonal that grows in both axes, the other one, and a side of a drawn frame, in mm.",
 )  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option("Print the result as JSON.")
 def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], as_json: bool) -> None:
     """Squareness in the senses of controls and instruments.
 

@@ -8,25 +8,23 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
+from olp.cli.options import fail_on_option, force_option, json_option, machine_option, output_option
 from olp.core.errors import UsageError
 
 
 @click.command("thermal")
 @click.argument("logs", metavar="LOG.csv ...", nargs=-1, required=True)
-@click.option("-m", "--machine", metavar="machine.toml", required=True, help="The machine file.")
-@click.option("-o", "--output", metavar="thermal.toml", help="Where the structure goes. Default: stdout.")
+@machine_option(required=True)
+@output_option("thermal.toml", "Where the structure goes. Default: stdout.")
 @click.option(
     "--reference-degC", "reference", multiple=True, metavar="[SENSOR=]degC",
     help="What the sensors said when the machine was calibrated: one for all, or one each. Default: "
     "temperature_degC of the calibration.",
 )  # fmt: skip
 @click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Take only these sensors.")
-@click.option(
-    "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error", show_default=True,
-    help="Exit with 1 where a finding is at least this severe.",
-)  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-@click.option("--force", is_flag=True, help="Overwrite the output.")
+@fail_on_option
+@json_option()
+@force_option("the output")
 def command(
     logs: tuple[str, ...], machine: str, output: str | None, reference: tuple[str, ...],
     sensors: tuple[str, ...], fail_on: str, as_json: bool, force: bool,
@@ -44,12 +42,12 @@ def command(
     target = None if output in (None, STREAM) else output
     if target is None and as_json:
         raise UsageError("both the structure and --json would go to stdout; name a file for it with -o")
-    setup, inputs = machine_given(machine, None)
+    session, inputs = machine_given(machine, None)
     refuse_early(files_of(target), (*inputs, *logs), force=force)
     from olp.files.write import write_bytes
     from olp.workflows.calibrate_thermal import fit_thermal
 
-    result = fit_thermal(logs, setup, reference_degC=_reference(reference), sensors=sensors)
+    result = fit_thermal(logs, session.setup, reference_degC=_reference(reference), sensors=sensors)
     if target is None:
         put(result.data)
     else:

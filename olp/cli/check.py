@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
 from olp.cli.common import (
     STREAM,
-    confidence_options,
-    contour_option,
-    date_option,
     exit_for,
-    fail_on_option,
     files_of,
     given,
-    outside_box_option,
+    options_of,
     put,
     refuse_early,
     refuse_twice,
-    setup_options,
     source,
     talk,
+)
+from olp.cli.options import (
+    confidence_options,
+    contour_option,
+    date_option,
+    fail_on_option,
+    force_option,
+    output_option,
+    outside_box_option,
+    setup_options,
     tolerance_option,
 )
 from olp.cli.progress import progress
@@ -53,32 +57,25 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     show_default=True,
     help="SARIF 2.1.0 and JUnit XML are for pipelines.",
 )
-@click.option("-o", "--output", metavar="OUT", default=STREAM, help="Default: stdout.")
+@output_option("OUT", "Default: stdout.", default=STREAM)
 @date_option()
 @tolerance_option
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options
 @click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
 @contour_option
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@force_option("the output file")
 def command(
     program: str | None,
     machine: str | None,
     job: str | None,
     nominal: str | None,
-    select: tuple[str, ...],
-    ignore: tuple[str, ...],
-    fail_on: str,
     form: str,
+    fail_on: str,
     output: str,
-    date: datetime.date | None,
-    tolerance_um: float,
-    outside_box: Literal["refuse", "hold"],
-    within_um: float | None,
-    only_sure_components: bool,
     clearances: str | None,
-    contour: bool,
     force: bool,
+    **words: Any,
 ) -> None:
     """May this program run on this machine? A gate before deployment.
 
@@ -97,23 +94,12 @@ def command(
 
     from olp.files.write import write_files
     from olp.reports.check import FORMATS, to_csv
-    from olp.workflows.check import check
+    from olp.workflows import check
 
-    with progress(form != "text") as show, naming("<stdin>" if call.program == STREAM else ""):
-        result = check(
-            source(call.program),
-            call.setup,
-            nominal=None if nominal is None else source(nominal),
-            tolerance_um=tolerance_um,
-            outside_box=outside_box,
-            contour=contour,
-            within_um=within_um,
-            only_sure_components=only_sure_components,
-            date=date,
-            select=select,
-            ignore=ignore,
-            progress=show,
-        )
+    options = options_of(check.CheckOptions, words)
+    other = None if nominal is None else source(call.session.sources, nominal)
+    with progress(form != "text") as show, naming(call.stream):
+        result = check.run(call.session, call.source, options, nominal=other, progress=show)
     parts = {output: FORMATS[form](result.report, fail_on).encode()}
     if clearances is not None and result.clearances is not None:
         parts[clearances] = to_csv(result.clearances.rows())

@@ -1,13 +1,12 @@
-"""What the verbs share: options, streams, where inputs come from, and when findings fail a run."""
+"""What the verbs share: streams, where inputs come from, and when findings fail a run."""
 
 from __future__ import annotations
 
-import datetime
-import math
+import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,184 +18,71 @@ from olp.findings.rule import Severity
 
 if TYPE_CHECKING:
     from olp.core.machine import Setup
+    from olp.files.sources import Source, Sources
+    from olp.workflows.session import Session
 
 STREAM = "-"
 FINDINGS_EXIT = 1
 REPORT_ENDINGS = (".html", ".json", ".md")
 PLOT_ENDINGS = (".svg", ".png")
 
-F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 
-class Length(click.FloatRange):
-    """A finite number above zero."""
-
-    def __init__(self) -> None:
-        super().__init__(min=0.0, min_open=True)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = float(super().convert(value, param, ctx))
-        if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number.", param, ctx)
-        return number
-
-
-def setup_options(function: F) -> F:
-    """-m, -j and --dialect, which every verb that needs a machine takes."""
-    function = click.option(
-        "--dialect",
-        metavar="NAME",
-        expose_value=False,
-        callback=_keep_dialect,
-        help="The dialect, such as apt, or a file that describes it. Default: what text and ending say.",
-    )(function)
-    function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
-    return click.option("-m", "--machine", metavar="machine.toml", help="The machine file.")(function)
-
-
-_DIALECT = "olp.dialect"
-
-
-def _keep_dialect(context: click.Context, _: click.Parameter, value: str | None) -> None:
-    context.meta[_DIALECT] = value
-
-
-def _day(
-    ctx: click.Context, parameter: click.Parameter, value: datetime.datetime | None
-) -> datetime.date | None:
-    return None if value is None else value.date()
-
-
-def date_option(of: str = "run") -> Callable[[F], F]:
-    """--date, as a day."""
-    return click.option(
-        "--date",
-        type=click.DateTime(["%Y-%m-%d"]),
-        callback=_day,
-        metavar="YYYY-MM-DD",
-        help=f"The day of the {of}, to be compared with valid_until of the calibration.",
-    )
-
-
-def outside_box_option(refused: str, held: str) -> Callable[[F], F]:
-    """--outside-box; its help says what becomes of what is outside."""
-    return click.option(
-        "--outside-box",
-        type=click.Choice(["refuse", "hold"]),
-        default="refuse",
-        show_default=True,
-        help=f"Outside the calibrated box: {refused}, or {held}.",
-    )
-
-
-fail_on_option = click.option(
-    "--fail-on",
-    type=click.Choice(["info", "warning", "error", "never"]),
-    default="error",
-    show_default=True,
-    help="Exit with 1 where a finding is at least this severe.",
-)
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-contour_option = click.option(
-    "--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."
-)
-tolerance_option = click.option(
-    "--tolerance-um",
-    type=Length(),
-    default=1.0,
-    show_default=True,
-    help="How far the corrected path may be from the nominal one, rounding apart.",
-)
-flatten_option = click.option(
-    "--flatten", is_flag=True, help="Write out loops, subprograms and expressions first."
-)
-report_option = click.option(
-    "--report", "report_file", metavar="FILE", help="Also write the report: .html, .json or .md."
-)
-
-
-def unroll_options(function: F) -> F:
-    """--flatten, --expand-cycles and what that needs."""
-    for option in (
-        click.option(
-            "--peck-clearance-mm",
-            type=Length(),
-            help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; "
-            "for --expand-cycles.",
-        ),
-        click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves."),
-        flatten_option,
-    ):
-        function = option(function)
-    return function
-
-
-def confidence_options(function: F) -> F:
-    """What every verb that looks at uncertainties has in common."""
-    for option in (
-        click.option(
-            "--within-um",
-            type=Length(),
-            help="The tolerance of the part: how probable is it that the tip stays within? "
-            "Default: --tolerance-um.",
-        ),
-        click.option(
-            "--only-sure-components",
-            is_flag=True,
-            help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
-        ),
-    ):
-        function = option(function)
-    return function
-
-
-def proof_options(function: F) -> F:
-    """What `correct` and `verify` have in common."""
-    for option in (fail_on_option, json_option, date_option(), contour_option, tolerance_option):
-        function = option(function)
-    return function
+#: Where a call keeps what --dialect says.
+DIALECT = "olp.dialect"
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a call is about: the program (a path or `-`), machine and job, and every file that it reads."""
+    """What a call is about: the program (a path or `-`) and its source, machine and job, and every file that
+    it reads."""
 
     program: str
-    setup: Setup
+    source: Source
+    session: Session
     inputs: tuple[str, ...]
+
+    @property
+    def setup(self) -> Setup:
+        return self.session.setup
+
+    @property
+    def stream(self) -> str:
+        """What errors call the program where it comes from stdin, else ""."""
+        return "<stdin>" if self.program == STREAM else ""
 
 
 def given(program: str | None, machine: str | None, job: str | None) -> Given:
     """Program and machine file: the command line's, else the job's. Raises UsageError, InputError."""
-    setup, inputs = machine_given(machine, job)
-    program = program if program is not None else setup.job.program
+    session, inputs = machine_given(machine, job)
+    program = program if program is not None else session.setup.job.program
     if program is None:
         raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
-    return Given(program, setup, (*files_of(program), *inputs))
+    return Given(program, source(session.sources, program), session, (*files_of(program), *inputs))
 
 
-def machine_given(machine: str | None, job: str | None) -> tuple[Setup, tuple[str, ...]]:
-    """Machine and job, and the files that describe them. Raises UsageError, InputError."""
-    from olp.files.calibration.reader import files_beside
-    from olp.files.config import load_setup
+def machine_given(machine: str | None, job: str | None) -> tuple[Session, tuple[str, ...]]:
+    """A session of machine and job, and the files that describe them. Raises UsageError, InputError."""
+    from olp.workflows.session import Session
 
-    setup = load_setup(machine, job)
-    dialect = click.get_current_context().meta.get(_DIALECT)
-    if dialect is not None:
-        from olp.files.described import described
-
-        setup = replace(setup, job=replace(setup.job, dialect=dialect, described=described(dialect)))
+    session = Session.start(machine, job, dialect=click.get_current_context().meta.get(DIALECT))
+    setup = session.setup
     meshes = (mesh.file for mesh in setup.job.meshes)
     named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
-    inputs = files_of(*named, *meshes)
-    if setup.machine.calibration is not None:
-        inputs += [str(file) for file in files_beside(setup.machine.calibration)]
-    return setup, tuple(inputs)
+    return session, (*files_of(*named, *meshes), *session.beside_calibration())
 
 
-def source(name: str) -> str | bytes:
-    """A program for the library: its path, or the bytes of stdin for `-`."""
-    return sys.stdin.buffer.read() if name == STREAM else name
+def source(sources: Sources, name: str) -> Source:
+    """A program for a session: a file, or stdin for `-`."""
+    from olp.files.sources import Source
+
+    return Source.stream(sys.stdin.buffer.read) if name == STREAM else sources.source(name)
+
+
+def options_of(kind: type[T], words: Mapping[str, Any]) -> T:
+    """A value, such as the options of a workflow, of the words of a call that it has by their names."""
+    return kind(**{key: words[key] for key in inspect.signature(kind).parameters if key in words})
 
 
 def files_of(*names: str | None) -> list[str]:

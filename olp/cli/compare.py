@@ -3,38 +3,51 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from olp.cli.common import (
     STREAM,
-    Length,
-    contour_option,
-    date_option,
     exit_for,
-    fail_on_option,
     files_of,
-    json_option,
     machine_given,
+    options_of,
     put,
     refuse_early,
     refuse_stream,
     refuse_twice,
     report_ending,
-    report_option,
-    setup_options,
     source,
     talk,
+)
+from olp.cli.options import (
+    Length,
+    contour_option,
+    date_option,
+    fail_on_option,
+    force_option,
+    json_option,
+    output_option,
+    quiet_option,
+    report_option,
+    setup_options,
 )
 from olp.cli.progress import progress
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from olp.comparison.pairing import Order
-    from olp.comparison.runs import Align
     from olp.files.point_profile import PointProfile
+    from olp.files.sources import Sources
+    from olp.files.write import Content
+    from olp.workflows.compare import Comparison
+    from olp.workflows.session import Session
+
+#: Options that say how files are laid out.
+_LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 
 
 @click.command("compare")
@@ -68,107 +81,113 @@ if TYPE_CHECKING:
 )
 @click.option("--tolerance-um", type=Length(), help="Exit with 1 where the measured path is farther off.")
 @click.option("--add-errors", is_flag=True, help="Move axis positions of a log by the machine's errors.")
-@click.option("-o", "--output", metavar="OUT.csv", help="Deviation of every point.")
+@output_option("OUT.csv", "Deviation of every point.")
 @click.option(
     "--part-frame", metavar="FILE.toml", help="Work offset from three or more poses, for the job file."
 )
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
-@report_option
+@report_option()
 @contour_option
 @date_option("measurement")
-@json_option
+@json_option()
 @fail_on_option
-@click.option("-q", "--quiet", is_flag=True, help="No report and no progress; the exit code tells.")
-@click.option("--force", is_flag=True, help="Overwrite output files.")
+@quiet_option("No report and no progress; the exit code tells.")
+@force_option()
 def command(
-    nominal: str,
-    measured: tuple[str, ...],
-    machine: str | None,
-    job: str | None,
-    before: tuple[str, ...],
-    poses: bool,
-    profile: str | None,
-    columns: tuple[str, ...],
-    unit: str | None,
-    delimiter: str | None,
-    positions: str | None,
-    save_profile: str | None,
-    align: Align,
-    order: Order | None,
-    reach_mm: float,
-    tolerance_um: float | None,
-    add_errors: bool,
-    output: str | None,
-    part_frame: str | None,
-    frame_name: str,
-    report_file: str | None,
-    contour: bool,
-    date: datetime.date | None,
-    as_json: bool,
-    fail_on: str,
-    quiet: bool,
-    force: bool,
+    nominal: str, measured: tuple[str, ...], machine: str | None, job: str | None, **words: Any
 ) -> None:
     """Hold measured runs against a nominal path.
 
     NOMINAL is a program (with -m or -j) or a file of points; every MEASURED is one run. Files come from
     trackers, CMMs, logs of a control, or olp simulate.
     """
-    setup, described = machine_given(machine, job) if machine or job else (None, ())
-    inputs = (*files_of(nominal, *measured, *before), *described)
-    refuse_stream(output=output, part_frame=part_frame, save_profile=save_profile)
-    targets = files_of(output, part_frame, save_profile, report_file)
-    refuse_early(targets, inputs, force=force)
-    refuse_twice(targets)
-    if part_frame and not poses:
-        raise UsageError("--part-frame takes points of a part, a row each; add --poses")
-    for name in files_of(report_file):
-        report_ending(name)
-    if output and poses:
-        raise UsageError("-o writes deviations along a path; poses are in the report")
+    from olp.files.sources import Sources
 
-    from olp.files.write import Content, write_files
+    out = options_of(_Outputs, words)
+    session, described = machine_given(machine, job) if machine or job else (None, ())
+    sources = Sources() if session is None else session.sources
+    inputs = (*files_of(nominal, *measured, *words["before"]), *described)
+    _refuse(out, inputs, poses=words["poses"])
+
+    from olp.files.write import write_files
     from olp.reports import compare as report_compare
     from olp.reports.report import to_json
-    from olp.workflows import report_files
-    from olp.workflows.compare import compare
+    from olp.workflows import compare
 
-    layout = _layout(profile, columns, measured[0], unit=unit, delimiter=delimiter, positions=positions)
-    with progress(quiet) as show:
-        result = compare(
-            source(nominal), measured, setup, before=before, poses=poses, profile=layout,
-            align=align, order=order, reach_mm=reach_mm, tolerance_um=tolerance_um, add_errors=add_errors,
-            part_frame=frame_name if part_frame else None, contour=contour, date=date, progress=show,
-        )  # fmt: skip
-        written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(output)}
-        if part_frame and result.part_frame:
-            written[Path(part_frame)] = result.part_frame.encode()
-        if save_profile:
-            written[Path(save_profile)] = result.profile.to_toml().encode()
-        if report_file and report_file != STREAM:
-            written[Path(report_file)] = report_files.comparison(result, setup, report_file, date)
-        write_files(written, force=force, inputs=inputs)
-    if as_json or report_file == STREAM:
+    part_frame = words["frame_name"] if out.part_frame else None
+    layout = _layout(measured[0], sources, **{key: words[key] for key in _LAYOUT})
+    options = options_of(compare.CompareOptions, words | {"profile": layout, "part_frame": part_frame})
+    with progress(out.quiet) as show:
+        result = compare.run(sources, session, source(sources, nominal), measured, options, show)
+        written = _files(result, out, session, options.date)
+        write_files(written, force=out.force, inputs=inputs)
+    if out.as_json or out.report_file == STREAM:
         put(to_json(result.report))
-    elif not quiet:
+    elif not out.quiet:
         put(report_compare.to_text(result.report))
-    if not quiet:
+    if not out.quiet:
         for path in written:
             talk(f"wrote {path}")
-    exit_for(result.findings, fail_on)
+    exit_for(result.findings, out.fail_on)
+
+
+@dataclass(frozen=True, slots=True)
+class _Outputs:
+    """Where the results of a call go."""
+
+    output: str | None
+    part_frame: str | None
+    save_profile: str | None
+    report_file: str | None
+    as_json: bool
+    fail_on: str
+    quiet: bool
+    force: bool
+
+
+def _refuse(out: _Outputs, inputs: Iterable[str], *, poses: bool) -> None:
+    """Raise UsageError for outputs that cannot be, or do not go together."""
+    refuse_stream(output=out.output, part_frame=out.part_frame, save_profile=out.save_profile)
+    targets = files_of(out.output, out.part_frame, out.save_profile, out.report_file)
+    refuse_early(targets, inputs, force=out.force)
+    refuse_twice(targets)
+    if out.part_frame and not poses:
+        raise UsageError("--part-frame takes points of a part, a row each; add --poses")
+    for name in files_of(out.report_file):
+        report_ending(name)
+    if out.output and poses:
+        raise UsageError("-o writes deviations along a path; poses are in the report")
+
+
+def _files(
+    result: Comparison, out: _Outputs, session: Session | None, date: datetime.date | None
+) -> dict[Path, Content]:
+    """What the call writes to files, by path."""
+    from olp.workflows import report
+
+    written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(out.output)}
+    if out.part_frame and result.part_frame:
+        written[Path(out.part_frame)] = result.part_frame.encode()
+    if out.save_profile:
+        written[Path(out.save_profile)] = result.profile.to_toml().encode()
+    for name in files_of(out.report_file):
+        written[Path(name)] = report.comparison(result, session, name, date)
+    return written
 
 
 def _layout(
-    profile: str | None, columns: tuple[str, ...], first: str, **values: str | None
+    first: str, sources: Sources, profile: str | None, columns: tuple[str, ...], **values: str | None
 ) -> PointProfile | None:
     """The profile that the call asks for, None where files tell their own."""
     from olp.files.point_profile import BUILT_IN, load_profile, with_options
     from olp.files.points import layout_of
-    from olp.files.write import read_bytes
 
     if profile is None and not columns and not any(values.values()):
         return None
-    start = load_profile(profile) if profile else layout_of(read_bytes(first)) or BUILT_IN["olp"]
+    if profile:
+        start = load_profile(profile, sources.read)
+    else:
+        start = layout_of(sources.read(first)) or BUILT_IN["olp"]
     if profile is None and columns and all(item.partition("=")[2].isdigit() for item in columns):
         start = start.model_copy(update={"header": False})
     return with_options(start, columns, **values)

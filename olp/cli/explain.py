@@ -9,6 +9,7 @@ import textwrap
 import click
 
 from olp.cli.common import put
+from olp.cli.options import json_option
 from olp.core.errors import UsageError
 from olp.findings.catalogue import RULES
 from olp.findings.rule import Rule
@@ -16,7 +17,7 @@ from olp.findings.rule import Rule
 
 @click.command("explain")
 @click.argument("code", required=False)
-@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+@json_option("Print as JSON.")
 def command(code: str | None, as_json: bool) -> None:
     """Explain the code of a finding, or list all codes."""
     rules = list(RULES.values()) if code is None else [_rule(code)]

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from olp.cli.common import talk
+from olp.cli.options import force_option
 from olp.core.errors import OlpError, UsageError
 
 #: A small machine, to be replaced by the travel of the real one.
@@ -28,7 +29,7 @@ Travel = tuple[tuple[str, float, float], ...]
     help="Travel of an axis in mm, such as --travel X 0 2000; once an axis.",
 )
 @click.option("--from-linuxcnc", "ini", metavar="INI", help="Take the machine from a LinuxCNC configuration.")
-@click.option("--force", is_flag=True, help="Overwrite files in DIR.")
+@force_option("files in DIR")
 def command(
     folder: str,
     name: str | None,

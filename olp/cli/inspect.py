@@ -8,21 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import (
-    files_of,
-    machine_given,
-    plot_ending,
-    put,
-    refuse_early,
-    setup_options,
-    source,
-    talk,
-)
+from olp.cli.common import files_of, machine_given, plot_ending, put, refuse_early, source, talk
+from olp.cli.options import force_option, json_option, plot_option, setup_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from olp.core.machine import Setup
     from olp.errormodel.calibration import Calibration
+    from olp.workflows.session import Session
 
 
 @click.command("inspect")
@@ -32,9 +24,9 @@ if TYPE_CHECKING:
     "--at", type=(float, float, float), metavar="X Y Z", help="Say the error at an axis position in mm."
 )
 @click.option("--tool", type=int, help="Tool number for --at. Default: the tool at the start.")
-@click.option("--plot", metavar="FILE", help="Draw the curves of the calibration, as .svg or .png.")
-@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-@click.option("--force", is_flag=True, help="Overwrite the plot.")
+@plot_option("Draw the curves of the calibration, as .svg or .png.")
+@json_option("Print as JSON.")
+@force_option("the plot")
 def command(
     file: str | None,
     machine: str | None,
@@ -56,7 +48,8 @@ def command(
         file, machine = None, file
     elif file is None and machine is None:
         ask_program = at is None and plot is None
-    setup, inputs = machine_given(machine, job)
+    session, inputs = machine_given(machine, job)
+    setup = session.setup
     if ask_program:
         file = setup.job.program
     if tool is not None and at is None:
@@ -66,19 +59,19 @@ def command(
     refuse_early(files_of(plot), (*inputs, *files_of(file)), force=force)
 
     if plot is not None:
-        _plot(setup, plot, inputs, force)
+        _plot(session, plot, inputs, force)
     if at is not None:
-        from olp.workflows import api
+        from olp.workflows.inspect import error_of
 
-        values = shown = api.error_at(setup, at, tool)
+        values = shown = error_of(session, at, tool)
     elif plot is not None:
         return
     elif file is None:
-        values = shown = machine_summary(setup)
+        values = shown = machine_summary(session)
     else:
-        from olp.workflows import api
+        from olp.workflows import inspect
 
-        values = api.inspect(source(file), setup)
+        values = inspect.run(session, source(session.sources, file))
         shown = values | {"support": _by_support(values.get("support") or ())}
     from olp.cli.outline import outline
     from olp.reports.report import to_json
@@ -86,11 +79,11 @@ def command(
     put(to_json(values) if as_json else outline(shown))
 
 
-def _plot(setup: Setup, name: str, inputs: Sequence[str], force: bool) -> None:
+def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> None:
     from olp.files.write import write_bytes
     from olp.reports.plots.base import calibration_curves
 
-    data = calibration_curves(_calibration(setup), "png" if Path(name).suffix.lower() == ".png" else "svg")
+    data = calibration_curves(_calibration(session), "png" if Path(name).suffix.lower() == ".png" else "svg")
     write_bytes(name, data, force=force, inputs=inputs)
     talk(f"wrote {name}")
 
@@ -101,37 +94,30 @@ def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:
     return {kind: " ".join(row["statement"] for row in matrix if row["support"] == kind) for kind in kinds}
 
 
-def _calibration(setup: Setup) -> Calibration:
-    from olp.files.calibration.reader import load_calibration
-
-    path = setup.machine.calibration
-    if path is None:
+def _calibration(session: Session) -> Calibration:
+    machine = session.setup.machine
+    if machine.calibration is None:
         raise UsageError(
-            f"machine {setup.machine.name!r} names no calibration; set the key calibration in its file"
+            f"machine {machine.name!r} names no calibration; set the key calibration in its file"
         )
-    return load_calibration(path, setup.machine, setup.job.temperatures_degC)
+    return session.calibration()
 
 
-def machine_summary(setup: Setup) -> dict[str, Any]:
-    """Axes, chain, calibration and the size of each of the 21 errors, with units in the keys."""
-    from olp.cli.inspect_parts import grid_summary
-    from olp.core.machine import COMPONENTS, SQUARENESS
-    from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+def machine_summary(session: Session) -> dict[str, Any]:
+    """Axes, chain, calibration and what each of its error sources says, with units in the keys."""
+    from olp.core.units import AXES
 
-    calibration, described = _calibration(setup), setup.machine
-    position, angular = (
-        [_size(calibration, name, unit, scale) for name in COMPONENTS if name[1] in senses]
-        for senses, unit, scale in (("XYZ", "um", UM_PER_MM), ("ABC", "urad", 1.0 / RAD_PER_URAD))
-    )
-    cyclic_position, cyclic_angular = (
-        [
-            {"name": term.component, "period_mm": term.period_mm, f"amplitude_{unit}": term.amplitude * scale}
-            for term in calibration.cyclic
-            if term.component[1] in senses
-        ]
-        for senses, unit, scale in (("XYZ", "um", UM_PER_MM), ("ABC", "urad", 1.0 / RAD_PER_URAD))
-    )
-    return {
+    setup = session.setup
+    calibration, described = _calibration(session), setup.machine
+    axes: dict[str, dict[str, Any]] = {
+        name: {
+            "travel_mm": list(axis.travel_mm),
+            "calibrated_mm": calibration.box_mm[AXES.index(name)].tolist(),
+            "least_increment_mm": axis.least_increment_mm,
+        }
+        for name, axis in described.axes.items()
+    }
+    summary: dict[str, Any] = {
         "machine": {
             "name": described.name,
             "chain": described.chain,
@@ -147,31 +133,12 @@ def machine_summary(setup: Setup) -> dict[str, Any]:
             "temperature_degC": calibration.temperature_degC,
             "datum_mm": list(calibration.datum_mm),
         },
-        "axes": {
-            name: {
-                "travel_mm": list(axis.travel_mm),
-                "calibrated_mm": calibration.box_mm[AXES.index(name)].tolist(),
-                "least_increment_mm": axis.least_increment_mm,
-                "lost_motion_um": calibration.backlash_mm[AXES.index(name)] * UM_PER_MM,
-            }
-            for name, axis in described.axes.items()
-        },
-        "position_errors": position,
-        "angular_errors": angular,
-        "squareness": {
-            f"{name}_urad": calibration.squareness.get(name, 0.0) / RAD_PER_URAD for name in SQUARENESS
-        },
-        "cyclic_position_errors": cyclic_position,
-        "cyclic_angular_errors": cyclic_angular,
-    } | grid_summary(calibration, described.chain)
-
-
-def _size(calibration: Calibration, name: str, unit: str, scale: float) -> dict[str, Any]:
-    """Largest absolute value and range; the points hold both, interpolation stays between them."""
-    values = [
-        value
-        for curve in calibration.curves_of(name[2])
-        if name in curve.names
-        for value in (curve.mean(name) * scale).tolist()
-    ] or [0.0]
-    return {"name": name, f"max_{unit}": max(map(abs, values)), f"range_{unit}": max(values) - min(values)}
+        "axes": axes,
+    }
+    frame = calibration.frame(described.chain)
+    # what no correction removes stands last
+    for kind, values in sorted(calibration.sources(), key=lambda pair: not pair[0].correctable):
+        for name, axis in axes.items():
+            axis |= kind.inspect_axis(values, name)
+        summary |= kind.inspect(values, frame)
+    return summary

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import click
-
 from olp.cli.common import exit_for, files_of, put, refuse_early, refuse_twice, talk
+from olp.cli.options import fail_on_option, force_option, json_option
 from olp.core.errors import UsageError
 from olp.findings.catalogue import Finding
 
@@ -19,12 +18,9 @@ PLOTS = (".svg", ".png")
 def ending_options(function: F) -> F:
     """--json, --fail-on and --force."""
     for option in (
-        click.option("--force", is_flag=True, help="Overwrite output files."),
-        click.option(
-            "--fail-on", type=click.Choice(["info", "warning", "error", "never"]), default="error",
-            show_default=True, help="Exit with 1 where a finding is at least this severe.",
-        ),
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        force_option(),
+        fail_on_option,
+        json_option("Print the result as JSON."),
     ):  # fmt: skip
         function = option(function)
     return function

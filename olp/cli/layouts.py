@@ -9,26 +9,26 @@ from olp.cli.common import STREAM, Given, files_of
 from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
+    from olp.files.sources import Source, Sources
     from olp.program.text.delimited import Layout
 
 
 def layout_of(
-    profile: str | None, columns: tuple[str, ...], unit: str | None, table: str | bytes
+    profile: str | None, columns: tuple[str, ...], unit: str | None, table: Source, sources: Sources
 ) -> Layout | None:
     """The layout that a call asks for, None where the table tells its own."""
     from olp.files.point_profile import BUILT_IN, from_layout, load_profile, with_options
-    from olp.files.write import read_bytes
     from olp.program.text.delimited import first_lines, told
 
     if profile is None and not columns and unit is None:
         return None
     if profile:
-        return with_options(load_profile(profile), columns, unit=unit).layout
-    found = told(first_lines(table if isinstance(table, bytes) else read_bytes(table)))
+        return with_options(load_profile(profile, sources.read), columns, unit=unit).layout
+    found = told(first_lines(table.data))
     if found is None and not columns:
         raise InputError(
             "does not tell which columns hold X, Y and Z; name them with --column X=.. and so on",
-            file=None if isinstance(table, bytes) else table,
+            file=table.name or None,
         )
     if not columns and found is not None:
         return replace(found, unit=unit or found.unit)
@@ -41,14 +41,15 @@ def layout_of(
 
 def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], unit: str | None) -> Given:
     """A call about a list of positions that is laid out as it says; the same call where it says nothing."""
-    from olp.program.pointlist.reader import with_layout
+    from olp.program.pointlist.dialect import with_layout
 
     if profile is None and not columns and unit is None:
         return call
     if call.program == STREAM:
         raise UsageError("a list of positions on stdin takes its layout from --dialect FILE.toml")
-    layout = layout_of(profile, columns, unit, call.program)
+    session = call.session
+    layout = layout_of(profile, columns, unit, call.source, session.sources)
     assert layout is not None
     job = replace(call.setup.job, described=with_layout(layout))
-    setup = replace(call.setup, job=job)
-    return replace(call, setup=setup, inputs=(*call.inputs, *files_of(profile)))
+    session = session.of(replace(call.setup, job=job))
+    return replace(call, session=session, inputs=(*call.inputs, *files_of(profile)))

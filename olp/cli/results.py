@@ -5,10 +5,14 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from olp.cli.common import STREAM, exit_for, files_of, given, put, refuse_early, refuse_twice, source, talk
+from olp.cli.common import STREAM, exit_for, files_of, given, put, refuse_early, refuse_twice, talk
 from olp.cli.layouts import layout_of
 from olp.core.errors import UsageError
+
+if TYPE_CHECKING:
+    from olp.workflows.session import Outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +26,7 @@ class Asked:
     tools: tuple[str, ...]
     tip_radius_mm: float | None
     decimals: int | None
-    hold: bool
+    outside_box: Outside
     date: datetime.date | None
     output: str | None
     report_file: str | None
@@ -47,18 +51,18 @@ def run(results: str | None, machine: str | None, job: str | None, asked: Asked)
     from olp.files.write import Content, write_files
     from olp.reports import report
     from olp.reports import results as report_results
-    from olp.workflows.results import correct_results
+    from olp.workflows import results as workflow
 
-    text = source(call.program)
-    result = correct_results(
-        text, call.setup, profile=layout_of(asked.profile, asked.columns, asked.unit, text),
-        frame=_names("--frame", asked.frames), tool=_numbers(asked.tools), tip_radius_mm=asked.tip_radius_mm,
-        decimals=asked.decimals,
-        outside_box="hold" if asked.hold else "refuse", date=asked.date,
+    layout = layout_of(asked.profile, asked.columns, asked.unit, call.source, call.session.sources)
+    options = workflow.ResultOptions(
+        profile=layout, frame=_names("--frame", asked.frames), tool=_numbers(asked.tools),
+        tip_radius_mm=asked.tip_radius_mm, decimals=asked.decimals, outside_box=asked.outside_box,
+        date=asked.date,
     )  # fmt: skip
+    result = workflow.run(call.session, call.source, options)
     written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
     for name in files_of(asked.report_file):
-        from olp.workflows import report_files
+        from olp.workflows import report as report_files
 
         written[Path(name)] = report_files.results(result, name, asked.date)
     write_files(written, force=asked.force, inputs=inputs)

@@ -4,29 +4,19 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import (
-    STREAM,
-    Length,
-    contour_option,
-    files_of,
-    given,
-    put,
-    refuse_early,
-    setup_options,
-    source,
-    talk,
-)
+from olp.cli.common import STREAM, files_of, given, put, refuse_early, talk
+from olp.cli.options import Length, contour_option, force_option, output_option, setup_options
 
 
 @click.command("simulate")
 @click.argument("program", required=False)
 @setup_options
-@click.option("-o", "--output", metavar="measured.csv", default=STREAM, help="Default: stdout.")
+@output_option("measured.csv", "Default: stdout.", default=STREAM)
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
 @contour_option
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@force_option("the output file")
 def command(
     program: str | None,
     machine: str | None,
@@ -44,9 +34,10 @@ def command(
     refuse_early(files_of(output), call.inputs, force=force)
 
     from olp.files.write import write_bytes
-    from olp.workflows import api
+    from olp.workflows import simulate
 
-    result = api.simulate(source(call.program), call.setup, step_mm=step_mm, contour=contour)
+    options = simulate.SimulateOptions(step_mm=step_mm, contour=contour)
+    result = simulate.run(call.session, call.source, options)
     data = result.to_csv()
     if output == STREAM:
         put(data)

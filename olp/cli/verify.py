@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import datetime
+from typing import Any
 
 import click
 
-from olp.cli.common import (
-    STREAM,
-    confidence_options,
-    exit_for,
-    given,
-    proof_options,
-    put,
-    setup_options,
-    source,
-)
+from olp.cli.common import STREAM, exit_for, given, options_of, put, source
+from olp.cli.options import confidence_options, proof_options, setup_options
 from olp.core.errors import UsageError
 
 
@@ -26,18 +18,9 @@ from olp.core.errors import UsageError
 @proof_options
 @confidence_options
 def command(
-    nominal: str,
-    corrected: str,
-    machine: str | None,
-    job: str | None,
-    tolerance_um: float,
-    contour: bool,
-    within_um: float | None,
-    only_sure_components: bool,
-    date: datetime.date | None,
-    as_json: bool,
-    fail_on: str,
-) -> None:
+    nominal: str, corrected: str, machine: str | None, job: str | None, as_json: bool, fail_on: str,
+    **words: Any,
+) -> None:  # fmt: skip
     """Prove a corrected program from the two texts alone.
 
     Whoever wrote CORRECTED: it is read, run through the model of the machine's errors, and compared with the
@@ -48,17 +31,9 @@ def command(
     call = given(nominal, machine, job)
 
     from olp.reports import report
-    from olp.workflows import api
+    from olp.workflows import verify
 
-    result = api.verify(
-        source(nominal),
-        source(corrected),
-        call.setup,
-        tolerance_um=tolerance_um,
-        contour=contour,
-        within_um=within_um,
-        only_sure_components=only_sure_components,
-        date=date,
-    )
+    options = options_of(verify.VerifyOptions, words)
+    result = verify.run(call.session, call.source, source(call.session.sources, corrected), options)
     put(report.to_json(result.report) if as_json else report.to_text(result.report))
     exit_for(result.findings, fail_on)

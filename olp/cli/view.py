@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import (
-    STREAM,
+from olp.cli.common import STREAM, files_of, given, options_of, put, refuse_early, source, talk
+from olp.cli.options import (
     Length,
     confidence_options,
     contour_option,
-    files_of,
-    given,
+    force_option,
+    output_option,
     outside_box_option,
-    put,
-    refuse_early,
+    quiet_option,
     setup_options,
-    source,
-    talk,
     tolerance_option,
     unroll_options,
 )
@@ -40,7 +37,7 @@ if TYPE_CHECKING:
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
 )
-@click.option("-o", "--output", metavar="review.html", help="Default: PROGRAM.review.html beside PROGRAM.")
+@output_option("review.html", "Default: PROGRAM.review.html beside PROGRAM.")
 @click.option(
     "--live", is_flag=True, help="Serve the page on this machine, until Ctrl-C, and keep it up to date."
 )
@@ -60,8 +57,8 @@ if TYPE_CHECKING:
     type=Length(),
     help="Distance between points of the path. Default: about 100,000 points in all.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no talk.")
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@quiet_option("No progress and no talk.")
+@force_option("the output file")
 def command(
     program: str | None,
     machine: str | None,
@@ -71,18 +68,10 @@ def command(
     output: str | None,
     live: bool,
     port: int,
-    tolerance_um: float,
-    outside_box: Literal["refuse", "hold"],
-    within_um: float | None,
-    only_sure_components: bool,
-    contour: bool,
-    flatten: bool,
-    expand_cycles: bool,
-    peck_clearance_mm: float | None,
     no_time: bool,
-    step_mm: float | None,
     quiet: bool,
     force: bool,
+    **words: Any,
 ) -> None:
     """Show a job in the browser: nominal, corrected and measured path, their errors enlarged.
 
@@ -93,7 +82,7 @@ def command(
         raise UsageError("--live serves files as they are: it goes with neither -o nor a program from stdin")
     if port and not live:
         raise UsageError("--port belongs to --live")
-    if corrected is not None and (flatten or expand_cycles):
+    if corrected is not None and (words["flatten"] or words["expand_cycles"]):
         raise UsageError(
             "--flatten and --expand-cycles change the nominal program, so they go without --corrected"
         )
@@ -104,19 +93,18 @@ def command(
     if not live:
         refuse_early(files_of(output), inputs, force=force)
 
-    from olp.review.job import view
+    from olp.review import job as review
+
+    options = options_of(review.ViewOptions, words | {"time": not no_time})
 
     def make() -> Review:
         # files may have changed since
-        setup = given(program, machine, job).setup if live else call.setup
-        with progress(quiet) as show, naming("<stdin>" if call.program == STREAM else ""):
-            return view(
-                source(call.program), setup, corrected=corrected, measured=measured,
-                tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
-                expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, time=not no_time,
-                step_mm=step_mm, within_um=within_um, only_sure_components=only_sure_components,
-                progress=show,
-            )  # fmt: skip
+        now = given(program, machine, job) if live else call
+        second = None if corrected is None else source(now.session.sources, corrected)
+        with progress(quiet) as show, naming(call.stream):
+            return review.run(
+                now.session, now.source, options, corrected=second, measured=measured, progress=show
+            )
 
     if live:
         _serve(make, inputs, port, quiet)

@@ -1,0 +1,1 @@
+"""Measured runs beside the nominal path: frames, pairing, figures."""

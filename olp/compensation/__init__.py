@@ -1,0 +1,1 @@
+"""Toolpath and error model to commands, and commands to edits of the text."""

@@ -62,7 +62,7 @@ def subdivide_arcs(
     band: float,
 ) -> Cuts:
     """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis
-    has lost motion (`turning`), also where that axis turns round."""
+    has backlash (`turning`), also where that axis turns round."""
     arcs = path.arcs
     if not len(arcs):
         return no_cuts()
@@ -266,7 +266,7 @@ def fit(
 
 
 def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask, band: float) -> Pieces:
-    """Cut arcs where an axis with lost motion turns round, unless it goes on by less than the band."""
+    """Cut arcs where an axis with backlash turns round, unless it goes on by less than the band."""
     arcs = path.arcs
     rows = np.arange(len(pieces))
     axes = _AXES[arcs.plane[pieces.arc]]

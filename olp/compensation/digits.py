@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 
-_POW10 = 10.0 ** np.arange(19)
-_INT10 = 10 ** np.arange(19, dtype=np.int64)
+#: powers of ten up to the digits of a mantissa, as doubles and as integers
+POW10 = 10.0 ** np.arange(19)
+INT10 = 10 ** np.arange(19, dtype=np.int64)
 #: relative slack when a command is compared with half a digit
 _SLACK = 1 + 1e-9
 
@@ -67,7 +68,7 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     decimals = np.where(rows.given, np.maximum(rows.decimals, least), usual)
     # one number of digits all through is the common case, and the cheap one
     same_all = count > 0 and bool((decimals == decimals[0]).all())
-    scale = _POW10[decimals[:1]] if same_all else _POW10[decimals]
+    scale = POW10[decimals[:1]] if same_all else POW10[decimals]
     with np.errstate(invalid="ignore"):
         wanted = np.rint((rows.command - rows.offset) / rows.unit * scale)
         unknown = np.isnan(wanted)
@@ -93,7 +94,7 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     with np.errstate(invalid="ignore"):
         insert = moves & ~(np.abs(emitted - previous) < 1e-9)
     more = decimals - np.minimum(rows.decimals, decimals)
-    same = (rows.word * _INT10[more] if more.any() else rows.word) == mantissa
+    same = (rows.word * INT10[more] if more.any() else rows.word) == mantissa
     return Digits(emitted, mantissa, decimals.astype(np.int8), (fix & ~same) | insert)
 
 
@@ -101,16 +102,16 @@ def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
     """G91: words are differences of positions rounded to `grid` decimals from `before` on."""
     unit = rows.unit
     decimals = np.full(len(rows.command), grid, np.int8)
-    own = rows.word * _INT10[np.maximum(grid - rows.decimals, 0)]
+    own = rows.word * INT10[np.maximum(grid - rows.decimals, 0)]
     with np.errstate(invalid="ignore"):
-        place = np.rint((rows.command - before) / unit * _POW10[grid])
+        place = np.rint((rows.command - before) / unit * POW10[grid])
     known = ~np.isnan(place) & ~rows.raw
     if not known.all():
         return _incremental_raw(rows, before, unit, grid, own, known)
     steps = place.astype(np.int64)
     mantissa = np.diff(steps, prepend=0)
     write = np.where(rows.given, mantissa != own, mantissa != 0)
-    return Digits(before + steps / _POW10[grid] * unit, mantissa, decimals, write)
+    return Digits(before + steps / POW10[grid] * unit, mantissa, decimals, write)
 
 
 def _incremental_raw(

@@ -58,7 +58,7 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
 
 
 def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-    """Commands for samples between way-points: one step of the iteration where errors are small (then it is
+    """Commands for samples between waypoints: one step of the iteration where errors are small (then it is
     right to a few nanometres), two elsewhere."""
     error = model.error(target_mm, tool_mm, play)
     if np.abs(error).max(initial=0.0) > _SMALL_MM:

@@ -1,7 +1,6 @@
-"""Where every move of a program has to be commanded so that the tip follows the nominal path.
+"""The plan of a correction: where every move is commanded, one or more rows per move.
 
-`plan` inverts the error model at the vertices, subdivides what would bend (`lines`, `arcs`), and carries
-the play of axes with lost motion (`reversal`). The result knows nothing of text.
+Knows nothing of text. `planning` makes it, the writers put it into the text of a program.
 """
 
 from __future__ import annotations
@@ -11,33 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.arcs import subdivide_arcs
-from olp.compensation.invert import invert
-from olp.compensation.lines import subdivide_lines
-from olp.compensation.reversal import Reversal, carry_play
-from olp.core.arrays import Array, Mask
-from olp.core.errors import OutsideBox, ProgramError
+from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import Vector
-from olp.core.toolpath import Flag, Frame, Kind, Toolpath
+from olp.core.toolpath import Frame, Toolpath
 from olp.errormodel.base import ErrorModel
-
-#: share of the tolerance that chords may use; the rest is for the search's own steps
-CHORD_SHARE = 0.95
-#: an arc through rounded ends with a rounded centre strays by about this much more of the last digit than
-#: a line
-ARC_DIGIT_SHARE = 0.6
-#: share that an axis with lost motion may stay behind instead of turning round
-DEAD_BAND_SHARE = 0.25
-
-_UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
-_UNSPLIT = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE)
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
     """What the plan must keep: tolerance of model and chords and the last digit written, in mm; whether
     rapids are subdivided too, whether commands outside the calibrated box are refused, and whether a step may
-    be put before a move that is not split (to take up lost motion)."""
+    be put before a move that is not split (to take up backlash)."""
 
     tolerance_mm: float
     digit_mm: float = 0.0
@@ -49,11 +32,11 @@ class Limits:
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
     """Rows in program order, one or more per move: (r,) `move`; (r, 3) `target_mm` where the tip has to be
-    (kept where lost motion is carried only) and `command_mm` to get there; (r, 3) `raw` where the axis keeps
-    what the program says; (r,) `reach`, the share of the move that ends at the row; (r,) `take_up`: only
-    takes up lost motion.
+    (kept only where the model has backlash) and `command_mm` to get there; (r, 3) `raw` where the axis keeps
+    what the program says; (r,) `reach`, the share of the move that ends at the row; (r,) `take_up`: the
+    row only takes up backlash.
 
-    `passed` are the moves that stay uncorrected for want of a position, `shift_mm` (frames, 3) what each
+    `passed` are the moves left uncorrected for want of a position, `shift_mm` (frames, 3) what each
     frame's touch-off holds.
     """
 
@@ -61,9 +44,9 @@ class Plan:
     target_mm: Array
     command_mm: Array
     raw: Mask
-    reach: npt.NDArray[np.float64]
+    reach: Array
     take_up: Mask
-    passed: npt.NDArray[np.int64]
+    passed: Index
     shift_mm: Array
     play: Array | None
 
@@ -74,15 +57,15 @@ class Plan:
 def zero_shifts(frames: tuple[Frame, ...], model: ErrorModel) -> Array:
     """(frames, 3): where the part really lies from where the offset says, per frame.
 
-    A point touched off on the raw machine at axis position c0 is at c0 + e(c0), and keeps its place.
+    A point touched off on the uncompensated machine at axis position c0 is at c0 + e(c0), and stays there.
     """
-    out = np.zeros((len(frames), 3))
+    shifts = np.zeros((len(frames), 3))
     for i, frame in enumerate(frames):
         for touch in (frame.touched, frame.tool_touched):
             if touch is not None:
-                at, lever = touch
-                out[i] += model.error(np.array([at]), np.array(lever, float))[0]
-    return out
+                position, tool = touch
+                shifts[i] += model.error(np.array([position]), np.array(tool, float))[0]
+    return shifts
 
 
 def targets(path: Toolpath, shift_mm: Array) -> Array:
@@ -91,148 +74,3 @@ def targets(path: Toolpath, shift_mm: Array) -> Array:
         return path.end_mm
     vectors: list[Vector] = [(float(s[0]), float(s[1]), float(s[2])) for s in shift_mm]
     return path.end_mm + path.per_frame(vectors)
-
-
-def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
-    """Commands for a whole path. Raises ProgramError for a feed move whose error cannot be known, OutsideBox,
-    NotInvertible."""
-    shift = zero_shifts(path.frames, model) if path.frames else np.zeros((0, 3))
-    target = targets(path, shift)
-    raw, passed = _untouched(path, model)
-    command = _vertices(path, model, target, raw)
-    reversal = Reversal.of(model, limits.tolerance_mm * DEAD_BAND_SHARE)
-    chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
-    kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
-    free = np.isin(path.kind, kinds) & ((path.flag & _UNSPLIT) == 0) & ~raw.any(axis=1)
-    # behind a `/` block the start depends on the switch, so no cut can be right for both
-    free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
-    cuts_line = subdivide_lines(path, model, target, free, chord)
-    chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
-    turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
-    cuts_arc = subdivide_arcs(path, model, target, raw, chord_arc, turning, band)
-    rows = _expand(
-        path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model, reversal is not None
-    )
-    if reversal is not None:
-        rows = carry_play(path, model, rows, reversal, insert=limits.insert)
-    if limits.refuse_outside:
-        _check_box(path, model, rows)
-    return rows
-
-
-def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, npt.NDArray[np.int64]]:
-    """(n, 3) axes that keep what the program says, and the moves that pass because an axis is unknown."""
-    raw = np.zeros((len(path), 3), bool)
-    raw[(path.flag & _UNTOUCHED) != 0] = True
-    unknown = np.isnan(path.end_mm)
-    passed = np.zeros(0, np.int64)
-    some = np.flatnonzero(unknown.any(axis=1))
-    if some.size:
-        blind = np.any(unknown[some][:, None, :] & model.depends_on[None], axis=2)
-        # an unknown axis that has an error would need a word, which it never gets
-        tool = path.tool_mm()
-        error = model.error(path.end_mm[some], tool if tool.ndim == 1 else tool[some])
-        lacking = (unknown[some] & (np.nan_to_num(error) != 0)).any(axis=1)
-        wanting = some[(blind.any(axis=1) | lacking) & ~raw[some].any(axis=1)]
-        cutting = wanting[path.kind[wanting] != Kind.RAPID]
-        if cutting.size:
-            i = int(cutting[0])
-            axes = " and ".join("XYZ"[a] for a in np.flatnonzero(unknown[i]))
-            raise ProgramError(
-                f"a feed move needs the position of {axes} for its correction, but nothing has commanded it "
-                "yet; command all axes in a rapid first, or give start_mm in the job file",
-                line=int(path.line[i]),
-            )
-        raw[some] |= blind | unknown[some]
-        passed = wanting
-    held = _hold_after_machine_moves(path, raw)
-    return raw, np.union1d(passed, held)
-
-
-def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> npt.NDArray[np.int64]:
-    """An axis that G53 sent to a place of the machine stays there in the rapids that follow without a word of
-    it: a word inserted there could drive it against its limit switch. Returns those rapids."""
-    held = []
-    machine = np.flatnonzero(path.flag & np.uint8(Flag.MACHINE))
-    for i in machine.tolist():
-        before = path.end_mm[i - 1] if i else np.array(path.start_mm)
-        for axis in np.flatnonzero(~(path.end_mm[i] == before)).tolist():
-            j = i + 1
-            while (
-                j < len(path) and path.kind[j] == Kind.RAPID and path.end_mm[j, axis] == path.end_mm[i, axis]
-            ):
-                raw[j, axis] = True
-                held.append(j)
-                j += 1
-    return np.array(sorted(set(held)), np.int64)
-
-
-def _vertices(path: Toolpath, model: ErrorModel, target: Array, raw: Mask) -> Array:
-    command = invert(model, target, path.tool_mm())
-    if raw.any():
-        command[raw] = path.end_mm[raw]
-    return command
-
-
-def _expand(
-    path: Toolpath,
-    target: Array,
-    command: Array,
-    raw: Mask,
-    passed: npt.NDArray[np.int64],
-    shift: Array,
-    cuts: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64], Array]],
-    model: ErrorModel,
-    keep_target: bool,
-) -> Plan:
-    """Rows of all moves with the cuts (move, share of the move, target there) before their ends."""
-    count = len(path)
-    none = np.zeros((0, 3))
-    where = np.concatenate([c[0] for c in cuts])
-    if not len(where):
-        return Plan(
-            np.arange(count, dtype=np.int32), target if keep_target else none, command, raw, np.ones(count),
-            np.zeros(count, bool), passed, shift, None,
-        )  # fmt: skip
-    share = np.concatenate([c[1] for c in cuts])
-    point = np.concatenate([c[2] for c in cuts])
-    order = np.lexsort((share, where))
-    where, share, point = where[order], share[order], point[order]
-    parts = np.bincount(where, minlength=count) + 1
-    move = np.repeat(np.arange(count, dtype=np.int32), parts)
-    last = np.cumsum(parts) - 1
-    is_cut = np.ones(len(move), bool)
-    is_cut[last] = False
-    tool = path.tool_mm()
-    cut_command = invert(model, point, tool if tool.ndim == 1 else tool[where])
-    out_target = none
-    if keep_target:
-        out_target = np.zeros((len(move), 3))
-        out_target[last], out_target[is_cut] = target, point
-    out_command = np.zeros((len(move), 3))
-    out_command[last], out_command[is_cut] = command, cut_command
-    reach = np.ones(len(move))
-    reach[is_cut] = share
-    return Plan(
-        move, out_target, out_command, raw[move], reach, np.zeros(len(move), bool), passed, shift, None
-    )
-
-
-def _check_box(path: Toolpath, model: ErrorModel, rows: Plan) -> None:
-    """Every corrected command has to lie in the calibrated box; arcs between their ends too."""
-    box = model.box_mm
-    with np.errstate(invalid="ignore"):
-        out = (rows.command_mm < box[:, 0]) | (rows.command_mm > box[:, 1])
-    out &= ~((path.flag & _UNTOUCHED) != 0)[rows.move][:, None]
-    if out.any():
-        row = int(np.flatnonzero(out.any(axis=1))[0])
-        axis = int(np.flatnonzero(out[row])[0])
-        raise OutsideBox(
-            f"axis {'XYZ'[axis]} would be commanded to {rows.command_mm[row, axis]:.3f} mm, outside the "
-            f"calibrated box {box[axis, 0]:g} to {box[axis, 1]:g} mm; move the part, calibrate there, or "
-            "accept the error at the box face with --outside-box hold",
-            line=int(path.line[rows.move[row]]),
-        )
-
-
-__all__ = ["Limits", "Plan", "plan", "targets", "zero_shifts"]

@@ -1,4 +1,4 @@
-"""Lost motion along a program: on which flank every axis rests, and the steps that take it up.
+"""Backlash along a program: which side of it every axis is on, and the steps that take it up.
 
 The exact inverse of a play is to lead by half of it in the direction of motion. An axis that nominally
 stands still would then jump by the whole play whenever a tiny straightness correction changes sign; a dead
@@ -8,18 +8,16 @@ band keeps it where it is instead.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.invert import invert
+from olp.compensation.plan import Plan
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
-
-if TYPE_CHECKING:
-    from olp.compensation.plan import Plan
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -29,18 +27,15 @@ _PASSES = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reversal:
-    """`axes` (3,) with lost motion worth the trouble; `band_mm` an axis may stay behind rather than turn;
-    `lost_mm` (3,) the largest lost motion of each."""
+    """`axes` (3,) with backlash that matters; `band_mm` an axis may stay behind rather than turn."""
 
     axes: Mask
     band_mm: float
-    lost_mm: Array
 
     @staticmethod
     def of(model: ErrorModel, band_mm: float) -> Reversal | None:
         probe = np.column_stack([np.linspace(low, high, 257) for low, high in model.box_mm])
-        lost = model.lost_motion_mm(probe)
-        if lost is None:
+        if model.lost_motion_mm(probe) is None:
             return None
         axes = np.zeros(3, bool)
         for axis in range(3):
@@ -49,13 +44,13 @@ class Reversal:
             ahead[:, axis] = 1.0
             change = model.error(probe, _NO_TOOL, ahead) - model.error(probe, _NO_TOOL, -ahead)
             axes[axis] = np.abs(change).max() / 2 > band_mm
-        return Reversal(axes, band_mm, lost.max(axis=0)) if axes.any() else None
+        return Reversal(axes, band_mm) if axes.any() else None
 
 
 def carry_play(
-    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool = True
+    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool
 ) -> Plan:
-    """The plan with play: commands lead by half the lost motion, and where an axis turns round in a feed
+    """The plan with play: commands lead by half the backlash, and where an axis turns round in a feed
     move, a row that only takes it up comes first; without `insert` not before moves that are never split.
 
     Where one axis turns the straightness of another may jump with it, and that one turns too: the states are
@@ -116,11 +111,11 @@ def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:
 
 
 def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Mask]:
-    """Play (n,) of one axis that has to bring its load to `position` with lost motion `lost`, where the load
+    """Play (n,) of one axis that has to bring its load to `position` with backlash `lost`, where the load
     then is, and the rows before which the drive has to turn.
 
     The play is known as an interval of the lag, in which its middle is taken: at the start it is anything
-    between the two flanks, and each motion narrows it. The axis turns only when it would be off by more than
+    between its two sides, and each motion narrows it. The axis turns only when it would be off by more than
     the band.
     """
     plays, loads, turns = [], [], []
@@ -160,7 +155,7 @@ def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mas
     target = rows.target_mm[where - 1]
     play = rows.play[where]
     command = invert(model, target + held[where - 1], tool if tool.ndim == 1 else tool[where], play)
-    # an axis that does not turn must not back out of its flank here
+    # an axis that does not turn must not leave its side of the backlash here
     step = command - rows.command_mm[where - 1]
     stay = ~turns[where] & (step * play < 0)
     command[stay] = rows.command_mm[where - 1][stay]

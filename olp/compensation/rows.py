@@ -2,50 +2,80 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.digits import Digits
+from olp.compensation.plan import Plan
 from olp.core.arrays import Array, Index, Mask
-from olp.core.toolpath import Flag
-
-if TYPE_CHECKING:
-    from olp.compensation.writer import Writer
-
+from olp.core.toolpath import Kind, Toolpath
 
 
 @dataclass(slots=True, eq=False)
 class Rows:
-    """Rows of the plan on their way into text. `head` marks the row that keeps its block's own line."""
+    """Consecutive rows of a plan, from row `first` of it on.
+
+    (r,) `move` and `flag` as in the plan and the path; `head` marks the row that keeps the text of its move,
+    `before` the rows that are put in front of it; `take_up` as in the plan, `arc` where the move is an arc.
+    (r, 3) `emitted`: axis positions in mm after each row as written, (3,) `entry` those before the first.
+    (r, 3) `write`: the number changes or is new, `mantissa` / 10**`decimals` is what is written.
+    """
 
     first: int
     move: npt.NDArray[np.int32]
-    head: Mask
     flag: npt.NDArray[np.uint8]
+    head: Mask
+    before: Mask
+    take_up: Mask
+    arc: Mask
     emitted: Array
     entry: Array
     write: Mask
     mantissa: Index
     decimals: npt.NDArray[np.int8]
-    before: Mask = field(default_factory=lambda: np.zeros(0, bool))
+
+    @staticmethod
+    def of(plan: Plan, path: Toolpath, first: int, last: int, entry: Array) -> Rows:
+        """Rows `first`..`last` of a plan, nothing of which is written yet."""
+        move = plan.move[first:last]
+        count = len(move)
+        rows = Rows(
+            first=first,
+            move=move,
+            flag=path.flag[move],
+            head=np.concatenate(([True], move[1:] != move[:-1])),
+            before=np.zeros(count, bool),
+            take_up=plan.take_up[first:last],
+            arc=np.isin(path.kind[move], (Kind.ARC_CW, Kind.ARC_CCW)),
+            emitted=np.empty((count, 3)),
+            entry=entry,
+            write=np.zeros((count, 3), bool),
+            mantissa=np.zeros((count, 3), np.int64),
+            decimals=np.zeros((count, 3), np.int8),
+        )
+        rows._mark_take_ups()
+        return rows
+
+    def _mark_take_ups(self) -> None:
+        """The first part of an arc keeps the arc's own text, so backlash is taken up in front of it."""
+        row = np.flatnonzero(self.take_up & self.arc & self.head)
+        while row.size:
+            self.before[row] = True
+            self.head[row] = False
+            self.head[row + 1] = True
+            row = row[self.take_up[row + 1]] + 1
+
+    def __len__(self) -> int:
+        return len(self.move)
 
     def serial(self, row: int) -> int:
         """Order of a row's words among insertions at one place."""
         return row * 8 + 16
 
-    def number(self, writer: Writer, row: int, axis: int) -> tuple[int, int]:
-        """Mantissa and decimals that say where the axis is after the row, whether or not it changes."""
-        if self.write[row, axis] or self.flag[row] & np.uint8(Flag.INCREMENTAL):
-            return int(self.mantissa[row, axis]), int(self.decimals[row, axis])
-        frame = writer.frame_of(int(self.move[row]))
-        decimals = writer.style.usual(axis, frame.unit_mm)
-        value = (self.emitted[row, axis] - frame.offset_mm[axis]) / frame.unit_mm
-        return round(value * 10**decimals), decimals
-
     def put(self, a: int, b: int, axis: int, digits: Digits) -> None:
+        """The digits of one axis for rows a..b."""
         self.emitted[a:b, axis] = digits.emitted
         self.write[a:b, axis] = digits.write
         self.mantissa[a:b, axis] = digits.mantissa

@@ -4,42 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from olp.compensation.arcwords import Arc, solve
+from olp.compensation.arc_centres import Arc, solve
+from olp.compensation.point_writer import FINE_DECIMALS, PointWriter
 from olp.compensation.rows import Rows
 from olp.core.geometry import PLANES
-from olp.core.toolpath import Flag, Kind
 from olp.program.program import ArcText
 from olp.program.text.edits import BARE, EditList, Edits
+from olp.program.text.numbers import MOST_DECIMALS
 
-if TYPE_CHECKING:
-    from olp.compensation.statements import StatementWriter
-
-#: doubles of positions are good for so many digits behind the point
-MOST_DECIMALS = 10
-#: digits of inserted numbers, where the program itself has as many
-FINE_DECIMALS = 6
 #: pieces of one inserted statement at the most, for their order among insertions at one place
 ROW = 64
 
 
-def arc_edits(writer: StatementWriter, rows: Rows) -> list[Edits]:
+def arc_edits(writer: PointWriter, rows: Rows) -> list[Edits]:
     """Centres, radii and angles of arcs, and the later parts of arcs."""
-    row = np.flatnonzero(
-        np.isin(writer.path.kind[rows.move], (Kind.ARC_CW, Kind.ARC_CCW))
-        & ((rows.flag & np.uint8(Flag.PASS)) == 0)
-        & ~writer.plan.take_up[rows.first : rows.first + len(rows.move)]
-    )
-    if not row.size:
+    if not rows.arc.any():
         return []
     edits = EditList(writer.prefixes)
-    arcs = solve(writer, rows, row)
+    arcs = solve(writer, rows)
     frame = writer.path.frame[arcs.move]
     centres = writer.local(arcs.centre, frame).tolist()
-    units, fewest = writer.unit[frame].tolist(), writer.fewest(writer.unit[frame]).tolist()
+    units, fewest = writer.frame_unit_mm[frame].tolist(), writer.fewest[frame].tolist()
     for i in range(len(arcs.row)):
         arc = arcs.one(i)
         text = writer.statements.arcs[arc.move]
@@ -55,7 +43,7 @@ def arc_edits(writer: StatementWriter, rows: Rows) -> list[Edits]:
 
 
 def _arc_words(
-    writer: StatementWriter, arc: Arc, text: ArcText, number: list[float], unit: float, fewest: list[int]
+    writer: PointWriter, arc: Arc, text: ArcText, number: list[float], unit: float, fewest: list[int]
 ) -> list[tuple[int, int, int]]:
     """(word, mantissa, decimals) of all that says an arc beside its end; `number` is its centre as said."""
     out = [
@@ -80,12 +68,12 @@ def _sweep(arc: Arc) -> float:
     return angle + 2 * math.pi * round((arc.sweep - angle) / (2 * math.pi))
 
 
-def _rounded(writer: StatementWriter, word: int, value: float, fewest: int) -> tuple[int, int, int]:
+def _rounded(writer: PointWriter, word: int, value: float, fewest: int) -> tuple[int, int, int]:
     decimals = min(max(int(writer.words.decimals[word]), fewest), MOST_DECIMALS)
     return word, round(value * 10**decimals), decimals
 
 
-def _replace(writer: StatementWriter, word: int, mantissa: int, decimals: int, edits: EditList) -> None:
+def _replace(writer: PointWriter, word: int, mantissa: int, decimals: int, edits: EditList) -> None:
     own = int(writer.words.decimals[word])
     said = int(writer.words.mantissa[word])
     same = said * 10 ** (decimals - own) if decimals >= own else round(said / 10 ** (own - decimals))
@@ -96,7 +84,7 @@ def _replace(writer: StatementWriter, word: int, mantissa: int, decimals: int, e
 
 
 def _arc_again(
-    writer: StatementWriter,
+    writer: PointWriter,
     rows: Rows,
     arc: Arc,
     text: ArcText,
@@ -126,7 +114,7 @@ def _arc_again(
 
 
 def _again(
-    writer: StatementWriter, begin: int, stop: int, values: dict[int, tuple[int, int]],
+    writer: PointWriter, begin: int, stop: int, values: dict[int, tuple[int, int]],
     long: tuple[int, int] | None, place: int, eol: bytes, order: int, edits: EditList,
 ) -> int:  # fmt: skip
     """Bytes once more, with other numbers in place of some words. A comment at the end is left out, and
@@ -148,7 +136,7 @@ def _again(
     return order + 1
 
 
-def _direction(writer: StatementWriter, arc: Arc, text: ArcText) -> dict[int, tuple[int, int]]:
+def _direction(writer: PointWriter, arc: Arc, text: ArcText) -> dict[int, tuple[int, int]]:
     """The way in which a part of an arc begins."""
     first, second = PLANES[arc.plane][:2]
     way = np.zeros(3)

@@ -107,6 +107,11 @@ class Style:
         an arc moves by twice what its centre does."""
         return min(self.usual(axis, unit_mm) + self.program.dialect.free_digits, _MOST_DECIMALS)
 
+    def block_start(self, line: int) -> bytes:
+        """What stands before the first word of a block that is inserted behind a line."""
+        deleted = self.program.text(line).lstrip().startswith("/")
+        return self.program.eol(line) + (b"/" if deleted else b"")
+
     def word(self, line: int, letter: str) -> int | None:
         """Index of the first word with a letter in a line."""
         words = self.program.words

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.holes import HolePlan
+from olp.compensation.block_writer import BlockWriter
+from olp.compensation.digits import INT10
+from olp.compensation.hole_plan import HolePlan
 from olp.compensation.plan import Plan
-from olp.compensation.statements import StatementWriter
+from olp.compensation.statement_writer import StatementWriter
 from olp.compensation.tally import Tally
-from olp.compensation.verbatim import LetteredWriter
-from olp.compensation.writer import Writer
+from olp.compensation.verbatim_writer import VerbatimWriter
+from olp.compensation.writer import Task, Writer
 from olp.core.machine import Vector
 from olp.core.units import MM_PER_INCH
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.program.text.numbers import Placing
-
-_POW10 = 10 ** np.arange(19, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Written:
 
 def write(
     program: Program,
-    rows: Plan,
+    plan: Plan,
     model: ErrorModel,
     *,
     tolerance_mm: float,
@@ -45,36 +45,40 @@ def write(
 ) -> Written:
     """Write a plan. The program is one that was read with its words. Raises ProgramError where it cannot be
     said in its dialect."""
-    if program.statements is not None:
-        lettered = bool(program.statements.decimal) and not _plain(program, rows)
-        kind = LetteredWriter if lettered else StatementWriter
-        made = kind(program, rows, model, tolerance_mm=tolerance_mm, increments_mm=increments_mm, stamp=stamp)
-        text = made.text()
-        return Written(text, text != program.data, made.parts, made.tally, HolePlan.of(program, rows, model))
-    writer = Writer(program, rows, model, tolerance_mm=tolerance_mm, increments_mm=increments_mm, stamp=stamp)
+    task = Task(program, plan, model, tolerance_mm, increments_mm, stamp)
+    writer = _writer(program, plan)(task)
     text = writer.text()
-    return Written(text, writer.changed, writer.parts, writer.tally, writer.holes)
+    return Written(text, text is not program.data, writer.parts, writer.tally, writer.holes)
 
 
-def _plain(program: Program, rows: Plan) -> bool:
-    """Whether numbers that keep their own form are all written as the writer of statements does: no column is
-    padded, no number has a sign or zeros that it need not have, none is shared, and nothing stands behind a
-    move that is split."""
-    words, said = program.words, program.statements
-    if words is None or said is None or not len(words.start):
+def _writer(program: Program, plan: Plan) -> type[Writer]:
+    """What a program needs: a writer of blocks of words, of whole statements, or of verbatim numbers."""
+    if program.statements is None:
+        return BlockWriter
+    if program.statements.decimal and not _plain(program, plan):
+        return VerbatimWriter
+    return StatementWriter
+
+
+def _plain(program: Program, plan: Plan) -> bool:
+    """Whether the writer of statements writes verbatim numbers just so: no column is padded, no number has a
+    sign or zeros that it need not have, none is shared, and nothing stands behind a move that is split."""
+    words, statements = program.words, program.statements
+    if words is None or statements is None or not len(words.start):
         return False
-    split = np.unique(rows.move[1:][rows.move[1:] == rows.move[:-1]])
-    if not np.isin(said.end[split], program.line_end).all():
+    split = np.unique(plan.move[1:][plan.move[1:] == plan.move[:-1]])
+    if not np.isin(statements.end[split], program.line_end).all():
         return False
-    if said.decimal != b"." or any(f.unit_mm not in (1.0, MM_PER_INCH) for f in program.toolpath.frames):
+    units = {frame.unit_mm for frame in program.toolpath.frames}
+    if statements.decimal != b"." or not units <= {1.0, MM_PER_INCH}:
         return False
     slot = program.slot[program.slot >= 0]
     if len(slot) != program.slot.size or len(slot) != len(words.start):
         return False
     text = np.frombuffer(program.data, np.uint8)
     size = np.abs(words.mantissa)
-    whole = size // _POW10[words.decimals]
-    length = 1 + (whole[:, None] >= _POW10[1:10]).sum(axis=1) + (words.mantissa < 0)
+    whole = size // INT10[words.decimals]
+    length = 1 + (whole[:, None] >= INT10[1:10]).sum(axis=1) + (words.mantissa < 0)
     length += np.where(words.decimals > 0, words.decimals + 1, 0)
     # zero behind a minus, which rounding leaves
     length += (size == 0) & (text[words.number] == ord("-"))

@@ -1,0 +1,1 @@
+"""What every room shares: errors, units, arrays, interpolation, the machine and a toolpath as values."""

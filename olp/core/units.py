@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 
 MM_PER_INCH = 25.4
 MM_PER_UM = 1e-3
 RAD_PER_URAD = 1e-6
 UM_PER_MM = 1e3
 AXES = "XYZ"
+
+#: Neighbours of a number that are tried until one reads back exactly.
+_NEIGHBOURS = 3
 
 
 def shifted(number: float | str, exponent: int) -> float:
@@ -23,3 +27,22 @@ def shifted(number: float | str, exponent: int) -> float:
         return value
     digits, _, own = text.lower().partition("e")
     return float(f"{digits}e{int(own or 0) + exponent}")
+
+
+def in_unit(value: float, power: int) -> float:
+    """The number of units of ten to `power` base units that reads back as `value`: 1e-4 mm is 0.1 um."""
+    number = shifted(value, -power)
+    low = high = number
+    for _ in range(_NEIGHBOURS):
+        for candidate in (low, high):
+            if shifted(candidate, power) == value:
+                return candidate
+        low, high = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
+    return number
+
+
+def in_unit_text(value: float, power: int) -> str:
+    """The shortest decimal of a double in units of ten to `power`; read as text it is the same double."""
+    text = format(Decimal(repr(float(value))).scaleb(-power), "f")
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return "0" if text in ("-0", "") else text

@@ -1,71 +1,23 @@
-"""The three moving bodies of a chain: what each carries, and the lever on which its angles act.
-
-Contribution of axis j: E_j(q) + eps_j(q) x [L_j(P, t) - L_j(P_line(q), t_line)] with L_j the tool vector plus
-the axes after j toward the tool, plus axis j itself where it carries the workpiece. Every translation
-component returns its measured value on its own line; so each row has a lever of its own.
-"""
+"""The three moving bodies of a chain: what each carries, and the lever on which its angles act."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
-from olp.core.interpolation import Column
-from olp.core.machine import CHAINS, ZERO, Vector
+from olp.core.machine import CHAINS, Vector
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.components import AxisComponents
+from olp.errormodel.levers import Levers, levers_of
+from olp.errormodel.sources.squareness import shears
 
 #: Short forms of sine and cosine may miss this much, over the box and with this much tool.
 TRIGONOMETRY_MM = 2e-11
 TOOL_REACH_MM = 1000.0
-
-#: The third coordinate: the lever of angle a on row i is coordinate _OTHER[i, a].
-_OTHER = {(i, a): 3 - i - a for i in range(3) for a in range(3) if i != a}
-
-#: First order: eps_a adds sign * eps_a * lever_k to row i, as (i, a, k, sign).
-CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
-
-
-class Measured(Protocol):
-    """What was measured along a line of one axis: names of components, and where and with what."""
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def line_mm(self) -> Vector | None: ...
-    @property
-    def tool_mm(self) -> Vector: ...
-    @property
-    def reference(self) -> str: ...
-
-
-@dataclass(frozen=True, slots=True)
-class Lever:
-    """Coordinate k is q_k + t_k - offset_k where `moves`, t_k - offset_k elsewhere; lengths in mm."""
-
-    moves: tuple[bool, bool, bool]
-    offset_mm: Vector
-
-    def at(self, position: list[Array], tool: list[Column]) -> list[Column]:
-        """Three columns, from columns of axis positions and of the tool vector."""
-        arms = [tool[k] - self.offset_mm[k] for k in range(3)]
-        return [position[k] + arms[k] if self.moves[k] else arms[k] for k in range(3)]
-
-    def reach_mm(self, box_mm: Array, tool_mm: Array) -> Array:
-        """(3,) largest absolute coordinate in the box for tool vectors (m, 3)."""
-        arms = tool_mm - np.array(self.offset_mm)
-        moves = np.array(self.moves)[:, None]
-        ends = np.where(moves, box_mm, 0.0)
-        return np.asarray(np.abs(ends.T[:, None, :] + arms[None, :, :]).max(axis=(0, 1)))
-
-
-Levers = tuple[tuple[tuple[int, ...], Lever], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,9 +42,7 @@ def build_bodies(
     if chain not in CHAINS:
         raise ConfigError(f"chain '{chain}'; expected X, Y, Z and F from workpiece to tool, such as FXYZ")
     order = chain.replace("F", "")
-    square = {name: 0.0 if name in skip else angle for name, angle in calibration.squareness.items()}
-    c0y, b0z, a0z = (square.get(name, 0.0) for name in ("C0Y", "B0Z", "A0Z"))
-    shears: dict[str, Vector] = {"X": ZERO, "Y": (0.0 - c0y, 0.0, 0.0), "Z": (b0z, 0.0 - a0z, 0.0)}
+    tilts = shears(calibration.squareness, skip)
     bodies = []
     for place in reversed(range(3)):
         axis, after = order[place], order[place + 1 :]
@@ -103,7 +53,7 @@ def build_bodies(
             calibration.curves_of(axis), calibration.datum_mm, axis, after, carries, tool_terms
         )
         terms = _sine_terms(components, levers, calibration.box_mm)
-        bodies.append(Body(j, carries, components, shears[axis], calibration.datum_mm[j], levers, terms))
+        bodies.append(Body(j, carries, components, tilts[axis], calibration.datum_mm[j], levers, terms))
     return tuple(bodies)
 
 
@@ -114,38 +64,3 @@ def _sine_terms(components: AxisComponents, levers: Levers, box_mm: Array) -> in
     if peak**4 / 8.0 * reach > TRIGONOMETRY_MM:
         return 0
     return 2 if peak**3 / 6.0 * reach > TRIGONOMETRY_MM else 1
-
-
-def levers_of(
-    curves: Sequence[Measured], datum_mm: Vector, axis: str, after: str, carries: bool, tool_terms: bool
-) -> Levers:
-    """The levers of what was measured of one axis, `after` it in the chain toward the tool."""
-    holder = {name: curve for curve in curves for name in curve.names}
-    default = curves[0] if len(curves) == 1 else None
-
-    def lever(sources: list[Measured | None]) -> Lever:
-        """Of one row, coordinate by coordinate from the curve it was measured with."""
-        moves, offset = [False] * 3, [0.0] * 3
-        for k, source in enumerate(sources):
-            tool = source.tool_mm[k] if source is not None and tool_terms else 0.0
-            own = AXES[k] == axis
-            table = own and carries and source is not None and source.reference == "table"
-            moves[k] = AXES[k] in after or table
-            line = source.line_mm if source is not None and not own else None
-            # On its own line an axis stands where it stands; seen from a reflector on its table, it has moved
-            # from the datum.
-            at = (datum_mm if line is None else line)[k] if moves[k] else 0.0
-            offset[k] = at + tool
-        return Lever((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
-
-    rows: dict[Lever, list[int]] = {}
-    for i in range(3):
-        measured = holder.get(f"E{AXES[i]}{axis}", default)
-        # A row without a curve is zero on the lines on which the angles were measured.
-        sources: list[Measured | None] = [measured] * 3
-        if measured is None:
-            for a, name in enumerate("ABC"):
-                if a != i:
-                    sources[_OTHER[i, a]] = holder.get(f"E{name}{axis}")
-        rows.setdefault(lever(sources), []).append(i)
-    return tuple((tuple(members), lever) for lever, members in rows.items())

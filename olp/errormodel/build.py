@@ -11,30 +11,10 @@ from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.bodies import build_bodies
-from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.errormodel.calibration import Calibration
 from olp.errormodel.chain import RigidBody
-from olp.errormodel.compliance import GridErrors
-from olp.errormodel.gridded import ComponentTable, DeviationMap
 from olp.errormodel.huddersfield import huddersfield
-from olp.errormodel.maps import MapErrors
-from olp.errormodel.reversal import play_interval, play_states, plays
-from olp.errormodel.thermal import ThermalExpansion
 from olp.errormodel.total import total
-
-__all__ = [
-    "Calibration",
-    "ComponentTable",
-    "Curve",
-    "Cyclic",
-    "DeviationMap",
-    "ErrorModel",
-    "Thermal",
-    "build",
-    "play_interval",
-    "play_states",
-    "plays",
-    "total",
-]
 
 
 def build(
@@ -61,30 +41,13 @@ def build(
             "and name "
             "them in active_during_measurement"
         )
-    hold, box = outside == "hold", calibration.box_mm
-    models: list[ErrorModel] = []
+    hold = outside == "hold"
     if calibration.model == "huddersfield":
-        models.append(huddersfield(calibration, chain, hold, skip_components))
+        bodies = huddersfield(calibration, chain, hold, skip_components)
     else:
-        models.append(RigidBody(box, hold, build_bodies(calibration, chain, skip_components)))
-    models += [MapErrors.of(described, box, hold) for described in calibration.maps]
-    beams = [beam.table(box, chain) for beam in calibration.beams]
-    if calibration.compliance or beams:
-        models.append(
-            GridErrors.of(
-                "load", calibration.compliance, chain, calibration.datum_mm, box, hold=hold,
-                apart=beams, mass_kg=calibration.payload_kg, tool_terms=calibration.model != "huddersfield",
-            )
-        )  # fmt: skip
-    if calibration.thermal is not None:
-        models.append(ThermalExpansion.of(calibration.thermal, box, hold))
-    if calibration.structure is not None:
-        tables = calibration.structure.tables(hold=hold)
-        if tables:
-            models.append(
-                GridErrors.of(
-                    "thermal", tables, chain, calibration.datum_mm, box, hold=hold,
-                    tool_terms=calibration.model != "huddersfield",
-                )
-            )  # fmt: skip
+        bodies = RigidBody(calibration.box_mm, hold, build_bodies(calibration, chain, skip_components))
+    models: list[ErrorModel] = [bodies]
+    frame = calibration.frame(chain, hold=hold)
+    for source, values in calibration.sources():
+        models += source.models(values, frame)
     return total(models)

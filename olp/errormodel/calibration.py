@@ -7,146 +7,38 @@ fills these types; relations between the parts are checked here and raise Config
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from olp.core.arrays import Array
-from olp.core.errors import ConfigError
-from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
+from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.beams import Beam
-from olp.errormodel.gridded import COVER_MM, ComponentTable, DeviationMap, cover_problems, frozen, refuse
-from olp.errormodel.structure import Structure
+from olp.errormodel.gridded import COVER_MM, ComponentTable, cover_problems, frozen, refuse
+from olp.errormodel.sources.base import ErrorSource, Frame
+from olp.errormodel.sources.beams import Beam
+from olp.errormodel.sources.curves import Curve, Reference
+from olp.errormodel.sources.cyclic import Cyclic
+from olp.errormodel.sources.expansion import Thermal
+from olp.errormodel.sources.maps import DeviationMap
+from olp.errormodel.sources.registry import SOURCES
+from olp.errormodel.sources.structure import Structure
+
+__all__ = ["Calibration", "Curve", "Cyclic", "Model", "Reference", "Thermal"]
 
 Model = Literal["rigid-body", "huddersfield"]
-Reference = Literal["functional-point", "table"]
-Interpolation = Literal["linear", "pchip"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Curve:
-    """Component errors of one axis along one measuring line.
-
-    `position_mm` (n,) strictly increasing; either `columns` (mean of both directions) or `forward` and
-    `backward` with the same names, each (n,) in mm or rad. `line_mm` says where the other axes stood
-    (the entry of the own axis is ignored), None means the datum; `tool_mm` is the tool vector then.
-    A value is what was measured at the functional point on that line; with `reference` "table" the
-    reflector stayed fixed on a moving table. Raises ConfigError.
-    """
-
-    axis: str
-    position_mm: Array
-    columns: Mapping[str, Array] = field(default_factory=dict)
-    forward: Mapping[str, Array] = field(default_factory=dict)
-    backward: Mapping[str, Array] = field(default_factory=dict)
-    line_mm: Vector | None = None
-    tool_mm: Vector = ZERO
-    reference: Reference = "functional-point"
-    interpolation: Interpolation = "pchip"
-
-    def __post_init__(self) -> None:
-        if self.axis not in AXES or len(self.axis) != 1:
-            raise ConfigError(f"curve of axis '{self.axis}'; expected X, Y or Z")
-        object.__setattr__(self, "position_mm", frozen(self.position_mm))
-        for name in ("columns", "forward", "backward"):
-            columns = {key: frozen(value) for key, value in getattr(self, name).items()}
-            object.__setattr__(self, name, MappingProxyType(columns))
-        refuse(self._problems())
-
-    def _problems(self) -> list[str]:
-        label, x = f"curve of axis {self.axis}", self.position_mm
-        problems = []
-        if x.ndim != 1 or len(x) < 2:
-            return [f"{label}: {x.size} positions; expected at least 2"]
-        if not np.all(np.isfinite(x)) or np.any(np.diff(x) <= 0.0):
-            problems.append(
-                f"{label}: positions do not strictly increase; sort them and average repeated ones"
-            )
-        if bool(self.columns) == bool(self.forward) or set(self.forward) != set(self.backward):
-            problems.append(f"{label}: expected columns of the mean, or the same columns in both directions")
-        for name, values in (*self.columns.items(), *self.forward.items(), *self.backward.items()):
-            if name not in COMPONENTS or name[2] != self.axis:
-                expected = ", ".join(f"E{d}{self.axis}" for d in "XYZABC")
-                problems.append(f"{label}: column '{name}'; expected one of {expected}")
-            elif values.shape != x.shape or not np.all(np.isfinite(values)):
-                problems.append(
-                    f"{label}: column {name} is not a finite number at each of {len(x)} positions"
-                )
-        if self.interpolation not in ("linear", "pchip"):
-            problems.append(f"{label}: interpolation '{self.interpolation}'; expected linear or pchip")
-        if self.reference not in ("functional-point", "table"):
-            problems.append(f"{label}: reference '{self.reference}'; expected functional-point or table")
-        for key, vector in (("line_mm", self.line_mm), ("tool_mm", self.tool_mm)):
-            if vector is not None and (len(vector) != 3 or not np.all(np.isfinite(vector))):
-                problems.append(f"{label}: {key} = {vector}; expected three finite lengths")
-        return problems
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.columns) or tuple(self.forward)
-
-    def mean(self, name: str) -> Array:
-        """(n,) mean of both directions."""
-        return self.columns[name] if self.columns else 0.5 * (self.forward[name] + self.backward[name])
-
-    def half_difference(self, name: str) -> Array | None:
-        """(n,) half of forward minus backward; None for a curve of the mean."""
-        return None if self.columns else 0.5 * (self.forward[name] - self.backward[name])
-
-
-@dataclass(frozen=True, slots=True)
-class Cyclic:
-    """amplitude * sin(2 pi q / period + phase) on a component, q the position of its axis; mm or rad."""
-
-    component: str
-    period_mm: float
-    amplitude: float
-    phase_rad: float = 0.0
-
-    def __post_init__(self) -> None:
-        problems = []
-        if self.component not in COMPONENTS:
-            problems.append(f"cyclic component '{self.component}'; expected a name such as EXX or EAX")
-        if not (np.isfinite(self.period_mm) and self.period_mm > 0.0):
-            problems.append(f"cyclic {self.component}: period {self.period_mm} mm; expected more than 0")
-        if not (np.isfinite(self.amplitude) and np.isfinite(self.phase_rad)):
-            problems.append(f"cyclic {self.component}: amplitude and phase must be finite")
-        refuse(problems)
-
-
-@dataclass(frozen=True, slots=True)
-class Thermal:
-    """Expansion of the scales (X, Y, Z) and of the workpiece, against the calibration's state.
-
-    E_jj += scale * (T_scale - T_cal) * (q - fixed) - workpiece * (T_workpiece - 20) * (q - clamped)
-    """
-
-    scale_per_K: Vector = ZERO
-    fixed_at_mm: Vector = ZERO
-    workpiece_per_K: float = 0.0
-    clamped_at_mm: Vector = ZERO
-    calibrated_at_degC: float = 20.0
-    scale_degC: Vector = (20.0, 20.0, 20.0)
-    workpiece_degC: float = 20.0
-
-    def __post_init__(self) -> None:
-        expansions = (*self.scale_per_K, self.workpiece_per_K)
-        temperatures = (self.calibrated_at_degC, *self.scale_degC, self.workpiece_degC)
-        if not np.all(np.isfinite((*expansions, *self.fixed_at_mm, *self.clamped_at_mm, *temperatures))):
-            raise ConfigError("thermal: a value is not finite; expected expansions per K, mm and degC")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y, B0Z,
     A0Z in rad, `backlash_mm` the constant lost motion per axis. Several curves of one axis hold different
-    components. `repeatability_mm` is the
-    standard deviation of each axis at one place, None where nobody stated it. `compliance` tables and
-    `beams` act per kg of payload beyond `payload_kg`, which was on the machine while measuring. Raises
+    components. `repeatability_mm` is the standard deviation of each axis at one place, None where nobody
+    stated it. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`, which was on the
+    machine while measuring. `more` holds key and values of each source without a field of its own. Raises
     ConfigError with every problem found."""
 
     machine: str
@@ -168,6 +60,7 @@ class Calibration:
     measured: datetime.date | None = None
     valid_until: datetime.date | None = None
     active_during_measurement: frozenset[str] = frozenset()
+    more: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "box_mm", frozen(self.box_mm))
@@ -175,6 +68,8 @@ class Calibration:
         problems = self._own_problems()
         if not problems:
             problems = self._curve_problems() + self._grid_problems()
+            for source, values in self.sources():
+                problems += source.problems(values, self.box_mm)
         refuse(problems)
 
     def _own_problems(self) -> list[str]:
@@ -286,3 +181,20 @@ class Calibration:
 
     def curves_of(self, axis: str) -> tuple[Curve, ...]:
         return tuple(curve for curve in self.curves if curve.axis == axis)
+
+    def sources(self) -> Iterator[tuple[ErrorSource[Any, Any], Any]]:
+        """Every source with its values; one without a field is left out where nothing is stated of it."""
+        more = dict(self.more)
+        for source in SOURCES:
+            if source.field:
+                yield source, getattr(self, source.field)
+            elif source.key in more:
+                yield source, more[source.key]
+
+    def frame(self, chain: str, *, hold: bool = False) -> Frame:
+        """What the models of the sources count on, on a chain such as "FXYZ"."""
+        frame = Frame(
+            chain, self.datum_mm, self.box_mm, hold, self.payload_kg, tool_terms=self.model != "huddersfield"
+        )
+        loads = [table for source, values in self.sources() for table in source.loads(values, frame)]
+        return replace(frame, loads=tuple(loads))

@@ -14,10 +14,11 @@ import numpy as np
 
 from olp.core.arrays import Array, Mask
 from olp.core.interpolation import Column
-from olp.errormodel.bodies import CROSS, Body
+from olp.errormodel.bodies import Body
 from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
+from olp.errormodel.levers import CROSS
 
 #: A block's columns stay near the second-level cache (1 MB); measured best of 2k to 32k.
 BLOCK = 16384

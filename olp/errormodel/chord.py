@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
-from olp.errormodel.calibration import Cyclic
+from olp.errormodel.sources.cyclic import Cyclic
 
 #: Bins run from 2^-20 to 2^20 mm; a binary64 shifted by 49 bits keeps its exponent and 3 bits of mantissa.
 _SHIFT = 49

@@ -9,11 +9,11 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.interpolation import ON_GRID_MM, Column, DenseTable, Interpolant, dense_table
 from olp.core.units import AXES
-from olp.errormodel.calibration import Calibration, Cyclic
+from olp.errormodel.calibration import Calibration
 from olp.errormodel.chord import Variation
-from olp.errormodel.cyclic import cyclic_value
+from olp.errormodel.levers import DIRECTIONS
+from olp.errormodel.sources.cyclic import Cyclic, cyclic_value
 
-DIRECTIONS = "XYZABC"
 #: Resampling stays this close to the interpolated curve: a ten-thousandth of a micrometre, at 1 m too.
 TABLE_MM = 1e-7
 TABLE_RAD = 1e-10

@@ -1,4 +1,5 @@
-"""Parts of a calibration that are tables over a rectilinear grid of axis positions, as values.
+"""Tables over a rectilinear grid of axis positions: component errors as values, and what every table is
+held to.
 
 Base units: mm, rad, kg, degC. error = actual - commanded, tool relative to workpiece.
 """
@@ -7,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from types import MappingProxyType
 from typing import Literal
 
@@ -17,7 +19,7 @@ from olp.core.errors import ConfigError
 from olp.core.grid_interpolation import KINDS
 from olp.core.grid_interpolation import Kind as Interpolation
 from olp.core.machine import COMPONENTS, ZERO, Vector
-from olp.core.units import AXES
+from olp.core.units import AXES, in_unit_text
 
 #: A table may miss a face of the box by rounding of its file, no more.
 COVER_MM = 1e-6
@@ -60,62 +62,13 @@ def cover_problems(
     return problems
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DeviationMap:
-    """Deviations of the tip (nx, ny, nz, 3) in mm over axis positions `knots_mm` (three arrays), measured
-    with the tool vector `tool_mm`.
-
-    A "residual" map adds to the curves; a "total" one is all that was measured and stands in for them. An
-    axis in `holds_along` may have one level: the map is taken to be the same all along it. `sigma`, of the
-    shape of the values, are standard uncertainties in mm; of a residual map beside those of the curves.
-    Raises ConfigError.
-    """
-
-    knots_mm: tuple[Array, Array, Array]
-    values: Array
-    kind: Literal["residual", "total"] = "residual"
-    tool_mm: Vector = ZERO
-    interpolation: Interpolation = "linear"
-    holds_along: tuple[str, ...] = ()
-    name: str = "map"
-    sigma: Array | None = None
-
-    def __post_init__(self) -> None:
-        x, y, z = (frozen(k) for k in self.knots_mm)
-        object.__setattr__(self, "knots_mm", (x, y, z))
-        object.__setattr__(self, "values", frozen(self.values))
-        if self.sigma is not None:
-            object.__setattr__(self, "sigma", frozen(self.sigma))
-        refuse(self._problems())
-
-    def _problems(self) -> list[str]:
-        problems = knot_problems(self.name, AXES, self.knots_mm)
-        shape = tuple(len(k) for k in self.knots_mm)
-        if self.values.shape != (*shape, 3) or not np.all(np.isfinite(self.values)):
-            problems.append(f"{self.name}: expected three finite deviations at each of {shape} nodes")
-        sigma = np.zeros((*shape, 3)) if self.sigma is None else self.sigma
-        if sigma.shape != (*shape, 3) or not np.all(np.isfinite(sigma)) or np.any(sigma < 0.0):
-            problems.append(
-                f"{self.name}: expected three uncertainties of 0 or above at each of {shape} nodes"
-            )
-        if self.kind not in ("residual", "total"):
-            problems.append(f"{self.name}: kind '{self.kind}'; expected residual or total")
-        if self.interpolation not in KINDS:
-            problems.append(f"{self.name}: interpolation '{self.interpolation}'; expected linear or cubic")
-        for axis, knots in zip(AXES, self.knots_mm, strict=True):
-            if len(knots) == 1 and axis not in self.holds_along:
-                problems.append(
-                    f"{self.name} has one level along {axis}, so it tells nothing of how the error changes "
-                    f'there; expected two levels or more, or holds_along = ["{axis}"] where the error is '
-                    f"known "
-                    "to be the same all along it"
-                )
-            elif len(knots) > 1 and axis in self.holds_along:
-                problems.append(
-                    f"{self.name} has {len(knots)} levels along {axis}, and holds_along names it; expected "
-                    "one level, or the axis left out there"
-                )
-        return problems
+def grid_rows(arguments: Sequence[str], knots: Sequence[Array], columns: Mapping[str, Sequence[str]]) -> str:
+    """The text of a CSV file over a grid: the levels, then columns of cells, a row a node."""
+    rows = [",".join([*(f"{a}_mm" for a in arguments), *columns])]
+    levels = [[in_unit_text(v, 0) for v in k.tolist()] for k in knots]
+    for number, place in enumerate(product(*levels)):
+        rows.append(",".join([*place, *(column[number] for column in columns.values())]))
+    return "\n".join(rows) + "\n"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,21 +20,16 @@ from olp.core.units import AXES
 from olp.errormodel.bodies import Body, build_bodies
 from olp.errormodel.boxed import as_points
 from olp.errormodel.calibration import Calibration, Thermal
-from olp.errormodel.thermal import REFERENCE_DEGC
-from olp.errormodel.uncertainty import EXPANSION_PER_K, Entry, Uncertainty
+from olp.errormodel.entry import Entry, Place, Slot
+from olp.errormodel.sources.expansion import REFERENCE_DEGC
+from olp.errormodel.sources.registry import NUMBERS
+from olp.errormodel.uncertainty import EXPANSION_PER_K, Uncertainty
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 #: Half the memory, and far more digits than an uncertainty has.
 Rows = npt.NDArray[np.float32]
-
-#: Row and sign of what a squareness adds, times the distance of its axis from the datum.
-_SHEAR = {"C0Y": (0, -1.0), "B0Z": (0, 1.0), "A0Z": (1, -1.0)}
-
-Index = npt.NDArray[np.int32]
-#: What n positions take of one unknown each: its number and its weight.
-Slot = tuple[Index, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +103,7 @@ class Sensitivity:
         for entry in entries:
             parts = 0
             if entry.rest.any():
-                parts = entry.cells + 1 if entry.kind in ("mean", "half") else len(entry.rest)
+                parts = NUMBERS[entry.kind].parts(entry)
             spare.append(at if parts else -1)
             at += parts
         at += 4 if expansion is not None else 0
@@ -141,12 +136,14 @@ class Sensitivity:
             tool = [tool_mm[..., k] for k in range(3)]
         for body in self.bodies:
             levers = [(rows, lever.at(position, tool)) for rows, lever in body.levers]
-            state, q = None if play is None else play[:, body.axis], position[body.axis]
+            q = position[body.axis]
+            state = None if play is None else play[:, body.axis]
+            place = Place(body.axis, q, state, body.datum_mm, levers)
             for entry, first, spare in zip(self.entries, self.first, self.spare, strict=True):
                 if AXES.index(entry.name[-1]) != body.axis:
                     continue
-                acts = list(_acts(entry, body, levers, q, state))
-                own = [*_numbers(entry, first, q), *_parts(entry, spare, q)] if acts else []
+                acts = list(NUMBERS[entry.kind].acts(entry, place))
+                own = list(_own(entry, first, spare, q)) if acts else []
                 for row, coefficient in acts:
                     slots[row].extend((number, weight * coefficient) for number, weight in own)
         if self.expansion is not None:
@@ -166,12 +163,12 @@ class Sensitivity:
 def value_rows(entry: Entry, q: Array) -> Array:
     """(n, columns) dependence of the value of an entry at q (n,) on independent unknowns of variance 1: those
     of the factor, and then its own."""
-    rank, n = entry.factor.shape[1], len(q)
-    parts = entry.cells + 1 if entry.kind in ("mean", "half") else len(entry.rest)
-    out = np.zeros((n, rank + parts))
-    for number, weight in _numbers(entry, 0, q):
-        out[:, :rank] += weight[:, None] * entry.factor[number]
-    for number, weight in _parts(entry, 0, q):
+    numbers, rank, n = NUMBERS[entry.kind], entry.factor.shape[1], len(q)
+    out = np.zeros((n, rank + numbers.parts(entry)))
+    if entry.factor.size:
+        for number, weight in numbers.weights(entry, q):
+            out[:, :rank] += weight[:, None] * entry.factor[number]
+    for number, weight in numbers.part_weights(entry, q):
         out[np.arange(n), rank + number] += weight
     return out
 
@@ -182,74 +179,11 @@ def _expansion(expansion: Expansion, j: int, first: int, q: Array) -> Iterator[S
     yield np.full(n, first + 3, np.int32), -expansion.workpiece * (q - expansion.clamped_at_mm[j])
 
 
-def _acts(
-    entry: Entry,
-    body: Body,
-    levers: list[tuple[tuple[int, ...], list[Column]]],
-    q: Array,
-    play: Array | None,
-) -> Iterator[tuple[int, Column]]:
-    """Rows of the error that a number acts on, and with what coefficient."""
-    if entry.kind == "squareness":
-        row, sign = _SHEAR[entry.name]
-        yield row, sign * (q - body.datum_mm)
-    elif entry.kind == "backlash":
-        if play is not None:
-            yield body.axis, -0.5 * play
-    elif entry.kind != "half" or play is not None:
-        side: Column = play if entry.kind == "half" and play is not None else 1.0
-        d = "XYZABC".index(entry.name[1])
-        if d < 3:
-            yield d, side
-            return
-        # eps x lever: an angle about a moves row a - 1 by its arm along a + 1, and row a + 1 by minus that
-        # along a - 1
-        after, before = (d - 2) % 3, (d - 1) % 3
-        for rows, arm in levers:
-            if before in rows:
-                yield before, side * arm[after]
-            if after in rows:
-                yield after, -(side * arm[before])
-
-
-def _numbers(entry: Entry, first: int, q: Array) -> Iterator[Slot]:
-    """The numbers of an entry that make its value at q (n,): those of the factor."""
-    n = len(q)
-    if not entry.factor.size:
-        return
-    if entry.kind in ("mean", "half"):
-        x = entry.position_mm
-        i = np.clip(np.searchsorted(x, q, side="right") - 1, 0, len(x) - 2).astype(np.int32)
-        share = (np.clip(q, x[0], x[-1]) - x[i]) / (x[i + 1] - x[i])
-        yield first + i, 1.0 - share
-        yield first + i + 1, share
-    elif entry.kind == "wave":
-        angle = q * (2.0 * np.pi / entry.period_mm)
-        yield np.full(n, first, np.int32), np.sin(angle)
-        yield np.full(n, first + 1, np.int32), np.cos(angle)
-    else:
-        yield np.full(n, first, np.int32), np.ones(n)
-
-
-def _parts(entry: Entry, first: int, q: Array) -> Iterator[Slot]:
-    """The independent parts beside them; the squares of the weights add up to their variance at q (n,),
-    wherever in a cell that is."""
-    n = len(q)
-    if first < 0:
-        return
-    if entry.kind == "wave":
-        angle = q * (2.0 * np.pi / entry.period_mm)
-        yield np.full(n, first, np.int32), entry.rest[0] * np.sin(angle)
-        yield np.full(n, first + 1, np.int32), entry.rest[1] * np.cos(angle)
-        return
-    if entry.kind not in ("mean", "half"):
-        yield np.full(n, first, np.int32), np.full(n, entry.rest[0])
-        return
-    x = entry.position_mm
-    sigma = np.interp(q, x, entry.rest)
-    at = np.clip((q - x[0]) / (x[-1] - x[0]), 0.0, 1.0) * entry.cells
-    cell = np.minimum(at.astype(np.int32), entry.cells - 1)
-    share = at - cell
-    size = sigma / np.sqrt(share**2 + (1.0 - share) ** 2)
-    yield first + cell, size * (1.0 - share)
-    yield first + cell + 1, size * share
+def _own(entry: Entry, first: int, spare: int, q: Array) -> Iterator[Slot]:
+    """The unknowns that make the value of an entry at q (n,): numbers of the factor, and independent
+    parts."""
+    numbers = NUMBERS[entry.kind]
+    if entry.factor.size:
+        yield from ((first + number, weight) for number, weight in numbers.weights(entry, q))
+    if spare >= 0:
+        yield from ((spare + number, weight) for number, weight in numbers.part_weights(entry, q))

@@ -10,22 +10,16 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from olp.core.arrays import Array
 from olp.core.errors import ConfigError
-from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
-from olp.core.units import AXES
+from olp.core.machine import ZERO, Vector
 from olp.errormodel.calibration import Calibration
+from olp.errormodel.entry import Entry
+from olp.errormodel.sources.base import Sigmas, digits
+from olp.errormodel.sources.curves import CELLS
+from olp.errormodel.sources.registry import NUMBERS
 
-Kind = Literal["mean", "half", "wave", "squareness", "backlash"]
-KINDS: tuple[Kind, ...] = ("mean", "half", "wave", "squareness", "backlash")
-#: A curve of which only standard uncertainties are known is independent from one of so many equal parts of it
-#: to the next: the cautious side, as then nothing of it cancels in a touch-off elsewhere.
-CELLS = 16
 #: What a report says of uncertainties from sigma columns.
 SIGMA_COLUMNS = (
     "sigma columns: components are taken as independent of each other, and each curve as independent "
@@ -35,49 +29,6 @@ SIGMA_COLUMNS = (
 EXPANSION_PER_K = 11.5e-6
 #: Days of a year.
 YEAR = 365.25
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Entry:
-    """Numbers of one kind: of component `name` at `position_mm` (n,) for "mean" and "half"; (sine, cosine) of
-    `period_mm` for "wave"; one number of a squareness, or of the lost motion of an axis.
-
-    `factor` (n, rank) and `rest` (n,), a standard uncertainty, in mm or rad. Raises ConfigError.
-    """
-
-    kind: Kind
-    name: str
-    factor: Array
-    rest: Array
-    position_mm: Array = field(default_factory=lambda: np.zeros(0))
-    period_mm: float = 0.0
-
-    def __post_init__(self) -> None:
-        curve = self.kind in ("mean", "half")
-        names = {"squareness": SQUARENESS, "backlash": tuple(AXES)}.get(self.kind, COMPONENTS)
-        count = len(self.position_mm) if curve else 2 if self.kind == "wave" else 1
-        x = self.position_mm
-        good = self.kind in KINDS and self.name in names and self.factor.ndim == 2
-        good = good and self.factor.shape[0] == count and self.rest.shape == (count,)
-        good = good and bool(np.isfinite(self.factor).all() and np.isfinite(self.rest).all())
-        good = good and bool((self.rest >= 0.0).all()) and (self.kind != "wave" or self.period_mm > 0.0)
-        if not good or (curve and (count < 2 or not np.isfinite(x).all() or np.any(np.diff(x) <= 0.0))):
-            raise ConfigError(
-                f"covariance of {self.kind} {self.name}: expected finite numbers at ascending positions"
-            )
-
-    @property
-    def sigma(self) -> Array:
-        """(n,) standard uncertainties, mm or rad."""
-        return np.asarray(np.sqrt((np.asarray(self.factor, float) ** 2).sum(axis=1) + self.rest**2))
-
-    @property
-    def cells(self) -> int:
-        """Into how many independent parts the rest falls."""
-        return min(CELLS, max(len(self.position_mm) - 1, 0))
-
-    def scaled(self, by: float) -> Entry:
-        return replace(self, factor=self.factor * by, rest=self.rest * by)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +50,11 @@ class Uncertainty:
     temperature_K: float = 0.0
 
     def __post_init__(self) -> None:
+        for entry in self.entries:
+            if entry.kind not in NUMBERS or not NUMBERS[entry.kind].fits(entry):
+                raise ConfigError(
+                    f"covariance of {entry.kind} {entry.name}: expected finite numbers at ascending positions"
+                )
         seen: set[tuple[str, str, float]] = set()
         for entry in self.entries:
             key = (entry.kind, entry.name, entry.period_mm)
@@ -112,7 +68,7 @@ class Uncertainty:
     def rank(self) -> int:
         return int(self.entries[0].factor.shape[1]) if self.entries else 0
 
-    def find(self, kind: Kind, name: str) -> Entry | None:
+    def find(self, kind: str, name: str) -> Entry | None:
         return next((e for e in self.entries if e.kind == kind and e.name == name), None)
 
     def scaled(self, by: float) -> Uncertainty:
@@ -134,43 +90,21 @@ def fingerprint(calibration: Calibration) -> str:
 
 
 def _lines(calibration: Calibration) -> Iterator[str]:
-    def text(values: object) -> str:
-        return " ".join(f"{value + 0.0:.9e}" for value in np.atleast_1d(np.asarray(values, float)).tolist())
-
     yield f"{calibration.machine} {calibration.model} {calibration.measured}"
-    yield f"{text(calibration.datum_mm)} {text(calibration.box_mm.ravel())}"
-    for curve in calibration.curves:
-        line = calibration.datum_mm if curve.line_mm is None else curve.line_mm
-        others = [at for at, axis in zip(line, AXES, strict=True) if axis != curve.axis]
-        yield f"{curve.axis} {curve.reference} {curve.interpolation} {text(others)} {text(curve.tool_mm)}"
-        yield text(curve.position_mm)
-        for part in (curve.columns, curve.forward, curve.backward):
-            for name in sorted(part):
-                yield f"{name} {text(part[name])}"
-    yield " ".join(f"{name} {text(calibration.squareness.get(name, 0.0))}" for name in SQUARENESS)
-    yield text(calibration.backlash_mm)
-    for term in calibration.cyclic:
-        yield f"{term.component} {text([term.period_mm, term.amplitude, term.phase_rad])}"
+    yield f"{digits(calibration.datum_mm)} {digits(calibration.box_mm.ravel())}"
+    for source, values in calibration.sources():
+        yield from source.fingerprint(values, calibration.datum_mm)
 
 
-def of_sigmas(
-    calibration: Calibration,
-    curves: Mapping[str, Array],
-    squareness: Mapping[str, float] | None = None,
-    backlash_mm: Mapping[str, float] | None = None,
-) -> Uncertainty | None:
-    """From standard uncertainties alone: of components by name at the positions of their curve, of squareness
-    and of lost motion. None where there are none."""
-    entries = []
-    for curve in calibration.curves:
-        for name in curve.names:
-            if name in curves:
-                n = len(curve.position_mm)
-                sigma = np.asarray(curves[name], float)
-                entries.append(Entry("mean", name, np.zeros((n, 0)), sigma, curve.position_mm))
-    none = np.zeros((1, 0))
-    entries += [Entry("squareness", k, none, np.array([v])) for k, v in (squareness or {}).items()]
-    entries += [Entry("backlash", k, none, np.array([v])) for k, v in (backlash_mm or {}).items()]
+def of_sigmas(calibration: Calibration, sigmas: Mapping[str, Sigmas]) -> Uncertainty | None:
+    """From standard uncertainties alone, by the key of their source, such as {"curves": {"EXX": ...},
+    "squareness": {"C0Y": ...}}: of components at the positions of their curve, of squareness and of lost
+    motion, mm or rad. None where there are none."""
+    entries = [
+        entry
+        for source, values in calibration.sources()
+        for entry in source.entries(values, sigmas.get(source.key, {}))
+    ]
     if not entries:
         return None
     return Uncertainty(tuple(entries), fingerprint(calibration), SIGMA_COLUMNS)

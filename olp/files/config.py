@@ -17,19 +17,19 @@ from olp.files.described import described
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
 
 
 def load_machine(path: PathLike) -> Machine:
     """The machine of an olp-machine-1 file; `calibration` becomes a path that can be opened."""
-    return _read_machine(path)[0]
+    return _read_machine(path, read_bytes)[0]
 
 
 def load_job(path: PathLike) -> Job:
     """The job of an olp-job-1 file; `program`, `machine` and meshes become paths that can be opened."""
-    return _read_job(path)[0]
+    return _read_job(path, read_bytes)[0]
 
 
 def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None = None) -> Setup:
@@ -38,12 +38,19 @@ def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None =
     Refuses names that neither file defines: the tool at the start, touch tools, frames of meshes. Raises
     UsageError where no machine file is named anywhere.
     """
-    job, job_lines = _read_job(job_path) if job_path is not None else (Job(), {})
+    return read_setup(machine_path, job_path, read_bytes)
+
+
+def read_setup(
+    machine_path: PathLike | None, job_path: PathLike | None, read: Reader
+) -> Setup:
+    """As `load_setup`, from the bytes that `read` gives for a path."""
+    job, job_lines = _read_job(job_path, read) if job_path is not None else (Job(), {})
     machine_path = machine_path if machine_path is not None else job.machine
     if machine_path is None:
         what = f"{job_path} names no machine" if job_path is not None else "no machine file is given"
         raise UsageError(f"{what}; name the machine file with -m, or with the key machine of the job file")
-    machine, machine_lines = _read_machine(machine_path)
+    machine, machine_lines = _read_machine(machine_path, read)
     setup = Setup(machine, job)
     found = _undefined_tools(setup, machine.work_offsets, machine_lines)
     if machine.default_tool is not None and setup.tool(machine.default_tool) is None:
@@ -63,8 +70,10 @@ def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None =
     return setup
 
 
-def _read_machine(path: PathLike) -> tuple[Machine, Mapping[Path, int]]:
-    values, lines = read_toml(read_bytes(path), str(path))
+def _read_machine(
+    path: PathLike, read: Reader
+) -> tuple[Machine, Mapping[Path, int]]:
+    values, lines = read_toml(read(path), str(path))
     file = validate(MachineFile, values, lines, str(path))
     axes = {
         axis: Axis(
@@ -113,8 +122,8 @@ def _compliance(stated: float | Vector, axis: int) -> Vector:
     return (own[0], own[1], own[2])
 
 
-def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
-    values, lines = read_toml(read_bytes(path), str(path))
+def _read_job(path: PathLike, read: Reader) -> tuple[Job, Mapping[Path, int]]:
+    values, lines = read_toml(read(path), str(path))
     file = validate(JobFile, values, lines, str(path))
     missing: list[Problem] = []
     meshes = []
@@ -129,11 +138,12 @@ def _read_job(path: PathLike) -> tuple[Job, Mapping[Path, int]]:
             missing.append((line_of(key, lines), sentence))
     if missing:
         raise config_error(missing, str(path))
-    own = described(file.dialect, beside(path, file.dialect)) if file.dialect is not None else None
+    stated = file.dialect
+    own = described(stated, beside(path, stated), read) if stated is not None else None
     job = Job(
         program=beside(path, file.program),
         machine=beside(path, file.machine),
-        dialect=None if own is not None else file.dialect,
+        dialect=None if own is not None else stated,
         described=own,
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,

@@ -10,16 +10,17 @@ from typing import Literal
 from pydantic import Field
 
 from olp.core.errors import ConfigError
-from olp.files.fields import SHIPPED, Text
+from olp.core.schema import Table, Text
+from olp.files.fields import SHIPPED
 from olp.files.point_profile import PointProfile
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import line_of, read_toml
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.described.forms import Form, form
 from olp.program.described.language import DOES, Rule, UserDialect
+from olp.program.described.reader import read_described
 from olp.program.dialect import Dialect
-from olp.program.pointlist.reader import with_layout
+from olp.program.pointlist.dialect import with_layout
 
 FOLDER = Path(__file__).parents[1] / "program" / "described" / "shipped"
 
@@ -75,9 +76,9 @@ class DialectFile(Table):
     statements: list[StatementTable] = Field(description="tables [[statements]], tried in their order")
 
 
-def load_described(path: PathLike) -> Dialect:
+def load_described(path: PathLike, read: Reader = read_bytes) -> Dialect:
     """The dialect in a file. Raises InputError, and ConfigError with all problems of the file."""
-    values, lines = read_toml(read_bytes(path), str(path))
+    values, lines = read_toml(read(path), str(path))
     if values.get("schema") == "olp-points-1":
         return with_layout(validate(PointProfile, values, lines, str(path)).layout)
     file = validate(DialectFile, values, lines, str(path))
@@ -117,7 +118,8 @@ def load_described(path: PathLike) -> Dialect:
         raise config_error(found, str(path))
     stamp = file.stamp or [file.comments[0] + " ", ""]
     return UserDialect(
-        name=file.name, title=file.title, path_mode=file.path_mode, about=file.about or "",
+        name=file.name, title=file.title, path_mode=file.path_mode, reader=read_described,
+        about=file.about or "",
         comment=(stamp[0].encode(), stamp[1].encode()), statements=tuple(rules), unit=file.unit,
         speed_unit=file.speed_unit,
         comments=tuple(file.comments), quote=file.quote, continuation=file.continuation,
@@ -126,12 +128,14 @@ def load_described(path: PathLike) -> Dialect:
     )  # fmt: skip
 
 
-def described(name: str, path: PathLike | None = None) -> Dialect | None:
+def described(
+    name: str, path: PathLike | None = None, read: Reader = read_bytes
+) -> Dialect | None:
     """The dialect that a name stands for, where a file describes it: one that comes with `olp`, or a path
     (`path` where it is to be read from). None for the others. Raises InputError."""
     if name in SHIPPED:
-        return load_described(FOLDER / f"{name}.toml")
-    return load_described(path or name) if name.endswith(".toml") else None
+        return load_described(FOLDER / f"{name}.toml", read)
+    return load_described(path or name, read) if name.endswith(".toml") else None
 
 
 def _problem(table: StatementTable, made: Form) -> str | None:

@@ -1,4 +1,4 @@
-"""The kinds of values in files: numbers with limits, chains, names of errors and of work offsets."""
+"""The kinds of values in files: chains, controls, names of errors and of work offsets."""
 
 from __future__ import annotations
 
@@ -9,25 +9,21 @@ import re
 from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
-from pydantic_core import PydanticCustomError
 
 from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
+from olp.core.schema import refusal
+from olp.program.registry import DESCRIBED, DIALECTS
 
 #: Dialect profiles that can be read and written today.
-CONTROLLERS = ("linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list")
+CONTROLLERS = tuple(DIALECTS)
 #: Dialects that are described by files which come with `olp`.
-SHIPPED = ("kawasaki-as", "val2", "karel", "irl")
+SHIPPED = DESCRIBED
 ISO_NAMES = COMPONENTS + SQUARENESS
 SIGN = "actual-minus-commanded"
 
 # Numbers only: a frame of another language may have any name, but a misspelt G-code would never be used.
 _TOOL_NUMBER = "(0|[1-9][0-9]*)"
 _G_OFFSET = re.compile(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?")
-
-
-def refusal(sentence: str) -> PydanticCustomError:
-    """An error whose sentence is complete: it is shown after the key path as it stands."""
-    return PydanticCustomError("olp", "{sentence}", {"sentence": sentence})
 
 
 def shown(value: object) -> str:
@@ -41,14 +37,6 @@ def shown(value: object) -> str:
     else:
         text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
-    if not pair[0] < pair[1]:
-        raise refusal(
-            f"= [{pair[0]:g}, {pair[1]:g}] mm is empty; expected [min, max] in mm with min below max"
-        )
-    return pair
 
 
 def _chain(value: object) -> object:
@@ -129,11 +117,6 @@ def _tool_number(name: str) -> str:
     return name
 
 
-Interval = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ascending)]
-Triple = Annotated[tuple[float, float, float], Field(strict=False)]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Text = Annotated[str, Field(min_length=1)]
 Compliance = Annotated[
     float | tuple[float, float, float],
     PlainValidator(_compliance),

@@ -6,10 +6,10 @@ import json
 from typing import Any
 
 from olp.core.errors import UsageError
+from olp.core.schema import Table
 from olp.files.described import DialectFile
 from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
-from olp.files.schema_base import Table
 from olp.files.schemas import FILES
 
 #: kind of file to its model

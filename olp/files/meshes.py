@@ -10,17 +10,19 @@ import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import InputError
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
 
-def read_mesh(path: PathLike) -> tuple[Array, Index]:
+def read_mesh(
+    path: PathLike, read: Reader = read_bytes
+) -> tuple[Array, Index]:
     """(v, 3) vertices and (m, 3) triangles of a mesh, in the units and the frame of its file.
 
     Triangles without an area stay: they are edges of something. Raises InputError for what is no mesh.
     """
     import trimesh
 
-    data = read_bytes(path)
+    data = read(path)
     try:
         # the text of an ASCII file tells its kind as little as a suffix in capitals
         kind = Path(path).suffix.lower().removeprefix(".")

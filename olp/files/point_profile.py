@@ -9,11 +9,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from olp.core.errors import UsageError
-from olp.files.fields import NotNegative, Positive, Text
+from olp.core.schema import NotNegative, Positive, Table, Text
 from olp.files.problems import nearest, validate
-from olp.files.schema_base import Table
 from olp.files.toml_text import read_toml, toml_lines
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.delimited import ROLES, Layout, mapping, told
 
 #: the columns of measured points that are compared
@@ -142,11 +141,11 @@ BUILT_IN = {
 }  # fmt: skip
 
 
-def load_profile(name: PathLike) -> PointProfile:
+def load_profile(name: PathLike, read: Reader = read_bytes) -> PointProfile:
     """A built-in profile by its name, or the profile in a TOML file. Raises InputError."""
     if str(name) in BUILT_IN:
         return BUILT_IN[str(name)]
-    values, lines = read_toml(read_bytes(name), str(name))
+    values, lines = read_toml(read(name), str(name))
     return validate(PointProfile, values, lines, str(name))
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import io
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +14,11 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.errors import InputError
+from olp.files.columns import place_in
 from olp.files.point_profile import MEASURED, PointProfile, looked_at
-from olp.files.problems import nearest
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
+from olp.program.text.rows import Form, decoded, form_of, no_number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,21 +41,23 @@ class Points:
         return len(self.points_mm)
 
 
-def read_points(path: PathLike, profile: PointProfile | None = None) -> Points:
+def read_points(
+    path: PathLike, profile: PointProfile | None = None, read: Reader = read_bytes
+) -> Points:
     """The points of a file; without a profile its layout is told from its first rows.
 
     Raises InputError where the file cannot be read, its layout cannot be told, or a row is wrong, with the
     line.
     """
-    return parse_points(read_bytes(path), str(path), profile)
+    return parse_points(read(path), str(path), profile)
 
 
 def row_line(points: Points, row: int) -> int:
     """The line of the file, counted from 1, in which a point stands."""
-    text = _lines(read_bytes(points.file).decode("utf-8-sig"))
-    profile = points.profile
-    skip, _ = _header(list(itertools.islice(io.StringIO(text), LOOK)), profile)
-    return next(itertools.islice(_rows(text, profile, skip), row, None))[0]
+    text = decoded(read_bytes(points.file))
+    form = form_of(points.profile.layout)
+    skip, _ = _header(text, form, points.profile.header)
+    return next(itertools.islice(form.rows(text, skip), row, None))[0]
 
 
 def layout_of(data: bytes) -> PointProfile | None:
@@ -66,14 +68,9 @@ def layout_of(data: bytes) -> PointProfile | None:
 def parse_points(data: bytes, file: str, profile: PointProfile | None = None) -> Points:
     """As `read_points`, from the bytes of the file."""
     try:
-        text = _lines(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8",
-            file=file, line=line,
-        ) from None  # fmt: skip
-    first = list(itertools.islice(io.StringIO(text), LOOK))
+        text = _lines(decoded(data))
+    except InputError as error:
+        raise error.in_file(file) from None
     found = profile or layout_of(data)
     if not text.strip():
         raise InputError("holds no points; expected a row a point", file=file)
@@ -83,12 +80,13 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
             "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
-    stated = stated_frame(first, file)
-    skip, header = _header(first, found)
-    if next(_rows(text, found, skip), None) is None:
+    stated = stated_frame(list(itertools.islice(io.StringIO(text), LOOK)), file)
+    form = form_of(found.layout)
+    skip, header = _header(text, form, found.header)
+    if next(form.rows(text, skip), None) is None:
         raise InputError("holds no points; expected a row a point", file=file)
     columns = {
-        key: _place(column, header, file) for key, column in found.columns.given.items() if key in MEASURED
+        key: place_in(header, column, file) for key, column in found.columns.given.items() if key in MEASURED
     }
     numbers = [key for key in columns if key != "name"]
     table = _table(text, file, found, skip, [columns[key] for key in numbers])
@@ -116,48 +114,19 @@ def _lines(text: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _header(first: Sequence[str], profile: PointProfile) -> tuple[int, list[str]]:
-    """How many lines stand before the first row of data, and the names of columns."""
-    for number, line in enumerate(first):
-        if _holds(line, profile):
-            if not profile.header:
-                return number, []
-            return number + 1, _cells(line, profile)
+def _header(text: str, form: Form, named: bool) -> tuple[int, list[str]]:
+    """How many lines stand before the first row of data, and the names of columns where a row names them."""
+    first = list(itertools.islice(form.lines(text), LOOK))
+    for line, whole in first:
+        if form.holds(whole):
+            return (line, form.cells(whole)) if named else (line - 1, [])
     return len(first), []
-
-
-def _holds(line: str, profile: PointProfile) -> bool:
-    """A line that is neither empty nor a comment."""
-    return bool(line.strip()) and not line.lstrip().startswith((profile.comment, "#"))
-
-
-def _cells(line: str, profile: PointProfile) -> list[str]:
-    mark = DELIMITERS[profile.delimiter]
-    if mark is None:
-        return line.split()
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True))]
-
-
-def _place(column: str | int, header: Sequence[str], file: str) -> int:
-    if isinstance(column, int):
-        return column - 1
-    if column in header:
-        return header.index(column)
-    near = nearest(column, header)
-    known = f"did you mean {near}?" if near else f"expected one of {', '.join(header) or 'their numbers'}"
-    raise InputError(f'there is no column "{column}"; {known}', file=file)
-
-
-def _rows(text: str, profile: PointProfile, skip: int) -> Iterator[tuple[int, list[str]]]:
-    for number, line in enumerate(io.StringIO(text), 1):
-        if number > skip and _holds(line, profile):
-            yield number, _cells(line, profile)
 
 
 def _texts(text: str, file: str, profile: PointProfile, skip: int, column: int) -> tuple[str, ...]:
     """The cells of a column."""
     out = []
-    for number, cells in _rows(text, profile, skip):
+    for number, cells in form_of(profile.layout).rows(text, skip):
         if column >= len(cells):
             raise _too_short(cells, column, file, number, profile)
         out.append(cells[column])
@@ -189,22 +158,18 @@ def _table(text: str, file: str, profile: PointProfile, skip: int, columns: Sequ
         raise _wrong_row(body, file, profile, skip, columns) from None
     bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
     if len(bad):
-        line = next(itertools.islice(_rows(body, profile, skip), int(bad[0]), None))[0]
+        line = next(itertools.islice(form_of(profile.layout).rows(body, skip), int(bad[0]), None))[0]
         raise InputError("a number is not finite; remove the row, or measure it again", file=file, line=line)
     return np.asarray(table, float)
 
 
 def _wrong_row(text: str, file: str, profile: PointProfile, skip: int, columns: Sequence[int]) -> InputError:
-    for number, cells in _rows(text, profile, skip):
+    for number, cells in form_of(profile.layout).rows(text, skip):
         for column in columns:
             if column >= len(cells):
                 return _too_short(cells, column, file, number, profile)
             try:
                 float(cells[column])
             except ValueError:
-                return InputError(
-                    f'column {column + 1} is "{cells[column][:40]}"; expected a number with a decimal '
-                    f"{profile.decimal}",
-                    file=file, line=number,
-                )  # fmt: skip
+                return InputError(no_number(column, cells[column], profile.decimal), file=file, line=number)
     return InputError("cannot be read as a table; check the delimiter", file=file)

@@ -9,8 +9,8 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import ValidationError
 
 from olp.core.errors import ConfigError
+from olp.core.schema import Table, is_table
 from olp.files.fields import shown
-from olp.files.schema_base import Table, is_table
 from olp.files.toml_text import Path, dotted, line_of
 
 #: A line, where it is known, and a sentence.

@@ -6,33 +6,23 @@ One class per TOML table; a key that no class names is refused. Every descriptio
 
 from __future__ import annotations
 
-import datetime
 from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from olp.core.machine import COMPONENTS
-from olp.files.calibration.gridded_schema import BeamTable, ComplianceTable, MapTable
+from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple, refusal
+from olp.files.calibration.schema import CalibrationFile
 from olp.files.fields import (
     CONTROLLERS,
-    SIGN,
     Chain,
     Compliance,
     Controller,
-    Interval,
     IsoNames,
-    NotNegative,
     OffsetName,
-    Positive,
     ProgramDialect,
-    Sign,
-    Text,
     ToolNumber,
-    Triple,
-    refusal,
 )
-from olp.files.schema_base import Position, Table
 
 
 class AxisTable(Table):
@@ -250,166 +240,6 @@ class MachineFile(Table):
     job_defaults: JobDefaultsTable = Field(
         default_factory=JobDefaultsTable, description="the state at the start of a program"
     )
-
-
-class CurveTable(Table):
-    file: Text = Field(description="the path of a CSV file with columns such as X_mm, EXX_um, EBX_urad")
-    line_mm: Position = Field(
-        default_factory=Position,
-        description="where the other axes stood while measuring, such as { Y = 0.0, Z = 0.0 } in mm; the "
-        "datum if left out",
-    )
-    tool_mm: Triple = Field(
-        default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"
-    )
-    reference: Literal["functional-point", "table"] = Field(
-        default="functional-point",
-        description='"functional-point" (measured at the tip on its line) or "table" (the reflector stayed '
-        "fixed on a moving table)",
-    )
-    interpolation: Literal["linear", "pchip"] = Field(default="pchip", description='"linear" or "pchip"')
-
-
-class SquarenessTable(Table):
-    C0Y_urad: float = Field(default=0.0, description="the squareness of Y to X, in urad")
-    B0Z_urad: float = Field(default=0.0, description="the squareness of Z to X, in urad")
-    A0Z_urad: float = Field(default=0.0, description="the squareness of Z to Y, in urad")
-    sigma_C0Y_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of C0Y, in urad")
-    sigma_B0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of B0Z, in urad")
-    sigma_A0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of A0Z, in urad")
-
-
-class BacklashTable(Table):
-    X_um: float = Field(default=0.0, description="the lost motion of axis X, in um")
-    Y_um: float = Field(default=0.0, description="the lost motion of axis Y, in um")
-    Z_um: float = Field(default=0.0, description="the lost motion of axis Z, in um")
-    sigma_X_um: NotNegative = Field(default=0.0, description="the standard uncertainty of X_um, in um")
-    sigma_Y_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Y_um, in um")
-    sigma_Z_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Z_um, in um")
-
-
-class CovarianceTable(Table):
-    file: Text | None = Field(
-        default=None,
-        description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
-        "this file; the sigma columns and keys if left out",
-    )
-    growth_per_year: NotNegative = Field(
-        default=0.0,
-        description="the share of themselves by which standard uncertainties grow in a year after measured: "
-        "0.5 makes half as much again",
-    )
-    temperature_K: NotNegative = Field(
-        default=0.0,
-        description="the standard uncertainty of the temperatures of scales and workpiece, in K",
-    )
-
-
-class RepeatabilityTable(Table):
-    X_um: NotNegative = Field(default=0.0, description="the standard deviation of axis X, in um")
-    Y_um: NotNegative = Field(default=0.0, description="the standard deviation of axis Y, in um")
-    Z_um: NotNegative = Field(default=0.0, description="the standard deviation of axis Z, in um")
-
-
-class CyclicTable(Table):
-    component: Literal[COMPONENTS] = Field(  # type: ignore[valid-type]
-        description='the ISO 230-1 name of a component error, such as "EXX"'
-    )
-    period_mm: Positive = Field(description="the period along the axis, in mm")
-    amplitude_um: float | None = Field(
-        default=None, description="the amplitude (peak) of a linear error, in um"
-    )
-    amplitude_urad: float | None = Field(
-        default=None, validate_default=True, description="the amplitude (peak) of an angular error, in urad"
-    )
-    phase_rad: float = Field(default=0.0, description="the phase at axis position 0, in rad")
-
-    @field_validator("amplitude_urad")
-    @classmethod
-    def _unit_fits(cls, urad: float | None, info: ValidationInfo) -> float | None:
-        component = info.data.get("component")
-        if component is None or "amplitude_um" not in info.data:
-            return urad
-        um = info.data["amplitude_um"]
-        angular = component[1] in "ABC"
-        if (um if angular else urad) is not None or (urad if angular else um) is None:
-            wanted = "amplitude_urad, in urad" if angular else "amplitude_um, in um"
-            raise refusal(f"does not fit component {component}; expected exactly one amplitude: {wanted}")
-        return urad
-
-
-class ThermalTable(Table):
-    X_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of X, in um/(m K)")
-    Y_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Y, in um/(m K)")
-    Z_scale_um_m_K: float = Field(default=0.0, description="the expansion of the scale of Z, in um/(m K)")
-    workpiece_um_m_K: float = Field(default=0.0, description="the expansion of the workpiece, in um/(m K)")
-    structure: Text | None = Field(
-        default=None,
-        description="the path of an olp-thermal-1 file, which `olp calibrate thermal` writes: how the "
-        "structure "
-        "distorts with the temperatures of sensors",
-    )
-    fixed_at_mm: Triple = Field(
-        default=(0.0, 0.0, 0.0), description="the axis positions where the scales are fixed, [X, Y, Z] in mm"
-    )
-    clamped_at_mm: Triple = Field(
-        default=(0.0, 0.0, 0.0),
-        description="the axis positions where the workpiece is clamped, [X, Y, Z] in mm",
-    )
-
-
-class CalibrationFile(Table):
-    """olp-calibration-1: the measured errors of one machine, actual minus commanded."""
-
-    schema_: Literal["olp-calibration-1"] = Field(
-        alias="schema", description='the format, "olp-calibration-1"'
-    )
-    machine: Text = Field(description="the name in the machine file that this calibration belongs to")
-    measured: datetime.date = Field(description="the date of measuring, such as 2026-05-14, without quotes")
-    valid_until: datetime.date | None = Field(
-        default=None, description="the last date of validity, such as 2027-05-14, without quotes"
-    )
-    temperature_degC: float = Field(description="the temperature of scales while measuring, in degC")
-    sign: Sign = Field(description=f'the sign of all values, "{SIGN}"')
-    model: Literal["rigid-body", "huddersfield"] = Field(description='"rigid-body" or "huddersfield"')
-    datum_mm: Triple = Field(description="the axis positions from which levers count, [X, Y, Z] in mm")
-    box_mm: Annotated[tuple[Interval, Interval, Interval], Field(strict=False)] = Field(
-        description="the calibrated axis positions, [[min, max], [min, max], [min, max]] of X, Y, Z in mm"
-    )
-    active_during_measurement: IsoNames = Field(
-        default=frozenset(),
-        description="the errors that the control corrected while measuring, a list of ISO 230-1 names",
-    )
-    payload_kg: NotNegative = Field(
-        default=0.0, description="the payload on the machine while measuring, in kg; 0 if left out"
-    )
-    curves: list[CurveTable] = Field(default=[], description="tables [[curves]]")
-    squareness: SquarenessTable = Field(default_factory=SquarenessTable, description="the table [squareness]")
-    backlash: BacklashTable = Field(default_factory=BacklashTable, description="the table [backlash]")
-    repeatability: RepeatabilityTable | None = Field(
-        default=None,
-        description="the table [repeatability]: the random part of each axis, which no correction removes",
-    )
-    cyclic: list[CyclicTable] = Field(default=[], description="tables [[cyclic]]")
-    maps: list[MapTable] = Field(default=[], description="tables [[maps]], measured deviations of the tip")
-    compliance: list[ComplianceTable] = Field(
-        default=[], description="tables [[compliance]], errors per kg of payload"
-    )
-    compliance_beam: list[BeamTable] = Field(
-        default=[], description="tables [[compliance_beam]], beams that bend under the payload"
-    )
-    thermal: ThermalTable | None = Field(default=None, description="the table [thermal]")
-    covariance: CovarianceTable | None = Field(
-        default=None, description="the table [covariance]: how well all this is known"
-    )
-
-    @field_validator("valid_until")
-    @classmethod
-    def _not_before_measured(cls, value: datetime.date | None, info: ValidationInfo) -> datetime.date | None:
-        measured = info.data.get("measured")
-        if value is not None and measured is not None and value < measured:
-            raise refusal(f"= {value} is before measured = {measured}; expected a later date")
-        return value
 
 
 class TemperaturesTable(Table):

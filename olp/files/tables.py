@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -16,11 +14,10 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES, shifted
-from olp.files.problems import Problem, config_error, nearest
-from olp.files.write import PathLike, read_bytes
-
-#: A data row: its line in the file and the number in each column.
-Row = tuple[int, list[float]]
+from olp.files.columns import Row, Wanted, names, read_sheet, unknown
+from olp.files.problems import Problem, config_error
+from olp.files.write import PathLike, Reader, read_bytes
+from olp.program.text.rows import LOOSE_CSV
 
 #: A unit of error columns as a power of ten of the base unit.
 _POWER = {"um": -3, "urad": -6, "um/kg": -3, "urad/kg": -6}
@@ -44,66 +41,34 @@ class CurveTable:
     sigma: Mapping[str, Array]
 
 
-def read_curves(path: PathLike) -> CurveTable:
+def read_curves(path: PathLike, read: Reader = read_bytes) -> CurveTable:
     """Read a curve file.
 
     Header `X_mm[, direction], EXX_um, EBX_urad ...[, sigma_EXX_um]`, then one row a position. Lines that
     start with `#` and empty lines are skipped. Raises InputError where the file cannot be read, and
     ConfigError with every problem and its line where the table is wrong.
     """
-    return parse_curves(read_bytes(path), str(path))
+    return parse_curves(read(path), str(path))
 
 
 def parse_curves(data: bytes, file: str) -> CurveTable:
     """As `read_curves`, from the bytes of the file."""
-    _, header, records = headed(data, file, "columns such as X_mm, EXX_um, EYX_um", _header_problems)
-    rows, found = rows_of(header, records)
+    sheet = read_sheet(
+        data,
+        file,
+        unit_columns("holds no header; expected columns such as X_mm, EXX_um, EYX_um", _header_problems),
+    )
     # Order and repetition mean little while rows are missing from it.
-    found = found or _order_problems(header, rows)
+    found = sheet.problems or _order_problems(sheet.header, sheet.rows)
     if found:
         raise config_error(found, file)
-    return _table(header, rows, file)
+    return _table(sheet.header, sheet.rows, file)
 
 
-def decoded(data: bytes, file: str) -> str:
-    """The text of a file. Raises ConfigError with the line of the first byte that is not UTF-8."""
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        sentence = f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
-        raise config_error([(line, sentence)], file) from None
-
-
-def headed(
-    data: bytes,
-    file: str,
-    expected: str,
-    problems_of: Callable[[int, Sequence[str]], list[Problem]],
-) -> tuple[int, list[str], list[tuple[int, list[str]]]]:
-    """The line of the header of a table, its names, and (line, cells) of the rows below it. Raises
-    ConfigError where there is none (`expected` says of what), or with the problems of it."""
-    try:
-        records = _records(decoded(data, file))
-    except csv.Error as error:
-        raise config_error([(None, f"is no table of comma-separated values ({error})")], file) from None
-    if not records:
-        raise config_error([(None, f"holds no header; expected {expected}")], file)
-    line, header = records[0]
-    found = problems_of(line, header)
-    if found:
-        raise config_error(found, file)
-    return line, header, records[1:]
-
-
-def _records(text: str) -> list[tuple[int, list[str]]]:
-    """(line, stripped cells) of each line that holds data."""
-    records = []
-    for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            cells = next(csv.reader(io.StringIO(line), skipinitialspace=True), [])
-            records.append((number, [cell.strip() for cell in cells]))
-    return records
+def unit_columns(nothing: str, header: Callable[[int, Sequence[str]], list[Problem]]) -> Wanted:
+    """A table of numbers whose names end in their unit."""
+    many = "; is a decimal comma in it? write a decimal point"
+    return Wanted(nothing, header, _number, "; expected one value a column", many, LOOSE_CSV)
 
 
 def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
@@ -118,12 +83,7 @@ def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
         if re.fullmatch(r"-?[\d.]+", first):
             found = f"the header is missing, line {line} starts with {first}"
         return [(line, f"{found}; expected X_mm, Y_mm or Z_mm, the position of the axis in mm")]
-    problems: list[Problem] = []
-    for number, name in enumerate(header[1:], 2):
-        if header.index(name) < number - 1:
-            problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
-        elif not (name == "direction" and number == 2) and (wrong := _column_problem(name, first[0])):
-            problems.append((line, f'column {number} is "{name}"; {wrong}'))
+    problems = names(line, header, lambda number, name: _column_problem(number, name, first[0]), 2)
     if not problems and not any(name in _columns_of(first[0]).values() for name in header):
         known = ", ".join(_columns_of(first[0]).values())
         problems.append((line, f"there is no error column; expected one of {known}"))
@@ -139,17 +99,16 @@ def _unit(component: str) -> str:
     return "um" if component[1] in AXES else "urad"
 
 
-def _column_problem(name: str, axis: str) -> str | None:
+def _column_problem(number: int, name: str, axis: str) -> str | None:
     """What is wrong with the name of an error column, or None."""
     known = _columns_of(axis)
-    if name.removeprefix("sigma_") in known.values():
+    if name.removeprefix("sigma_") in known.values() or (name == "direction" and number == 2):
         return None
     if name == "direction":
         return f"expected direction as column 2, right behind {axis}_mm"
     match = _COLUMN.fullmatch(name)
     if match is None:
-        near = nearest(name, known.values())
-        return f"did you mean {near}?" if near else f"expected one of {', '.join(known.values())}"
+        return unknown(name, tuple(known.values()))
     component = match[2].upper()
     if component[2] != axis:
         return f"an error of axis {component[2]}, but column 1 is {axis}_mm; expected E, direction, {axis}"
@@ -159,29 +118,12 @@ def _column_problem(name: str, axis: str) -> str | None:
     return f"expected {match[1] or ''}{wanted}"
 
 
-def rows_of(
-    header: Sequence[str], records: Sequence[tuple[int, list[str]]]
-) -> tuple[list[Row], list[Problem]]:
-    """The numbers of each row, and what is wrong with them."""
-    rows: list[Row] = []
-    problems: list[Problem] = []
-    for line, cells in records:
-        if len(cells) != len(header):
-            hint = "; is a decimal comma in it? write a decimal point" if len(cells) > len(header) else ""
-            sentence = f"{len(cells)} values under {len(header)} columns; expected one value a column{hint}"
-            problems.append((line, sentence))
-            continue
-        numbers = []
-        for name, cell in zip(header, cells, strict=True):
-            number, wrong = _number(name, cell)
-            numbers.append(number)
-            if wrong:
-                problems.append((line, f"{name} {wrong}"))
-        rows.append((line, numbers))
-    return rows, problems
-
-
 def _number(name: str, cell: str) -> tuple[float, str | None]:
+    number, wrong = _stated(name, cell)
+    return number, f"{name} {wrong}" if wrong else None
+
+
+def _stated(name: str, cell: str) -> tuple[float, str | None]:
     unit = "/".join(name.split("_")[-2:]) if name.endswith("_kg") else name.rpartition("_")[2]
     if not cell:
         return 0.0, f"is empty; expected a number in {unit}"

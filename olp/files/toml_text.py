@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from olp.core.errors import ConfigError
 
@@ -145,6 +145,14 @@ def toml_key(name: str) -> str:
 def toml_lines(values: Mapping[str, object]) -> Iterator[str]:
     """`key = value` lines; keys whose value is None are left out."""
     return (f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items() if value is not None)
+
+
+def toml_document(tables: Iterable[tuple[str, Mapping[str, object]]]) -> str:
+    """Header and keys of each table, an empty line before each; the first may have no header: ""."""
+    lines: list[str] = []
+    for header, values in tables:
+        lines += [*(("", header) if header else ()), *toml_lines(values)]
+    return "\n".join(lines) + "\n"
 
 
 def comment(sentence: str) -> Iterator[str]:

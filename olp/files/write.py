@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, UsageError
@@ -13,6 +13,8 @@ from olp.core.errors import InputError, OlpError, UsageError
 PathLike = str | os.PathLike[str]
 #: a whole file, or its parts in order
 Content = bytes | Iterable[bytes]
+#: reads a whole file, as `read_bytes` does; one that remembers opens each file once
+Reader = Callable[[PathLike], bytes]
 
 
 def read_bytes(path: PathLike) -> bytes:

@@ -16,7 +16,11 @@ class Severity(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A code with its title, its usual severity, why it matters, what to do, and a case of it."""
+    """A code with its title, its usual severity, why it matters, what to do, and a case of it.
+
+    `topic` says what it is about; `gate` whether `olp check` looks for it in a program: findings of measured
+    paths, of results, and of measurements of a machine are not for it.
+    """
 
     code: str
     title: str
@@ -24,3 +28,5 @@ class Rule:
     why: str
     remedy: str
     example: str
+    topic: str
+    gate: bool = True

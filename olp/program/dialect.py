@@ -1,16 +1,19 @@
 """What every dialect of programs gives: its names, its marks, its table of statements.
 
-A dialect is a value; what reads its text stands in `olp.program.registry`, by `family`. A reading gives a
-`Program`: immutable bytes, words, nominal moves, and which word holds which coordinate of which move.
+A dialect is a value, `DIALECT` of a file of its own, which has a line in `olp.program.registry`. Its fields
+say all that others have to know of it: nothing outside asks for its name. A reading gives a `Program`:
+immutable bytes, words, nominal moves, and which word holds which coordinate of which move.
 Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) are written by
 `olp.compensation.writing`, which needs nothing of the dialect but what is stated here and in the program.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +48,37 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dialect:
-    """A dialect of programs. `family` says which reader takes it; `path_mode` is how the control passes from
-    move to move where a program does not say; `inch_decimals` are the decimals of inch programs for a least
-    increment of 0.001 mm, `free_digits` those that centres of arcs may have beyond those of positions.
-    `marks`: a corrected program says so in a comment.
-    `comment` are the marks around a comment, and `first` the beginnings of lines, in capitals, that have to
-    stay in front of any other, in their order (`|` between such as stand for each other)."""
+    """A dialect of programs.
+
+    `reader` reads a text: called with data, setup, this dialect, options, and `words` by keyword, it returns
+    a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out: called with
+    data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes; None where the
+    dialect has none.
+
+    `path_mode` is how the control passes from move to move where a program does not say; `inch_decimals` are
+    the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
+    may have beyond those of positions. `marks`: a corrected program says so in a comment. `comment` are the
+    marks around a comment, and `first` the beginnings of lines, in capitals, that have to stay in front of
+    any other, in their order (`|` between such as stand for each other).
+
+    `endings` are endings of files, in small letters, that only this dialect has; `sign` matches what only its
+    texts say at the start of a line, `shared_sign` what they say and those of other dialects too. With
+    `payload_comments` the payload may change inside a program. `path_tolerance`: programs state how far the
+    control may leave the path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions
+    count at the end of the ram, whatever stylus or tool is active.
+    """
 
     name: str
     title: str
-    family: str
     path_mode: str
+    reader: Callable[..., Any]
+    unroller: Callable[..., bytes] | None = None
+    endings: tuple[str, ...] = ()
+    sign: re.Pattern[bytes] | None = None
+    shared_sign: re.Pattern[bytes] | None = None
+    payload_comments: bool = False
+    path_tolerance: bool = False
+    axes_at_ram: bool = False
     inch_decimals: int = 5
     free_digits: int = 1
     comment: tuple[bytes, bytes] = (b"(", b")")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from olp.core.arrays import Index
 from olp.core.toolpath import Toolpath
 from olp.program.dialect import Dialect
-from olp.program.rs274.profiles import Profile
+from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
 
 Small = npt.NDArray[np.int32]

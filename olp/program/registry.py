@@ -1,68 +1,49 @@
-"""All dialects, which of them a text is written in, and the one way to read any of them.
+"""All dialects by name, which of them a text is written in, and the one way to read any of them.
 
-A new dialect is a value in `DIALECTS` and a reader in `READERS`; how it may be told from others by its text
-stands in `_SIGNS`, by its file's ending in `_ENDINGS`.
+A new dialect is a file with its value, `DIALECT`, and a line in `_MODULES` here; one that a file describes is
+that file and its name in `DESCRIBED`. Only this module looks names up.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from importlib import import_module
+from types import MappingProxyType
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
-from olp.program.apt import reader as apt
-from olp.program.apt.table import APT
-from olp.program.described.reader import read_described
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
-from olp.program.dmis import reader as dmis
-from olp.program.dmis.table import DMIS
-from olp.program.pointlist.reader import POINT_LIST, read_list
 from olp.program.program import Program
-from olp.program.rs274 import reader
-from olp.program.rs274.profiles import PROFILES, Profile
 
-Reader = Callable[..., Program]
+_MODULES = (
+    "olp.program.rs274.profiles.linuxcnc",
+    "olp.program.rs274.profiles.fanuc",
+    "olp.program.rs274.profiles.grbl",
+    "olp.program.rs274.profiles.haas",
+    "olp.program.apt.dialect",
+    "olp.program.dmis.dialect",
+    "olp.program.pointlist.dialect",
+)
+#: Files of `olp/program/described/shipped` that describe a dialect, without their ending.
+DESCRIBED = ("kawasaki-as", "val2", "karel")
 
 
-def _rs274(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
-    assert isinstance(dialect, Profile)
-    return reader.read(data, setup, dialect, options, words=words)
+def _registered() -> dict[str, Dialect]:
+    found: dict[str, Dialect] = {}
+    for module in _MODULES:
+        dialect: Dialect = import_module(module).DIALECT
+        if dialect.name in found:
+            raise ValueError(f"two dialects have the name {dialect.name}")
+        found[dialect.name] = dialect
+    return found
 
 
-READERS: Mapping[str, Reader] = {
-    "rs274": _rs274,
-    "apt": apt.read,
-    "dmis": dmis.read,
-    "list": read_list,
-    "described": read_described,
-}
-DIALECTS: Mapping[str, Dialect] = {**PROFILES, APT.name: APT, DMIS.name: DMIS, POINT_LIST.name: POINT_LIST}
+_BY_NAME = _registered()
+#: All registered dialects in the order of their lines.
+DIALECTS: Mapping[str, Dialect] = MappingProxyType(_BY_NAME)
 
-#: Endings of files that only one family has. The ending of a version (`.ncl.3`) does not count.
-_ENDINGS: Mapping[str, str] = {
-    **dict.fromkeys(("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"), "apt"),
-    **dict.fromkeys(("dmi", "dms", "dmis"), "dmis"),
-    **dict.fromkeys(("csv", "tsv"), "list"),
-}
-#: What only texts of a family say at the start of a line.
-_SIGNS: Mapping[str, re.Pattern[bytes]] = {
-    "apt": re.compile(
-        rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
-        rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
-        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/|UNITS?[ \t]*/[ \t]*(?:MM|INCH(?:ES)?)[ \t]*\r?$|"
-        rb"GOTO[ \t]*/[-+.\dED \t]+(?:,[-+.\dED \t]+){5})"
-    ),
-    "dmis": re.compile(
-        rb"(?im)^[ \t]*(DMISMN|FILNAM|SNSLCT|SNSET|PTMEAS|MEAS[ \t]*/|ENDMES|ENDFIL|WKPLAN|TECOMP|"
-        rb"UNITS[ \t]*/[ \t]*\w+[ \t]*,|GOTO[ \t]*/[ \t]*CART|"
-        rb"MODE[ \t]*/[ \t]*(?:MAN|PROG|AUTO)|F\([^)]*\)[ \t]*=[ \t]*FEAT|"
-        rb"FEDRAT[ \t]*/[ \t]*\w+VEL)"
-    ),
-}
-#: What only texts of statements say, without saying of which family.
-_STATEMENTS = re.compile(rb"(?im)^[ \t]*(GOTO|RAPID|FROM)[ \t]*/")
 _VERSION = re.compile(r"\.\d+$")
 _LOOKED_AT = 1 << 16
 _PAYLOAD = re.compile(rb"(?im)^[^\r\n]*\bolp[ \t]+payload\b")
@@ -76,9 +57,10 @@ def read(
 
     Without `words` the columns that only writing needs are left out.
     """
-    if dialect.family != "rs274":
+    if not dialect.payload_comments:
         _refuse_payloads(data, setup, dialect)
-    return READERS[dialect.family](data, setup, dialect, options or Options(), words=words)
+    program: Program = dialect.reader(data, setup, dialect, options or Options(), words=words)
+    return program
 
 
 def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
@@ -95,17 +77,27 @@ def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
         )
 
 
+def find(name: str) -> Dialect | None:
+    """The registered dialect of this name, None where there is none."""
+    return DIALECTS.get(name)
+
+
+def named(name: str) -> Dialect:
+    """The registered dialect of this name. Raises UsageError where there is none."""
+    dialect = find(name)
+    if dialect is None:
+        raise UsageError(f"there is no dialect {name!r}; expected one of {', '.join(DIALECTS)}")
+    return dialect
+
+
 def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Dialect:
     """The dialect of a program: the one that is named, else what its text and the ending of its file say,
     else that of the control. Raises UsageError for a name that there is not, ProgramError where text and
     ending contradict each other or tell too little."""
     if name is not None:
-        found = DIALECTS.get(name)
-        if found is None:
-            raise UsageError(f"there is no dialect {name!r}; expected one of {', '.join(DIALECTS)}")
-        return found
+        return named(name)
     said = _by_text(data)
-    ending = _ENDINGS.get(_ending(file))
+    ending = _by_ending(file)
     if len(said) > 1 and ending in said:
         return DIALECTS[ending]
     if len(said) > 1 and control.name in said:
@@ -126,15 +118,17 @@ def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Di
     return DIALECTS[ending] if ending is not None else control
 
 
-def _ending(file: str) -> str:
-    return _VERSION.sub("", file).rpartition(".")[2].lower()
+def _by_ending(file: str) -> str | None:
+    """The dialect that alone has the ending of a file. The ending of a version (`.ncl.3`) does not count."""
+    ending = _VERSION.sub("", file).rpartition(".")[2].lower()
+    return next((name for name, dialect in DIALECTS.items() if ending in dialect.endings), None)
 
 
 def _by_text(data: bytes) -> set[str]:
     """The dialects of statements that a text may be written in; none where it holds no statements."""
     start = data[:_LOOKED_AT]
-    counts = {name: len(sign.findall(start)) for name, sign in _SIGNS.items()}
+    counts = {name: len(d.sign.findall(start)) for name, d in DIALECTS.items() if d.sign is not None}
     most = max(counts.values(), default=0)
     if most:
         return {name for name, count in counts.items() if count == most}
-    return set(_SIGNS) if _STATEMENTS.search(start) else set()
+    return {name for name, d in DIALECTS.items() if d.shared_sign is not None and d.shared_sign.search(start)}

@@ -17,7 +17,7 @@ from olp.errormodel.reversal import plays
 _RADIUS_MM, _SHARE = 150.0, 0.4
 _PLACES = 720
 _TARGETS = 21
-#: steps between targets of a diagonal, so that lost motion is taken up as it would be
+#: steps between targets of a diagonal, so that backlash is taken up as it would be
 _STEPS = 20
 _PLANES = {"XY": (0, 1), "YZ": (1, 2), "ZX": (2, 0)}
 
@@ -39,7 +39,7 @@ def _runs(model: ErrorModel, target: Array, tool: Array, digit: float) -> dict[s
     """Where the tip goes on targets (n, 3), commanded as they are and corrected."""
     command = target
     for _ in range(2):
-        # the flank depends on the corrected commands, and they on the flank
+        # the side of the backlash depends on the corrected commands, and they on it
         command = invert(model, target, tool, plays(model, command))
     command = np.round(command / digit) * digit
     return {
@@ -56,7 +56,7 @@ def _circle(model: ErrorModel, tool: Array, digit: float, plane: str) -> dict[st
     centre = box.mean(axis=1)
     side = float(np.diff(box, axis=1)[[first, second]].min())
     radius = min(_RADIUS_MM, round(_SHARE * side))
-    # a lap and a quarter: the first quarter takes up what is not known of lost motion
+    # a lap and a quarter: the first quarter takes up what is not known of the play
     angle = 2.0 * np.pi * np.arange(_PLACES * 5 // 4) / _PLACES
     out: dict[str, Any] = {"plane": plane, "radius_mm": radius, "centre_mm": centre.tolist()}
     radial: dict[str, list[Array]] = {"before": [], "after": []}

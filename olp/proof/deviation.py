@@ -1,4 +1,4 @@
-"""How far the tip is from the nominal path: at the way-points and between them.
+"""How far the tip is from the nominal path: at the waypoints and between them.
 
 The actual path of a program is its commands plus the error model, sampled so finely that the model cannot
 hide anything between two samples. It is held against the nominal path move by move: `groups` tells
@@ -33,7 +33,7 @@ _ARC_STEPS = 8
 class Deviation:
     """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way and at its end, `bend`
     the part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
-    `flank` (n,): how far the tip may be off because the flank of an axis with lost motion is not known
+    `flank` (n,): how far the tip may be off because the side of the backlash of an axis is not known
     yet."""
 
     waypoint: Single
@@ -43,7 +43,7 @@ class Deviation:
     flank: Array
 
     def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
-        """Largest and rms in um, at way-points of all judged moves and along those that are `cutting`."""
+        """Largest and rms in um, at waypoints of all judged moves and along those that are `cutting`."""
         at = self.waypoint[self.judged & np.isfinite(self.waypoint)]
         along = self.path[self.judged & cutting & np.isfinite(self.path)]
         return {"waypoints": _figures(at), "between": _figures(along)}
@@ -75,7 +75,7 @@ def measure(
 ) -> Deviation:
     """Hold the actual path of `path` against the nominal one.
 
-    `target_mm` (n, 3) are the nominal way-points where the part really lies; `groups` (n,) is the index of
+    `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
     the last move of `path` that belongs to each nominal move. `exempt` moves pass uncorrected and are not
     judged.
     """
@@ -97,7 +97,7 @@ def measure(
 
 def _unknown_flank(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is
-    more. It shrinks as an axis moves to and fro, and is gone once that range is the lost motion."""
+    more. It shrinks as an axis moves in both directions, and is gone once that range is the backlash."""
     width = model.lost_motion_mm(path.end_mm) if len(groups) else None
     if width is None:
         return np.zeros(len(groups))

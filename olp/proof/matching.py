@@ -11,14 +11,14 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.program.program import Program
 
-#: a way-point counts as reached within this where nothing comes nearer; corrections are far smaller
+#: a waypoint counts as reached within this where nothing comes nearer; corrections are far smaller
 GATE_MM = 0.05
 _BLOCK = 4096
 _ARCS = (Kind.ARC_CW, Kind.ARC_CCW)
 
 
 def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel, near_mm: float) -> Index:
-    """(n,) index of the last move of `corrected` for each move of `program`, whose way-points are
+    """(n,) index of the last move of `corrected` for each move of `program`, whose waypoints are
     `target_mm`.
 
     Way-points are looked for in order: the next move that comes within `near_mm`, else the nearest of those
@@ -37,7 +37,7 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
     actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
     loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)
-    # what takes up lost motion before a whole circle is where that ends, and is no part of an arc
+    # what takes up backlash before a whole circle is where that ends, and is no part of an arc
     curved = np.isin(nominal.kind, _ARCS)
     straight = ~np.isin(path.kind, _ARCS)
     groups = np.zeros(count, np.int64)

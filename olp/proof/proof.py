@@ -1,5 +1,5 @@
 """Proof by reading back: the written bytes are parsed again, run through the forward model and held against
-the nominal path, at and between the way-points."""
+the nominal path, at and between the waypoints."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""What a run found, for people and programs: text, JSON, SARIF, documents, plots. No verdict is made here."""

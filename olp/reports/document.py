@@ -9,6 +9,7 @@ import html
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from olp.reports.report import printable
 
@@ -145,6 +146,11 @@ def to_html(document: Document) -> bytes:
         parts += [_html(block, after) for block, after in zip(section.blocks, following, strict=True)]
     parts.append(f"<footer>{_text(document.footer)}</footer></body></html>")
     return ("\n".join(parts) + "\n").encode()
+
+
+def in_form(document: Document, name: str) -> bytes:
+    """As HTML or as Markdown, by the ending of the file's name."""
+    return to_html(document) if Path(name).suffix.lower() == ".html" else to_markdown(document)
 
 
 def to_markdown(document: Document) -> bytes:

@@ -13,6 +13,7 @@ from typing import NoReturn, TypeVar
 import numpy as np
 
 from olp.core.errors import InputError
+from olp.program.dmis.dialect import DIALECT as DMIS
 from olp.program.dmis.events import MACHINE_FRAME
 from olp.program.text.numbers import Number, number
 from olp.program.text.statements import Comment, Statement, chunks
@@ -216,7 +217,8 @@ def read_dmis(data: bytes) -> Reported:
     unit = np.array(reader.units)
     return Reported(
         data=data,
-        dialect="dmis",
+        dialect=DMIS.name,
+        axes_at_ram=DMIS.axes_at_ram,
         line=np.array(reader.lines, np.int64),
         start=span[:, :, 0],
         end=span[:, :, 1],

@@ -35,8 +35,8 @@ class Reported:
     `start`, `end` (n, 3) are the places of the numbers in `data`, `form` the numbers as written, `unit_mm`
     (n,) mm per unit. `tool` (n,) indexes `tools`, labels or numbers of styli (None: the one of the job),
     `stylus_mm` (n, 3) gauge point to tip where a row states it. `approach_mm` (n,) is the way before a touch,
-    NaN where not known. `comment` are the marks of a comment, None where the form has none. `assumed` says in
-    words what was told from the file.
+    NaN where not known. `axes_at_ram`: axis positions count at the end of the ram. `comment` are the marks of
+    a comment, None where the form has none. `assumed` says in words what was told from the file.
     """
 
     data: bytes
@@ -58,6 +58,7 @@ class Reported:
     decimal: bytes = b"."
     comment: tuple[bytes, bytes] | None = (b"# ", b"")
     point: str | None = None
+    axes_at_ram: bool = False
     tip_radius_mm: float | None = None
     carried: tuple[Carried, ...] = ()
     stated: tuple[Stated, ...] = ()

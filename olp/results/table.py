@@ -7,8 +7,9 @@ import re
 import numpy as np
 
 from olp.core.errors import InputError
-from olp.program.text.delimited import AXES, Cells, Layout, Span, first_lines, stated_frame
-from olp.program.text.numbers import Number, number
+from olp.program.text.delimited import AXES, Layout, first_lines, stated_frame
+from olp.program.text.numbers import Number
+from olp.program.text.rows import Cells, Span
 from olp.results.reported import Reported, Stated
 
 _DIRECTION = ("I", "J", "K")
@@ -26,7 +27,6 @@ _YES = re.compile(r"\b(on|yes|true|active|enabled|applied|1)\b", re.IGNORECASE)
 def read_table(data: bytes, layout: Layout) -> Reported:
     """The points of a table. Raises InputError with the line of what is wrong."""
     cells = Cells(data, layout)
-    decimal = b"," if layout.decimal == "comma" else b"."
     unit = layout.unit_mm
     places = [cells.place(axis) for axis in AXES]
     if None in places:
@@ -47,26 +47,17 @@ def read_table(data: bytes, layout: Layout) -> Reported:
         found: list[Number] = []
         for place in wanted:
             assert place is not None
-            if place >= len(row):
-                problems.append(
-                    (line, f"{len(row)} columns; expected at least {place + 1} between {layout.delimiter}s")
-                )
-                break
-            told = number(data[slice(*row[place])], decimal)
-            if told is None:
-                what = cells.text(row[place])[:40]
-                problems.append((
-                    line,
-                    f'column {place + 1} is "{what}"; expected a number with a decimal {layout.decimal}',
-                ))  # fmt: skip
+            told = cells.number(row, place)
+            if isinstance(told, str):
+                problems.append((line, told))
                 break
             found.append(told)
         else:
             lines.append(line)
             spans.append([row[p] for p in places if p is not None])
             forms.append(tuple(found))
-            names.append(_cell(cells, row, others["name"]))
-            tools.append(_tool(_cell(cells, row, others["tool"])))
+            names.append(cells.word(row, others["name"]))
+            tools.append(_tool(cells.word(row, others["tool"])))
         if len(problems) >= _MOST_PROBLEMS:
             break
     if problems:
@@ -99,17 +90,13 @@ def read_table(data: bytes, layout: Layout) -> Reported:
         stylus_mm=value[:, -3:] * unit if has_stylus else nothing,
         approach_mm=np.full(count, np.nan if layout.approach_mm is None else layout.approach_mm),
         names=tuple(names),
-        decimal=decimal,
+        decimal=cells.decimal,
         comment=(layout.comment.encode() + b" ", b"") if layout.stamp else None,
         point=layout.point,
         tip_radius_mm=layout.tip_radius_mm,
         stated=tuple(_stated(data, layout)),
         assumed=layout.assumed,
     )
-
-
-def _cell(cells: Cells, row: list[Span], place: int | None) -> str:
-    return cells.text(row[place]) if place is not None and place < len(row) else ""
 
 
 def _tool(text: str) -> str | int | None:

@@ -18,7 +18,8 @@ from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import MM_PER_UM
 from olp.files.points import read_points
-from olp.files.write import read_bytes, write_bytes
+from olp.files.sources import Source, Sources
+from olp.files.write import write_bytes
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.matching import match as match_moves
@@ -32,14 +33,29 @@ from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene, Sureness
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
-from olp.workflows import api
-from olp.workflows.correct import last_digit_mm, verify_programs
-from olp.workflows.retime import retime
-from olp.workflows.session import Loaded, PathLike, load, source_of, unrolled
-from olp.workflows.uncertainty import unknowns_of
+from olp.workflows import retime
+from olp.workflows.confidence import unknowns_of
+from olp.workflows.correct import Correction, CorrectOptions
+from olp.workflows.correct import corrected as correct_program
+from olp.workflows.flatten import unrolled
+from olp.workflows.proof import ProofOptions, last_digit_mm, verify_programs
+from olp.workflows.retime import RetimeOptions, Retiming
+from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 #: shorter stays at a sample are none
 _REST_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewOptions(ProofOptions):
+    """What `view` takes beside its files; see there."""
+
+    outside_box: Outside = "refuse"
+    flatten: bool = False
+    expand_cycles: bool = False
+    peck_clearance_mm: float | None = None
+    time: bool = True
+    step_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +90,7 @@ def view(
     *,
     corrected: PathLike | bytes | None = None,
     measured: Sequence[PathLike] = (),
-    correction: api.Correction | None = None,
+    correction: Correction | None = None,
     corrected_name: str = "",
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "refuse",
@@ -99,59 +115,144 @@ def view(
     `only_sure_components` and `date` are those of `correct`. Raises InputError (ProgramError with its line,
     ConfigError) and CannotCompute.
     """
+    session, source = opened(program, machine, job)
+    options = ViewOptions(
+        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+        expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, within_um=within_um,
+        only_sure_components=only_sure_components, date=date, time=time, step_mm=step_mm,
+    )  # fmt: skip
+    second = None if corrected is None else session.sources.source(corrected)
+    return run(
+        session, source, options, corrected=second, correction=correction, corrected_name=corrected_name,
+        measured=measured, progress=progress,
+    )  # fmt: skip
+
+
+def run(
+    session: Session,
+    program: Source,
+    options: ViewOptions,
+    *,
+    corrected: Source | None = None,
+    correction: Correction | None = None,
+    corrected_name: str = "",
+    measured: Sequence[PathLike] = (),
+    progress: Progress | None = None,
+) -> Review:
+    """As `view`, in a session."""
     tell = progress or silent
-    data, name = source_of(program)
-    outside = "hold" if corrected is not None else outside_box
-    with naming(name):
-        loaded = load(machine, job, outside, only_sure=only_sure_components).reading(data, name)
-    setup, options = loaded.setup, Options(contour=contour)
-    if flatten or expand_cycles:
-        with naming(name):
-            data = unrolled(data, name, setup, loaded.dialect, expand_cycles, peck_clearance_mm)
+    outside = "hold" if corrected is not None else options.outside_box
+    program.load()
+    with program.errors():
+        loaded = session.loaded(outside, only_sure=options.only_sure_components).reading(program)
+        data = _unrolled(session, program, loaded, options)
     if corrected is not None:
-        other, corrected_name = source_of(corrected)
+        corrected.load()
+        other, corrected_name = corrected.data, corrected.name
     else:
         if correction is None:
-            with naming(name):
-                correction = api.correct(
-                    data, setup, tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
-                    progress=progress, within_um=within_um, only_sure_components=only_sure_components,
-                    date=date,
-                )  # fmt: skip
+            with program.errors():
+                correction = _corrected(session, data, loaded, options, tell)
         other = correction.data
     tell("read", 0.0)
-    with naming(name):
-        nominal = read(data, setup, loaded.dialect, options)
+    reading = Options(contour=options.contour)
+    with program.errors():
+        nominal = read(data, loaded.setup, loaded.dialect, reading)
+    name = program.name
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
-        second = read(other, setup, loaded.dialect, options)
+        second = read(other, loaded.setup, loaded.dialect, reading)
         if correction is not None:
             report = correction.report
         else:
-            report = verify_programs(
-                (nominal, name), (second, corrected_name), loaded, tolerance_um=tolerance_um,
-                contour=contour, date=date, within_um=within_um,
-            ).report  # fmt: skip
-        groups = _groups(nominal, second, loaded, tolerance_um)
-        tell("sample", 0.0)
-        samples = sample(nominal, second, groups, loaded.model, step_mm)
-        plan = retime(other, setup, contour=contour, progress=progress) if time else None
+            report = verify_programs((nominal, name), (second, corrected_name), loaded, options).report
+        texts = _Texts(program, data, corrected_name, other, nominal, second, report)
+        shown = _shown(session, texts, loaded, options, progress)
     tell("pack", 0.0)
+    return Review(_scene(session, texts, shown, loaded, options, measured))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Texts:
+    """The nominal program as it is shown, unrolled where that was asked for, and the corrected one, as bytes
+    and as read; `report` is that of the correction or of its verification."""
+
+    source: Source
+    data: bytes
+    corrected_name: str
+    corrected: bytes
+    nominal: Program
+    second: Program
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """The nominal moves of the corrected ones, points along both paths, and the motion where it is
+    planned."""
+
+    groups: Index
+    samples: Samples
+    plan: Retiming | None
+
+
+def _unrolled(session: Session, program: Source, loaded: Loaded, options: ViewOptions) -> bytes:
+    if not (options.flatten or options.expand_cycles):
+        return program.data
+    return unrolled(
+        session.sources, program, loaded.setup, loaded.dialect, expand_cycles=options.expand_cycles,
+        peck_clearance_mm=options.peck_clearance_mm,
+    )  # fmt: skip
+
+
+def _corrected(
+    session: Session, data: bytes, loaded: Loaded, options: ViewOptions, tell: Progress
+) -> Correction:
+    correcting = CorrectOptions(**options.proof(), outside_box=options.outside_box)
+    done = correct_program(session.sources, session.sources.source(data), loaded, correcting, tell)
+    return Correction(done.text, done.report, done.findings, done.confidence)
+
+
+def _shown(
+    session: Session, texts: _Texts, loaded: Loaded, options: ViewOptions, progress: Progress | None
+) -> _Shown:
+    groups = _groups(texts.nominal, texts.second, loaded, options.tolerance_um)
+    (progress or silent)("sample", 0.0)
+    samples = sample(texts.nominal, texts.second, groups, loaded.model, options.step_mm)
+    plan = None
+    if options.time:
+        other = session.sources.source(texts.corrected)
+        timing = RetimeOptions(contour=options.contour)
+        plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
+    return _Shown(groups, samples, plan)
+
+
+def _scene(
+    session: Session, texts: _Texts, shown: _Shown, loaded: Loaded, options: ViewOptions,
+    measured: Sequence[PathLike],
+) -> Scene:  # fmt: skip
+    setup, nominal, plan, samples = loaded.setup, texts.nominal, shown.plan, shown.samples
     if plan is None:
         moment = by_feed(nominal, samples, setup.machine)
     else:
-        samples, moment = _resting(samples, *retimed(second.toolpath, samples, plan.trajectories))
+        samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
     frame = Frame.of(nominal.toolpath)
     position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
-    seen: tuple[Matched, ...] = ()
+    report = texts.report
+    seen: list[Matched] = []
+    digests: list[str] = []
     if measured:
         matcher = Matcher(nominal.toolpath, samples, loaded.model, setup, np.array(frame.origin_mm))
-        seen = tuple(matcher.match(read_points(path)) for path in measured)
+        for path in measured:
+            points = read_points(path, read=session.sources.read_last)
+            seen.append(matcher.match(points))
+            digests.append(points.sha256)
         more = [finding.as_dict() for found in seen for finding in found.findings]
         report = report | {"findings": [*report["findings"], *more]}
-    scene = Scene(
-        name=Path(name).name or "program",
-        corrected_name=Path(corrected_name).name,
-        digest=_digest(data, other, loaded, (*measured, *(mesh.file for mesh in setup.job.meshes))),
+    bodies = tuple(_bodies(session, setup, nominal, samples, frame, position))
+    return Scene(
+        name=texts.source.short or "program",
+        corrected_name=Path(texts.corrected_name).name,
+        digest=_digest(texts, loaded, digests, session.sources),
         machine=setup.machine,
         nominal=nominal,
         frame=frame,
@@ -161,21 +262,22 @@ def view(
         motion=None if plan is None else table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
-        listing=aligned(nominal, second, groups),
-        bodies=tuple(_bodies(setup, nominal, samples, frame, position)),
-        measured=seen,
+        listing=aligned(nominal, texts.second, shown.groups),
+        bodies=bodies,
+        measured=tuple(seen),
         report=report,
-        tolerance_um=tolerance_um,
+        tolerance_um=options.tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
-        sureness=_sureness(loaded, nominal, samples, within_um or tolerance_um, date),
+        sureness=_sureness(
+            loaded, nominal, samples, options.within_um or options.tolerance_um, options.date
+        ),
     )
-    return Review(scene)
 
 
 def _sureness(
     loaded: Loaded, nominal: Program, samples: Samples, within_um: float, date: datetime.date | None
 ) -> Sureness | None:
-    """Of samples, as `olp.workflows.uncertainty` of way-points."""
+    """Of samples, as `olp.workflows.confidence` of way-points."""
     if loaded.uncertainty is None:
         return None
     unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)
@@ -199,11 +301,14 @@ def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples,
     return twice, np.where(again, leaving[order], arrival[order])
 
 
-def _digest(data: bytes, other: bytes, loaded: Loaded, files: Sequence[PathLike]) -> str:
-    """12 digits that change with whatever the page is made of."""
-    found = hashlib.sha256(b"\0".join((data, other, loaded.digest.encode(), repr(loaded.setup).encode())))
-    for path in files:
-        found.update(hashlib.sha256(read_bytes(path)).digest())
+def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sources) -> str:
+    """12 digits that change with whatever the page is made of; `measured` are the digests of those files."""
+    parts = (texts.data, texts.corrected, loaded.digest.encode(), repr(loaded.setup).encode())
+    found = hashlib.sha256(b"\0".join(parts))
+    for digest in measured:
+        found.update(bytes.fromhex(digest))
+    for mesh in loaded.setup.job.meshes:
+        found.update(sources.digest(mesh.file))
     return found.hexdigest()[:12]
 
 
@@ -215,9 +320,9 @@ def _groups(nominal: Program, second: Program, loaded: Loaded, tolerance_um: flo
 
 
 def _bodies(
-    setup: Setup, nominal: Program, samples: Samples, frame: Frame, position: Array
+    session: Session, setup: Setup, nominal: Program, samples: Samples, frame: Frame, position: Array
 ) -> Iterator[Body]:
-    yield from of_job(setup, np.array(frame.origin_mm))
+    yield from of_job(setup, np.array(frame.origin_mm), session.sources.read)
     first = nominal.toolpath.frames[int(nominal.toolpath.frame[samples.move[0]])]
     tip = position[0]
     gauge = tip - np.array(first.tool_mm)

@@ -19,6 +19,7 @@ from olp.core.geometry import rotation_matrix
 from olp.core.machine import Machine, Mesh, Setup
 from olp.core.units import AXES
 from olp.files.meshes import read_mesh
+from olp.files.write import Reader
 
 #: more faces than this are drawn coarser
 MOST_FACES = 150_000
@@ -50,17 +51,17 @@ class Body:
         return _OPACITY[self.role]
 
 
-def of_job(setup: Setup, origin_mm: Array) -> list[Body]:
+def of_job(setup: Setup, origin_mm: Array, read: Reader) -> list[Body]:
     """The meshes of the job, placed by their frames; `origin_mm` is what the frame shown counts from on the
-    machine.
+    machine, `read` opens their files.
 
     Raises InputError for a file that is no mesh.
     """
-    return [_placed(mesh, k, setup, origin_mm) for k, mesh in enumerate(setup.job.meshes, 1)]
+    return [_placed(mesh, k, setup, origin_mm, read) for k, mesh in enumerate(setup.job.meshes, 1)]
 
 
-def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array) -> Body:
-    vertices, faces = coarser(*read_mesh(mesh.file))
+def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array, read: Reader) -> Body:
+    vertices, faces = coarser(*read_mesh(mesh.file, read))
     vertices = vertices * mesh.unit_mm
     offset = None if mesh.frame == "machine" else setup.work_offset(mesh.frame)
     if offset is not None:

@@ -194,13 +194,6 @@ def _too_fast_of(x: Array, top: Array, found: Profile, spans: Index, everywhere:
     return worst
 
 
-def critical(path: SmoothPath, limits: AxisLimits) -> Motion:
-    """The motion along `path` from rest to rest; no axis limit and no feed is exceeded."""
-    if not len(path):
-        return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), np.zeros(0, np.int64), path.line)
-    return driven(path, best_profile(path, limits))
-
-
 def best_profile(path: SmoothPath, limits: AxisLimits) -> Profile:
     """The fastest profile found along a path of one piece and more."""
     share = _shares(path)

@@ -33,6 +33,8 @@ _NEAR, _LEAVE, _BACK, _TRIES = 0.98, 0.03, 0.7, 30
 _FIRST, _LEAST = 0.1, 1e-9
 _FALL = ((0.8, 0.1), (0.5, 0.35), (0.2, 0.7), (-1.0, 1.0))
 _DONE, _GAP = 1e-4, 3e-2
+#: steps of Newton at the most
+_STEPS = 80
 _RIDGES = (1e-13, 1e-9, 1e-6, 1e-3)
 
 
@@ -179,7 +181,7 @@ def fits(rows: Rows, spline: Spline, beta: Array) -> bool:
     return bool((beta[2:-2] > 0.0).all() and _State(rows, *rows.spread(spline.cells(beta))).inside())
 
 
-def least_time(rows: Rows, spline: Spline, beta: Array, most: int = 80) -> Array:
+def least_time(rows: Rows, spline: Spline, beta: Array) -> Array:
     """The coefficients of least time, from ones strictly inside every bound; the first and last two stay.
 
     Raises LinAlgError where Newton's matrix cannot be factored.
@@ -191,7 +193,7 @@ def least_time(rows: Rows, spline: Spline, beta: Array, most: int = 80) -> Array
     mu = _FIRST * whole / count
     dual = _Dual(here, beta, mu)
     calm = 0
-    for _ in range(most):
+    for _ in range(_STEPS):
         gradient, band = _newton(rows, spline, here, dual, beta, mu)
         step = np.zeros_like(beta)
         step[2:-2] = _solved(band, gradient)

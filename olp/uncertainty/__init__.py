@@ -1,0 +1,1 @@
+"""Uncertainty of a corrected path: bands, probabilities and advice from that of the calibration."""

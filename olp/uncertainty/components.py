@@ -14,8 +14,9 @@ import numpy as np
 
 from olp.core.arrays import Array
 from olp.errormodel.calibration import Calibration
+from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import value_rows
-from olp.errormodel.uncertainty import Entry, Uncertainty
+from olp.errormodel.uncertainty import Uncertainty
 from olp.uncertainty.probability import normal
 from olp.uncertainty.spread import SURE
 

@@ -1,0 +1,1 @@
+"""The session, and one file a verb: files in, result out."""

@@ -20,8 +20,9 @@ from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.checkpoints import load_checkpoints
+from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
-from olp.workflows.session import PathLike, setup_of
+from olp.workflows.session import PathLike, Session
 
 #: Rows of points that are named in a finding.
 _LISTED = 10
@@ -74,8 +75,12 @@ def diagnose_calibration(
     in the machine's frame with `frame_known`. `sigma_um` and `tool_mm` fill in what the file does not say.
     Raises InputError, ConfigError and CannotCompute.
     """
-    described = setup_of(machine, None).machine
-    stated = calibration if isinstance(calibration, Calibration) else load_calibration(calibration, described)
+    session = Session.start(machine)
+    described = session.setup.machine
+    if isinstance(calibration, Calibration):
+        stated = calibration
+    else:
+        stated = load_calibration(calibration, described, read=session.sources.read)
     if isinstance(points, Points):
         taken, known = points, frame_known
     else:
@@ -88,15 +93,17 @@ def diagnose_calibration(
     advice = advise(found, tools) if found.undecided else None
     left, words = None, "none is stated"
     if not isinstance(calibration, Calibration):
-        left, words = _carried(found, calibration, stated)
+        left, words = _carried(found, calibration, stated, session.sources)
     report = _report(found, advice) | {"uncertainty": words}
     return CalibrationDiagnosis(found, advice, report, tuple(_findings(found, advice)), left)
 
 
-def _carried(found: Diagnosis, path: PathLike, stated: Calibration) -> tuple[Uncertainty | None, str]:
+def _carried(
+    found: Diagnosis, path: PathLike, stated: Calibration, sources: Sources
+) -> tuple[Uncertainty | None, str]:
     """The uncertainty of the corrected calibration, and words on what becomes of the stated one."""
     try:
-        old = load_uncertainty(path, stated)
+        old = load_uncertainty(path, stated, sources.read)
     except ConfigError:
         # curves that were edited by hand have a covariance of others; their signs can be judged all the same
         return None, "not carried over: the covariance is that of another calibration"

@@ -25,7 +25,7 @@ from olp.errormodel.calibration import Calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.reader import load_measurements
 from olp.findings.catalogue import Finding
-from olp.workflows.session import PathLike, setup_of
+from olp.workflows.session import PathLike, Session
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,7 @@ def fit_calibration(
     asks for a map of what no rigid bodies make, or forbids it; without it the plan says.
     Raises InputError, ConfigError with every problem of the files, and CannotCompute.
     """
-    described = None if machine is None else setup_of(machine, None).machine
+    described = None if machine is None else Session.start(machine).setup.machine
     if isinstance(data, Measurements):
         measurements = data
     else:

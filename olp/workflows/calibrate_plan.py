@@ -28,8 +28,8 @@ from olp.files.measurements.plan_files import Pass, plan_files
 from olp.findings.catalogue import Finding
 from olp.program.registry import read
 from olp.program.rs274.positions import positions_program
-from olp.program.rs274.profiles import Profile
-from olp.workflows.session import PathLike, control_of, setup_of
+from olp.program.rs274.profiles.base import Profile
+from olp.workflows.session import PathLike, Session
 
 Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
 INSTRUMENTS: tuple[Instrument, ...] = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
@@ -107,7 +107,7 @@ def plan_measurements(
     coordinate, `periods_mm` those of screws and scales by axis. Raises UsageError, ConfigError and
     CannotCompute.
     """
-    setup = setup_of(machine, None)
+    setup = Session.start(machine).setup
     described = setup.machine
     box = _box(described, box_mm)
     reflectors = list(tools) or _reflectors(described)
@@ -308,7 +308,6 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
         yield folder / name, data
     profile = _control(plan.setup)
     digits = max(0, math.ceil(-math.log10(min(machine.least_increment_mm)) - 1e-9))
-    ending = "ngc" if machine.controller == "linuxcnc" else "nc"
     for run in chosen.passes:
         notes = [
             f"{machine.name}: {run.words}",
@@ -319,12 +318,12 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
         ]  # fmt: skip
         text = positions_program(profile, run.places_mm, run.wait_s, digits, notes)
         _proved(text, run, plan.setup, digits)
-        yield folder / f"{run.name}.{ending}", text
+        yield folder / f"{run.name}.{profile.written_ending}", text
 
 
 def _control(setup: Setup) -> Profile:
     """What the control reads. Raises CannotCompute where no program of positions is written for it."""
-    control = control_of(setup)
+    control = Session(setup).control()
     if not isinstance(control, Profile):
         raise CannotCompute(
             f"no programs of positions are written for {control.title}; take the points from the CSV files, "

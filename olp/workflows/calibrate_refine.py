@@ -27,11 +27,11 @@ from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.checkpoints import load_checkpoints
-from olp.files.write import read_bytes
+from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.program.registry import read
-from olp.workflows.compare import compare
-from olp.workflows.session import PathLike, reading, setup_of
+from olp.workflows import compare
+from olp.workflows.session import PathLike, Session
 
 #: A run whose chi-square a degree of freedom is beyond this was not foreseen by the covariance.
 MISFIT = 1.5
@@ -89,10 +89,10 @@ def refine_calibration(
     standard uncertainty of a coordinate, `date` the day of the run. Raises InputError, ConfigError where the
     calibration states no uncertainty, and CannotCompute.
     """
-    setup = setup_of(machine, job)
-    described = dataclasses.replace(setup.machine, calibration=str(calibration))
-    old = load_calibration(calibration, described)
-    known = load_uncertainty(calibration, old)
+    session = Session.start(machine, job)
+    described = dataclasses.replace(session.setup.machine, calibration=str(calibration))
+    old = load_calibration(calibration, described, read=session.sources.read)
+    known = load_uncertainty(calibration, old, session.sources.read)
     if known is None or not known.entries:
         raise ConfigError(
             "states no uncertainty, within which it could move; expected [covariance] or sigma_ columns, as "
@@ -105,8 +105,9 @@ def refine_calibration(
     if program is not None:
         if sigma_um is None or isinstance(measured, Points):
             raise ConfigError("points along a program state no uncertainty; expected sigma_um")
-        run = dataclasses.replace(setup, machine=described)
-        points, along, play = _along(old, skip, run, program, measured, sigma_um * MM_PER_UM)
+        run = session.of(dataclasses.replace(session.setup, machine=described))
+        nominal = session.sources.source(program)
+        points, along, play = _along(old, skip, run, nominal, measured, sigma_um * MM_PER_UM)
     elif isinstance(measured, Points):
         points = measured
     else:
@@ -127,20 +128,19 @@ def refine_calibration(
 def _along(
     calibration: Calibration,
     skip: frozenset[str],
-    setup: Setup,
-    program: PathLike,
+    session: Session,
+    program: Source,
     measured: PathLike,
     sigma: float,
 ) -> tuple[Points, Array, Array | None]:
     """Points of a corrected run with the commands that led there, tangents of the path and play of axes."""
-    chain = setup.machine.chain
+    chain = session.setup.machine.chain
     model = build(calibration, chain, outside="hold", skip_components=skip)
-    found = compare(program, [measured], setup)
+    found = compare.run(session.sources, session, program, [measured], compare.CompareOptions())
     path, run = found.path, found.runs[0]
     assert path is not None
-    data = read_bytes(program)
-    setup, dialect = reading(setup, data, str(program))
-    toolpath = read(data, setup, dialect).toolpath
+    setup, dialect = session.reading(program)
+    toolpath = read(program.data, setup, dialect).toolpath
     axes = nominal_of(toolpath, model, "axes")
     if len(axes.path) != len(path):
         raise CannotCompute("the path has moves whose axis positions are not known; give start_mm in the job")

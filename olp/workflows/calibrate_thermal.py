@@ -13,12 +13,11 @@ from olp.calibration.thermal.drift import ThermalFit, findings, identify
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
-from olp.errormodel.structure import Structure
+from olp.errormodel.sources.structure import Structure
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.structure import read_drift_log, structure_text
-from olp.files.calibration.writer import in_unit
 from olp.findings.catalogue import Finding
-from olp.workflows.session import PathLike, setup_of
+from olp.workflows.session import PathLike, Session
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +45,8 @@ def fit_thermal(
     or one for all; default the temperature of the calibration. `sensors` chooses some. Raises InputError,
     ConfigError, and CannotCompute where the logs do not tell enough.
     """
-    described = setup_of(machine, None).machine
+    session = Session.start(machine)
+    described = session.setup.machine
     if described.calibration is None:
         raise ConfigError(
             f"machine {described.name!r} names no calibration; its box_mm and temperature_degC are needed"
@@ -73,7 +73,7 @@ def fit_thermal(
         f"({fit.held_out}): {fit.removed:.1%}",
         'Name this file in the calibration file: [thermal] structure = "..."',
     ]
-    data = structure_text(fit.structure, described.name, in_unit, notes)
+    data = structure_text(fit.structure, described.name, notes)
     return ThermalFitting(fit.structure, data, report, findings(fit))
 
 

@@ -17,22 +17,38 @@ from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp
 from olp.core.arrays import Array
-from olp.core.errors import OlpError, UsageError, naming
+from olp.core.errors import UsageError
 from olp.core.geometry import PLANES
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.meshes import read_mesh
-from olp.findings.catalogue import CONFIDENCE_CODES, GATE_CODES, Finding
+from olp.files.sources import Source, Sources
+from olp.findings.catalogue import GATE_CODES, RULES, Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.proof import Proof
-from olp.workflows.correct import Run, correct_bytes, last_digit_mm, verify_programs
-from olp.workflows.session import Loaded, PathLike, load, setup_of, source_of
+from olp.workflows.correct import CorrectOptions, corrected
+from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
+from olp.workflows.session import Loaded, Outside, PathLike, Session
 
 #: blocks with the least clearance that a report names
 _NEAREST = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions(ProofOptions):
+    """What `check` takes; see there."""
+
+    outside_box: Outside = "refuse"
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+
+    @property
+    def outside_code(self) -> str:
+        """The code of what lies outside the calibrated box."""
+        return "OLP405" if self.outside_box == "refuse" else "OLP403"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +73,7 @@ class _Case:
     run: Run | None
     proof: Proof | None
     loaded: Loaded
-    options: Options
+    reading: Options
     checked: str
     corrected_here: bool = False
 
@@ -65,7 +81,7 @@ class _Case:
         """A program with its words, which a correction drops early."""
         if program.words is not None:
             return program
-        return read(program.data, self.loaded.setup, self.loaded.dialect, self.options)
+        return read(program.data, self.loaded.setup, self.loaded.dialect, self.reading)
 
 
 def check(
@@ -95,37 +111,55 @@ def check(
     Raises UsageError for a code that does not exist, InputError for what cannot be read, or corrected, at all
     (ProgramError with its line), and CannotCompute.
     """
-    codes = chosen(select, ignore)
+    options = CheckOptions(
+        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, within_um=within_um,
+        only_sure_components=only_sure_components, date=date, select=tuple(select), ignore=tuple(ignore),
+    )  # fmt: skip
+    chosen(options)
+    session = Session.start(machine, job)
+    other = None if nominal is None else session.sources.source(nominal)
+    return run(session, session.sources.source(program), options, nominal=other, progress=progress)
+
+
+def run(
+    session: Session,
+    program: Source,
+    options: CheckOptions,
+    *,
+    nominal: Source | None = None,
+    progress: Progress | None = None,
+) -> Check:
+    """As `check`, in a session."""
+    codes = chosen(options)
     tell = progress or silent
-    setup = setup_of(machine, job)
+    setup = session.setup
     everything = "all" in setup.machine.compensated_by_controller
     if everything:
         setup = replace(setup, machine=replace(setup.machine, compensated_by_controller=frozenset()))
-    loaded = load(setup, None, "hold", only_sure=only_sure_components)
-    data, name = source_of(program)
-    with naming(name):
-        loaded = loaded.reading(data, name)
-    outside = "OLP405" if outside_box == "refuse" else "OLP403"
-    options = Options(contour=contour)
-    with naming(name):
-        case = _case(data, name, nominal, loaded, options, tolerance_um, date, outside, tell, within_um)
+        session = session.of(setup)
+    loaded = session.loaded("hold", only_sure=options.only_sure_components)
+    program.load()
+    with program.errors():
+        loaded = loaded.reading(program)
+        case = _case(session.sources, program, nominal, loaded, options, tell)
         tell("check", 0.8)
-        found = _findings(case, tolerance_um * MM_PER_UM, outside, date, contour)
-        around = _clearances(case, codes, tell)
+        found = _findings(case, options)
+        around = _clearances(case, codes, session.sources, tell)
     if everything:
         found.append(finding("OLP410", 'compensated_by_controller is "all"'))
     if around is not None:
         found += around.findings(setup.machine.sanity.clearance_mm)
     kept = tuple(sorted((f for f in found if f.code in codes), key=lambda f: (f.code, f.line or 0)))
-    report = _report(case, kept, codes, date, tolerance_um)
+    report = _report(case, kept, codes, options)
     if around is not None:
         report["clearance"] = list(around.nearest(_NEAREST).rows())
     return Check(kept, report, around)
 
 
-def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
+def chosen(options: CheckOptions) -> list[str]:
     """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises
     UsageError for what begins no code."""
+    select, ignore = options.select, options.ignore
     for prefix in (*select, *ignore):
         if not any(code.startswith(prefix.upper()) for code in GATE_CODES):
             raise UsageError(
@@ -137,46 +171,38 @@ def chosen(select: Sequence[str], ignore: Sequence[str]) -> list[str]:
 
 
 def _case(
-    data: bytes, name: str, nominal: PathLike | bytes | None, loaded: Loaded, options: Options,
-    tolerance_um: float, date: datetime.date | None, outside: str, tell: Progress,
-    within_um: float | None,
+    sources: Sources, program: Source, nominal: Source | None, loaded: Loaded, options: CheckOptions,
+    tell: Progress,
 ) -> _Case:  # fmt: skip
     tell("read", 0.0)
+    reading = Options(contour=options.contour)
+    name, data = program.name, program.data
     if nominal is None and find_stamp(data) is None:
-        run = correct_bytes(
-            data, name, loaded, tolerance_um=tolerance_um, hold=True, unroll=False, expand=False,
-            clearance=None, contour=options.contour, rapids=False, date=date, tell=tell, outside=outside,
-            within_um=within_um,
-        )  # fmt: skip
+        correcting = CorrectOptions(**options.proof(), outside_box="hold")
+        run = corrected(sources, program, loaded, correcting, tell, options.outside_code)
         what = "what olp correct makes of the program"
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
-        return _Case(name, data, run.corrected, run, proof, loaded, options, what, corrected_here=True)
-    written = read(data, loaded.setup, loaded.dialect, options)
+        return _Case(name, data, run.corrected, run, proof, loaded, reading, what, corrected_here=True)
+    written = read(data, loaded.setup, loaded.dialect, reading)
     if nominal is None:
         what = "the corrected program as it is; what needs the nominal one is left out (--nominal)"
-        return _Case(name, data, written, None, None, loaded, options, what)
-    source, other = source_of(nominal)
-    try:
-        first = read(source, loaded.setup, loaded.dialect, options)
-    except OlpError as error:
-        raise error.in_file(other or "<nominal>") from None
-    run = verify_programs(
-        (first, other), (written, name), loaded, tolerance_um=tolerance_um, contour=options.contour,
-        date=date, within_um=within_um,
-    )  # fmt: skip
-    what = f"the corrected program against the nominal one ({Path(other).name if other else 'stdin'})"
+        return _Case(name, data, written, None, None, loaded, reading, what)
+    nominal.load()
+    with nominal.errors("<nominal>"):
+        first = read(nominal.data, loaded.setup, loaded.dialect, reading)
+    run = verify_programs((first, nominal.name), (written, name), loaded, options)
+    what = f"the corrected program against the nominal one ({nominal.short or 'stdin'})"
     proof = replace(
         run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
     )
-    return _Case(name, data, written, run, proof, loaded, options, what)
+    return _Case(name, data, written, run, proof, loaded, reading, what)
 
 
-def _findings(
-    case: _Case, tolerance_mm: float, outside: str, date: datetime.date | None, contour: bool
-) -> list[Finding]:
+def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     """All findings. What the run that made the case has found stands; the rest is looked for here."""
-    loaded, run, proof = case.loaded, case.run, case.proof
+    loaded, run, proof, date = case.loaded, case.run, case.proof, options.date
+    tolerance_mm = options.tolerance_um * MM_PER_UM
     machine, sanity = loaded.setup.machine, loaded.setup.machine.sanity
     found = [
         *_stamps(case),
@@ -191,9 +217,9 @@ def _findings(
         path = proof.written
     else:
         found += state.travel_findings(path, machine)
-        found += state.box_findings(path, loaded.model.box_mm, outside)
+        found += state.box_findings(path, loaded.model.box_mm, options.outside_code)
         found += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
-        found += checks.program_findings(case.written, loaded.setup, contour=contour)
+        found += checks.program_findings(case.written, loaded.setup, contour=options.contour)
         found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             found += checks.proof_findings(proof, run.passed)
@@ -231,17 +257,19 @@ def _confidence(run: Run) -> list[Finding]:
             lines=tuple(there[line] for line in found.lines),
         )
         for found in run.findings
-        if found.code in CONFIDENCE_CODES
+        if RULES[found.code].topic == "uncertainty"
     ]
 
 
-def _clearances(case: _Case, codes: list[str], tell: Progress) -> Clearances | None:
+def _clearances(
+    case: _Case, codes: list[str], sources: Sources, tell: Progress
+) -> Clearances | None:
     """None where there are no meshes, or nobody asks."""
     setup = case.loaded.setup
-    if not setup.job.meshes or not any(code.startswith("OLP7") for code in codes):
+    if not setup.job.meshes or not any(RULES[code].topic == "clearance" for code in codes):
         return None
     tell("clearance", 0.9)
-    read = ((mesh, *read_mesh(mesh.file)) for mesh in setup.job.meshes)
+    read = ((mesh, *read_mesh(mesh.file, sources.read)) for mesh in setup.job.meshes)
     solids = [
         Solid(mesh, Path(mesh.file).name, vertices[faces] * mesh.unit_mm) for mesh, vertices, faces in read
     ]
@@ -284,7 +312,7 @@ def _line(data: bytes, at: int) -> int:
 
 
 def _report(
-    case: _Case, found: tuple[Finding, ...], codes: list[str], date: datetime.date | None, tolerance_um: float
+    case: _Case, found: tuple[Finding, ...], codes: list[str], options: CheckOptions
 ) -> dict[str, Any]:
     machine, calibration = case.loaded.setup.machine, case.loaded.calibration
     return {
@@ -301,8 +329,8 @@ def _report(
             "valid_until": calibration.valid_until,
             "sha256": case.loaded.digest,
         },
-        "date": date,
-        "tolerance_um": tolerance_um,
+        "date": options.date,
+        "tolerance_um": options.tolerance_um,
         "rules": codes,
         "findings": [f.as_dict() for f in found],
     }

@@ -1,4 +1,4 @@
-"""Comparison of measured paths and poses with nominal ones: from files to figures and findings."""
+"""`compare`: measured paths and poses against nominal ones, from files to figures and findings."""
 
 from __future__ import annotations
 
@@ -11,26 +11,43 @@ from typing import Any, Literal
 
 import numpy as np
 
-from olp.checks import state
 from olp.comparison import figures, runs
 from olp.comparison.nominal import Nominal, nominal_of
 from olp.comparison.pairing import Order
 from olp.comparison.path import Path
 from olp.core.arrays import Array, Index
-from olp.core.errors import InputError, OlpError, UsageError
+from olp.core.errors import InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import UM_PER_MM
 from olp.files.point_profile import PointProfile
 from olp.files.points import Points, layout_of, parse_points, read_points
-from olp.files.write import read_bytes
+from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.workflows import compare_parts as parts
+from olp.workflows import compare_report as parts
 from olp.workflows.compare_poses import part_frame as poses_frame
 from olp.workflows.compare_poses import poses_report
-from olp.workflows.session import Loaded, PathLike, load, setup_of
+from olp.workflows.proof import calibration_findings
+from olp.workflows.session import Loaded, PathLike, Session
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompareOptions:
+    """What `compare` takes beside its files; see there."""
+
+    before: tuple[PathLike, ...] = ()
+    poses: bool = False
+    profile: PointProfile | None = None
+    align: runs.Align = "auto"
+    order: Order | None = None
+    reach_mm: float = 1.0
+    tolerance_um: float | None = None
+    add_errors: bool = False
+    part_frame: str | None = None
+    contour: bool = False
+    date: datetime.date | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,11 +91,10 @@ def _quoted(cell: str) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Source:
+class _Side:
     """The nominal side: points, or a program with its machine."""
 
-    name: str
-    data: bytes
+    source: Source
     points: Points | None
     program: Program | None
     loaded: Loaded | None
@@ -112,94 +128,125 @@ def compare(
     machine's tip would go. `part_frame` names the work offset that poses, measured in axis positions, are
     to give. Raises InputError, UsageError and CannotCompute.
     """
+    sources = Sources()
+    session = None if machine is None and job is None else Session.start(machine, job, sources=sources)
+    options = CompareOptions(
+        before=tuple(before), poses=poses, profile=profile, align=align, order=order, reach_mm=reach_mm,
+        tolerance_um=tolerance_um, add_errors=add_errors, part_frame=part_frame, contour=contour, date=date,
+    )  # fmt: skip
+    return run(sources, session, sources.source(nominal), measured, options, progress)
+
+
+def run(
+    sources: Sources,
+    session: Session | None,
+    nominal: Source,
+    measured: Sequence[PathLike],
+    options: CompareOptions,
+    progress: Progress | None = None,
+) -> Comparison:
+    """As `compare`, in a session, or without one where the nominal path is a file of points."""
     tell = progress or silent
-    options = {"align": align, "reach_mm": reach_mm, "tolerance_um": tolerance_um}
     tell("read", 0.0)
     if not measured:
         raise UsageError("no measured file is given; name at least one")
-    sets = [[read_points(name, profile) for name in names] for names in (measured, before)]
-    source = _source(nominal, machine, job, contour)
-    layout = sets[0][0].profile
-    if poses:
-        if source.points is None:
-            raise UsageError("poses come from a file of points; the nominal one is a program")
-        report, found = poses_report(source.points, *sets, align=align, reach_mm=reach_mm)
-        report = _head(source, sets, options) | report
-        table = None if part_frame is None else poses_frame(source.points, sets[0], part_frame)
-        return Comparison(_with(report, found), tuple(found), layout, part_frame=table)
+    sets = [
+        [read_points(name, options.profile, sources.read_last) for name in names]
+        for names in (measured, options.before)
+    ]
+    side = _nominal_side(nominal, session, options.contour)
+    return _poses(side, sets, options) if options.poses else _paths(side, sets, options, tell)
+
+
+def _poses(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> Comparison:
+    if side.points is None:
+        raise UsageError("poses come from a file of points; the nominal one is a program")
+    report, found = poses_report(side.points, *sets, align=options.align, reach_mm=options.reach_mm)
+    report = _head(side, sets, options) | report
+    name = options.part_frame
+    table = None if name is None else poses_frame(side.points, sets[0], name)
+    return Comparison(_with(report, found), tuple(found), sets[0][0].profile, part_frame=table)
+
+
+def _paths(
+    side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions, tell: Progress
+) -> Comparison:
     axes = _positions(sets) == "axes"
-    if add_errors and not (axes and source.program):
+    if options.add_errors and not (axes and side.program):
         raise UsageError(
             "--add-errors moves axis positions of a control's log by the machine's errors; give a program as "
             'NOMINAL, -m, and a profile with positions = "axes"'
         )
-    path, move = _nominal(source, axes)
-    _same_frame(source, sets, axes)
+    path, move = _nominal(side, axes)
+    _same_frame(side, sets, axes)
     names = _names([p.file for files in sets for p in files])
     tell("pair", 0.2)
     points = [p.points_mm for files in sets for p in files]
-    if add_errors:
-        points = [_with_errors(source, path, move, p, order, reach_mm) for p in points]
-    placed = runs.place(path, names, points, align, order, reach_mm)
+    if options.add_errors:
+        points = [_with_errors(side, path, move, p, options.order, options.reach_mm) for p in points]
+    placed = runs.place(path, names, points, options.align, options.order, options.reach_mm)
     tell("figures", 0.8)
     found = runs.findings(path, placed)
     judged = placed.fitted and all(placed.right) and bool(placed.runs[0].counted.any())
-    taken = _taken(source, path, move, placed, axes) if judged else None
+    taken = _taken(side, path, move, placed, axes) if judged else None
     if taken is not None:
         found += runs.eaten_finding(*taken)
-    count = len(measured)
+    report = _head(side, sets, options) | _placed_report(path, placed, taken, axes, options)
+    count = len(sets[0])
     groups = {"after": placed.runs[:count], "before": placed.runs[count:]}
     right = {"after": placed.right[:count], "before": placed.right[count:]}
-    report = _head(source, sets, options)
-    report["frame"] = parts.frame(placed)
-    if taken is not None:
-        report["frame"] |= {"error_rms_um": taken[0], "left_by_fit_rms_um": taken[1], "error_is": taken[2]}
-    report["path"] = {
-        "length_mm": path.length_mm,
-        "segments": len(path),
-        "cutting_mm": float(np.diff(path.s_mm)[path.cutting].sum()),
-
-        "compared_in": "axis positions" if axes else "the program's frame",
-        "machine_errors_added": add_errors,
-    }  # fmt: skip
     for name, members in groups.items():
         if members:
             report[name] = parts.group(path, members, right[name])
-    if source.program is not None and all(right["after"]):
+    if side.program is not None and all(right["after"]):
         worst = report["after"].get("worst") or []
-        report["worst"] = [row | {"text": source.program.text(row["line"])} for row in worst]
-    found += parts.verdict(report, tolerance_um)
+        report["worst"] = [row | {"text": side.program.text(row["line"])} for row in worst]
+    found += parts.verdict(report, options.tolerance_um)
     found += parts.cycles(groups)
-    if source.loaded is not None:
-        days = source.loaded.setup.machine.sanity.calibration_days
-        found += state.calibration_findings(source.loaded.calibration, date, days)
-    return Comparison(_with(report, found), tuple(found), layout, path, groups["after"], groups["before"])
+    if side.loaded is not None:
+        found += calibration_findings(side.loaded, options.date)
+    after, before = groups["after"], groups["before"]
+    return Comparison(_with(report, found), tuple(found), sets[0][0].profile, path, after, before)
+
+
+def _placed_report(
+    path: Path, placed: runs.Placed, taken: tuple[float, float, str] | None, axes: bool,
+    options: CompareOptions,
+) -> dict[str, Any]:  # fmt: skip
+    frame = parts.frame(placed)
+    if taken is not None:
+        frame |= {"error_rms_um": taken[0], "left_by_fit_rms_um": taken[1], "error_is": taken[2]}
+    return {
+        "frame": frame,
+        "path": {
+            "length_mm": path.length_mm,
+            "segments": len(path),
+            "cutting_mm": float(np.diff(path.s_mm)[path.cutting].sum()),
+            "compared_in": "axis positions" if axes else "the program's frame",
+            "machine_errors_added": options.add_errors,
+        },
+    }
 
 
 def _with(report: dict[str, Any], found: Sequence[Finding]) -> dict[str, Any]:
     return report | {"findings": [f.as_dict() for f in found]}
 
 
-def _source(
-    nominal: PathLike | bytes, machine: PathLike | Setup | None, job: PathLike | None, contour: bool
-) -> _Source:
-    setup = None if machine is None and job is None else setup_of(machine, job)
-    data = nominal if isinstance(nominal, bytes) else read_bytes(nominal)
-    name = "" if isinstance(nominal, bytes) else str(nominal)
+def _nominal_side(nominal: Source, session: Session | None, contour: bool) -> _Side:
+    nominal.load()
+    name, data = nominal.name, nominal.data
     if layout_of(data) is not None:
-        loaded = None if setup is None else load(setup, None, "hold")
-        return _Source(name, data, parse_points(data, name or "<stdin>"), None, loaded)
-    if setup is None:
+        loaded = None if session is None else session.loaded("hold")
+        return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
+    if session is None:
         raise UsageError(
             f"{name or 'the nominal path'} is no table of points, and a program needs its machine; "
             "name the machine file with -m, or a job with -j"
         )
-    try:
-        loaded = load(setup, None, "hold").reading(data, name)
+    with nominal.errors("<stdin>"):
+        loaded = session.loaded("hold").reading(nominal)
         program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
-    except OlpError as error:
-        raise error.in_file(name or "<stdin>") from None
-    return _Source(name, data, None, program, loaded)
+    return _Side(nominal, None, program, loaded)
 
 
 def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
@@ -209,22 +256,22 @@ def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
     return kinds.pop()
 
 
-def _nominal(source: _Source, axes: bool) -> tuple[Path, Index | None]:
-    if source.points is not None:
-        return Path.through(source.points.points_mm, source.points.line), None
-    assert source.program is not None and source.loaded is not None
-    found: Nominal = nominal_of(source.program.toolpath, source.loaded.model, "axes" if axes else "tip")
+def _nominal(side: _Side, axes: bool) -> tuple[Path, Index | None]:
+    if side.points is not None:
+        return Path.through(side.points.points_mm, side.points.line), None
+    assert side.program is not None and side.loaded is not None
+    found: Nominal = nominal_of(side.program.toolpath, side.loaded.model, "axes" if axes else "tip")
     return found.path, found.move
 
 
-def _same_frame(source: _Source, sets: Sequence[Sequence[Points]], axes: bool) -> None:
+def _same_frame(side: _Side, sets: Sequence[Sequence[Points]], axes: bool) -> None:
     """Frames that files state never mix. Raises InputError."""
     stated = {p.frame: p.file for files in sets for p in files if p.frame}
-    if source.points is not None and source.points.frame:
-        stated.setdefault(source.points.frame, source.points.file)
-    if source.program is not None and len(source.program.toolpath) and not axes:
-        path = source.program.toolpath
-        stated.setdefault(path.frames[int(path.frame[0])].work_offset, source.name)
+    if side.points is not None and side.points.frame:
+        stated.setdefault(side.points.frame, side.points.file)
+    if side.program is not None and len(side.program.toolpath) and not axes:
+        path = side.program.toolpath
+        stated.setdefault(path.frames[int(path.frame[0])].work_offset, side.source.name)
     if len(stated) > 1:
         (a, file_a), (b, file_b) = list(stated.items())[:2]
         raise InputError(
@@ -240,12 +287,12 @@ def _names(files: Sequence[str]) -> list[str]:
 
 
 def _with_errors(
-    source: _Source, path: Path, move: Index | None, points: Array, order: Order | None, reach_mm: float
+    side: _Side, path: Path, move: Index | None, points: Array, order: Order | None, reach_mm: float
 ) -> Array:
     """Axis positions moved to where the tip of the calibrated machine would go, the tool's lever included."""
-    assert source.program is not None and source.loaded is not None and move is not None
-    tool = source.program.toolpath.tool_mm()
-    model = source.loaded.model
+    assert side.program is not None and side.loaded is not None and move is not None
+    tool = side.program.toolpath.tool_mm()
+    model = side.loaded.model
     if tool.ndim == 2:
         first = runs.place(path, [""], [points], "none", order, reach_mm).runs[0]
         tool = tool[move[first.pairing.segment]]
@@ -253,7 +300,7 @@ def _with_errors(
 
 
 def _taken(
-    source: _Source, path: Path, move: Index | None, placed: runs.Placed, axes: bool
+    side: _Side, path: Path, move: Index | None, placed: runs.Placed, axes: bool
 ) -> tuple[float, float, str] | None:
     """What the fit takes of the error: rms in um across the path before and after it, and of which error;
     None where nothing is known of that."""
@@ -261,28 +308,29 @@ def _taken(
     moved = float(np.abs(rigid.inverse()(run.points_mm) - run.points_mm).max())
     if moved < 1.0:  # stated in the nominal frame already, as far as anybody can tell
         return *runs.eaten(path, run, rigid), "as measured"
-    if source.program is None or source.loaded is None or move is None:
+    if side.program is None or side.loaded is None or move is None:
         return None
-    toolpath = source.program.toolpath
+    toolpath = side.program.toolpath
     tool = toolpath.tool_mm()
     which = move[run.pairing.segment]
     at = run.pairing.foot_mm
     if not axes:
-        nominal = nominal_of(toolpath, source.loaded.model, "axes")
+        nominal = nominal_of(toolpath, side.loaded.model, "axes")
         share = (run.pairing.s_mm - path.s_mm[run.pairing.segment]) / np.diff(path.s_mm)[run.pairing.segment]
         if len(nominal.path) != len(path):
             return None
         begin = nominal.path.vertex_mm[run.pairing.segment]
         at = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
-    error = source.loaded.model.error(at, tool if tool.ndim == 1 else tool[which])
+    error = side.loaded.model.error(at, tool if tool.ndim == 1 else tool[which])
     whose = "that the calibration predicts for the uncorrected machine"
     return *runs.eaten_of_field(path, run, error), whose
 
 
-def _head(source: _Source, sets: Sequence[Sequence[Points]], options: dict[str, Any]) -> dict[str, Any]:
+def _head(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> dict[str, Any]:
     nominal = {
-        "name": FilePath(source.name).name if source.name else "",
-        "sha256": hashlib.sha256(source.data).hexdigest(),
-        "kind": "program" if source.program else "points",
+        "name": side.source.short,
+        "sha256": hashlib.sha256(side.source.data).hexdigest(),
+        "kind": "program" if side.program else "points",
     }
-    return parts.head(nominal, source.loaded, *sets) | options
+    stated = ("align", "reach_mm", "tolerance_um")
+    return parts.head(nominal, side.loaded, *sets) | {key: getattr(options, key) for key in stated}

@@ -1,4 +1,5 @@
-"""One correction of reported results: read, run the model forward, write, report."""
+"""`correct --results`: what a measuring machine reported, corrected: read, run the model forward, write,
+report."""
 
 from __future__ import annotations
 
@@ -6,7 +7,6 @@ import datetime
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -14,10 +14,11 @@ import numpy as np
 from olp.checks import state
 from olp.compensation.stamp import find_stamp, stamp_line, stamped
 from olp.core.arrays import Array
-from olp.core.errors import AlreadyCorrected, InputError, OlpError, UsageError
+from olp.core.errors import AlreadyCorrected, InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.units import UM_PER_MM
 from olp.files.point_profile import load_profile
+from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.program.text.delimited import Layout, first_lines, told
 from olp.program.text.numbers import Placing, number, spliced, written
@@ -25,7 +26,7 @@ from olp.results.forward import Forward, forward
 from olp.results.places import place_of, stylus_of
 from olp.results.reported import Reported, Stated
 from olp.results.table import read_table
-from olp.workflows.session import Loaded, PathLike, load, source_of
+from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 #: Rounding above this is said; bar of the corrections themselves.
 _ROUNDING_MM = 2e-4
@@ -52,6 +53,19 @@ DOES_NOT_PROVE = (
     "and compare",
     "anything about the probing system (lobing, wear, wrong tip radius), which is no error of the axes",
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResultOptions:
+    """What `correct_results` takes beside its files; see there."""
+
+    profile: PathLike | Layout | None = None
+    frame: str | Mapping[str, str] | None = None
+    tool: int | Mapping[str, int] | None = None
+    tip_radius_mm: float | None = None
+    decimals: int | None = None
+    outside_box: Outside = "refuse"
+    date: datetime.date | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,30 +98,29 @@ def correct_results(
     that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
     Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
     """
-    data, name = source_of(results)
-    loaded = load(machine, job, outside_box)
-    layout = load_profile(profile).layout if isinstance(profile, str | Path) else profile
-    asked = _Asked(layout, frame, tool, tip_radius_mm, decimals, outside_box == "hold", date)
-    try:
-        return _corrected(data, name, loaded, asked)
-    except OlpError as error:
-        raise error.in_file(name or "<results>") from None
+    session, source = opened(results, machine, job)
+    options = ResultOptions(
+        profile=profile, frame=frame, tool=tool, tip_radius_mm=tip_radius_mm, decimals=decimals,
+        outside_box=outside_box, date=date,
+    )  # fmt: skip
+    return run(session, source, options)
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What a caller of `correct_results` asks for."""
-
-    layout: Layout | None
-    frame: str | Mapping[str, str] | None
-    tool: int | Mapping[str, int] | None
-    tip_radius_mm: float | None
-    decimals: int | None
-    hold: bool
-    date: datetime.date | None
+def run(session: Session, results: Source, options: ResultOptions) -> ResultCorrection:
+    """As `correct_results`, in a session."""
+    loaded = session.loaded(options.outside_box)
+    profile = options.profile
+    if profile is not None and not isinstance(profile, Layout):
+        profile = load_profile(profile, session.sources.read).layout
+    results.load()
+    with results.errors("<results>"):
+        return _corrected(results, loaded, options, profile)
 
 
-def _corrected(data: bytes, name: str, loaded: Loaded, asked: _Asked) -> ResultCorrection:
+def _corrected(
+    results: Source, loaded: Loaded, options: ResultOptions, layout: Layout | None
+) -> ResultCorrection:
+    data = results.data
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
@@ -115,50 +128,50 @@ def _corrected(data: bytes, name: str, loaded: Loaded, asked: _Asked) -> ResultC
             "error twice; correct the file as the machine wrote it",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
-    reported = _read(data, asked.layout)
-    radius = asked.tip_radius_mm if asked.tip_radius_mm is not None else reported.tip_radius_mm
+    reported = _read(data, layout)
+    radius = options.tip_radius_mm if options.tip_radius_mm is not None else reported.tip_radius_mm
     reported = replace(
         reported,
-        frames=_named("frame", reported.frames, asked.frame),
-        tools=_named("tool", reported.tools, asked.tool),
+        frames=_named("frame", reported.frames, options.frame),
+        tools=_named("tool", reported.tools, options.tool),
         tip_radius_mm=radius,
     )
     setup = loaded.setup
-    axes = _axes(reported, setup)
+    axes = _axes(reported, loaded)
     reported = replace(reported, assumed=(*reported.assumed, _COUNTED[axes]))
     findings = _already(reported, loaded)
     own = bool(np.isfinite(reported.stylus_mm).all())
     places = [place_of(setup, n) for n in reported.frames]
     styli = [stylus_of(setup, t, own) for t in reported.tools]
     found = forward(
-        reported, places, styli, loaded.model, axes=axes, hold=asked.hold, payload_kg=setup.job.payload_kg
-    )
+        reported, places, styli, loaded.model, axes=axes, hold=options.outside_box == "hold",
+        payload_kg=setup.job.payload_kg,
+    )  # fmt: skip
     if radius is None and any(s.radius_mm == 0.0 and any(s.lever_mm) for s in styli):
         findings.append(
             Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
         )
-    text, rounding = _write(reported, found.added_mm, loaded.digest, asked.decimals)
+    text, rounding = _write(reported, found.added_mm, loaded.digest, options.decimals)
     turned = sorted(
         {p.name for p in places if p.touched is not None and not np.allclose(p.rotation, np.eye(3))}
     )
     findings += [
         *_findings(reported, found, rounding, turned),
-        *state.calibration_findings(loaded.calibration, asked.date, setup.machine.sanity.calibration_days),
+        *state.calibration_findings(loaded.calibration, options.date, setup.machine.sanity.calibration_days),
     ]
     outside = ~loaded.model.inside(found.axis_mm).all(axis=1)
     if outside.any():
         lines = reported.line[outside].tolist()
         findings.append(_finding("OLP403", f"{len(lines)} touches lie outside the calibrated box", lines))
-    report = _report(reported, found, loaded, name, text, rounding, findings)
+    report = _report(reported, found, loaded, results.short, text, rounding, findings)
     return ResultCorrection(text, report, tuple(findings))
 
 
-def _axes(reported: Reported, setup: Setup) -> Literal["tip", "tool", "ram"]:
-    """Where axis positions count. On a machine that takes DMIS programs it is the end of the ram, as
-    there."""
-    if "dmis" in (reported.dialect, setup.machine.controller):
+def _axes(reported: Reported, loaded: Loaded) -> Literal["tip", "tool", "ram"]:
+    """Where axis positions count: as in the programs of the machine."""
+    if reported.axes_at_ram or loaded.dialect.axes_at_ram:
         return "ram"
-    return "tool" if setup.machine.length_active else "tip"
+    return "tool" if loaded.setup.machine.length_active else "tip"
 
 
 def _named(what: str, told: tuple[Any, ...], given: object) -> tuple[Any, ...]:
@@ -324,7 +337,7 @@ def _report(
     return {
         "schema": "olp-results-1",
         "results": {
-            "name": Path(name).name if name else "",
+            "name": name,
             "sha256": hashlib.sha256(reported.data).hexdigest(),
             "dialect": reported.dialect,
             "points": len(reported),

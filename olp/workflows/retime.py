@@ -1,10 +1,10 @@
-"""One re-timing run: from a program to a trajectory and the report of it."""
+"""`retime`: from a program to a trajectory and the report of it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,9 +13,13 @@ from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.files import trajectory as files
+from olp.files.sources import Source
 from olp.files.write import write_files
 from olp.findings.catalogue import Finding
+from olp.program.feeds.timing import BLEND_MM
 from olp.program.feeds.words import Shared
+from olp.program.registry import Options, read
+from olp.program.rs274.state import PathMode
 from olp.reports.plots.base import Format as Picture
 from olp.trajectory.from_program import axis_limits
 from olp.trajectory.inertia import Inertial, compliance_of
@@ -23,8 +27,9 @@ from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 from olp.trajectory.summary import MOST, compare, summary
 from olp.trajectory.usage import LineUse, SlowPlaces
-from olp.workflows.retime_variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
-from olp.workflows.session import PathLike, setup_of, source_of
+from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
+from olp.workflows.flatten import unrolled
+from olp.workflows.session import PathLike, Session
 
 Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
 _SUFFIX: Mapping[str, Format] = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
@@ -35,6 +40,18 @@ PICTURES: Mapping[str, Picture] = {".svg": "svg", ".png": "png"}
 CYCLE_S = 1e-3
 #: of the tolerances that the program uses, those that `blend_study` tries
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RetimeOptions:
+    """What `retime` takes beside its programs; see there."""
+
+    blend_mm: float | None = None
+    study_blend: bool = False
+    max_inertial_um: float | None = None
+    contour: bool = False
+    block_delete: bool = False
+    flatten: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -214,37 +231,78 @@ def retime(
     (OLP402), and planned all the same. Raises InputError (ProgramError with its line,
     ConfigError), UsageError and CannotCompute.
     """
-    setup = setup_of(machine, job)
+    session = Session.start(machine, job)
+    options = RetimeOptions(
+        blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um, contour=contour,
+        block_delete=block_delete, flatten=flatten,
+    )  # fmt: skip
+    other = None if nominal is None else session.sources.source(nominal)
+    source = session.sources.source(program)
+    return run(session, source, options, nominal=other, proof=proof, progress=progress)
+
+
+def run(
+    session: Session,
+    program: Source,
+    options: RetimeOptions,
+    *,
+    nominal: Source | None = None,
+    proof: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+) -> Retiming:
+    """As `retime`, in a session."""
+    setup, most_um = session.setup, options.max_inertial_um
     proved = None if proof is None else _proved(proof, setup)
     tell = progress or silent
-
-    def case_of(source: PathLike | bytes) -> Case:
-        return Case.of(
-            *source_of(source), setup, blend_mm=blend_mm, contour=contour, block_delete=block_delete,
-            flatten=flatten,
-        )  # fmt: skip
-
     tell("read", 0.0)
-    case = case_of(program)
-    other = None if nominal is None else case_of(nominal)
+    case = _case(session, program, options)
+    other = None if nominal is None else _case(session, nominal, options)
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
-    if max_inertial_um is None:
+    if most_um is None:
         found = planned(case, limits, tell)
     else:
-        found = within_inertial(case, limits, compliance, max_inertial_um * 1e-3, tell)
-    report = _report(case, found, compliance, max_inertial_um)
+        found = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
+    report = _report(case, found, compliance, most_um)
     if other is not None:
         report["nominal"] = _against(found, planned(other, found.limits, tell, "nominal"), other)
     if proved is not None:
         moving = sum(report["budget_um"].values())
         report["proof"] = proved | {"at_most_um": proved["path_max_um"] + moving}
-    if study_blend:
+    if options.study_blend:
         report["blend_study"] = blend_study(case, found, FACTORS, tell)
     # the motion keeps to the box of its way-points, so commands within travel are motion within travel
     findings = tuple(travel_findings(case.program.toolpath, setup.machine))
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(found, report, findings)
+
+
+def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
+    """A program as it is to be planned. Raises ProgramError with its file and line; CannotCompute where
+    nothing of it can be timed."""
+    blend_mm, stated = options.blend_mm, session.setup.machine.blend_mm
+    reading = Options(block_delete=options.block_delete, contour=options.contour)
+    program.load()
+    with program.errors():
+        setup, dialect = session.reading(program)
+        text = unrolled(session.sources, program, setup, dialect) if options.flatten else program.data
+        found = read(text, setup, dialect, reading)
+        if setup.machine.path_mode == "exact-stop" and blend_mm is None:
+            # a mode of line 0 holds from the start
+            found = replace(found, path_modes=(PathMode(0, "G61.1"), *found.path_modes))
+        case = Case(
+            program.short, setup, found,
+            next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
+            "the call" if blend_mm is not None else "the machine file" if stated else "the default",
+            options.block_delete, options.contour, (),
+        ).driven()  # fmt: skip
+    if not case.legs and case.untimed()["moves"]:
+        raise CannotCompute(
+            "no move of the program begins and ends at known positions of all axes, so nothing can be "
+            "timed; give start_mm in the job file, or command X, Y and Z first",
+            file=program.name or None,
+        )
+    return case
 
 
 def _against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:

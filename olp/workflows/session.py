@@ -1,14 +1,15 @@
-"""Loading: from the files or values that a caller gives to all that a run needs."""
+"""A session: machine, job, calibration and programs of a run, each opened once. It is the only way from files
+to values."""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from olp.core.errors import ConfigError, UsageError
-from olp.core.machine import Job, Setup
+from olp.core.errors import ConfigError
+from olp.core.machine import Setup
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
@@ -16,14 +17,15 @@ from olp.errormodel.uncertainty import Uncertainty
 from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import files_beside, load_calibration
 from olp.files.calibration.structure import read_drift_log, sensors_of
-from olp.files.config import load_setup
+from olp.files.config import read_setup
 from olp.files.described import described
-from olp.files.write import read_bytes
+from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
-from olp.program.registry import DIALECTS, dialect_of
+from olp.program.registry import DIALECTS, dialect_of, find
 from olp.uncertainty.components import unsure
 
 PathLike = str | Path
+Outside = Literal["refuse", "hold"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,153 +50,177 @@ class Loaded:
             return self.model
         return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
 
-    def reading(self, data: bytes, name: str) -> Loaded:
+    def reading(self, program: Source) -> Loaded:
         """The same for a program: its dialect is settled here, also for what is made of it later. Raises
-        ProgramError where it cannot be told."""
-        setup, dialect = reading(self.setup, data, name)
+        ProgramError where it cannot be told, UsageError for a name that there is not."""
+        setup, dialect = _settled(self.setup, self.dialect, program)
         return replace(self, setup=setup, dialect=dialect)
 
 
-def load(
-    machine: PathLike | Setup,
-    job: PathLike | None,
-    outside: Literal["refuse", "hold"],
-    *,
-    only_sure: bool = False,
-) -> Loaded:
-    """Machine, calibration and job of a run, and the error model that they make; `only_sure` leaves out
-    components within their own uncertainty. Raises InputError, ConfigError."""
-    setup = setup_of(machine, job)
-    described = setup.machine
-    if described.calibration is None:
-        raise ConfigError(
-            f"machine {described.name!r} names no calibration; give the key calibration in its file"
-        )
-    if "all" in described.compensated_by_controller:
-        raise ConfigError(
-            'compensated_by_controller = "all": the control corrects everything already, a corrected program '
-            "would be corrected twice; list the components that it corrects, or switch its tables off"
-        )
-    calibration = load_calibration(described.calibration, described, dict(setup.job.temperatures_degC))
-    calibration = at_temperatures(calibration, setup.job)
-    skip = frozenset(described.compensated_by_controller - calibration.active_during_measurement)
-    uncertainty = load_uncertainty(described.calibration, calibration)
-    left_out: frozenset[str] = frozenset()
-    if only_sure:
-        if uncertainty is None:
-            raise ConfigError(
-                "the calibration states no uncertainty, so nobody knows which components are sure; give the "
-                "file of [covariance] or sigma columns, or correct without --only-sure-components",
-                file=described.calibration,
+@dataclass(frozen=True, slots=True, eq=False)
+class Session:
+    """Machine and job of a run, and the files that it reads, each opened once. The calibration is loaded when
+    it is first asked for."""
+
+    setup: Setup
+    sources: Sources = field(default_factory=Sources)
+    _loaded: dict[tuple[Outside, bool], Loaded] = field(default_factory=dict, init=False, repr=False)
+    _calibrations: list[Calibration] = field(default_factory=list, init=False, repr=False)
+
+    @staticmethod
+    def start(
+        machine: PathLike | Setup | None,
+        job: PathLike | None = None,
+        *,
+        dialect: str | None = None,
+        sources: Sources | None = None,
+    ) -> Session:
+        """The setup that a caller has, or that of a machine file and a job file; `dialect` is the name of the
+        program's dialect, or the file that describes it. Raises InputError, ConfigError, UsageError."""
+        sources = sources or Sources()
+        if isinstance(machine, Setup):
+            return Session(machine, sources)
+        setup = read_setup(machine, job, sources.read)
+        if dialect is not None:
+            own = described(dialect, read=sources.read)
+            setup = replace(setup, job=replace(setup.job, dialect=dialect, described=own))
+        return Session(setup, sources)
+
+    def of(self, setup: Setup) -> Session:
+        """A session of another setup that reads the same files."""
+        return Session(setup, self.sources)
+
+    def beside_calibration(self) -> list[str]:
+        """The files that the calibration file names. Raises InputError where that cannot be read."""
+        path = self.setup.machine.calibration
+        return [] if path is None else [str(file) for file in files_beside(path, self.sources.read)]
+
+    def control(self) -> Dialect:
+        """What the control of the machine reads and writes."""
+        name = self.setup.machine.controller
+        dialect = find(name) or described(name, read=self.sources.read)
+        if dialect is None:
+            raise ConfigError(f"controller {name!r} has no dialect; expected one of {', '.join(DIALECTS)}")
+        return dialect
+
+    def reading(self, program: Source) -> tuple[Setup, Dialect]:
+        """The dialect of a program, and the setup with it named, so that what is made of the program later is
+        read alike. Raises as `Loaded.reading`."""
+        own = self.setup.job.described
+        return _settled(self.setup, own if isinstance(own, Dialect) else self.control(), program)
+
+    def calibration(self) -> Calibration:
+        """The calibration of the machine, as its file states it. Raises ConfigError where there is none, or
+        it is wrong."""
+        if not self._calibrations:
+            machine, job = self.setup.machine, self.setup.job
+            if machine.calibration is None:
+                raise ConfigError(
+                    f"machine {machine.name!r} names no calibration; give the key calibration in its file"
+                )
+            temperatures = dict(job.temperatures_degC)
+            self._calibrations.append(
+                load_calibration(machine.calibration, machine, temperatures, read=self.sources.read)
             )
-        left_out = unsure(calibration, uncertainty) - skip
-    model = build(calibration, described.chain, outside=outside, skip_components=skip | left_out)
-    digest = _digest(described.calibration, described, left_out)
-    return Loaded(setup, control_of(setup), calibration, model, digest, uncertainty, skip, left_out)
+        return self._calibrations[0]
 
+    def loaded(self, outside: Outside, *, only_sure: bool = False) -> Loaded:
+        """Calibration and error model beside machine and job; `only_sure` leaves out components within their
+        own uncertainty. Raises InputError, ConfigError."""
+        key = (outside, only_sure)
+        if key not in self._loaded:
+            self._loaded[key] = self._load(outside, only_sure)
+        return self._loaded[key]
 
-def at_temperatures(calibration: Calibration, job: Job) -> Calibration:
-    """The calibration with its thermal structure at the temperatures of the job. Raises ConfigError where the
-    job names sensors that it does not have, or leaves some out."""
-    structure = calibration.structure
-    if structure is None:
-        if job.sensors_degC or job.sensor_log:
+    def _load(self, outside: Outside, only_sure: bool) -> Loaded:
+        machine = self.setup.machine
+        if machine.calibration is not None and "all" in machine.compensated_by_controller:
             raise ConfigError(
-                "the job states temperatures of sensors, and the calibration has no thermal structure; give "
-                "[thermal] structure in the calibration file, or leave the sensors out"
+                'compensated_by_controller = "all": the control corrects everything already, a corrected '
+                "program would be corrected twice; list the components that it corrects, or switch its "
+                "tables off"
             )
-        return calibration
-    if job.sensors_degC is not None:
-        structure = structure.at(job.sensors_degC)
-    elif job.sensor_log is not None:
-        log = read_drift_log(job.sensor_log)
-        sensors = sensors_of(log, dict.fromkeys(s.name for s in structure.sensors))
-        structure = structure.settled(log.time_s, sensors, job.sensor_log_at_s)
-    return replace(calibration, structure=structure)
+        calibration = self._at_temperatures(self.calibration())
+        assert machine.calibration is not None
+        skip = frozenset(machine.compensated_by_controller - calibration.active_during_measurement)
+        uncertainty = load_uncertainty(machine.calibration, calibration, read=self.sources.read)
+        left_out: frozenset[str] = frozenset()
+        if only_sure:
+            if uncertainty is None:
+                raise ConfigError(
+                    "the calibration states no uncertainty, so nobody knows which components are sure; give "
+                    "the file of [covariance] or sigma columns, or correct without --only-sure-components",
+                    file=machine.calibration,
+                )
+            left_out = unsure(calibration, uncertainty) - skip
+        model = build(calibration, machine.chain, outside=outside, skip_components=skip | left_out)
+        digest = self._digest(machine.calibration, left_out)
+        control = self.control()
+        return Loaded(self.setup, control, calibration, model, digest, uncertainty, skip, left_out)
+
+    def _at_temperatures(self, calibration: Calibration) -> Calibration:
+        """The calibration with its thermal structure at the temperatures of the job. Raises ConfigError where
+        the job names sensors that it does not have, or leaves some out."""
+        structure, job = calibration.structure, self.setup.job
+        if structure is None:
+            if job.sensors_degC or job.sensor_log:
+                raise ConfigError(
+                    "the job states temperatures of sensors, and the calibration has no thermal structure; "
+                    "give [thermal] structure in the calibration file, or leave the sensors out"
+                )
+            return calibration
+        if job.sensors_degC is not None:
+            structure = structure.at(job.sensors_degC)
+        elif job.sensor_log is not None:
+            log = read_drift_log(job.sensor_log, read=self.sources.read)
+            sensors = sensors_of(log, dict.fromkeys(s.name for s in structure.sensors))
+            structure = structure.settled(log.time_s, sensors, job.sensor_log_at_s)
+        return replace(calibration, structure=structure)
+
+    def _digest(self, calibration: str, left_out: frozenset[str]) -> str:
+        """Hash of the calibration file, the files that it names and the machine values that decide the
+        model."""
+        digest = hashlib.sha256(self.sources.read(calibration))
+        for file in files_beside(calibration, self.sources.read):
+            digest.update(self.sources.read(file))
+        digest.update(repr(self.setup.machine.chain).encode())
+        if left_out:
+            digest.update(repr(sorted(left_out)).encode())
+        return digest.hexdigest()
+
+    def lever(self, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:
+        """Gauge point to tip in mm of a tool number, of a vector, or of the tool in the spindle at the start.
+        Raises ConfigError for a tool without one."""
+        if isinstance(tool, tuple):
+            return tool
+        number = self.setup.machine.default_tool if tool is None else tool
+        if not number:
+            return (0.0, 0.0, 0.0)
+        found = self.setup.tool(number)
+        if found is None or found.lever_mm is None:
+            raise ConfigError(
+                f"tool {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm in the machine file"
+            )
+        return found.lever_mm
 
 
-def setup_of(machine: PathLike | Setup | None, job: PathLike | None) -> Setup:
-    """The setup that a caller gave, or that of a machine file and a job file."""
-    return machine if isinstance(machine, Setup) else load_setup(machine, job)
+def opened(
+    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None, role: str | None = None
+) -> tuple[Session, Source]:
+    """Session and program of what a caller in Python gave, the program read first. `role` as in
+    `Source.errors`. Raises InputError, ConfigError, UsageError."""
+    sources = Sources()
+    source = sources.source(program)
+    source.load()
+    with source.errors(role):
+        return Session.start(machine, job, sources=sources), source
 
 
-def control_of(setup: Setup) -> Dialect:
-    """What the control of a machine reads and writes."""
-    dialect = DIALECTS.get(setup.machine.controller) or described(setup.machine.controller)
-    if dialect is None:
-        raise ConfigError(
-            f"controller {setup.machine.controller!r} has no dialect; expected one of {', '.join(DIALECTS)}"
-        )
-    return dialect
-
-
-def reading(setup: Setup, data: bytes, name: str) -> tuple[Setup, Dialect]:
-    """The dialect of a program, and the setup with it named, so that what is made of the program later is
-    read alike. Raises ProgramError where it cannot be told, UsageError for a name that there is not."""
+def _settled(setup: Setup, control: Dialect, program: Source) -> tuple[Setup, Dialect]:
+    """The dialect of a program on a control, and the setup with it named."""
     own = setup.job.described
     if isinstance(own, Dialect):
         return setup, own
-    dialect = dialect_of(setup.job.dialect, control_of(setup), data, name)
-    own = None if dialect.name in DIALECTS else dialect
+    dialect = dialect_of(setup.job.dialect, control, program.data, program.name)
+    own = None if find(dialect.name) is not None else dialect
     return replace(setup, job=replace(setup.job, dialect=dialect.name, described=own)), dialect
-
-
-def _digest(calibration: str, machine: object, left_out: frozenset[str]) -> str:
-    """Hash of the calibration file, the files that it names and the machine values that decide the model."""
-    digest = hashlib.sha256(read_bytes(calibration))
-    for file in files_beside(calibration):
-        digest.update(read_bytes(file))
-    digest.update(repr(getattr(machine, "chain", "")).encode())
-    if left_out:
-        digest.update(repr(sorted(left_out)).encode())
-    return digest.hexdigest()
-
-
-def source_of(program: PathLike | bytes) -> tuple[bytes, str]:
-    """Bytes and name of a program; bytes that a caller gave have no name."""
-    if isinstance(program, bytes):
-        return program, ""
-    return read_bytes(program), str(program)
-
-
-def unrolled(
-    data: bytes, name: str, setup: Setup, dialect: Dialect, expand: bool, clearance: float | None = None
-) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
-    Payloads that the job gives by line become comments first, as lines are others afterwards. Raises
-    UsageError for a dialect that has none of them."""
-    from olp.program.directives import with_payloads
-    from olp.program.rs274.flatten.unroll import flatten as unroll
-
-    if dialect.family != "rs274":
-        raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
-    data = with_payloads(data, setup.job.payloads, dialect.comment)
-    folder = Path(name).parent if name else None
-
-    def beside(wanted: str) -> bytes | None:
-        if folder is None:
-            return None
-        for suffix in ("", ".ngc", ".nc"):
-            candidate = folder / f"{wanted}{suffix}"
-            if candidate.is_file():
-                return read_bytes(candidate)
-        return None
-
-    return unroll(
-        data, profile=dialect.name, subprograms=beside, expand_cycles=expand, peck_clearance=clearance
-    )
-
-
-def lever_of(setup: Setup, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:
-    """Gauge point to tip of a tool number, of a vector, or of the tool in the spindle at the start."""
-    if isinstance(tool, tuple):
-        return tool
-    number = setup.machine.default_tool if tool is None else tool
-    if not number:
-        return (0.0, 0.0, 0.0)
-    found = setup.tool(number)
-    if found is None or found.lever_mm is None:
-        raise ConfigError(
-            f"tool {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm in the machine file"
-        )
-    return found.lever_mm

@@ -16,7 +16,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from posts import FLAVOURS, Step, apt  # noqa: E402
+from cases.posts import FLAVOURS, Step, apt  # noqa: E402
 
 ENDINGS = {"creo": "ncl", "nx": "cls", "catia": "aptsource", "solidworks": "apt", "autodesk": "apt"}
 HOLES = {

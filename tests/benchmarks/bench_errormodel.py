@@ -11,8 +11,9 @@ import numpy as np
 from olp.compensation.invert import invert
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
-from olp.errormodel.gridded import ComponentTable, DeviationMap
+from olp.errormodel.gridded import ComponentTable
 from olp.errormodel.reversal import play_states
+from olp.errormodel.sources.maps import DeviationMap
 
 BOX = np.array([[0.0, 2000.0], [0.0, 1000.0], [-600.0, 0.0]])
 

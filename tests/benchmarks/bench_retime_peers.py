@@ -135,10 +135,14 @@ def main() -> None:
     sys.path.insert(0, str(Path(__file__).parent))
     import retime_paths
 
-    from olp.trajectory.critical import critical
+    from olp.trajectory.critical import best_profile, driven
     from olp.trajectory.overlap import overlap
     from olp.trajectory.plan import plan
     from olp.trajectory.smooth import smooth
+
+    def critical(route: Any, limits: Any) -> Any:
+        path = smooth(route, limits)
+        return driven(path, best_profile(path, limits))
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("peers_python")
@@ -161,7 +165,7 @@ def main() -> None:
 
         found, rate = cpu(partial(plan, route, limits))
         _, by_overlap = cpu(partial(overlap, route, limits))
-        _, by_critical = cpu(lambda route=route: critical(smooth(route, limits), limits))
+        _, by_critical = cpu(partial(critical, route, limits))
         own = ratios(found.at(np.arange(0.0, found.duration_s, CYCLE_S))[0], bounds)
         path = smooth(route, limits)
         with tempfile.TemporaryDirectory() as folder:

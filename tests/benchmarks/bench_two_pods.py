@@ -36,7 +36,7 @@ from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.observations.measurements import Measurements
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
-from olp.errormodel.gridded import DeviationMap
+from olp.errormodel.sources.maps import DeviationMap
 
 SEEDS = 6
 CHAIN = "FXYZ"

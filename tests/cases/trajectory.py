@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from olp.core.arrays import Array, Index
+from olp.trajectory.critical import best_profile, driven
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.same import groups_of_same
+from olp.trajectory.smooth import SmoothPath
 
 #: samples in one block, and segments that a search looks ahead
 _BLOCK, _AHEAD = 1 << 14, 64
@@ -18,6 +20,13 @@ _EVEN_MM = 1e-8
 _TINY = float(np.finfo(np.float64).tiny)
 
 LIMITS = AxisLimits(np.array([500.0, 500, 300]), np.array([5e3, 5e3, 3e3]), np.array([1e5, 1e5, 6e4]))
+
+
+def critical(path: SmoothPath, limits: AxisLimits) -> Motion:
+    """The motion along `path` from rest to rest; no axis limit and no feed is exceeded."""
+    if not len(path):
+        return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), np.zeros(0, np.int64), path.line)
+    return driven(path, best_profile(path, limits))
 
 
 def route(point: Array, feed: float | Array, tolerance: float) -> Route:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,9 @@ from reports.test_report import REPORT
 
 from olp.cli import main
 from olp.core.errors import NotInvertible, OutsideBox, ProgramError
+from olp.files.sources import Source
 from olp.findings.catalogue import Finding
+from olp.workflows.session import Session
 
 ABOVE = Finding("OLP101", "2.50 um in line 3", 3)
 CORRECTED = b"(stamp)\r\nG21\r\nG1 X1.0123 F100\r\n"
@@ -31,8 +33,12 @@ class Fake:
     data: bytes = CORRECTED
     report: dict[str, Any] = field(default_factory=lambda: dict(REPORT))
 
-    def __call__(self, *args: Any, **options: Any) -> Fake:
-        self.calls.append((args, options))
+    def __call__(self, session: Session, *args: Any) -> Fake:
+        """Kept are texts and setup, and the options with the progress that is asked for."""
+        count = sum(isinstance(value, Source) for value in args)
+        texts = (source.name or source.data for source in args[:count])
+        progress = args[count + 1] if len(args) > count + 1 else None
+        self.calls.append(((*texts, session.setup), asdict(args[count]) | {"progress": progress}))
         if self.raises is not None:
             raise self.raises
         return self
@@ -42,7 +48,7 @@ class Fake:
 def library(monkeypatch: pytest.MonkeyPatch) -> Fake:
     fake = Fake()
     for name in ("correct", "verify"):
-        monkeypatch.setattr(f"olp.workflows.api.{name}", fake)
+        monkeypatch.setattr(f"olp.workflows.{name}.run", fake)
     return fake
 
 
@@ -197,7 +203,7 @@ def test_an_interrupt_is_130_and_writes_nothing(mill: Path, monkeypatch: pytest.
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("olp.workflows.api.correct", interrupted)
+    monkeypatch.setattr("olp.workflows.correct.run", interrupted)
     result = CliRunner().invoke(main, ["correct", "-j", str(mill / "job.toml")])
     assert result.exit_code == 130
     assert not (mill / "small.corrected.nc").exists()

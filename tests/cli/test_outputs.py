@@ -111,8 +111,8 @@ def test_only_what_came_from_stdin_is_called_so(
 
 
 @pytest.mark.parametrize(("verb", "target"), [
-    ("check", "olp.workflows.check.check"), ("view", "olp.review.job.view"),
-    ("retime", "olp.workflows.retime.retime"),
+    ("check", "olp.workflows.check.run"), ("view", "olp.review.job.run"),
+    ("retime", "olp.workflows.retime.run"),
 ])  # fmt: skip
 def test_an_error_of_no_file_stays_of_no_file(
     folder: Path, verb: str, target: str, monkeypatch: pytest.MonkeyPatch

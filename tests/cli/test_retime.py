@@ -226,7 +226,7 @@ def test_nothing_is_overwritten_without_force(job: Path, tmp_path: Path) -> None
     assert run("retime", part, "-j", job, "--lines", same, "--slow", same).exit_code == 2
 
 
-@pytest.mark.parametrize("where", ["olp.workflows.retime_variants.plan", "olp.files.trajectory.rows"])
+@pytest.mark.parametrize("where", ["olp.trajectory.variants.plan", "olp.files.trajectory.rows"])
 def test_an_interrupt_leaves_nothing(
     where: str, job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,7 +14,7 @@ from olp.core.errors import ConfigError
 from olp.core.grid_interpolation import Grid
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
-from olp.errormodel.gridded import DeviationMap
+from olp.errormodel.sources.maps import DeviationMap
 from olp.errormodel.total import total
 from olp.files.calibration.grids import read_component_grid, read_map
 from olp.files.calibration.reader import load_calibration

@@ -19,15 +19,16 @@ import olp
 from olp.cli import main
 from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import CHAINS
-from olp.errormodel.beams import Beam, tube_mm4
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
-from olp.errormodel.gridded import ComponentTable, DeviationMap
+from olp.errormodel.gridded import ComponentTable
+from olp.errormodel.sources.beams import Beam, tube_mm4
+from olp.errormodel.sources.maps import DeviationMap
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.write import write_files
 from olp.program.directives import with_payloads
-from olp.workflows.session import load
+from olp.workflows.session import Session
 
 #: EZX = -X/100 um/kg, EBX = 2 urad/kg
 LOAD = "X_mm,EZX_um_kg,EBX_urad_kg\n-1000,10,2\n2000,-20,2\n"
@@ -387,7 +388,7 @@ def test_a_beam_in_the_files_of_a_machine(tmp_path: Path) -> None:
         "section_mm = [200, 300, 10]\n"
     )
     path = machine(tmp_path, table, tables=TRUE_ZERO, job="payload_kg = 30")
-    found = load(path, path.with_name("job.toml"), "refuse").model
+    found = Session.start(path, path.with_name("job.toml")).loaded("refuse").model
     expected = 30 * 9.80665 * 3000.0**3 / (48 * 210e3 * tube_mm4(200, 300, 10))
     np.testing.assert_allclose(
         found.error(np.array([[500.0, 0, 0]]), np.array([0, 0, 0, 30.0])), [[0, 0, -expected]], rtol=1e-6
@@ -449,9 +450,9 @@ def test_inspect_shows_maps_loads_and_payloads(tmp_path: Path) -> None:
 
 def test_the_stamp_changes_with_every_file_that_decides_the_model(tmp_path: Path) -> None:
     path = loaded(tmp_path)
-    before = load(path, None, "refuse").digest
+    before = Session.start(path).loaded("refuse").digest
     (tmp_path / "load.csv").write_text(LOAD.replace("-20,2", "-21,2"))
-    assert load(path, None, "refuse").digest != before
+    assert Session.start(path).loaded("refuse").digest != before
 
 
 def test_the_review_page_and_a_comparison_take_the_payload(tmp_path: Path) -> None:

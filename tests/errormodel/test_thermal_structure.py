@@ -21,10 +21,11 @@ from olp.cli import main
 from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Thermal
-from olp.errormodel.structure import Distortion, Sensor, Structure, lagged, shapes
+from olp.errormodel.distortion import lagged, shapes
+from olp.errormodel.sources.structure import Distortion, Sensor, Structure
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.structure import load_structure, parse_drift_log, structure_text
-from olp.files.calibration.writer import calibration_files, in_unit
+from olp.files.calibration.writer import calibration_files
 from olp.files.write import write_files
 
 BOX = np.array([[0.0, 2000.0], [-500.0, 500.0], [-600.0, 0.0]])
@@ -209,7 +210,7 @@ def test_what_the_logs_do_not_tell_is_refused_or_said() -> None:
 
 
 def test_a_structure_is_written_and_read_back_the_same(tmp_path: Path) -> None:
-    (tmp_path / "t.toml").write_bytes(structure_text(STRUCTURE, "m", in_unit, ["a note"]))
+    (tmp_path / "t.toml").write_bytes(structure_text(STRUCTURE, "m", ["a note"]))
     again = load_structure(tmp_path / "t.toml", "m")
     assert (again.sensors, again.distortions) == (STRUCTURE.sensors, STRUCTURE.distortions)
     with pytest.raises(ConfigError, match=r'line 3: machine = "m" is not the name'):
@@ -343,7 +344,7 @@ def test_a_job_without_temperatures_is_told_so_and_one_out_of_range_is_refused(t
     path = machine(tmp_path, '[thermal]\nstructure = "t.toml"\n', tables=TRUE_ZERO, job="")
     calibration = path.with_name("calibration.toml")
     calibration.write_text(calibration.read_text().replace("[[-1000.0, 2000.0]", "[[0.0, 2000.0]"))
-    (tmp_path / "t.toml").write_bytes(structure_text(STRUCTURE, "m", in_unit))
+    (tmp_path / "t.toml").write_bytes(structure_text(STRUCTURE, "m"))
     job, source = path.with_name("job.toml"), b"G21 G90 G54 G64 P0.001 Q0\nG0 X0 Y0 Z0\nG1 X1500 F600\nM2\n"
     assert [f.code for f in olp.correct(source, path, job).findings] == ["OLP423"]
 

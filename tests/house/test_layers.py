@@ -1,12 +1,14 @@
-"""A module imports only from the layers above its own; siblings inside a package are free."""
+"""The rooms of the house: one direction of imports, no circles, and the page that is generated from them."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+import graphlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from house.write_page import PAGE, page, purpose
 
 import olp
 
@@ -51,8 +53,48 @@ def violations(own: str, source: str) -> list[str]:
     return found
 
 
-def test_every_module_has_a_row() -> None:
-    assert {top(path) for path in MODULES} - FRONT <= ROW.keys()
+def test_every_room_is_in_the_list_and_nothing_lies_loose() -> None:
+    assert {top(path) for path in MODULES} - FRONT == ROW.keys()
+    assert {path.stem for path in PACKAGE.glob("*.py")} == FRONT
+
+
+def test_the_page_of_the_house_is_the_house() -> None:
+    """Stale: run python tests/house/write_page.py."""
+    assert PAGE.read_text("utf-8") == page(ROOMS)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_every_module_says_what_it_holds(path: Path) -> None:
+    assert purpose(path)
+
+
+def files_imported(modules: Mapping[str, str]) -> dict[str, set[str]]:
+    """Module to the modules that its text imports, also for types and in functions; packages do not count."""
+    graph: dict[str, set[str]] = {}
+    for name, source in modules.items():
+        graph[name] = set()
+        for node in ast.walk(ast.parse(source)):
+            wanted = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                wanted = [f"{node.module}.{alias.name}" for alias in node.names] + [node.module]
+            graph[name] |= {other for other in wanted if other in modules and other != name}
+    return graph
+
+
+def test_there_is_no_circle_of_files() -> None:
+    texts = {
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path.read_text("utf-8")
+        for path in MODULES
+        if path.name != "__init__.py"
+    }
+    graphlib.TopologicalSorter(files_imported(texts)).prepare()
+
+
+def test_a_circle_would_be_found() -> None:
+    texts = {"olp.a": "def late():\n    from olp import b", "olp.b": "from olp.c import x"}
+    texts["olp.c"] = "import olp.a"
+    with pytest.raises(graphlib.CycleError):
+        graphlib.TopologicalSorter(files_imported(texts)).prepare()
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())

@@ -1,21 +1,20 @@
 """Laws L1 to L8 of the program representation over all dialects: one table of cases, one suite.
 
-A dialect joins with a `Case`: how it says points, distances and comments, which characters it is made of, and
-where real programs of it are. What only one family has is tested beside it (`test_laws`, `test_apt`,
-`test_dmis`).
+A dialect joins with a case in `cases.dialects`. What only one family has is tested beside it (`test_laws`,
+`test_apt`, `test_dmis`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cases.acceptance import points, unstamped
+from cases.dialects import CASES, FRAMES, RS274, Case
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from judge import machines
@@ -28,138 +27,13 @@ from olp.core.errors import OlpError, ProgramError
 from olp.core.machine import Setup
 from olp.files.config import load_setup
 from olp.files.described import described
+from olp.program import registry
 
 #: 1 nm, within which the two independent models agree
 SLACK_MM = 1e-6
 OFFSET = np.array([250.0, 200.0, -300.0])
 LEVER = np.array([0.0, 0.0, -120.0])
-NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
 HALF_DIGIT = 0.5e-3 + SLACK_MM
-Lines = list[str]
-
-
-@dataclass(frozen=True)
-class Case:
-    """One dialect. `coordinates` finds the numbers of motion statements, its one group the three of them;
-    `lever` is what the tool of the test's machine is to this dialect."""
-
-    name: str
-    controller: str
-    alphabet: str
-    head: Lines
-    tail: Lines
-    point: Callable[[Sequence[float], int], str]
-    distance: Callable[[Sequence[float], int], str] | None
-    comment: Callable[[str], str]
-    coordinates: re.Pattern[bytes]
-    specimens: tuple[str, ...]
-    examples: tuple[bytes, ...] = ()
-    keys: str = ""
-
-    def program(self, points: np.ndarray, digits: int) -> bytes:
-        said = [self.point(p, digits) for p in points.tolist()]
-        return ("\n".join([*self.head, *said, *self.tail]) + "\n").encode()
-
-
-def _words(values: Sequence[float], digits: int) -> str:
-    return " ".join(f"{a}{v:.{digits}f}" for a, v in zip("XYZ", values, strict=True))
-
-
-def _list(values: Sequence[float], digits: int) -> str:
-    return ",".join(f"{v:.{digits}f}" for v in values)
-
-
-def _rs274(name: str) -> Case:
-    return Case(
-        name, name, "GXYZIJKRFMTNSPQHLDO%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!",
-        ["G21 G90 G17 G54 G94 F600"], ["M2"],
-        lambda p, d: f"G1 {_words(p, d)}", lambda p, d: f"G91 G1 {_words(p, d)}",
-        lambda text: f"({text})",
-        re.compile(rb"(?m)^G1 X(" + NUMBER + rb") Y(" + NUMBER + rb") Z(" + NUMBER + rb")"),
-        ("gcode_cncjs/*",) if name == "linuxcnc" else ("gcode_fanuc*/*",) if name == "fanuc" else (),
-        (b"%\n%\n", b"\xef\xbb\xbfG21\nG0 X1\n"),
-    )  # fmt: skip
-
-
-RS274 = ("linuxcnc", "grbl", "fanuc", "haas")
-CASES = {
-    **{name: _rs274(name) for name in RS274},
-    "apt": Case(
-        "apt", "apt", "GOTDLAFRMCIEUNSP/,.+-$ 0123456789\r\n\t=()'",
-        ["PARTNO TEST", "UNITS/MM", "FEDRAT/600,MMPM"], ["FINI"],
-        lambda p, d: f"GOTO/{_list(p, d)}", lambda p, d: f"GODLTA/{_list(p, d)}",
-        lambda text: f"$$ {text}",
-        re.compile(rb"(?m)^GOTO/(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
-        ("apt_cldata/*",),
-        (
-            b"GOTO/1,2,3$", b"GOTO/1,2,$\n3", b"GOTO/1.$\n5,2,3", b"$$ $\nGOTO/1,2,3\n",
-            b"GOTO/1,2,3,0,0,1\nGOTO/4,5,6",
-            b"CIRCLE/0,0,0,0,0,1\nGOTO/1,0,0", b"GODLTA/1\nGOTO/1,2,3\nGODLTA/-2", b"RAPID\nGOTO/1,2,3",
-            b"GOTO/1E2,2D0,3", b"GOTO/1E999,0,0",
-            b"INDIRV/1,0,0\nTLON,GOFWD/(CIRCLE/0,0,0,1),ON,(LINE/0,0,0,1,0,0)",
-            b"CYCLE/DRILL,DEPTH,5,CLEAR,1\nGOTO/1,2,3\nCYCLE/OFF\nGOTO/2,3,4", b"PPRINT $\nGOTO/1,2,3",
-            b"\xef\xbb\xbfGOTO/1,2,3\r\nGOTO/1,2,4\r\n", b"GOTO/1,2,3\rGOTO/1,2,4\r", b"LOADTL/1\nGOTO/0,0,0",
-            b"$$-> CSYS / 1,0,0,0, $\n0,1,0,0, $\n0,0,1,0\nGOTO/1,2,3\n", b"GOTO/99999999999999999999,1,2",
-        ),
-    ),
-    "dmis": Case(
-        "dmis", "dmis", "GOTPMEASCRDUNI/,.+-$ 0123456789\r\n\t=()'F",
-        ["DMISMN/'TEST',05.2", "UNITS/MM,ANGDEC", "MODE/PROG,MAN"], ["ENDFIL"],
-        lambda p, d: f"GOTO/{_list(p, d)}", None,
-        lambda text: f"$$ {text}",
-        re.compile(rb"(?m)^GOTO/(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
-        ("dmis/*",),
-        (
-            b"GOTO/CART,1,2,3", b"MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3,0,0,1\nENDMES", b"PTMEAS/CART,1,2,3",
-            b"F(A)=FEAT/POINT,CART,1,2,3,0,0,1\nGOTO/1,2,$\n3", b"MEAS/POINT,F(A),1\nENDMES\nGOTO/1,2,3",
-            b"MODE/MAN\nGOTO/1,2,3", b"IF/(A .EQ. 1)\nGOTO/1,2,3\nENDIF",
-            b"TEXT/OPER,'GOTO/1,2,$$'\nGOTO/1,2,3",
-            b"$$ a $\nGOTO/1,2,3", b"D(A)=DATSET/DAT(A),ZDIR\nGOTO/1,2,3", b"BEGIN/CHFILE\nX = 3\nEND/CHFILE",
-        ),
-    ),
-    "list": Case(
-        "list", "list", "XYZ_mminch,;.+-# 0123456789\r\n\t\"eE=",
-        ["X_mm,Y_mm,Z_mm"], [],
-        _list, None, lambda text: f"# {text}",
-        re.compile(rb"(?m)^(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
-        (),
-        (
-            b"X_mm;Y_mm;Z_mm\n1,5;2,5;3,5\n", b"X_inch Y_inch Z_inch\n 1.50  2.5  -3\n", b"1,2,3",
-            b"X_mm,Y_mm,Z_mm", b'X_mm,Y_mm,Z_mm\n"1","2","3"', b"X_mm,Y_mm,Z_mm\n1,2,3,\n",
-            b"\xef\xbb\xbfX_mm,Y_mm,Z_mm\r\n1e1,2E-1,.5\r", b"X_mm,Y_mm,Z_mm\n1,2,\n",
-            b"# frame=G55\nX_mm,Y_mm,Z_mm\n1,2,3", b"X_mm,Y_mm,Z_mm\n1e99,2,3",
-            b"X_mm,Y_mm,Z_mm\n" + b"0" * 50 + b"1,2,3", b'X_mm,Y_mm,Z_mm\n"1,2,3',
-        ),
-    ),
-    "kawasaki-as": Case(
-        "kawasaki-as", "kawasaki-as", "LMOVETRANSPOINDW().,;\"+-= #0123456789\r\n\tp",
-        [".PROGRAM test()", "SPEED 100 MM/S ALWAYS"], [".END"],
-        lambda p, d: f"LMOVE TRANS({_list(p, d)})", lambda p, d: f"DRAW {_list(p, d)}",
-        lambda text: f"; {text}",
-        re.compile(rb"(?m)^LMOVE TRANS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\)"),
-        (),
-        (
-            b"LMOVE p\n.TRANS\np 1 2 3\n.END", b"LMOVE TRANS(1,2,3,0,180,0) ; x",
-            b"JMOVE #a\nLMOVE TRANS(1,2,3)",
-            b'PRINT ";"\nLMOVE TRANS(1,2,3)', b"LMOVE TRANS(1E400,2,3)", b"DRAW 1,2,3",
-            b".TRANS\np 1 2 3\np 1 2 3\n.END\nLMOVE p", b"TOOL 99\nLMOVE TRANS(1,2,3)",
-            b"LMOVE TRANS(1,2,3)\rLMOVE TRANS(1,2,3)",
-        ),
-    ),
-    "val2": Case(
-        "val2", "val2", "MOVESTRANSPD().,;\"+-= #0123456789\r\n\tp",
-        ["SPEED 100 ALWAYS"], [],
-        lambda p, d: f"MOVES TRANS({_list(p, d)})", lambda p, d: f"DRAW {_list(p, d)}",
-        lambda text: f"; {text}",
-        re.compile(rb"(?m)^MOVES TRANS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\)"),
-        (),
-        (b"10 SET a = TRANS(1,2,3)\n20 MOVES a\n30 MOVES a", b"MOVE #p\nMOVES TRANS(1,2,3)"),
-    ),
-}  # fmt: skip
-FRAMES = {
-    name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
-    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3")
-}
 
 
 def recipe(case: Case, **more: object) -> Recipe:
@@ -197,6 +71,11 @@ def attempt(data: bytes, setup: Setup) -> bytes | None:
     except OlpError as error:
         assert str(error)
         return None
+
+
+def test_every_registered_dialect_has_a_case() -> None:
+    assert set(CASES) == {*registry.DIALECTS, *registry.DESCRIBED}
+    assert all(case.name == name for name, case in CASES.items())
 
 
 # -- L1, L3: identity ----------------------------------------------------------------------------------
@@ -387,7 +266,7 @@ def test_l8_the_tally_is_complete(bent: dict[str, Path], name: str) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_the_support_matrix_says_what_becomes_of_each_statement(zero: dict[str, Setup], name: str) -> None:
     rows = olp.inspect(CASES[name].program(np.zeros((2, 3)), 3), zero[name])["support"]
-    assert {row["support"] for row in rows} == {"corrected", "read", "carried", "refused"}
+    assert {row["support"] for row in rows} == CASES[name].support
     assert all(row["why"] for row in rows if row["support"] == "refused")
     assert len({row["statement"] for row in rows}) == len(rows)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine, points, unstamped
+from cases.dialects import RS274
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from judge import machines, programs
@@ -19,7 +20,6 @@ from judge.path import match
 import olp
 from olp.core.errors import OlpError
 
-DIALECTS = ("linuxcnc", "grbl", "fanuc", "haas")
 ALPHABET = "GXYZIJKRFMTNSPQHLDO%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!"
 #: 1 nm, within which the two independent models agree
 SLACK_MM = 1e-6
@@ -47,13 +47,13 @@ WORD = re.compile(rb"(?i)([XYZ])([ \t]*)([+-]?(?:\d+\.?\d*|\.\d+))")
 @pytest.fixture(scope="module")
 def zero(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("zero")
-    return {name: machines.zero_machine(folder / name, Recipe(controller=name)) for name in DIALECTS}
+    return {name: machines.zero_machine(folder / name, Recipe(controller=name)) for name in RS274}
 
 
 @pytest.fixture(scope="module")
 def shifted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("shift")
-    return {name: machines.shift_machine(folder / name, recipe=Recipe(controller=name)) for name in DIALECTS}
+    return {name: machines.shift_machine(folder / name, recipe=Recipe(controller=name)) for name in RS274}
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def attempt(data: bytes, path: Path) -> bytes | None:
 # -- L1, L3: identity ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", RS274)
 @given(data=st.one_of(st.binary(max_size=200), st.text(ALPHABET, max_size=120).map(str.encode)))
 @example(data=b"")
 @example(data=b"%\n%\n")
@@ -89,7 +89,7 @@ def test_l1_any_bytes_come_back_or_are_refused(zero: dict[str, Path], dialect: s
     assert out is None or out == data
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", RS274)
 @given(noise=st.binary(max_size=60))
 @settings(max_examples=15)
 def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Path], dialect: str, noise: bytes) -> None:

@@ -18,6 +18,7 @@ from olp.findings.catalogue import RULES
 from olp.review import job
 from olp.review import page as pages
 from olp.review.manifest import manifest_of
+from olp.workflows.session import Session
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAD = b"G21 G17 G90 G94 G54 G64 P0.01 Q0\nG43 H1\nG0 X0 Y0 Z20\n"
@@ -273,14 +274,15 @@ def test_a_correction_of_an_unrolled_program_is_shown_beside_it(
     corrected = olp.correct(text, machine, flatten=True)
     ours = olp.view(text, machine, correction=corrected, flatten=True, time=False).scene
     calls: list[str] = []
-    for name, what in (("read", job.read), ("load", job.load)):
+    for name, where, key in (("read", job, "read"), ("load", Session, "loaded")):
+        what = getattr(where, key)
 
         def counted(*args: Any, _what: Any = what, _name: str = name, **more: Any) -> Any:
             calls.append(_name)
             return _what(*args, **more)
 
-        monkeypatch.setattr(job, name, counted)
-    monkeypatch.setattr("olp.workflows.api.read", None)
+        monkeypatch.setattr(where, key, counted)
+    monkeypatch.setattr("olp.workflows.verify.read", None)
     theirs = olp.view(text, machine, corrected=corrected.data, flatten=True, time=False).scene
     np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
     assert theirs.report["deviation"] == ours.report["deviation"]

@@ -413,7 +413,7 @@ int getaddrinfo(const char *a, const char *b, const void *c, void *d) { return s
 _PLAN = """
 import sys
 sys.path.insert(0, {tests!r})
-from test_trajectory_adversarial import ROUTES
+from trajectory.test_adversarial import ROUTES
 from olp.trajectory.plan import plan
 for make in ROUTES.values():
     plan(*make())

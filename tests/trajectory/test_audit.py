@@ -7,13 +7,12 @@ from math import comb
 
 import numpy as np
 import pytest
-from cases.trajectory import far_from, path_deviation
+from cases.trajectory import critical, far_from, path_deviation
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from olp.core.errors import UsageError
 from olp.trajectory.audit import audit, slowing
-from olp.trajectory.critical import critical
 from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.extremes import largest, nodes
 from olp.trajectory.motion import Motion

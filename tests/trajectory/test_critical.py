@@ -6,12 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases.trajectory import CASES, LIMITS, excess, random_route, route
+from cases.trajectory import CASES, LIMITS, critical, excess, random_route, route
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from olp.trajectory import ramps
-from olp.trajectory.critical import critical
 from olp.trajectory.forecast import expected_s
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route

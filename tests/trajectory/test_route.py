@@ -20,7 +20,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.files.config import load_setup
 from olp.program.feeds.timing import BLEND_MM
-from olp.program.rs274.profiles import PROFILES
+from olp.program.registry import DIALECTS
 from olp.program.rs274.reader import read
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, axis_limits, routes
 from olp.trajectory.route import Route
@@ -221,7 +221,7 @@ def test_a_probe_is_not_driven_beyond_its_start_and_an_unknown_start_is_no_way()
     assert route.point_mm[:, 0].tolist() == [0, 1, 9, 20]
     bare = setup_of("linuxcnc", "")
     unknown = Setup(bare.machine)
-    program = read(b"F60\nG0 X1\nY1\nZ1\nG1 X2\nM2\n", unknown, PROFILES["linuxcnc"])
+    program = read(b"F60\nG0 X1\nY1\nZ1\nG1 X2\nM2\n", unknown, DIALECTS["linuxcnc"])
     (found,) = routes(program)
     assert found.point_mm.tolist() == [[1, 1, 1], [2, 1, 1]]
 
@@ -309,7 +309,7 @@ def test_shipped_programs_and_their_corrections_give_routes(name: str) -> None:
     path = FOLDER / name
     machine, job = path.with_name("machine.toml"), path.with_name(JOBS[name])
     setup = load_setup(machine, job)
-    profile = PROFILES[setup.machine.controller]
+    profile = DIALECTS[setup.machine.controller]
     nominal = routes(read(path.read_bytes(), setup, profile))
     assert nominal
     for route in nominal:
@@ -336,7 +336,7 @@ def test_real_programs_give_routes(corpus: Path, setups: dict[str, tuple[Path, P
     done = 0
     for path in programs(corpus, folder):
         try:
-            program = read(path.read_bytes(), setup, PROFILES[PROFILE_OF[folder]])
+            program = read(path.read_bytes(), setup, DIALECTS[PROFILE_OF[folder]])
         except ProgramError:
             continue
         for route in routes(program):

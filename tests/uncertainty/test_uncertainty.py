@@ -26,8 +26,9 @@ from olp.core.errors import ConfigError
 from olp.core.progress import silent
 from olp.core.toolpath import Frame, Toolpath
 from olp.errormodel.calibration import Calibration, Curve, Thermal
+from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import Expansion, Sensitivity
-from olp.errormodel.uncertainty import Entry, Uncertainty, fingerprint, of_sigmas
+from olp.errormodel.uncertainty import Uncertainty, fingerprint, of_sigmas
 from olp.files.calibration.covariance import covariance_bytes, load_uncertainty, parse_covariance
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
@@ -124,7 +125,7 @@ def test_a_place_where_it_was_touched_off_is_known() -> None:
     path = path_of(at, touch=True)
     frame = replace(path.frames[0], tool_mm=TOUCH[1])
     path = replace(path, frames=(frame,))
-    for known in (random_uncertainty(), of_sigmas(flat(), {"EXX": np.full(6, 3e-3)})):
+    for known in (random_uncertainty(), of_sigmas(flat(), {"curves": {"EXX": np.full(6, 3e-3)}})):
         assert known is not None
         band = bands(covariances(unknowns(known), path, points_of(at)))
         assert band[0] < 1e-9 < 1e-3 < band[1]
@@ -134,7 +135,7 @@ def test_a_place_where_it_was_touched_off_is_known() -> None:
 @settings(max_examples=30, deadline=None)
 def test_sigma_columns_hold_anywhere_between_their_positions(q: float, name: str) -> None:
     sigma = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 4.0]) * (1e-3 if name == "EXX" else 1e-6)
-    known = of_sigmas(flat(), {name: sigma})
+    known = of_sigmas(flat(), {"curves": {name: sigma}})
     assert known is not None
     at = np.array([[q, 0.0, -400.0]])
     rows = Sensitivity.of(flat(), "FXYZ", known).rows(at, np.zeros(3))[0, 0]
@@ -143,7 +144,7 @@ def test_sigma_columns_hold_anywhere_between_their_positions(q: float, name: str
 
 
 def test_variances_of_independent_numbers_add() -> None:
-    first = of_sigmas(flat(), {"EXX": np.full(6, 3e-3)}, {"C0Y": 4e-6})
+    first = of_sigmas(flat(), {"curves": {"EXX": np.full(6, 3e-3)}, "squareness": {"C0Y": 4e-6}})
     assert first is not None
     at = np.array([[100.0, 1000.0, 0.0]])
     sigma = np.sqrt(np.diagonal(covariances(unknowns(first), path_of(at), points_of(at))[0]))
@@ -219,7 +220,7 @@ def test_lines_do_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_gain_of_one_number_is_sure_beyond_two_sigma() -> None:
-    known = of_sigmas(flat(), {"EXX": np.full(6, 2e-3)})
+    known = of_sigmas(flat(), {"curves": {"EXX": np.full(6, 2e-3)}})
     assert known is not None
     at = np.full((2, 3), [1500.0, 0.0, 0.0])
     before = np.array([[4.0e-3, 0.0, 0.0], [1.0e-3, 0.0, 0.0]])
@@ -237,7 +238,11 @@ def test_components_within_their_uncertainty_are_named() -> None:
     )
     calibration = flat(curves=curves, squareness={"C0Y": 30e-6, "B0Z": 4e-6})
     known = of_sigmas(
-        calibration, {"EXX": np.full(6, 2e-3), "EYX": np.full(6, 2e-3)}, {"C0Y": 5e-6, "B0Z": 5e-6}
+        calibration,
+        {
+            "curves": {"EXX": np.full(6, 2e-3), "EYX": np.full(6, 2e-3)},
+            "squareness": {"C0Y": 5e-6, "B0Z": 5e-6},
+        },
     )
     assert known is not None
     assert unsure(calibration, known) == {"EYX", "B0Z"}

@@ -26,8 +26,9 @@ from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Axis
 from olp.files.config import load_setup
 from olp.files.measurements.reader import load_measurements
+from olp.program.registry import DIALECTS
 from olp.program.rs274.positions import positions_program
-from olp.program.rs274.profiles import PROFILES
+from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.reader import read
 from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
 
@@ -134,19 +135,19 @@ def test_more_points_and_better_ones_are_never_worse() -> None:
 # -- programs --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("control", sorted(PROFILES))
+@pytest.mark.parametrize("control", sorted(name for name, d in DIALECTS.items() if isinstance(d, Profile)))
 def test_programs_stop_where_they_are_meant_to(control: str) -> None:
     setup = load_setup(MACHINE)
     setup = dataclasses.replace(setup, machine=dataclasses.replace(setup.machine, controller=control))
     places = np.array([[10.0, 20.0, -30.0], [10.0, 20.0, -200.125], [700.5, 3.25, -4.0]])
-    text = positions_program(PROFILES[control], places, [0.0, 2.5, 4.0], 3, ["a (note) " * 12])
-    path = read(text, setup, PROFILES[control]).toolpath
+    text = positions_program(DIALECTS[control], places, [0.0, 2.5, 4.0], 3, ["a (note) " * 12])
+    path = read(text, setup, DIALECTS[control]).toolpath
     assert np.array_equal(path.end_mm[0], [np.nan, np.nan, -30.0], equal_nan=True)
     assert np.array_equal(path.end_mm[1:], places)
     words = text.decode().split()
     dwell = [float(w[1:]) for w in words if w.startswith("P")]
     pointed = ["." in w for w in words if w.startswith("P")]
-    waits = [PROFILES[control].dwell_s(d, pointed=p) for d, p in zip(dwell, pointed, strict=True)]
+    waits = [DIALECTS[control].dwell_s(d, pointed=p) for d, p in zip(dwell, pointed, strict=True)]
     assert waits == [2.5, 4.0]
     assert max(map(len, text.decode().splitlines())) <= 72
 

@@ -22,7 +22,7 @@ import olp
 from olp.core.errors import OlpError, ProgramError
 from olp.core.toolpath import Flag, Toolpath
 from olp.files.config import load_setup
-from olp.program.rs274.profiles import PROFILES
+from olp.program.registry import DIALECTS
 from olp.program.rs274.reader import read
 
 pytestmark = pytest.mark.oracle
@@ -192,7 +192,7 @@ def spacious(folder: Path, shift_um: tuple[float, float, float]) -> Path:
 
 def reading(text: bytes, path: Path) -> Toolpath:
     setup = load_setup(path, path.with_name("job.toml"))
-    return read(text, setup, PROFILES["linuxcnc"], words=False).toolpath
+    return read(text, setup, DIALECTS["linuxcnc"], words=False).toolpath
 
 
 def difference(path: Toolpath, moves: CanonMoves) -> str:

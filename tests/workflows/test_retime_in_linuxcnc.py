@@ -19,7 +19,7 @@ from judge import controller
 from judge.retiming import judge
 
 from olp.files.config import load_setup
-from olp.program.rs274.profiles import PROFILES
+from olp.program.registry import DIALECTS
 from olp.program.rs274.reader import read
 from olp.trajectory.from_program import routes
 from olp.trajectory.plan import Trajectory, plan
@@ -70,7 +70,7 @@ def times(
     text = "\n".join([mode, *moves, "M2", ""]).encode()
     described = machine(folder / "machine", tables=TRUE_ZERO, job=START)
     setup = load_setup(described, described.with_name("job.toml"))
-    (route,) = routes(read(text, setup, PROFILES["linuxcnc"]))
+    (route,) = routes(read(text, setup, DIALECTS["linuxcnc"]))
     route = replace(route, feed_mm_s=np.minimum(route.feed_mm_s, controller.SPEED_MM_S))
     limits = AxisLimits(
         np.full(3, controller.SPEED_MM_S), np.full(3, share * controller.ACCELERATION_MM_S2), np.full(3, JERK)

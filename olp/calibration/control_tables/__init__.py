@@ -1,0 +1,1 @@
+"""What a control does with compensation tables, and what they leave."""

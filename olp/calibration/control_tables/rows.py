@@ -14,9 +14,10 @@ from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.core.machine import COMPONENTS, ZERO
 from olp.core.units import AXES
-from olp.errormodel.bodies import Lever, build_bodies
+from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Reference
-from olp.errormodel.cyclic import cyclic_value
+from olp.errormodel.levers import Lever
+from olp.errormodel.sources.cyclic import cyclic_value
 
 #: Between rows a table may miss the curve by this much, in mm or rad times a metre, where its size allows.
 MISS_MM = 5e-5

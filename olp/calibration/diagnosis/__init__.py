@@ -1,0 +1,1 @@
+"""A calibration judged by independent points, and refined by measured runs."""

@@ -21,8 +21,9 @@ from olp.core.rigid_fit import fit_frame
 from olp.core.units import AXES
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
+from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import Sensitivity, value_rows
-from olp.errormodel.uncertainty import Entry, Uncertainty, fingerprint
+from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
 Change = Mapping[tuple[str, str, float], tuple[Entry, Array]]
 

@@ -15,7 +15,8 @@ from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.uncertainty import Entry, Uncertainty, fingerprint
+from olp.errormodel.entry import Entry
+from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
 #: Positions of a curve in each cell of its spline: between them its factor is straight.
 _PER_CELL = 3
@@ -63,7 +64,7 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
         own = slice(at, at + len(table))
         at = own.stop
         variance = fit.between_targets(name, q) if kind == "mean" else np.zeros(len(table))
-        entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))  # type: ignore[arg-type]
+        entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))
     kinds = Counter(result.state.noun for result in fit.results if result.state.noun)
     taken = ", ".join(f"{files} of {kind}" for kind, files in kinds.items())
     words = (

@@ -16,7 +16,7 @@ from olp.core.grid_interpolation import Grid
 from olp.core.machine import Vector
 from olp.core.units import UM_PER_MM
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.gridded import DeviationMap
+from olp.errormodel.sources.maps import DeviationMap
 from olp.findings.catalogue import Finding
 
 #: What interpolation may lose where nobody says it, in mm.

@@ -1,0 +1,1 @@
+"""Readings of instruments as values and as rows of the adjustment, one file an instrument."""

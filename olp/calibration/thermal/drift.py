@@ -23,7 +23,8 @@ from olp.calibration.thermal.drift_problem import Problem, rms, thinned
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.units import AXES
-from olp.errormodel.structure import SHAPES, Distortion, Sensor, Structure
+from olp.errormodel.distortion import SHAPES
+from olp.errormodel.sources.structure import Distortion, Sensor, Structure
 from olp.findings.catalogue import Finding
 
 #: Sensors whose histories are so nearly combinations of one another tell nothing apart.

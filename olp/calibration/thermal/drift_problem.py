@@ -12,7 +12,7 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
-from olp.errormodel.structure import SHAPES, lagged, shapes
+from olp.errormodel.distortion import SHAPES, lagged, shapes
 
 Index = npt.NDArray[np.intp]
 

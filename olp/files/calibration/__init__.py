@@ -1,0 +1,1 @@
+"""Calibration files: their tables, grids, covariance and thermal structure, read and written."""

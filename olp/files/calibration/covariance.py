@@ -16,15 +16,14 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from olp.core.errors import ConfigError
-from olp.core.machine import SQUARENESS, ZERO
-from olp.core.units import AXES, shifted
+from olp.core.machine import COMPONENTS, ZERO
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.uncertainty import KINDS, Entry, Uncertainty, fingerprint, of_sigmas
-from olp.files.problems import validate
-from olp.files.schemas import CalibrationFile, CovarianceTable
-from olp.files.tables import parse_curves
-from olp.files.toml_text import read_toml
-from olp.files.write import PathLike, read_bytes
+from olp.errormodel.entry import Entry
+from olp.errormodel.sources.registry import NUMBERS, SOURCES
+from olp.errormodel.uncertainty import Uncertainty, fingerprint, of_sigmas
+from olp.files.calibration.reader import CalibrationReading
+from olp.files.calibration.schema import covariance_of
+from olp.files.write import PathLike, Reader, read_bytes
 
 SCHEMA = "olp-covariance-1"
 _ARRAYS = {
@@ -33,18 +32,19 @@ _ARRAYS = {
 }  # fmt: skip
 
 
-def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | None:
+def load_uncertainty(
+    path: PathLike, calibration: Calibration, read: Reader = read_bytes
+) -> Uncertainty | None:
     """What is known of the uncertainty of a calibration that was read from `path`; None where nothing is.
 
     The file that [covariance] names wins over sigma columns and keys. Raises InputError where a file cannot
     be read, ConfigError where it is no covariance, or that of another calibration.
     """
-    values, lines = read_toml(read_bytes(path), str(path))
-    file = validate(CalibrationFile, values, lines, str(path))
-    stated = file.covariance or CovarianceTable()
+    reading = CalibrationReading(path, {}, read)
+    stated = covariance_of(reading.file)
     if stated.file is not None:
         named = FilePath(path).parent / stated.file
-        found: Uncertainty | None = parse_covariance(read_bytes(named), str(named))
+        found: Uncertainty | None = parse_covariance(read(named), str(named))
         if found is not None and found.fingerprint != fingerprint(calibration):
             raise ConfigError(
                 f"is the covariance of another calibration than {FilePath(path).name}: that has been changed "
@@ -53,7 +53,10 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
                 file=str(named),
             )
     else:
-        found = _of_sigmas(file, FilePath(path).parent, calibration)
+        found = of_sigmas(
+            calibration,
+            {source.key: source.sigmas(source.stated(reading.file), reading) for source in SOURCES},
+        )
     repeatability = calibration.repeatability_mm or ZERO
     if found is None and (any(repeatability) or stated.temperature_K):
         found = Uncertainty((), fingerprint(calibration), "nothing is known of the calibration itself")
@@ -64,24 +67,6 @@ def load_uncertainty(path: PathLike, calibration: Calibration) -> Uncertainty | 
         repeatability_mm=repeatability,
         growth_per_year=stated.growth_per_year,
         temperature_K=stated.temperature_K,
-    )
-
-
-def _of_sigmas(file: CalibrationFile, folder: FilePath, calibration: Calibration) -> Uncertainty | None:
-    curves = {}
-    for table in file.curves:
-        data = read_bytes(folder / table.file)
-        # most files have none, and need not be read twice
-        if b"sigma_" in data:
-            sigma = parse_curves(data, table.file).sigma
-            curves.update({name: values for name, values in sigma.items() if values.any()})
-    square = {name: shifted(getattr(file.squareness, f"sigma_{name}_urad"), -6) for name in SQUARENESS}
-    lost = {axis: shifted(getattr(file.backlash, f"sigma_{axis}_um"), -3) for axis in AXES}
-    return of_sigmas(
-        calibration,
-        curves,
-        {name: value for name, value in square.items() if value},
-        {axis: value for axis, value in lost.items() if value},
     )
 
 
@@ -132,8 +117,10 @@ def parse_covariance(data: bytes, file: str) -> Uncertainty:
         for k, last in enumerate(ends):
             own = slice(last - int(count[k]), last)
             kind = str(found["kind"][k])
-            if kind not in KINDS:
-                raise ConfigError(f"kind '{kind}'; expected one of {', '.join(KINDS)}")
+            if kind not in NUMBERS:
+                # those of component errors first
+                known = sorted(NUMBERS, key=lambda name: NUMBERS[name].names != COMPONENTS)
+                raise ConfigError(f"kind '{kind}'; expected one of {', '.join(known)}")
             position = found["position_mm"][own].astype(float) if kind in ("mean", "half") else np.zeros(0)
             entries.append(
                 Entry(

@@ -10,9 +10,10 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES
+from olp.files.columns import Row, names, read_sheet
 from olp.files.problems import Problem, config_error, nearest
-from olp.files.tables import Row, headed, rows_of
-from olp.files.write import PathLike, read_bytes
+from olp.files.tables import unit_columns
+from olp.files.write import PathLike, Reader, read_bytes
 
 MAP_COLUMNS = ("DX_um", "DY_um", "DZ_um")
 SIGMA_COLUMNS = tuple(f"sigma_{name}" for name in MAP_COLUMNS)
@@ -32,36 +33,38 @@ class GridTable:
     columns: Mapping[str, Array]
 
 
-def read_map(path: PathLike) -> GridTable:
+def read_map(path: PathLike, read: Reader = read_bytes) -> GridTable:
     """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, a row a node in any order, and standard
     uncertainties `sigma_DX_um, sigma_DY_um, sigma_DZ_um` where they are stated; the columns DX, sigma_DX ..
     of the result are in mm.
 
     Raises InputError where the file cannot be read, ConfigError with every problem and its line.
     """
-    table = _parse(read_bytes(path), str(path), _map_problems)
+    table = _parse(read(path), str(path), _map_problems)
     return GridTable(
         table.arguments, table.knots_mm, {n.removesuffix("_um"): v for n, v in table.columns.items()}
     )
 
 
-def read_component_grid(path: PathLike) -> GridTable:
+def read_component_grid(path: PathLike, read: Reader = read_bytes) -> GridTable:
     """Read component errors of one axis per kg: one to three columns of axis positions (`Y_mm`, `Z_mm`), then
     `EZY_um_kg`, `EAY_urad_kg` ...; the columns of the result are in mm/kg and rad/kg by ISO 230-1 name.
 
     Raises as `read_map`.
     """
-    table = _parse(read_bytes(path), str(path), _component_problems)
+    table = _parse(read(path), str(path), _component_problems)
     return GridTable(table.arguments, table.knots_mm, {n[:3]: v for n, v in table.columns.items()})
 
 
 def _parse(data: bytes, file: str, problems_of: Callable[[int, Sequence[str]], list[Problem]]) -> GridTable:
-    line, header, records = headed(data, file, "columns such as X_mm", problems_of)
-    rows, found = rows_of(header, records)
-    if found or not rows:
-        raise config_error(found or [(line, "no rows follow the header; expected one a node")], file)
+    wanted = unit_columns("holds no header; expected columns such as X_mm", problems_of)
+    sheet = read_sheet(data, file, wanted)
+    header, rows = sheet.header, sheet.rows
+    if sheet.problems or not rows:
+        nothing = (sheet.line, "no rows follow the header; expected one a node")
+        raise config_error(sheet.problems or [nothing], file)
     arguments = tuple(name[0] for name in header if name in _POSITIONS)
-    at = np.array([[numbers[header.index(f"{a}_mm")] for a in arguments] for _, numbers in rows])
+    at = np.array([[row[header.index(f"{a}_mm")] for a in arguments] for _, row in rows])
     knots, index = _levels(at)
     found = _node_problems(arguments, knots, index, rows)
     if found:
@@ -71,7 +74,7 @@ def _parse(data: bytes, file: str, problems_of: Callable[[int, Sequence[str]], l
     for place, name in enumerate(header):
         if name not in _POSITIONS:
             values = np.empty(shape)
-            values[tuple(index.T)] = [numbers[place] for _, numbers in rows]
+            values[tuple(index.T)] = [row[place] for _, row in rows]
             columns[name] = values
     return GridTable(arguments, knots, columns)
 
@@ -112,15 +115,13 @@ def _component_problems(line: int, header: Sequence[str]) -> list[Problem]:
 
 
 def _header_problems(line: int, header: Sequence[str], known: Sequence[str]) -> list[Problem]:
-    problems: list[Problem] = []
-    for number, name in enumerate(header, 1):
-        if header.index(name) < number - 1:
-            problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
-        elif name not in known:
-            near = nearest(name, [n for n in known if n not in header])
-            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known[:6])} ..."
-            problems.append((line, f'column {number} is "{name}"; {hint}'))
-    return problems
+    def wrong(_: int, name: str) -> str | None:
+        if name in known:
+            return None
+        near = nearest(name, [n for n in known if n not in header])
+        return f"did you mean {near}?" if near else f"expected one of {', '.join(known[:6])} ..."
+
+    return names(line, header, wrong)
 
 
 def _levels(at: Array) -> tuple[tuple[Array, ...], Index]:

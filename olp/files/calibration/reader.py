@@ -1,4 +1,4 @@
-"""Loads a calibration file with its curve files."""
+"""Loads a calibration file with the files that it names."""
 
 from __future__ import annotations
 
@@ -10,118 +10,139 @@ from typing import TypeVar
 import numpy as np
 
 from olp.core.errors import ConfigError, InputError
-from olp.core.machine import SQUARENESS, Machine, Vector
-from olp.core.units import AXES, shifted
-from olp.errormodel.beams import Beam, tube_mm4
-from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
-from olp.errormodel.gridded import ComponentTable, DeviationMap
-from olp.errormodel.structure import Structure
-from olp.files.calibration.gridded_schema import BeamTable, ComplianceTable, MapTable
-from olp.files.calibration.grids import read_component_grid, read_map
-from olp.files.calibration.structure import load_structure
-from olp.files.problems import config_error, validate
-from olp.files.schema_base import Position
-from olp.files.schemas import CalibrationFile, CurveTable, CyclicTable, ThermalTable
-from olp.files.tables import read_curves
+from olp.core.machine import Machine
+from olp.core.schema import Table
+from olp.errormodel.calibration import Calibration
+from olp.errormodel.sources.base import NamesFile
+from olp.errormodel.sources.registry import SOURCES
+from olp.files.calibration.grids import GridTable, read_component_grid, read_map
+from olp.files.calibration.schema import CalibrationFile, CalibrationHead
+from olp.files.calibration.structure import read_document
+from olp.files.problems import Problem, config_error, validate
+from olp.files.tables import CurveTable, read_curves
 from olp.files.toml_text import Path, dotted, line_of, read_toml
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike, Reader, read_bytes
 
-#: The workpiece's size holds at this temperature (ISO 1) where the job states none.
-REFERENCE_DEGC = 20.0
-
-
-T = TypeVar("T", CurveTable, MapTable, ComplianceTable)
+F = TypeVar("F", bound=NamesFile)
+T = TypeVar("T", bound=Table)
+S = TypeVar("S")
 V = TypeVar("V")
 
 
-def files_beside(path: PathLike) -> list[FilePath]:
+def files_beside(path: PathLike, read: Reader = read_bytes) -> list[FilePath]:
     """The files that a calibration file names, as far as it can be read; its loader says what is wrong with
     it."""
     try:
-        values = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
-        names = [t["file"] for name in ("curves", "maps", "compliance") for t in values.get(name, ())]
-        structure = values.get("thermal", {}).get("structure")
+        values = tomllib.loads(read(path).decode("utf-8-sig"))
+        names = [name for source in SOURCES for name in source.named(values)]
         covariance = values.get("covariance", {}).get("file")
-        names += [name for name in (structure, covariance) if name]
+        names += [covariance] if covariance else []
         return [FilePath(path).parent / name for name in names]
     except (ValueError, TypeError, KeyError, AttributeError):
         return []
 
 
 def load_calibration(
-    path: PathLike, machine: Machine | None = None, temperatures_degC: Mapping[str, float] | None = None
+    path: PathLike,
+    machine: Machine | None = None,
+    temperatures_degC: Mapping[str, float] | None = None,
+    read: Reader = read_bytes,
 ) -> Calibration:
     """The calibration of an olp-calibration-1 file.
 
     With `machine` it must belong to that machine. `temperatures_degC` are the job's: a scale that they
-    leave out is at the calibration's temperature, the workpiece at 20 degC. Raises InputError where the
-    file cannot be read, and ConfigError with all problems of it and of its curve files.
+    leave out is at the calibration's temperature, the workpiece at 20 degC. `read` opens every file. Raises
+    InputError where the file cannot be read, and ConfigError with all problems of it and of its curve files.
     """
-    values, lines = read_toml(read_bytes(path), str(path))
-    file = validate(CalibrationFile, values, lines, str(path))
-    found = [(line_of(key, lines), sentence) for key, sentence in _mismatches(file, machine)]
-    errors: list[ConfigError] = []
-
-    def each(name: str, tables: Sequence[T], make: Callable[[FilePath, T, Vector], V]) -> tuple[V, ...]:
-        """What the tables [[name]] and their files hold."""
-        made = []
-        for index, table in enumerate(tables):
-            key: Path = (name, index, "file")
-            try:
-                made.append(make(FilePath(path).parent / table.file, table, file.datum_mm))
-            except ConfigError as error:
-                errors.append(error)
-            except InputError as error:
-                found.append((line_of(key, lines), f'{dotted(key)} = "{table.file}": {error.message}'))
-        return tuple(made)
-
-    curves = each("curves", file.curves, _curve)
-    maps = each("maps", file.maps, _map)
-    compliance = each("compliance", file.compliance, _compliance)
-    structure: Structure | None = None
-    if file.thermal is not None and file.thermal.structure is not None:
-        key = ("thermal", "structure")
-        try:
-            structure = load_structure(FilePath(path).parent / file.thermal.structure, file.machine)
-        except ConfigError as error:
-            errors.append(error)
-        except InputError as error:
-            found.append(
-                (line_of(key, lines), f'{dotted(key)} = "{file.thermal.structure}": {error.message}')
-            )
-    if found:
-        errors.insert(0, config_error(found, str(path)))
-    if errors:
-        raise _merged(errors)
+    reading = CalibrationReading(path, temperatures_degC or {}, read)
+    file = reading.file
+    reading.refuse(_mismatches(file, machine))
+    values = {source: source.read(source.stated(file), reading) for source in SOURCES}
+    reading.finish()
     try:
         return Calibration(
             machine=file.machine,
             box_mm=np.array(file.box_mm),
             model=file.model,
             datum_mm=file.datum_mm,
-            curves=curves,
-            maps=maps,
-            compliance=compliance,
-            beams=tuple(_beam(table, file.datum_mm) for table in file.compliance_beam),
             payload_kg=file.payload_kg,
-            squareness={name: shifted(getattr(file.squareness, f"{name}_urad"), -6) for name in SQUARENESS},
-            backlash_mm=_vector([shifted(getattr(file.backlash, f"{axis}_um"), -3) for axis in AXES]),
-            repeatability_mm=None
-            if file.repeatability is None
-            else _vector([shifted(getattr(file.repeatability, f"{axis}_um"), -3) for axis in AXES]),
-            cyclic=tuple(_cyclic(table) for table in file.cyclic),
-            structure=structure,
-            thermal=_thermal(file.thermal, file.temperature_degC, temperatures_degC or {}),
             temperature_degC=file.temperature_degC,
             measured=file.measured,
             valid_until=file.valid_until,
             active_during_measurement=file.active_during_measurement,
+            more=tuple((source.key, found) for source, found in values.items() if not source.field and found),
+            **{source.field: found for source, found in values.items() if source.field},
         )
     except ConfigError as error:
         raise error.in_file(str(path)) from None
 
 
-def _mismatches(file: CalibrationFile, machine: Machine | None) -> Iterator[tuple[Path, str]]:
+class CalibrationReading:
+    """A calibration file while it is read; gathers what is wrong with the files that it names. Raises
+    InputError and ConfigError of the file itself."""
+
+    def __init__(self, path: PathLike, temperatures_degC: Mapping[str, float], read: Reader) -> None:
+        values, self._lines = read_toml(read(path), str(path))
+        self.file = validate(CalibrationFile, values, self._lines, str(path))
+        self.machine, self.datum_mm = self.file.machine, self.file.datum_mm
+        self.temperature_degC = self.file.temperature_degC
+        self.temperatures_degC = temperatures_degC
+        self._path, self._read = path, read
+        self._found: list[Problem] = []
+        self._errors: list[ConfigError] = []
+
+    def refuse(self, problems: Iterator[tuple[Path, str]]) -> None:
+        """Keys and what is wrong with them."""
+        self._found += [(line_of(key, self._lines), sentence) for key, sentence in problems]
+
+    def finish(self) -> None:
+        """Raises ConfigError where anything was wrong."""
+        errors = list(self._errors)
+        if self._found:
+            errors.insert(0, config_error(self._found, str(self._path)))
+        if errors:
+            raise _merged(errors)
+
+    def each(self, key: str, tables: Sequence[F], make: Callable[[F], V]) -> tuple[V, ...]:
+        made = [
+            self._made((key, index, "file"), table.file, make, table) for index, table in enumerate(tables)
+        ]
+        return tuple(one for one in made if one is not None)
+
+    def one(self, key: tuple[str, ...], file: str, make: Callable[[str], V]) -> V | None:
+        return self._made(key, file, make, file)
+
+    def _made(self, key: Path, file: str, make: Callable[[S], V], of: S) -> V | None:
+        try:
+            return make(of)
+        except ConfigError as error:
+            self._errors.append(error)
+            error.in_file(str(self._beside(file)))
+        except InputError as error:
+            where = line_of(key, self._lines)
+            self._found.append((where, f'{dotted(key)} = "{file}": {error.message}'))
+        return None
+
+    def content(self, file: str) -> bytes:
+        return self._read(self._beside(file))
+
+    def curve(self, file: str) -> CurveTable:
+        return read_curves(self._beside(file), self._read)
+
+    def deviations(self, file: str) -> GridTable:
+        return read_map(self._beside(file), self._read)
+
+    def components(self, file: str) -> GridTable:
+        return read_component_grid(self._beside(file), self._read)
+
+    def document(self, file: str, schema: type[T]) -> T:
+        return read_document(self._beside(file), schema, self.machine, self._read)
+
+    def _beside(self, file: str) -> FilePath:
+        return FilePath(self._path).parent / file
+
+
+def _mismatches(file: CalibrationHead, machine: Machine | None) -> Iterator[tuple[Path, str]]:
     """Where the calibration contradicts the machine file."""
     if machine is None:
         return
@@ -145,117 +166,6 @@ def _mismatches(file: CalibrationFile, machine: Machine | None) -> Iterator[tupl
             "the machine file; expected each in one of them: the curves do not hold what the control "
             "corrected while measuring",
         )
-
-
-def _curve(path: FilePath, table: CurveTable, datum_mm: Vector) -> Curve:
-    columns = read_curves(path)
-    both = columns.forward is not None
-    try:
-        return Curve(
-            axis=columns.axis,
-            position_mm=columns.position_mm,
-            columns={} if both else columns.columns,
-            forward=columns.forward or {},
-            backward=columns.backward or {},
-            line_mm=_line(table.line_mm, datum_mm),
-            tool_mm=table.tool_mm,
-            reference=table.reference,
-            interpolation=table.interpolation,
-        )
-    except ConfigError as error:
-        raise error.in_file(str(path)) from None
-
-
-def _line(stated: Position, datum_mm: Vector) -> Vector:
-    """Where the other axes stood; an axis left out stood at the datum."""
-    return _vector([datum if at is None else at for at, datum in zip(stated.values, datum_mm, strict=True)])
-
-
-def _map(path: FilePath, table: MapTable, datum_mm: Vector) -> DeviationMap:
-    grid = read_map(path)
-    order = [grid.arguments.index(axis) for axis in AXES]
-    values = np.stack([grid.columns[f"D{axis}"].transpose(order) for axis in AXES], axis=-1)
-    sigma = None
-    if "sigma_DX" in grid.columns:
-        sigma = np.stack([grid.columns[f"sigma_D{axis}"].transpose(order) for axis in AXES], axis=-1)
-    x, y, z = (grid.knots_mm[k] for k in order)
-    try:
-        return DeviationMap(
-            knots_mm=(x, y, z),
-            values=values,
-            kind=table.kind,
-            tool_mm=table.tool_mm,
-            interpolation=table.interpolation,
-            holds_along=tuple(table.holds_along),
-            name=f"map {table.file}",
-            sigma=sigma,
-        )
-    except ConfigError as error:
-        raise error.in_file(str(path)) from None
-
-
-def _compliance(path: FilePath, table: ComplianceTable, datum_mm: Vector) -> ComponentTable:
-    grid = read_component_grid(path)
-    try:
-        return ComponentTable(
-            axis=next(iter(grid.columns))[2],
-            arguments=grid.arguments,
-            knots_mm=grid.knots_mm,
-            columns=grid.columns,
-            line_mm=_line(table.line_mm, datum_mm),
-            tool_mm=table.tool_mm,
-            reference=table.reference,
-            interpolation=table.interpolation,
-            name=f"compliance {table.file}",
-        )
-    except ConfigError as error:
-        raise error.in_file(str(path)) from None
-
-
-def _beam(table: BeamTable, datum_mm: Vector) -> Beam:
-    second_moment = table.second_moment_mm4
-    if second_moment is None:
-        assert table.section_mm is not None
-        second_moment = tube_mm4(*table.section_mm)
-    return Beam(
-        axis=table.axis,
-        support=table.support,
-        span_mm=table.span_mm,
-        youngs_modulus_GPa=table.youngs_modulus_GPa,
-        second_moment_mm4=second_moment,
-        direction=table.direction,
-        line_mm=_line(table.line_mm, datum_mm),
-        tool_mm=table.tool_mm,
-    )
-
-
-def _cyclic(table: CyclicTable) -> Cyclic:
-    if table.amplitude_um is not None:
-        amplitude = shifted(table.amplitude_um, -3)
-    else:
-        amplitude = shifted(table.amplitude_urad or 0.0, -6)
-    return Cyclic(table.component, table.period_mm, amplitude, table.phase_rad)
-
-
-def _thermal(
-    table: ThermalTable | None, calibrated_at_degC: float, temperatures_degC: Mapping[str, float]
-) -> Thermal | None:
-    if table is None:
-        return None
-    return Thermal(
-        scale_per_K=_vector([shifted(getattr(table, f"{axis}_scale_um_m_K"), -6) for axis in AXES]),
-        fixed_at_mm=table.fixed_at_mm,
-        workpiece_per_K=shifted(table.workpiece_um_m_K, -6),
-        clamped_at_mm=table.clamped_at_mm,
-        calibrated_at_degC=calibrated_at_degC,
-        scale_degC=_vector([temperatures_degC.get(f"{axis}_scale", calibrated_at_degC) for axis in AXES]),
-        workpiece_degC=temperatures_degC.get("workpiece", REFERENCE_DEGC),
-    )
-
-
-def _vector(values: Sequence[float]) -> Vector:
-    x, y, z = values
-    return (x, y, z)
 
 
 def _merged(errors: Sequence[ConfigError]) -> ConfigError:

@@ -6,197 +6,134 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-
-import numpy as np
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import TypeVar
 
 from olp.calibration.thermal.drift import DriftLog
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
+from olp.core.schema import Table
 from olp.core.units import AXES, shifted
-from olp.errormodel.structure import Distortion, Sensor, Structure
-from olp.files.calibration.thermal_schema import DistortionTable, ThermalFile
+from olp.errormodel.sources.structure import Structure, ThermalFile, structure_of, structure_tables
+from olp.files.columns import Row, Wanted, names, read_sheet
 from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Position
-from olp.files.tables import decoded, headed
-from olp.files.toml_text import comment, line_of, read_toml, toml_lines
-from olp.files.write import PathLike, read_bytes
+from olp.files.toml_text import comment, line_of, read_toml, toml_document
+from olp.files.write import PathLike, Reader, read_bytes
+from olp.program.text.rows import LOOSE_CSV
+
+T = TypeVar("T", bound=Table)
 
 _READING = re.compile(r"(E[A-Z]{2})@([-+]?\d+(?:\.\d+)?)_(um|urad)")
 _DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
 
 
-def load_structure(path: PathLike, machine: str | None = None) -> Structure:
+def load_structure(path: PathLike, machine: str | None = None, read: Reader = read_bytes) -> Structure:
     """The structure of an olp-thermal-1 file. Raises InputError where it cannot be read, ConfigError with all
     problems."""
-    values, lines = read_toml(read_bytes(path), str(path))
-    file = validate(ThermalFile, values, lines, str(path))
-    if machine is not None and file.machine != machine:
-        sentence = f'machine = "{file.machine}" is not the name in the machine file; expected "{machine}"'
-        raise config_error([(line_of(("machine",), lines), sentence)], str(path))
     try:
-        return Structure(
-            tuple(Sensor(s.name, s.reference_degC, s.range_degC, s.lag_s) for s in file.sensors),
-            tuple(_distortion(d) for d in file.distortions),
-        )
+        return structure_of(read_document(path, ThermalFile, machine, read))
     except ConfigError as error:
         raise error.in_file(str(path)) from None
 
 
-def _distortion(table: DistortionTable) -> Distortion:
-    unit, power = ("urad", -6) if table.component[1] in "ABC" else ("um", -3)
-
-    def of(shape: str, more: int = 0) -> float:
-        value = getattr(table, shape.format(unit))
-        return 0.0 if value is None else shifted(value, power + more)
-
-    return Distortion(
-        component=table.component,
-        sensor=table.sensor,
-        span_mm=table.span_mm,
-        offset=of("offset_{}_K"),
-        growth=of("growth_{}_m_K", -3),
-        bow=of("bow_{}_K"),
-        line_mm=None if table.line_mm is None else _vector(table.line_mm, table.component),
-        tool_mm=table.tool_mm,
-    )
+def read_document(path: PathLike, schema: type[T], machine: str | None, read: Reader) -> T:
+    """A TOML file by its schema, whose key `machine` must be that of the machine file. Raises InputError,
+    ConfigError."""
+    values, lines = read_toml(read(path), str(path))
+    file = validate(schema, values, lines, str(path))
+    named = getattr(file, "machine", None)
+    if machine is not None and named != machine:
+        sentence = f'machine = "{named}" is not the name in the machine file; expected "{machine}"'
+        raise config_error([(line_of(("machine",), lines), sentence)], str(path))
+    return file
 
 
-def _vector(stated: Position, component: str) -> Vector:
-    """Where the other axes stood; that of the component's own axis does not matter."""
-    missing = [a for a, at in zip(AXES, stated.values, strict=True) if at is None and a != component[2]]
-    if missing:
-        raise ConfigError(f"line_mm of {component} names no {missing[0]}; expected where each axis stood")
-    x, y, z = (0.0 if at is None else at for at in stated.values)
-    return (x, y, z)
+def structure_text(structure: Structure, machine: str, notes: Sequence[str] = ()) -> bytes:
+    """An olp-thermal-1 file that reads back the same; notes become comments."""
+    above = "".join(f"{line}\n" for note in notes for line in comment(note))
+    return (above + toml_document(structure_tables(structure, machine))).encode()
 
 
-def structure_text(
-    structure: Structure, machine: str, in_unit: Callable[[float, int], float], notes: Sequence[str] = ()
-) -> bytes:
-    """An olp-thermal-1 file that reads back the same; `in_unit` states a number in units of ten to a power,
-    notes become comments."""
-    lines = [line for note in notes for line in comment(note)]
-    lines += toml_lines({"schema": "olp-thermal-1", "machine": machine})
-    for sensor in structure.sensors:
-        lines += ["", "[[sensors]]"]
-        lines += toml_lines(
-            {
-                "name": sensor.name,
-                "reference_degC": sensor.reference_degC,
-                "range_degC": list(sensor.range_degC),
-                "lag_s": sensor.lag_s,
-            }
-        )
-    for d in structure.distortions:
-        unit, power = ("urad", -6) if d.component[1] in "ABC" else ("um", -3)
-        line = None if d.line_mm is None else dict(zip(AXES, map(float, d.line_mm), strict=True))
-        lines += ["", "[[distortions]]"]
-        lines += toml_lines(
-            {
-                "component": d.component,
-                "sensor": d.sensor,
-                "span_mm": [float(v) for v in d.span_mm],
-                f"offset_{unit}_K": in_unit(d.offset, power),
-                f"growth_{unit}_m_K": in_unit(d.growth, power - 3),
-                f"bow_{unit}_K": in_unit(d.bow, power),
-                "line_mm": line,
-                "tool_mm": None if d.tool_mm == ZERO else [float(v) for v in d.tool_mm],
-            }
-        )
-    return ("\n".join(lines) + "\n").encode()
-
-
-def read_drift_log(path: PathLike) -> DriftLog:
+def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:
     """A log: `t_s`, sensors `NAME_degC`, and readings of drift `EXX@500_um` (component @ axis position in
     mm); a reading may be empty. Comment lines `# tool_mm = [0, 0, -120]` and `# line_mm = [0, 500, -300]` say
     with what and where it was read.
 
     Raises InputError where it cannot be read, ConfigError with every problem and its line.
     """
-    return parse_drift_log(read_bytes(path), str(path))
+    return parse_drift_log(read(path), str(path))
 
 
 def parse_drift_log(data: bytes, file: str) -> DriftLog:
     """As `read_drift_log`, from the bytes of the file."""
-    expected = "t_s, NAME_degC ..., EXX@500_um ..."
-    line, header, records = headed(data, file, expected, _header_problems)
-    rows, found = _rows(header, records)
-    placed, wrong = _placed(decoded(data, file))
-    found += wrong
-    if len(rows) < 2 and not found:
-        found.append((line, f"{len(rows)} rows follow the header; expected at least 2"))
+    sheet = read_sheet(data, file, _LOG)
+    placed, wrong = _placed(sheet.text)
+    found = [*sheet.problems, *_time_problems(sheet.rows), *wrong]
+    if len(sheet.rows) < 2 and not found:
+        found.append((sheet.line, f"{len(sheet.rows)} rows follow the header; expected at least 2"))
     if found:
         raise config_error(found, file)
-    table = np.array(rows)
-    sensors = {n.removesuffix("_degC"): table[:, i] for i, n in enumerate(header) if n.endswith("_degC")}
+    columns = sheet.columns
+    sensors = {name.removesuffix("_degC"): columns[name] for name in columns if name.endswith("_degC")}
     readings: dict[tuple[str, float], Array] = {}
-    for i, name in enumerate(header):
+    for name in columns:
         match = _READING.fullmatch(name)
         if match:
-            readings[match[1], float(match[2])] = table[:, i]
+            readings[match[1], float(match[2])] = columns[name]
     line_mm = placed.get("line_mm")
-    return DriftLog(table[:, 0], sensors, readings, line_mm, placed.get("tool_mm", ZERO), file)
+    return DriftLog(columns["t_s"], sensors, readings, line_mm, placed.get("tool_mm", ZERO), file)
 
 
 def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
     problems: list[Problem] = []
     if header[0] != "t_s":
         problems.append((line, f'column 1 is "{header[0]}"; expected t_s, the time in s'))
-    for number, name in enumerate(header[1:], 2):
-        match = _READING.fullmatch(name)
-        if header.index(name) < number - 1:
-            problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
-        elif match:
-            unit = "um" if match[1][1] in AXES else "urad"
-            if match[1] not in COMPONENTS or match[3] != unit:
-                problems.append(
-                    (
-                        line,
-                        f'column {number} is "{name}"; expected an ISO 230-1 name and its unit, {unit} here',
-                    )
-                )
-        elif not (name.endswith("_degC") and len(name) > len("_degC")):
-            problems.append(
-                (
-                    line,
-                    f'column {number} is "{name}"; expected a sensor such as beam_degC, or a reading such as '
-                    "EXX@500_um",
-                )
-            )
+    problems += names(line, header, _column_problem, 2)
     if not problems and not any(name.endswith("_degC") for name in header):
         problems.append((line, "there is no sensor; expected columns such as beam_degC"))
     return problems
 
 
-def _rows(
-    header: Sequence[str], records: Sequence[tuple[int, list[str]]]
-) -> tuple[list[list[float]], list[Problem]]:
-    rows: list[list[float]] = []
-    problems: list[Problem] = []
-    for line, cells in records:
-        if len(cells) != len(header):
-            problems.append(
-                (line, f"{len(cells)} values under {len(header)} columns; expected one value a column")
-            )
-            continue
-        row = []
-        for name, cell in zip(header, cells, strict=True):
-            reading = _READING.fullmatch(name)
-            power = 0 if reading is None else -3 if reading[3] == "um" else -6
-            try:
-                value = math.nan if reading and not cell else shifted(cell, power)
-                good = math.isfinite(value) or (reading is not None and not cell)
-            except ValueError:
-                value, good = math.nan, False
-            if not good:
-                problems.append((line, f'{name} = "{cell}" is no number; expected a finite number'))
-            row.append(value)
-        if rows and not row[0] > rows[-1][0]:
-            problems.append((line, f"t_s = {row[0]:g} comes after {rows[-1][0]:g}; expected ascending times"))
-        rows.append(row)
-    return rows, problems
+def _column_problem(_: int, name: str) -> str | None:
+    """What is wrong with the name of a column behind the time, or None."""
+    match = _READING.fullmatch(name)
+    if match:
+        unit = "um" if match[1][1] in AXES else "urad"
+        right = match[1] in COMPONENTS and match[3] == unit
+        return None if right else f"expected an ISO 230-1 name and its unit, {unit} here"
+    if name.endswith("_degC") and len(name) > len("_degC"):
+        return None
+    return "expected a sensor such as beam_degC, or a reading such as EXX@500_um"
+
+
+def _number(name: str, cell: str) -> tuple[float, str | None]:
+    """The number in a cell; a reading may be empty."""
+    reading = _READING.fullmatch(name)
+    if reading and not cell:
+        return math.nan, None
+    try:
+        value = shifted(cell, 0 if reading is None else -3 if reading[3] == "um" else -6)
+    except ValueError:
+        value = math.nan
+    good = math.isfinite(value)
+    return value, None if good else f'{name} = "{cell}" is no number; expected a finite number'
+
+
+def _time_problems(rows: Sequence[Row]) -> Iterator[Problem]:
+    for (_, before), (line, row) in pairwise(rows):
+        if not row[0] > before[0]:
+            yield line, f"t_s = {row[0]:g} comes after {before[0]:g}; expected ascending times"
+
+
+_LOG = Wanted(
+    "holds no header; expected t_s, NAME_degC ..., EXX@500_um ...",
+    _header_problems,
+    _number,
+    "; expected one value a column",
+    form=LOOSE_CSV,
+)
 
 
 def _placed(text: str) -> tuple[dict[str, Vector], list[Problem]]:

@@ -21,6 +21,7 @@ from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration, Curve, Reference
 from olp.files.problems import Problem, config_error
 from olp.findings.catalogue import Finding
+from olp.program.text.rows import Form
 
 #: "error": a value is actual minus commanded, which the control takes off; "correction": it adds the value.
 Sense = Literal["error", "correction"]
@@ -34,7 +35,7 @@ _IN_TABLES = frozenset(
     {
         "machine", "box_mm", "model", "datum_mm", "curves", "squareness", "backlash_mm", "cyclic",
         "temperature_degC", "measured", "valid_until", "active_during_measurement", "repeatability_mm",
-        "payload_kg",
+        "payload_kg", "more",
     }
 )  # fmt: skip
 
@@ -124,6 +125,12 @@ def signed(values: Array, factor: float) -> Array:
 def text_of(data: bytes) -> str:
     """The text of a table; bytes beyond ASCII stand in comments only and are kept apart."""
     return data.decode("latin-1").removeprefix("\xef\xbb\xbf")
+
+
+def lines(data: bytes, remark: str | None = None) -> Iterator[tuple[int, str]]:
+    """Every line of a table with its number, without blanks around it and without what follows `remark`."""
+    form = Form(None, remark=remark)
+    return ((line, text.strip()) for line, text in form.lines(text_of(data)))
 
 
 def number(cell: str) -> float | None:
@@ -237,6 +244,7 @@ def not_held(
     others = [
         f.name for f in fields(calibration) if f.name not in _IN_TABLES and _states(calibration, f.name)
     ]
+    others += [key for key, _ in calibration.more]
     if others:
         parts.append(f"no table holds what the calibration states of {', '.join(others)}")
     if parts:

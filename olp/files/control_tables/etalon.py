@@ -43,7 +43,7 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     left: list[str] = []
     problems: list[Problem] = []
     seen: set[str] = set()
-    for line, name, rows, value in _sections(base.text_of(load(path)), problems):
+    for line, name, rows, value in _sections(load(path), problems):
         if name in seen:
             problems.append((line, f"[{name}] stands twice; expected it once"))
         seen.add(name)
@@ -74,15 +74,14 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     return Imported(base.calibration_of(given, curves, path, square), tuple(findings))
 
 
-def _sections(text: str, problems: list[Problem]) -> Iterator[tuple[int, str, Section, float | None]]:
+def _sections(data: bytes, problems: list[Problem]) -> Iterator[tuple[int, str, Section, float | None]]:
     """(line, name, rows, value) of each section."""
     name, first = "", 0
     rows: Section = []
     value: float | None = None
     inside = False
-    lines = text.splitlines()
-    for line, raw in enumerate([*lines, "[]"], 1):
-        bare = raw.split("//", 1)[0].strip()
+    lines = list(base.lines(data, "//"))
+    for line, bare in [*lines, (len(lines) + 1, "[]")]:
         header = _SECTION.fullmatch(bare)
         if header or line > len(lines):
             if inside:

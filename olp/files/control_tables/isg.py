@@ -45,7 +45,7 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     left: list[str] = []
     problems: list[Problem] = []
     seen: set[str] = set()
-    for line, header, rows in _blocks(base.text_of(load(path)), problems):
+    for line, header, rows in _blocks(load(path), problems):
         arguments = [name for name in header if name in _ARGUMENTS]
         names = [name for name in header if name not in arguments]
         table = np.array([row for _, row in rows]).reshape(len(rows), len(header))
@@ -81,11 +81,10 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     return Imported(base.calibration_of(given, curves, path, square), tuple(findings))
 
 
-def _blocks(text: str, problems: list[Problem]) -> Iterator[Block]:
+def _blocks(data: bytes, problems: list[Problem]) -> Iterator[Block]:
     line, header = 0, list[str]()
     rows: list[tuple[int, list[float]]] = []
-    for number, raw in enumerate(text.splitlines(), 1):
-        bare = raw.split("//", 1)[0].strip()
+    for number, bare in base.lines(data, "//"):
         if bare.startswith("#"):
             if header:
                 yield line, header, rows

@@ -26,7 +26,7 @@ _SECTION = re.compile(r"\[\s*([^\]\s]+)\s*([^\]]*?)\s*\]")
 def _read(path: Path, given: Given, load: Load) -> Imported:
     found: dict[str, dict[str, float]] = {}
     problems: list[Problem] = []
-    for line, section, key, value in _entries(base.text_of(load(path))):
+    for line, section, key, value in _entries(load(path)):
         if key is None:
             if section in found:
                 problems.append((line, f"[skew_correction {section}] stands twice; expected it once"))
@@ -50,11 +50,11 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     )
 
 
-def _entries(text: str) -> Iterator[tuple[int, str, str | None, str]]:
+def _entries(data: bytes) -> Iterator[tuple[int, str, str | None, str]]:
     """(line, section, key, value) inside sections of skew_correction; the key is None at their header."""
     section: str | None = None
-    for line, raw in enumerate(text.splitlines(), 1):
-        bare = raw.strip().removeprefix("#*#").strip()
+    for line, raw in base.lines(data):
+        bare = raw.removeprefix("#*#").strip()
         bare = re.split(r"\s*(?:#|;)", bare, maxsplit=1)[0]
         header = _SECTION.fullmatch(bare)
         if header:

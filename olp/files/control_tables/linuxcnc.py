@@ -70,12 +70,12 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
 def _curve(axis: str, data: bytes, file: Path, kind: int, mm: float) -> Curve:
     rows: list[tuple[int, list[str]]] = []
     problems: list[Problem] = []
-    for line, text in enumerate(base.text_of(data).splitlines(), 1):
+    for line, text in base.lines(data):
         cells = text.split()
         if not cells:
             continue
         if len(cells) != 3 or any(base.number(cell) is None for cell in cells):
-            sentence = f'"{text.strip()[:40]}" is no row of three numbers; LinuxCNC stops reading at it'
+            sentence = f'"{text[:40]}" is no row of three numbers; LinuxCNC stops reading at it'
             problems.append((line, sentence + ": expected nominal, forward, reverse"))
             continue
         rows.append((line, cells))

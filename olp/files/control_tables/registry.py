@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 from olp.core.errors import UsageError
 from olp.errormodel.calibration import Calibration
-from olp.files.control_tables import etalon, heidenhain, isg, klipper, linuxcnc, siemens
 from olp.files.control_tables.base import Exported, Format, Given, Imported, Load
 from olp.files.problems import nearest
 from olp.files.write import read_bytes
 
-FORMATS: dict[str, Format] = {
-    module.FORMAT.key: module.FORMAT for module in (isg, etalon, linuxcnc, klipper, siemens, heidenhain)
-}
+#: the modules of this package that hold a FORMAT, in the order in which formats are listed
+MODULES = (
+    "isg",
+    "etalon",
+    "linuxcnc",
+    "klipper",
+    "siemens",
+    "heidenhain",
+)
+
+
+def _format(module: str) -> Format:
+    found: Format = import_module(f"olp.files.control_tables.{module}").FORMAT
+    return found
+
+
+FORMATS: dict[str, Format] = {form.key: form for form in map(_format, MODULES)}
 
 
 def format_named(key: str) -> Format:

@@ -59,7 +59,7 @@ class _Table:
 def _read(path: Path, given: Given, load: Load) -> Imported:
     factor = base.sign(base.sense_of(given, None, "Sinumerik"))
     problems: list[Problem] = []
-    tables = _tables(base.text_of(load(path)), problems)
+    tables = _tables(load(path), problems)
     base.refuse(problems, path)
     names = {control.upper(): axis for axis, control in _names(given).items()}
     found: dict[tuple[str, int], tuple[int, np.ndarray, np.ndarray]] = {}
@@ -82,10 +82,9 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     return Imported(base.calibration_of(given, curves, path))
 
 
-def _tables(text: str, problems: list[Problem]) -> dict[int, _Table]:
+def _tables(data: bytes, problems: list[Problem]) -> dict[int, _Table]:
     tables: dict[int, _Table] = {}
-    for line, raw in enumerate(text.splitlines(), 1):
-        bare = raw.split(";", 1)[0].strip()
+    for line, bare in base.lines(data, ";"):
         if not bare or _FRAME.fullmatch(bare):
             continue
         value, key = _VALUE.fullmatch(bare), _KEY.fullmatch(bare)

@@ -1,0 +1,1 @@
+"""Files of measurements: plans, readings of instruments, profiles of their layouts."""

@@ -11,9 +11,8 @@ measured ones.
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path as FilePath
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -21,14 +20,13 @@ from pydantic import Field
 from olp.calibration.observations.points import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
+from olp.core.schema import NotNegative, Positive, Table, Triple
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Positive, Triple
 from olp.files.measurements.instruments.base import PER_UNIT
-from olp.files.measurements.point_readings import DEVIATION, MEASURED, PointReadings, parse_point_readings
+from olp.files.measurements.point_readings import DEVIATION, MEASURED, parse_point_readings
 from olp.files.measurements.reader import load_measurements
-from olp.files.problems import config_error, validate
-from olp.files.schema_base import Table
-from olp.files.toml_text import Path
+from olp.files.measurements.stated import stated_as
+from olp.files.problems import config_error
 from olp.files.write import PathLike, read_bytes
 
 MACHINE = "machine"
@@ -71,7 +69,8 @@ def load_checkpoints(
     header = next((line for line in data.splitlines() if line.strip() and not line.startswith(b"#")), b"")
     deviates = b"deviation_" in header
     readings = parse_point_readings(data, str(path), DEVIATION if deviates else MEASURED)
-    stated = _stated(readings)
+    keys = {key: said for key, said in readings.keys.items() if key in StatedOfPoints.model_fields}
+    stated = stated_as(keys, StatedOfPoints, readings.file, bare=False)
     problems = []
     if stated.sigma_um is not None and sigma_um is not None and stated.sigma_um != sigma_um:
         problems.append(f"sigma_um = {stated.sigma_um:g}, and {sigma_um:g} in the call; expected it once")
@@ -102,16 +101,3 @@ def load_checkpoints(
         row=readings.row,
     )
     return points, stated.frame == MACHINE
-
-
-def _stated(readings: PointReadings) -> StatedOfPoints:
-    values: dict[str, Any] = {}
-    for key, (text, line) in readings.keys.items():
-        if key not in StatedOfPoints.model_fields:
-            continue
-        try:
-            values[key] = tomllib.loads(f"{key} = {text}")[key]
-        except tomllib.TOMLDecodeError:
-            raise config_error([(line, f"{key} = {text} is no value")], readings.file) from None
-    lines: dict[Path, int] = {(key,): line for key, (_, line) in readings.keys.items()}
-    return validate(StatedOfPoints, values, lines, readings.file)

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from olp.core.machine import COMPONENTS
-from olp.files.fields import IsoNames, NotNegative, Positive, Text, Triple, refusal, shown
+from olp.core.schema import NotNegative, Position, Positive, Table, Text, Triple, refusal
+from olp.files.fields import IsoNames, shown
 from olp.files.measurements.readings import SENSES
-from olp.files.schema_base import Position, Table
 
 
 def _sense(value: object) -> object:

@@ -15,7 +15,6 @@ value = "Error"
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -28,21 +27,20 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.errors import InputError
 from olp.core.machine import COMPONENTS
-from olp.files.fields import Text, refusal
+from olp.core.schema import Table, Text, refusal
+from olp.files.columns import decoded, place_in
 from olp.files.measurements.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.measurements.readings import ANGULAR, SENSES, UNITS, Readings, parse_readings
 from olp.files.measurements.renishaw import MARK, RTX, RecordingTable, line_of_recording, parse_rtx, read_rtx
-from olp.files.problems import Problem, config_error, nearest, validate
-from olp.files.schema_base import Table
-from olp.files.tables import decoded
+from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
+from olp.program.text.delimited import DELIMITERS, MM
+from olp.program.text.rows import Form
 
 Column = Text | Annotated[int, Field(ge=1)]
 Direction = Annotated[int, Field(ge=-1, le=1)]
 
-DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": None}
-POSITION_UNITS = {"mm": 1.0, "um": 1e-3, "m": 1e3, "inch": 25.4}
 _THOUSANDS = {"none": "", "point": ".", "comma": ",", "space": " ", "apostrophe": "'"}
 
 #: Files of instruments for which no grammar and no specimen is public; their programs export text.
@@ -218,7 +216,8 @@ def parse_line(data: bytes, file: str, profile: LineProfile) -> Readings:
     if profile.columns is None:
         raise InputError("the profile has no table [columns]; expected target and value in it", file=file)
     header, rows = _lines(decoded(data, file), profile)
-    cells = {key: _place(column, header, file) for key, column in _wanted(profile.columns)}
+    hint = "; are header_lines and delimiter right?"
+    cells = {key: place_in(header, column, file, hint) for key, column in _wanted(profile.columns)}
     values = [key for key in cells if key.startswith("value")]
     table: list[tuple[int, float, list[float], float, int]] = []
     problems: list[Problem] = []
@@ -247,7 +246,7 @@ def parse_line(data: bytes, file: str, profile: LineProfile) -> Readings:
                 wrong.append(f'direction "{text}" is not among {known}; set forward and backward')
         problems += [(line, text) for text in wrong]
         if not wrong:
-            target = float(numbers["target"]) * POSITION_UNITS[profile.position_unit]
+            target = float(numbers["target"]) * MM[profile.position_unit]
             table.append((line, target, [float(numbers[key]) for key in values], run, sign))
     if not problems and len(table) < 2:
         problems = [(None, f"holds {len(table)} readings in these columns; expected at least 2")]
@@ -261,20 +260,15 @@ def _lines(text: str, profile: LineProfile) -> tuple[list[str], list[tuple[int, 
     header: list[str] = []
     rows: list[tuple[int, list[str] | None]] = []
     waits = profile.header
-    for number, line in enumerate(text.splitlines(), 1):
-        if number <= profile.header_lines or line.lstrip().startswith(profile.comment):
+    form = Form(DELIMITERS[profile.delimiter], (profile.comment,), loose=True)
+    for number, line in form.lines(text):
+        begin = line.lstrip()
+        if number <= profile.header_lines or begin.startswith(form.comments):
             continue
-        if profile.end is not None and line.lstrip().startswith(profile.end):
+        if profile.end is not None and begin.startswith(profile.end):
             break
-        if not line.strip():
-            rows.append((number, None))
-            continue
-        mark = DELIMITERS[profile.delimiter]
-        row = (
-            line.split() if mark is None else next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-        )
-        cells = [cell.strip() for cell in row]
-        if waits:
+        cells = form.cells(line) if begin else None
+        if waits and cells is not None:
             header, waits = cells, False
         else:
             rows.append((number, cells))
@@ -289,18 +283,6 @@ def _wanted(columns: LineColumns) -> Iterator[tuple[str, str | int]]:
         column = getattr(columns, key)
         if column is not None:
             yield key, column
-
-
-def _place(column: str | int, header: Sequence[str], file: str) -> int:
-    if isinstance(column, int):
-        return column - 1
-    if column in header:
-        return header.index(column)
-    near = nearest(column, header)
-    known = f"did you mean {near}?" if near else f"expected one of {', '.join(header) or 'their numbers'}"
-    raise InputError(
-        f'there is no column "{column}"; {known}; are header_lines and delimiter right?', file=file
-    )
 
 
 def _cell(row: Sequence[str], place: int) -> str:

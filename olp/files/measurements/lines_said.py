@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 import datetime
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError
+from olp.core.schema import Position
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.files.measurements.instruments.base import PER_UNIT
 from olp.files.measurements.line_keys import LineKeys, LineTable, Stated
 from olp.files.measurements.readings import Readings
-from olp.files.problems import Problem, config_error, validate
-from olp.files.schema_base import Position
-from olp.files.toml_text import Path
+from olp.files.measurements.stated import Said, stated_as
+from olp.files.problems import Problem, config_error
 
 _KEYS = tuple(LineKeys.model_fields)
 
 
-def stated_of(keys: Mapping[str, tuple[str, int]], file: str) -> tuple[Stated, dict[str, int]]:
-    """The typed comments of a file, and their lines; words need no quotes there."""
-    values: dict[str, object] = {}
-    places: dict[Path, int] = {}
-    for key, (text, line) in keys.items():
-        try:
-            values[key] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[key] = text
-        places[(key,)] = line
-    return validate(Stated, values, places, file), {str(key[0]): line for key, line in places.items()}
+def stated_of(keys: Mapping[str, Said], file: str) -> tuple[Stated, dict[str, int]]:
+    """The typed comments of a file, and their lines."""
+    return stated_as(keys, Stated, file), {key: line for key, (_, line) in keys.items()}
 
 
 def merged(

@@ -12,10 +12,8 @@ pods azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,9 +21,9 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.units import AXES
-from olp.files.measurements.readings import stated_keys
-from olp.files.problems import Problem, config_error, nearest
-from olp.files.tables import decoded
+from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
+from olp.files.measurements.stated import stated_keys
+from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
 
 AXIS = tuple(f"{axis}_mm" for axis in AXES)
@@ -64,61 +62,35 @@ def read_point_readings(path: PathLike, measured: tuple[str, ...] = MEASURED) ->
 
 def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEASURED) -> PointReadings:
     """As `read_point_readings`, from the bytes of the file."""
-    text = decoded(data, file)
-    records = [
-        (number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))])
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not records:
-        raise config_error([(None, f"holds no points; expected {','.join((*AXIS, *measured))}")], file)
-    line, header = records[0]
-    found: list[Problem] = [(line, sentence) for sentence in _header_problems(header, measured)]
-    if found:
-        raise config_error(found, file)
-    rows = []
-    for number, cells in records[1:]:
-        if len(cells) != len(header):
-            found.append((number, f"{len(cells)} values under {len(header)} columns"))
-            continue
-        values = [_number(cell) for cell in cells]
-        for name, cell, value in zip(header, cells, values, strict=True):
-            if not math.isfinite(value):
-                found.append((number, f'{name} = "{cell}"; expected a number in {name.rpartition("_")[2]}'))
-        rows.append(values)
-    if found:
-        raise config_error(found, file)
-    table = np.array(rows, float).reshape(-1, len(header))
+    known = (*AXIS, *measured, *TOOL)
 
-    def columns(names: Sequence[str]) -> Array:
-        return np.asarray(table[:, [header.index(name) for name in names]])
+    def header_problems(line: int, header: Sequence[str]) -> list[Problem]:
+        wanted = (*AXIS, *measured, *(TOOL if any(name in header for name in TOOL) else ()))
+        return [
+            *names(line, header, lambda _, name: unknown(name, known)),
+            *missing(line, header, wanted),
+        ]
+
+    nothing = f"holds no points; expected {','.join((*AXIS, *measured))}"
+    sheet = read_sheet(data, file, Wanted(nothing, header_problems, _number))
+    if sheet.problems:
+        raise config_error(sheet.problems, file)
+    table = sheet.table
+
+    def columns(group: Sequence[str]) -> Array:
+        return np.asarray(table[:, [sheet.header.index(name) for name in group]])
 
     return PointReadings(
         file,
         columns(AXIS),
         columns(measured),
-        columns(TOOL) if TOOL[0] in header else None,
-        np.array([number for number, _ in records[1:]], np.int64),
-        dict(stated_keys(text)),
+        columns(TOOL) if TOOL[0] in sheet.header else None,
+        sheet.lines,
+        dict(stated_keys(sheet.text)),
     )
 
 
-def _header_problems(header: Sequence[str], measured: tuple[str, ...]) -> Iterator[str]:
-    known = (*AXIS, *measured, *TOOL)
-    for number, name in enumerate(header, 1):
-        if header.index(name) < number - 1:
-            yield f'column {number} repeats "{name}"; expected each column once'
-        elif name not in known:
-            near = nearest(name, known)
-            yield f'column {number} is "{name}"; ' + (
-                f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
-            )
-    wanted = (*AXIS, *measured, *(TOOL if any(name in header for name in TOOL) else ()))
-    yield from (f"the column {name} is missing" for name in wanted if name not in header)
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell) if "_" not in cell else math.nan
-    except ValueError:
-        return math.nan
+def _number(name: str, cell: str) -> tuple[float, str | None]:
+    value = finite(cell)
+    wrong = f'{name} = "{cell}"; expected a number in {name.rpartition("_")[2]}'
+    return value, wrong if math.isnan(value) else None

@@ -10,11 +10,10 @@ from pydantic import Field
 from olp.calibration.iso230.postures import Postures, turn_of
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
+from olp.core.schema import NotNegative, Table, Text
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Text
 from olp.files.measurements.columns import read_columns
 from olp.files.problems import config_error
-from olp.files.schema_base import Table
 from olp.files.write import PathLike
 
 

@@ -18,13 +18,14 @@ from olp.calibration.observations.lines import Line, Square
 from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError, InputError
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
+from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Plan
 from olp.files.measurements.instruments.registry import INSTRUMENTS, rank_of
 from olp.files.measurements.lines_said import as_line, stated_of, word
-from olp.files.measurements.readings import check_component, parse_readings, stated_keys
+from olp.files.measurements.readings import check_component, parse_readings
 from olp.files.measurements.schemas import MeasurementsFile, SquareTable
+from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error, validate
-from olp.files.tables import decoded
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 

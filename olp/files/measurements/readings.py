@@ -14,11 +14,9 @@ table [[lines]] of a plan (`olp.files.measurements.reader`); any other comment i
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -27,8 +25,9 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
-from olp.files.problems import Problem, config_error, nearest
-from olp.files.tables import decoded
+from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
+from olp.files.measurements.stated import stated_keys
+from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
 
 #: What a file may state, and the factor that makes it actual minus commanded of the tool relative to the
@@ -57,7 +56,6 @@ UNITS: Mapping[str, float] = MappingProxyType(
 )
 ANGULAR = frozenset({"rad", "mrad", "urad", "arcsec", "um/m", "mm/m"})
 
-_KEY = re.compile(r"#+\s*([A-Za-z_]\w*)\s*=\s*(\S.*?)\s*$")
 _HEADER = ("target_mm", "run", "direction")
 _VALUES = {"value_um": "um", "value_urad": "urad"}
 
@@ -104,28 +102,15 @@ def read_readings(path: PathLike) -> Readings:
 
 def parse_readings(data: bytes, file: str) -> Readings:
     """As `read_readings`, from the bytes of the file."""
-    text = decoded(data, file)
-    keys = dict(stated_keys(text))
-    records = [
-        (number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))])
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not records:
-        raise config_error([(None, f"holds no readings; expected {','.join(_HEADER)},value_um")], file)
-    line, header = records[0]
-    found = list(_header_problems(header))
-    if found:
-        raise config_error([(line, sentence) for sentence in found], file)
-    rows, problems = _rows(header, records[1:])
-    if not problems and len(rows) < 2:
-        problems = [(line, f"{len(rows)} readings; expected at least 2")]
-    if problems:
-        raise config_error(problems, file)
-    table = np.array(rows)
-    value = next(name for name in header if name in _VALUES)
+    sheet = read_sheet(data, file, _WANTED)
+    if sheet.problems:
+        raise config_error(sheet.problems, file)
+    if len(sheet.rows) < 2:
+        raise config_error([(sheet.line, f"{len(sheet.rows)} readings; expected at least 2")], file)
+    keys = dict(stated_keys(sheet.text))
+    value = next(name for name in sheet.header if name in _VALUES)
     unit = _VALUES[value]
-    column = {name: table[:, header.index(name)] for name in header}
+    column = sheet.columns
     component = keys["component"][0].strip("\"'") if "component" in keys else None
     return Readings(
         file,
@@ -133,19 +118,11 @@ def parse_readings(data: bytes, file: str) -> Readings:
         column[value] * UNITS[unit],
         column["run"].astype(np.int64),
         column["direction"].astype(np.int64),
-        np.array([number for number, _ in records[1:]]),
+        sheet.lines,
         component,
         unit in ANGULAR,
         MappingProxyType(keys),
     )
-
-
-def stated_keys(text: str) -> Iterator[tuple[str, tuple[str, int]]]:
-    """(key, (value as written, line)) of each comment `# key = value`."""
-    for number, line in enumerate(text.splitlines(), 1):
-        found = _KEY.fullmatch(line.strip())
-        if found:
-            yield found[1], (found[2], number)
 
 
 def check_component(readings: Readings, component: str) -> None:
@@ -162,50 +139,35 @@ def check_component(readings: Readings, component: str) -> None:
         )
 
 
-def _header_problems(header: Sequence[str]) -> Iterator[str]:
+def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
     known = (*_HEADER, *_VALUES)
     if len(header) == 1 and re.search(r"[;\t]", header[0]):
-        yield "columns are separated by semicolons or tabs; expected commas, or a profile for this file"
-        return
-    for number, name in enumerate(header, 1):
-        if header.index(name) < number - 1:
-            yield f'column {number} repeats "{name}"; expected each column once'
-        elif name not in known:
-            near = nearest(name, known)
-            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
-            yield f'column {number} is "{name}"; {hint}; files of other instruments need a profile'
-    yield from (f"the column {name} is missing" for name in _HEADER if name not in header)
+        sentence = "columns are separated by semicolons or tabs; expected commas, or a profile for this file"
+        return [(line, sentence)]
+    more = "; files of other instruments need a profile"
+    problems = names(line, header, lambda _, name: unknown(name, known, more))
+    problems += missing(line, header, _HEADER)
     if sum(name in _VALUES for name in header) != 1:
-        yield "expected one column of values: value_um for lengths or value_urad for angles"
+        sentence = "expected one column of values: value_um for lengths or value_urad for angles"
+        problems.append((line, sentence))
+    return problems
 
 
-def _rows(
-    header: Sequence[str], records: Sequence[tuple[int, list[str]]]
-) -> tuple[list[list[float]], list[Problem]]:
-    rows: list[list[float]] = []
-    problems: list[Problem] = []
-    for line, cells in records:
-        if len(cells) != len(header):
-            hint = "; is a decimal comma in it? write a decimal point" if len(cells) > len(header) else ""
-            problems.append((line, f"{len(cells)} values under {len(header)} columns{hint}"))
-            continue
-        numbers = []
-        for name, cell in zip(header, cells, strict=True):
-            number = _number(cell)
-            numbers.append(number)
-            if not math.isfinite(number):
-                wrong = "is empty" if not cell else f'= "{cell}" is no finite number'
-                problems.append((line, f"{name} {wrong}; leave the row out where the reading is missing"))
-            elif name == "direction" and number not in (1.0, -1.0):
-                problems.append((line, f"direction = {cell}; expected 1 (approached in +) or -1"))
-            elif name == "run" and (number != int(number) or number < 1):
-                problems.append((line, f"run = {cell}; expected a whole number from 1"))
-        rows.append(numbers)
-    return rows, problems
+def _number(name: str, cell: str) -> tuple[float, str | None]:
+    value, said = finite(cell), None
+    if math.isnan(value):
+        wrong = "is empty" if not cell else f'= "{cell}" is no finite number'
+        said = f"{name} {wrong}; leave the row out where the reading is missing"
+    elif name == "direction" and value not in (1.0, -1.0):
+        said = f"direction = {cell}; expected 1 (approached in +) or -1"
+    elif name == "run" and (value != int(value) or value < 1):
+        said = f"run = {cell}; expected a whole number from 1"
+    return value, said
 
 
-def _number(cell: str) -> float:
-    try:
-        return float(cell) if "_" not in cell else math.nan
-    except ValueError:
-        return math.nan
+_WANTED = Wanted(
+    f"holds no readings; expected {','.join(_HEADER)},value_um",
+    _header_problems,
+    _number,
+    many="; is a decimal comma in it? write a decimal point",
+)

@@ -17,8 +17,8 @@ from pydantic import Field
 
 from olp.core.arrays import Array
 from olp.core.errors import InputError
+from olp.core.schema import Table
 from olp.files.measurements.readings import ANGULAR, UNITS, Readings
-from olp.files.schema_base import Table
 from olp.files.write import PathLike, read_bytes
 
 RTX = ".rtx"

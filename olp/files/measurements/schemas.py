@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, create_model
 
-from olp.files.fields import Chain, IsoNames, Positive, Text
+from olp.core.schema import Positive, Table, Text
+from olp.files.fields import Chain, IsoNames
 from olp.files.measurements.instruments.registry import INSTRUMENTS
 from olp.files.measurements.line_keys import LineKeys
-from olp.files.schema_base import Table
 
 
 class SquareTable(Table):

@@ -1,0 +1,1 @@
+"""The codes of findings, one table of data a topic."""

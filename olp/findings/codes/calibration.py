@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-CALIBRATION = (
-    Rule(
+_rule = partial(Rule, topic="calibration", gate=False)
+
+RULES = (
+    _rule(
         "OLP801",
         "error not observed",
         Severity.WARNING,
@@ -15,7 +19,7 @@ CALIBRATION = (
         "across it, against the same reference.",
         "ECZ of a vertical Z, which an electronic level cannot read.",
     ),
-    Rule(
+    _rule(
         "OLP802",
         "readings left out",
         Severity.WARNING,
@@ -24,7 +28,7 @@ CALIBRATION = (
         "Look at the rows that are named; measure again where they are many.",
         "One reading of ten that is 40 um off.",
     ),
-    Rule(
+    _rule(
         "OLP803",
         "readings scatter more than stated",
         Severity.WARNING,
@@ -33,7 +37,7 @@ CALIBRATION = (
         "Look for air turbulence, vibration or loose optics; state the real uncertainty.",
         "sigma_um = 0.2 and a spread of 1.5 um.",
     ),
-    Rule(
+    _rule(
         "OLP804",
         "step in a curve",
         Severity.INFO,
@@ -42,7 +46,7 @@ CALIBRATION = (
         "Read targets close together across the joint.",
         "EYX jumps by 8 um between X 1000 and X 1100.",
     ),
-    Rule(
+    _rule(
         "OLP805",
         "errors hard to tell apart",
         Severity.WARNING,
@@ -51,17 +55,17 @@ CALIBRATION = (
         "Add a reading on which they act differently.",
         "C0Y and A0Z when one square was used for both, of which nobody knows the error.",
     ),
-    Rule(
+    _rule(
         "OLP806",
         "squareness not observed",
         Severity.WARNING,
         "Straightness is read against a line of unknown slope, so without a square, diagonals or a ball-bar "
         "nothing says how the axes stand to each other; it stands as zero in the calibration.",
-        "Read both straightness lines of the plane against one square (the key square), or give a reading "
-        "of squareness.",
+        "Read both straightness lines of the plane against one square (the key square), or give a reading of "
+        "squareness.",
         "EYX and EXY without the key square.",
     ),
-    Rule(
+    _rule(
         "OLP807",
         "calibrated box smaller than the travel",
         Severity.INFO,
@@ -69,7 +73,7 @@ CALIBRATION = (
         "Measure over the whole travel where programs need it.",
         "Lines from X 50 to X 1950 on a travel of 2000 mm.",
     ),
-    Rule(
+    _rule(
         "OLP808",
         "readings do not fit the model",
         Severity.WARNING,
@@ -78,7 +82,7 @@ CALIBRATION = (
         "Look at the lines with the largest residuals.",
         "chi-square of 3 a degree of freedom.",
     ),
-    Rule(
+    _rule(
         "OLP809",
         "scale not observed",
         Severity.WARNING,
@@ -87,7 +91,7 @@ CALIBRATION = (
         "State a known distance between two pods, or add a line of a laser or lengths.",
         "Two theodolites, one offset of the reflector and no baseline.",
     ),
-    Rule(
+    _rule(
         "OLP841",
         "errors that no rigid bodies make",
         Severity.INFO,
@@ -97,7 +101,7 @@ CALIBRATION = (
         "Nothing; more points make its uncertainty smaller.",
         "DZ sinks by 20 um in the middle of the table, and only with the ram down.",
     ),
-    Rule(
+    _rule(
         "OLP842",
         "no map written",
         Severity.INFO,
@@ -107,7 +111,7 @@ CALIBRATION = (
         "box.",
         "120 points of a rigid machine.",
     ),
-    Rule(
+    _rule(
         "OLP843",
         "map from too few offsets of the reflector",
         Severity.WARNING,

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-TABLES = (
-    Rule(
+_rule = partial(Rule, topic="control_tables", gate=False)
+
+RULES = (
+    _rule(
         "OLP871",
         "table cannot hold all errors",
         Severity.WARNING,
@@ -14,7 +18,7 @@ TABLES = (
         "Choose a format that holds them, or leave the table out and correct the programs.",
         "Pitch and yaw, exported to LinuxCNC, which corrects one axis by its own position.",
     ),
-    Rule(
+    _rule(
         "OLP872",
         "part of a table left out",
         Severity.WARNING,
@@ -23,7 +27,7 @@ TABLES = (
         "See that the errors left out are zero or corrected elsewhere.",
         "The section `[C0B]`, the place of a rotary axis, in an Etalon exchange file.",
     ),
-    Rule(
+    _rule(
         "OLP873",
         "table coarser than the curve",
         Severity.INFO,
@@ -32,7 +36,7 @@ TABLES = (
         "Give the control more rows where it can take them, or correct the programs.",
         "A curve with 400 positions in a table of 256 rows.",
     ),
-    Rule(
+    _rule(
         "OLP874",
         "sense of a table not verified",
         Severity.WARNING,
@@ -41,7 +45,7 @@ TABLES = (
         "Run the verification program beside the table, with a laser or a dial gauge, before any part.",
         "`olp calibrate export --format siemens-cec --sense correction`.",
     ),
-    Rule(
+    _rule(
         "OLP875",
         "lost motion in the table",
         Severity.WARNING,
@@ -51,7 +55,7 @@ TABLES = (
         "active.",
         "`[backlash] X_um = 4.0` in a table with forward and reverse columns.",
     ),
-    Rule(
+    _rule(
         "OLP876",
         "corrected by the control already",
         Severity.INFO,

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-GATE = (
-    Rule(
+_rule = partial(Rule, topic="gate")
+
+RULES = (
+    _rule(
         "OLP204",
         "reversal-heavy passage",
         Severity.WARNING,
         "An axis with lost motion turns round again and again after ways that are hardly longer than its "
-        "lost motion. There the tip follows the play more than the command, and small faults of the "
-        "measured lost motion add up.",
+        "lost motion. There the tip follows the play more than the command, and small faults of the measured "
+        "lost motion add up.",
         "Smooth the passage in the source (fewer points, a larger tolerance of the CAM chords).",
         "`[backlash] X_um = 20`, and X10.00 X10.05 X10.00 X10.05 in a row.",
     ),
-    Rule(
+    _rule(
         "OLP205",
         "feed beyond the velocity of an axis",
         Severity.WARNING,
@@ -24,26 +28,26 @@ GATE = (
         "Lower F; `olp retime --write-feed` writes feeds that the axes can follow.",
         "`G1 X100 F60000` on an axis with velocity_mm_s = 500.",
     ),
-    Rule(
+    _rule(
         "OLP206",
         "acceleration beyond an axis",
         Severity.WARNING,
         "At the programmed feed, an arc or a run of short blocks asks an axis for more than "
-        "acceleration_mm_s2, so the control slows down, or leaves the path. Of short blocks a correction "
-        "can make more.",
+        "acceleration_mm_s2, so the control slows down, or leaves the path. Of short blocks a correction can "
+        "make more.",
         "Lower F there; `olp retime --slow` lists where and why.",
         "`G2 I0.5 F6000`: 100 mm/s about a radius of 0.5 mm asks for 20 m/s2.",
     ),
-    Rule(
+    _rule(
         "OLP307",
         "no feed",
         Severity.ERROR,
-        "A feed move has no feed, or one that cannot be read for sure, so the control stops with an "
-        "alarm, or moves at the last feed of the program before.",
+        "A feed move has no feed, or one that cannot be read for sure, so the control stops with an alarm, "
+        "or moves at the last feed of the program before.",
         "Write an F word in the first feed move, and in every block of G93.",
         "`G1 X100` with no F before it.",
     ),
-    Rule(
+    _rule(
         "OLP308",
         "feed by time or by turns",
         Severity.INFO,
@@ -52,7 +56,7 @@ GATE = (
         "Look whether this is meant; go back to G94 where it is not.",
         "`G93` in the first line, left over from a job with a rotary axis.",
     ),
-    Rule(
+    _rule(
         "OLP309",
         "feed changed",
         Severity.WARNING,
@@ -61,7 +65,7 @@ GATE = (
         "Compare the F words of both programs at these lines.",
         "`G1 X100 F600` in the nominal program, and F60 in the corrected one.",
     ),
-    Rule(
+    _rule(
         "OLP310",
         "below the nominal path",
         Severity.ERROR,
@@ -70,7 +74,7 @@ GATE = (
         "Look at the Z words of these blocks; correct the nominal program again.",
         "`G0 Z50` as retract in the nominal program, and `G0 Z5` in the corrected one.",
     ),
-    Rule(
+    _rule(
         "OLP311",
         "corrected twice",
         Severity.ERROR,
@@ -79,7 +83,7 @@ GATE = (
         "Take the nominal program, as it came from CAM, and correct that once.",
         "`olp check twice.nc --nominal once.nc`, where once.nc is corrected already.",
     ),
-    Rule(
+    _rule(
         "OLP312",
         "corrected with another calibration",
         Severity.ERROR,
@@ -88,7 +92,7 @@ GATE = (
         "Correct the nominal program with the calibration that is in force.",
         "part.corrected.nc of last month, and a calibration.toml of today.",
     ),
-    Rule(
+    _rule(
         "OLP405",
         "outside the calibrated volume",
         Severity.ERROR,
@@ -97,7 +101,7 @@ GATE = (
         "Move the part, measure the machine there, or accept the error at the face with --outside-box hold.",
         "box_mm of X up to 2000, and an arc that bulges to X2003 between two ends inside.",
     ),
-    Rule(
+    _rule(
         "OLP406",
         "tool unlike those measured with",
         Severity.WARNING,
@@ -107,7 +111,7 @@ GATE = (
         "Measure with a tool of such length too, or raise tool_within_mm with a reason.",
         "Curves with tool_mm = [0, 0, -120], and a tool of 300 mm.",
     ),
-    Rule(
+    _rule(
         "OLP407",
         "temperature unlike that of the calibration",
         Severity.WARNING,
@@ -117,7 +121,7 @@ GATE = (
         "Wait until the machine is back in its range, or measure it warm.",
         "temperature_degC = 20, X_scale = 28 in the job file.",
     ),
-    Rule(
+    _rule(
         "OLP408",
         "age of the calibration not checked",
         Severity.INFO,
@@ -125,7 +129,7 @@ GATE = (
         "Give --date, in a pipeline the day of the run.",
         "`olp check part.nc -m machine.toml`.",
     ),
-    Rule(
+    _rule(
         "OLP409",
         "correction larger than the sanity limit",
         Severity.ERROR,
@@ -134,7 +138,7 @@ GATE = (
         "Look at `olp inspect machine.toml --at` of that place; raise the limit where the figure is right.",
         "EXX written in mm into a column EXX_um of a thousand times the value.",
     ),
-    Rule(
+    _rule(
         "OLP410",
         "the control compensates everything",
         Severity.ERROR,
@@ -143,7 +147,7 @@ GATE = (
         "List what the control corrects now and did not while measuring, or switch its tables off.",
         'compensated_by_controller = "all".',
     ),
-    Rule(
+    _rule(
         "OLP411",
         "digits too coarse",
         Severity.WARNING,
@@ -151,31 +155,5 @@ GATE = (
         "tolerance, so the tolerance promises what the digits cannot hold.",
         "Let the control take more digits (least_increment_mm), or state the tolerance that is meant.",
         "least_increment_mm = 0.01 with --tolerance-um 1.",
-    ),
-    Rule(
-        "OLP701",
-        "contact",
-        Severity.ERROR,
-        "Tool or holder touches a mesh of the job where it must not: a fixture or the machine at any "
-        "time, the workpiece in a rapid, or with what does not cut.",
-        "Look at the line and the place named; change the approach, the stickout or the set-up.",
-        "`G0 X200` at Z5 through a clamp that is 20 mm high.",
-    ),
-    Rule(
-        "OLP702",
-        "clearance below the limit",
-        Severity.WARNING,
-        "Tool or holder comes nearer to a mesh than clearance_mm of [check], without touching it.",
-        "Raise the retract plane, or lower clearance_mm with a reason.",
-        "A rapid 0.4 mm above a clamp, clearance_mm = 1.",
-    ),
-    Rule(
-        "OLP703",
-        "clearance not checked",
-        Severity.WARNING,
-        "Moves were left out of the check of clearance: the position of an axis is not known there, or the "
-        "tool in the spindle has no length.",
-        "Give start_mm in the job file, command all axes in the first rapid, and give Z_mm of the tool.",
-        "`T9 M6` with a tool that stands in no table.",
     ),
 )

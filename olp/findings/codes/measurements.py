@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-METROLOGY = (
-    Rule(
+_rule = partial(Rule, topic="measurements", gate=False)
+
+RULES = (
+    _rule(
         "OLP851",
         "less than ISO 230-2 asks for",
         Severity.INFO,
@@ -14,7 +18,7 @@ METROLOGY = (
         "Measure more runs or targets, or state their number with the figures.",
         "A of an axis of 1 m from three runs at four targets.",
     ),
-    Rule(
+    _rule(
         "OLP852",
         "targets at equal steps",
         Severity.INFO,
@@ -24,16 +28,16 @@ METROLOGY = (
         "Move each target by a random part of the pitch, or add a fine sweep over two pitches.",
         "Targets at 0, 50, 100 ... mm on a screw of 10 mm pitch.",
     ),
-    Rule(
+    _rule(
         "OLP853",
         "cyclic error not seen by the targets",
         Severity.WARNING,
-        "At these targets an error of that period cannot be told from a slow one or from none, so it was "
-        "not fitted, and what it does to the machine stays unknown.",
+        "At these targets an error of that period cannot be told from a slow one or from none, so it was not "
+        "fitted, and what it does to the machine stays unknown.",
         "Move each target by a random part of the period, or add a fine sweep over two periods.",
         "period 10 mm, and targets at every 50 mm.",
     ),
-    Rule(
+    _rule(
         "OLP854",
         "reversal depends on position",
         Severity.INFO,
@@ -42,7 +46,7 @@ METROLOGY = (
         "Let olp calibrate fit write a direction column instead of one number in [backlash].",
         "4 um at one end of a screw and 9 um at the other.",
     ),
-    Rule(
+    _rule(
         "OLP855",
         "reversal the wrong way round",
         Severity.WARNING,
@@ -52,7 +56,7 @@ METROLOGY = (
         "Look at the backlash compensation of the control and at the directions in the file.",
         "+3 um approached in +, -3 um approached in -.",
     ),
-    Rule(
+    _rule(
         "OLP856",
         "not determined by these measurements",
         Severity.WARNING,
@@ -60,7 +64,7 @@ METROLOGY = (
         "Add the measurement that is named, or state the value from another source with its uncertainty.",
         "A ball-bar run in one direction: squareness and servo mismatch look alike.",
     ),
-    Rule(
+    _rule(
         "OLP857",
         "measurement does not fit its model",
         Severity.WARNING,
@@ -69,7 +73,7 @@ METROLOGY = (
         "Look at the residuals, and give the lines to olp calibrate fit, which knows levers and drift.",
         "Body diagonals that leave 20 um where 1 um was stated.",
     ),
-    Rule(
+    _rule(
         "OLP858",
         "readings not evaluated",
         Severity.WARNING,
@@ -77,7 +81,7 @@ METROLOGY = (
         "Complete the run, or leave the incomplete one out; the message says what is missing.",
         "A line whose last run ended half way.",
     ),
-    Rule(
+    _rule(
         "OLP859",
         "reading far from its repetitions",
         Severity.WARNING,

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-MODEL = (
-    Rule(
+_rule = partial(Rule, topic="model")
+
+RULES = (
+    _rule(
         "OLP420",
         "map of another tool",
         Severity.WARNING,
@@ -16,7 +20,7 @@ MODEL = (
         'leave (kind = "residual").',
         "A map of kind total with tool_mm = [0, 0, -120], and a tool of 200 mm: at 20 urad 1.6 um.",
     ),
-    Rule(
+    _rule(
         "OLP421",
         "payload changes before a cut",
         Severity.WARNING,
@@ -25,17 +29,17 @@ MODEL = (
         "Let a rapid come first after the change, such as the retract of a gripper.",
         "`(OLP PAYLOAD 30 kg)` in front of `G1 X100` where 30 kg bend the beam by 40 um.",
     ),
-    Rule(
+    _rule(
         "OLP422",
         "payload without compliance",
         Severity.WARNING,
-        "The job or the program states a payload other than that of the calibration, and the calibration "
-        "has no [[compliance]]: what the payload bends stays in the path.",
+        "The job or the program states a payload other than that of the calibration, and the calibration has "
+        "no [[compliance]]: what the payload bends stays in the path.",
         "Measure the errors with a load, give the beam in [[compliance_beam]], or leave the payload out "
         "where the machine is stiff enough.",
         "payload_kg = 30 in the job file, and a calibration of curves alone.",
     ),
-    Rule(
+    _rule(
         "OLP423",
         "sensor temperatures not stated",
         Severity.WARNING,
@@ -44,7 +48,7 @@ MODEL = (
         "Give [temperatures_degC.sensors], or sensor_log, in the job file.",
         'structure = "thermal.toml" under [thermal], and a job without temperatures.',
     ),
-    Rule(
+    _rule(
         "OLP424",
         "structure warmer or colder than identified",
         Severity.WARNING,
@@ -52,31 +56,5 @@ MODEL = (
         "identified; it was taken at the end of the range (--outside-box hold).",
         "Log the drift at such temperatures too, or wait until the machine is back in the range.",
         "range_degC = [19, 30] of a sensor that says 33 degC.",
-    ),
-    Rule(
-        "OLP881",
-        "shape of a drift not identified",
-        Severity.WARNING,
-        "The readings of this component stand at too few positions, or over too little of the axis, to tell "
-        "its growth from its bow there.",
-        "Read the drift at three positions or more, at both ends and in the middle.",
-        "`EXX@500_um` alone: only an offset can be told.",
-    ),
-    Rule(
-        "OLP882",
-        "bend without its angle",
-        Severity.WARNING,
-        "A straightness drifts, so a guide bends, and what rides on a bent guide turns. No angle of that "
-        "axis was read, so the part of the drift that acts over the length of the tool is not in the model.",
-        "Read the angle too, with a level or a laser.",
-        "`EZX@1000_um` and no `EBX@..._urad`: 40 urad at 300 mm are 12 um.",
-    ),
-    Rule(
-        "OLP883",
-        "drift that the sensors do not explain",
-        Severity.WARNING,
-        "Held out of the fit, much of the drift of this component is left.",
-        "Put a sensor where the heat comes in, log for longer, or log days that differ.",
-        "EZZ with 45 % of its drift left: the spindle has no sensor.",
     ),
 )

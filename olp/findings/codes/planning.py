@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-PLANNING = (
-    Rule(
+_rule = partial(Rule, topic="planning", gate=False)
+
+RULES = (
+    _rule(
         "OLP831",
         "curve in the wrong sense or unit",
         Severity.ERROR,
@@ -16,7 +20,7 @@ PLANNING = (
         "with all that is decided put right.",
         "EBX flipped: a level that counts + where the nose goes down.",
     ),
-    Rule(
+    _rule(
         "OLP832",
         "curves of an axis in another arrangement",
         Severity.ERROR,
@@ -26,7 +30,7 @@ PLANNING = (
         "decided.",
         "EAX and EBX in each other's place: pitch and roll of X confused.",
     ),
-    Rule(
+    _rule(
         "OLP833",
         "sense not decided by these points",
         Severity.WARNING,
@@ -35,7 +39,7 @@ PLANNING = (
         "Add the proposed points to the same set-up; a curve that does little anywhere may stay open.",
         "ECZ, which acts on offset tools only, from points with one straight tool.",
     ),
-    Rule(
+    _rule(
         "OLP834",
         "points not explained",
         Severity.WARNING,
@@ -45,7 +49,7 @@ PLANNING = (
         "Compare date, temperature and active tables of the control; look at the rows with large residuals.",
         "Points taken after a crash.",
     ),
-    Rule(
+    _rule(
         "OLP835",
         "point far off",
         Severity.WARNING,
@@ -54,17 +58,17 @@ PLANNING = (
         "Measure it again, or leave the row out.",
         "Row 14, 9 standard deviations off.",
     ),
-    Rule(
+    _rule(
         "OLP836",
         "error not on the machine",
         Severity.ERROR,
         "Points show nothing of this curve, although they would: the control corrects it already, or the "
-        "curve is of another state of the machine. Corrected with it, the error comes back in the "
-        "other sense.",
+        "curve is of another state of the machine. Corrected with it, the error comes back in the other "
+        "sense.",
         "Look at the tables that are active in the control, and list them in compensated_by_controller.",
         "EXX while the pitch compensation of X is on.",
     ),
-    Rule(
+    _rule(
         "OLP837",
         "wanted uncertainty out of reach",
         Severity.WARNING,
@@ -72,7 +76,7 @@ PLANNING = (
         "Use a better instrument or more points (--points), make the box smaller (--box), or want less.",
         "2 um over 3 x 2 x 1 m from a tracker of 15 um.",
     ),
-    Rule(
+    _rule(
         "OLP838",
         "plan leaves errors unseen",
         Severity.WARNING,
@@ -80,7 +84,7 @@ PLANNING = (
         "Use three reflectors that are not on one line, or another method.",
         "ECZ with one straight reflector.",
     ),
-    Rule(
+    _rule(
         "OLP839",
         "run not foreseen by the calibration's uncertainty",
         Severity.WARNING,

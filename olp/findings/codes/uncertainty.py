@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from olp.findings.rule import Rule, Severity
 
-CONFIDENCE = (
-    Rule(
+_rule = partial(Rule, topic="uncertainty")
+
+RULES = (
+    _rule(
         "OLP431",
         "gain within its uncertainty",
         Severity.INFO,
@@ -17,7 +21,7 @@ CONFIDENCE = (
         "components that are within their own uncertainty.",
         "3 um of correction, and a squareness that is known to 5 um there.",
     ),
-    Rule(
+    _rule(
         "OLP432",
         "correction not sure to help",
         Severity.WARNING,
@@ -26,7 +30,7 @@ CONFIDENCE = (
         "Run the nominal program, or calibrate again with a lower uncertainty.",
         "A calibration of 20 um of uncertainty for errors of 10 um.",
     ),
-    Rule(
+    _rule(
         "OLP433",
         "within tolerance by chance",
         Severity.WARNING,
@@ -35,7 +39,7 @@ CONFIDENCE = (
         "Widen the tolerance, or lower the uncertainty: the report tells what it is made of.",
         "--within-um 5 with a band of 8 um.",
     ),
-    Rule(
+    _rule(
         "OLP434",
         "temperature not corrected",
         Severity.WARNING,
@@ -45,7 +49,7 @@ CONFIDENCE = (
         "Give the table [thermal] of the calibration, or work at its temperature.",
         "`X_scale = 24.0` in the job, and no X_scale_um_m_K: 46 um over 1 m.",
     ),
-    Rule(
+    _rule(
         "OLP435",
         "components within their own uncertainty",
         Severity.INFO,
@@ -54,7 +58,7 @@ CONFIDENCE = (
         "Measure them better, or leave them out with --only-sure-components.",
         "A squareness of 4 urad with a standard uncertainty of 5 urad.",
     ),
-    Rule(
+    _rule(
         "OLP436",
         "components left out",
         Severity.INFO,
@@ -63,7 +67,7 @@ CONFIDENCE = (
         "Nothing; without the option they are corrected.",
         "--only-sure-components, and a squareness of 4 urad known to 5 urad.",
     ),
-    Rule(
+    _rule(
         "OLP437",
         "calibration has aged",
         Severity.WARNING,

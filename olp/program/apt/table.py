@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from olp.program.dialect import StatementDialect, Support
+from olp.program.dialect import Support
 
 _C, _R, _X = Support.CORRECTED, Support.READ, Support.CARRIED
 _NO = Support.REFUSED
@@ -88,14 +88,3 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
 
 #: statements that take the rest of their line as text
 FREE = (b"PARTNO", b"PPRINT", b"INSERT", b"REMARK", b"REM", b"TITLE", b"TPRINT", b"DISPLY", b"CATPROCESS")
-
-
-APT = StatementDialect(
-    name="apt",
-    family="apt",
-    table=TABLE,
-    title="APT and cutter-location data (ISO 4343, ISO 3592)",
-    path_mode="the post-processor's",
-    comment=(b"$$ ", b""),
-    first=(b"%", b"$$*", b"PARTNO"),
-)

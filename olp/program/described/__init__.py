@@ -1,0 +1,1 @@
+"""Line-oriented languages of motion that a file describes."""

@@ -49,7 +49,6 @@ class Rule:
 class UserDialect(Dialect):
     """A language that a file describes."""
 
-    family: str = "described"
     statements: tuple[Rule, ...]
     unit: str | None
     speed_unit: str | None = None

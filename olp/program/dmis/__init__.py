@@ -1,0 +1,1 @@
+"""DMIS part programs of coordinate measuring machines (ISO 22093)."""

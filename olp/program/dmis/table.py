@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from olp.program.dialect import StatementDialect, Support
+from olp.program.dialect import Support
 
 _C, _R, _X, _NO = Support.CORRECTED, Support.READ, Support.CARRIED, Support.REFUSED
 
@@ -79,14 +79,3 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
 
 #: majors of assignments that run and input statements make; their value is text or logic, never motion
 FREE = (b"TEXT", b"DISPLAY", b"PSTHRU")
-
-
-DMIS = StatementDialect(
-    name="dmis",
-    family="dmis",
-    table=TABLE,
-    title="DMIS part programs of coordinate measuring machines (ISO 22093)",
-    path_mode="the control's own approach and retract",
-    comment=(b"$$ ", b""),
-    first=(b"FILNAM|DMISMN|DMISMD",),
-)

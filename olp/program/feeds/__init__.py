@@ -1,0 +1,1 @@
+"""What a program says about time: feeds, dwells, path modes, and feeds written back."""

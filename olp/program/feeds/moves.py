@@ -32,7 +32,6 @@ class Scan:
     line: Index
     code: Index
     code_line: Index
-    iso: bool
 
     @staticmethod
     def of(program: Program, words: Words, *, block_delete: bool) -> Scan:
@@ -46,8 +45,7 @@ class Scan:
         word, line = word[active], line[active]
         g = words.letter[word] == ord("G")
         code = np.rint(numbers(words, word[g]) * 10).astype(np.int64)
-        # axis words of ISO controls have increments, and so have their times
-        return Scan(program, words, word, line, code, line[g], program.rs274.cycles_apart)
+        return Scan(program, words, word, line, code, line[g])
 
     def of_letter(self, letter: bytes) -> tuple[Index, Index]:
         """Indices and lines of the words of a letter."""
@@ -160,7 +158,7 @@ def _modes(scan: Scan) -> _Modes:
     line = np.concatenate(([0], scan.code_line[chosen]))
     code = np.concatenate(([_PER_MINUTE], scan.code[chosen]))
     changed = np.append(True, code[1:] != code[:-1])
-    if scan.program.dialect.name == "linuxcnc":
+    if scan.program.rs274.feed_words_end:
         changed[1:] |= code[1:] != _INVERSE
     since = np.maximum.accumulate(np.where(changed, line, 0))
     return _Modes(line, code, since)
@@ -169,7 +167,7 @@ def _modes(scan: Scan) -> _Modes:
 def _unit(scan: Scan, line: Index) -> Array:
     """mm per unit of F words on these lines; RS-274 takes F before a G20 or G21 of the same block."""
     chosen = np.isin(scan.code, (200, 210))
-    side = "left" if scan.program.dialect.name == "linuxcnc" else "right"
+    side = "left" if scan.program.rs274.feed_before_unit else "right"
     before = np.searchsorted(scan.code_line[chosen], line, side=side)  # type: ignore[call-overload]
     inch = np.concatenate(([False], scan.code[chosen] == 200))[before]
     return np.asarray(np.where(inch, MM_PER_INCH, 1.0), float)
@@ -231,7 +229,7 @@ def _check_values(scan: Scan, modes: _Modes, line: Index, value: Array, pointed:
         return
     # Fanuc counts whole mm/min; Haas asks its setting 77, and other units have increments of their own
     mode, _ = modes.at(line)
-    plain = (mode == _PER_MINUTE) & (unit == 1.0) & (scan.program.dialect.name == "fanuc")
+    plain = (mode == _PER_MINUTE) & (unit == 1.0) & scan.program.rs274.feed_without_point
     open_ = ~pointed & ~plain & (mode != _INVERSE)
     if open_.any():
         i = int(np.flatnonzero(open_)[0])

@@ -25,11 +25,9 @@ from olp.program.program import Program, Statements
 #: expects of a finishing cut.
 BLEND_MM = 0.01
 
-#: M codes that LinuxCNC carries out along with the motion, without a rest: M62, M63, M67.
-_ALONG = (620, 630, 670)
-#: M codes that take effect after the motion of their block: on all controls, and on ISO controls besides.
+#: M codes that take effect after the motion of their block, and those that do besides where stops are exact.
 _AFTER = (0, 10, 20, 300, 600)
-_AFTER_ISO = (50, 90)
+_AFTER_EXACT = (50, 90)
 
 
 class PathControl(IntEnum):
@@ -84,7 +82,7 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
     rest, dwell = _rests(program, scan)
     probes = np.flatnonzero(path.kind == Kind.PROBE)
     rest[probes + 1] = True
-    if scan.iso:
+    if program.rs274.exact_stop:
         # in-position check of G0 on both sides, whatever the mode
         rapids = np.flatnonzero(path.kind == Kind.RAPID)
         rest[rapids] = rest[rapids + 1] = True
@@ -131,9 +129,9 @@ def _modes(program: Program, scan: Scan) -> tuple[Mode, ...]:
             stated = mode.tolerance_mm if mode.tolerance_mm is not None and mode.tolerance_mm > 0 else None
             found.append(Mode(mode.line, PathControl.BLEND, stated))
         else:
-            stop = code == "G61.1" or scan.iso
+            stop = code == "G61.1" or program.rs274.exact_stop
             found.append(Mode(mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH))
-    if scan.iso:
+    if program.rs274.exact_stop:
         # G62 and G63 end exact stop as G64 does
         lines = scan.code_line[np.isin(scan.code, (620, 630))].tolist()
         found += [Mode(line, PathControl.BLEND) for line in lines]
@@ -159,13 +157,13 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     dwell = np.zeros(len(line) + 1)
     word, at = scan.of_letter(b"M")
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
-    if program.dialect.name == "linuxcnc":
-        at, code = at[~np.isin(code, _ALONG)], code[~np.isin(code, _ALONG)]
-    late = np.isin(code, _AFTER + _AFTER_ISO if scan.iso else _AFTER)
+    along = np.isin(code, [10 * m for m in program.rs274.m_with_motion])
+    at, code = at[~along], code[~along]
+    late = np.isin(code, _AFTER + _AFTER_EXACT if program.rs274.exact_stop else _AFTER)
     rest[np.searchsorted(line, at[late], "right")] = True
     rest[np.searchsorted(line, at[~late], "left")] = True
     rest[np.searchsorted(line, scan.of_letter(b"S")[1], "left")] = True
-    if scan.iso:
+    if program.rs274.exact_stop:
         rest[np.searchsorted(line, scan.code_line[scan.code == 90], "right")] = True
     pauses = scan.code_line[scan.code == 40]
     if len(pauses):
@@ -176,20 +174,20 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
 
 
 def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
-    """Seconds of each G4 block: P, and on ISO controls X or U too."""
-    words = scan.words
+    """Seconds of each G4 block: P, and where the control takes them X or U too."""
+    words, axis_dwell = scan.words, program.rs274.axis_dwell
     first = words.first_word[pauses - 1].astype(np.int64)
     count = words.first_word[pauses] - first
     owner = np.repeat(np.arange(len(pauses)), count)
     word = np.repeat(first - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-    time = np.isin(words.letter[word], list(b"PXU" if scan.iso else b"P"))
+    time = np.isin(words.letter[word], list(b"PXU" if axis_dwell else b"P"))
     owner, word = owner[time], word[time]
     stated = np.bincount(owner, minlength=len(pauses))
     if (stated > 1).any():
         raise ProgramError(
             "a dwell has two times in one block", line=int(pauses[np.flatnonzero(stated > 1)[0]])
         )
-    if not scan.iso and (stated == 0).any():
+    if not axis_dwell and (stated == 0).any():
         raise ProgramError(
             "a dwell G4 has no P word with its time", line=int(pauses[np.flatnonzero(stated == 0)[0]])
         )
@@ -198,7 +196,7 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     seconds = np.zeros(len(pauses))
     # P counts milliseconds where it has no point; X and U do where lengths count increments
     bare = ~pointed & ((words.letter[word] == ord("P")) | (not program.calculator))
-    seconds[owner] = np.where(bare & scan.iso, number / 1000.0, number)
+    seconds[owner] = np.where(bare & axis_dwell, number / 1000.0, number)
     if (seconds < 0).any():
         raise ProgramError("a dwell cannot be negative", line=int(pauses[np.flatnonzero(seconds < 0)[0]]))
     return seconds

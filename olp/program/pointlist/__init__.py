@@ -1,0 +1,1 @@
+"""Lists of positions: tables whose rows are places, in order."""

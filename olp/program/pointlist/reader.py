@@ -7,7 +7,7 @@ judged only where the layout says that they are joined by straight lines. Only X
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,9 @@ from olp.program.frames import FrameTable
 from olp.program.places import frame_index
 from olp.program.pointlist.columns import columns
 from olp.program.program import Program
-from olp.program.text.delimited import AXES, MM_S, Cells, Layout, first_lines, stated_frame, told
-from olp.program.text.numbers import number
+from olp.program.text.delimited import AXES, MM_S, Layout, first_lines, stated_frame, told
+from olp.program.text.numbers import Number, number
+from olp.program.text.rows import Cells
 from olp.program.verbatim import Moves
 
 _TURNING = ("A", "B", "C", "I", "J", "K")
@@ -53,22 +54,10 @@ _SUPPORT = {
 class PointList(Dialect):
     """A list of positions; `layout` None: told from its first rows."""
 
-    family: str = "list"
     layout: Layout | None = None
 
     def rows(self) -> Sequence[Row]:
         return [Row(f"column {k}" if len(k) < 6 else k, what, why) for k, (what, why) in _SUPPORT.items()]
-
-
-POINT_LIST = PointList(
-    name="list", title="list of positions (CSV, TXT)", path_mode="not stated", comment=(b"# ", b"")
-)
-
-
-def with_layout(layout: Layout) -> PointList:
-    """The dialect of lists that are laid out so."""
-    comment = (layout.comment.encode() + b" ", b"")
-    return replace(POINT_LIST, layout=layout, comment=comment, marks=layout.stamp)
 
 
 @dataclass(slots=True)
@@ -167,7 +156,7 @@ def _in_columns(
         found.tools = {t: first[t] for t in dict.fromkeys(found.tool)}
     feed = np.full(count, np.nan)
     if speed is not None and layout.speed_unit is not None:
-        known = [number(t, b"," if layout.decimal == "comma" else b".") for t in texts[-1]]
+        known = [number(t, cells.decimal) for t in texts[-1]]
         if None in known:
             return None
         feed = np.array([k.value for k in known if k is not None]) * MM_S[layout.speed_unit]
@@ -180,7 +169,6 @@ def _in_columns(
 
 def _rows(data: bytes, layout: Layout) -> _Found:
     cells = Cells(data, layout)
-    decimal = b"," if layout.decimal == "comma" else b"."
     places = [cells.place(axis) for axis in AXES]
     if None in places:
         raise InputError("has no columns for X, Y and Z; name them with --column X=.. or in a profile")
@@ -195,28 +183,21 @@ def _rows(data: bytes, layout: Layout) -> _Found:
     found = _Found()
     values: list[tuple[float, ...]] = []
     for line, row in cells.rows():
-        if max(xyz) >= len(row):
-            raise InputError(
-                f"{len(row)} columns; expected at least {max(xyz) + 1} between {layout.delimiter}s", line=line
-            )
-        numbers = [number(data[slice(*row[p])], decimal) for p in xyz]
-        wrong = next((p for p, n in zip(xyz, numbers, strict=True) if n is None), None)
+        # a row that is too short says so by its last column
+        numbers = [cells.number(row, p) for p in (xyz if max(xyz) < len(row) else [max(xyz)])]
+        wrong = next((said for said in numbers if isinstance(said, str)), None)
         if wrong is not None:
-            raise InputError(
-                f'column {wrong + 1} is "{cells.text(row[wrong])[:40]}"; expected a number with a decimal '
-                f"{layout.decimal}",
-                line=line,
-            )
-        text = cells.text(row[tool]) if tool is not None and tool < len(row) else ""
+            raise InputError(wrong, line=line)
+        text = cells.word(row, tool)
         if text and not text.isdigit():
             raise InputError(
                 f'"{text}" is no tool number; expected the number of a table [tools.N]', line=line
             )
-        said = number(data[slice(*row[speed])], decimal) if speed is not None and speed < len(row) else None
+        said = cells.number(row, speed) if speed is not None else None
         # a row without a speed keeps that of the row before
-        feed = feed if said is None else said.value * factor
+        feed = said.value * factor if isinstance(said, Number) else feed
         found.feed.append(feed)
-        known = [n for n in numbers if n is not None]
+        known = [n for n in numbers if not isinstance(n, str)]
         found.spans += [row[p] for p in xyz]
         found.line.append(line)
         found.bounds.append(cells.bounds)

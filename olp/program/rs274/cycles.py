@@ -2,7 +2,7 @@
 
 Pure functions of numbers in program coordinates and program units. Codes are integers, ten times the
 G number (810 is G81). The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC
-carries it out; `profile="fanuc"` gives that of Fanuc and Haas controls, which differ in these points only:
+carries it out (`NGC_CYCLES`); `ISO_CYCLES` are those of Fanuc and Haas controls, which differ here:
 
 - an initial level below R: LinuxCNC goes straight to R first; Fanuc positions in the plane at the level
   where it stands, then goes to R.
@@ -22,7 +22,7 @@ strokes of G84 and G74 there along the wrong axes.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -44,6 +44,50 @@ _PECKING = frozenset({730, 830})
 _DWELL_NEEDED = frozenset({820, 860, 890})
 # A peck step far below the resolution of the numbers would never end.
 _MAX_PECKS = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CycleRules:
+    """How a control makes canned cycles.
+
+    - `rises_first`: it leaves a level below R before it goes to the hole.
+    - `feeds_home`: G84, G74 and G89 feed all the way up, else to R only.
+    - `taps_in_any_plane`: else G84 and G74 go along the wrong axes outside G17.
+    - `taps_by_control`: it synchronises G84 and G74, so that plain moves cannot replace them.
+    - `peck_by_parameter`: a parameter of the control gives the clearance of pecks.
+    - `repeat_words`: these count the holes of a block, the first of them that is there.
+    - `stores`: zero holes store the words of the cycle, else they are an error.
+    - `new_code_forgets`: another cycle of a series takes no words from the one before.
+    - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
+    - `exact_corners`: all corners of a cycle are exact, whatever the path mode.
+    """
+
+    rises_first: bool
+    feeds_home: bool
+    taps_in_any_plane: bool
+    taps_by_control: bool
+    peck_by_parameter: bool
+    repeat_words: str
+    stores: bool
+    new_code_forgets: bool
+    levels_follow_distance: bool
+    exact_corners: bool
+
+    def counter(self, words: Mapping[str, int]) -> int | None:
+        """Of the words of a block by letter the one that counts its holes."""
+        return next((words[letter] for letter in self.repeat_words if letter in words), None)
+
+
+NGC_CYCLES = CycleRules(
+    rises_first=True, feeds_home=True, taps_in_any_plane=False, taps_by_control=False,
+    peck_by_parameter=False, repeat_words="L", stores=False, new_code_forgets=True,
+    levels_follow_distance=False, exact_corners=True,
+)  # fmt: skip
+ISO_CYCLES = CycleRules(
+    rises_first=False, feeds_home=False, taps_in_any_plane=True, taps_by_control=True,
+    peck_by_parameter=True, repeat_words="LK", stores=True, new_code_forgets=False,
+    levels_follow_distance=True, exact_corners=False,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +133,7 @@ def hole_moves(
     initial_z: float,
     plane: int = 17,
     clearance: float = LCNC_CLEARANCE_MM,
-    profile: Literal["linuxcnc", "fanuc"] = "linuxcnc",
+    rules: CycleRules = NGC_CYCLES,
 ) -> tuple[Stroke, ...]:
     """Strokes of one hole, in order; rapids of zero length are left out, a feed of zero length is not.
 
@@ -103,12 +147,11 @@ def hole_moves(
     Raises ProgramError (without a line) for a cycle without offline geometry and for words it cannot accept.
     """
     _check(code, plane, r, z, q, p)
-    if profile == "linuxcnc" and code in _TAPPING and plane != 17:
+    if not rules.taps_in_any_plane and code in _TAPPING and plane != 17:
         raise ProgramError(
             f"G{code // 10} in plane G{plane}: LinuxCNC 2.9 taps along the wrong axes outside G17; use G17"
         )
     axes = PLANES[plane]
-    like_lcnc = profile == "linuxcnc"
     level = start[axes[2]]
     clear = r if retract_to_r else max(initial_z, r)
     hole = _Hole(
@@ -120,9 +163,9 @@ def hole_moves(
         p=p or 0.0,
         clear=clear,
         clearance=clearance,
-        feed_home=like_lcnc,
+        feed_home=rules.feeds_home,
     )
-    if like_lcnc:
+    if rules.rises_first:
         if initial_z < r:
             hole.rapid_to(r)
         if level <= r or initial_z < r:
@@ -148,7 +191,7 @@ def cycle_moves(
     initial_z: float,
     plane: int = 17,
     clearance: float = LCNC_CLEARANCE_MM,
-    profile: Literal["linuxcnc", "fanuc"] = "linuxcnc",
+    rules: CycleRules = NGC_CYCLES,
 ) -> tuple[Stroke, ...]:
     """Strokes of a block with a repeat count (L; K on Fanuc): first hole at `xy`, the next `step` further.
 
@@ -160,7 +203,7 @@ def cycle_moves(
     for _ in range(repeats):
         strokes += hole_moves(
             code, start=start, xy=xy, r=r, z=z, q=q, p=p, retract_to_r=retract_to_r, initial_z=initial_z,
-            plane=plane, clearance=clearance, profile=profile,
+            plane=plane, clearance=clearance, rules=rules,
         )  # fmt: skip
         start = strokes[-1].point
         xy = (xy[0] + step[0], xy[1] + step[1])

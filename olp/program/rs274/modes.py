@@ -17,7 +17,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
-from olp.program.rs274.profiles import CUTTER_COMPENSATION, Act
+from olp.program.rs274.profiles.base import CUTTER_COMPENSATION, Act
 from olp.program.rs274.state import State
 
 Modal = npt.NDArray[np.int16]
@@ -77,7 +77,7 @@ class Modes:
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = (*_CLAIMS, 40) if profile.cycles_apart else _CLAIMS
+        self._claims = (*_CLAIMS, 40) if profile.axis_dwell else _CLAIMS
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act

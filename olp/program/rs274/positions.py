@@ -10,7 +10,7 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.units import AXES
-from olp.program.rs274.profiles import Profile
+from olp.program.rs274.profiles.base import Profile
 
 #: Lines of comments are no longer than some controls take.
 _WIDTH = 68

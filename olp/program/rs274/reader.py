@@ -24,7 +24,7 @@ from olp.program.rs274.collector import Collector
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import PLANE_OF, Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
-from olp.program.rs274.profiles import CYCLES, PROBES, Profile
+from olp.program.rs274.profiles.base import CYCLES, PROBES, Profile
 from olp.program.rs274.special_blocks import Singles, event_block
 from olp.program.rs274.state import NAN, Effect, State
 

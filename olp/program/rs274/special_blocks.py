@@ -21,7 +21,7 @@ from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycles import Stroke, hole_moves, levels
 from olp.program.rs274.modes import PLANE_OF, Context, scaled
 from olp.program.rs274.motion import fill
-from olp.program.rs274.profiles import CUTTER_COMPENSATION, CYCLES, Act, Profile
+from olp.program.rs274.profiles.base import CUTTER_COMPENSATION, CYCLES, Act, Profile
 from olp.program.rs274.state import NAN, Effect, State, Word
 
 _M_REFUSED = {
@@ -192,7 +192,7 @@ class Singles:
                     code, start=start, xy=(place[0], place[1]), r=r, z=z, q=self._sticky.get("Q"),
                     p=self._sticky.get("P"), retract_to_r=bool(context.retract[at] == 990),
                     initial_z=self._initial, plane=17 + plane,
-                    profile="linuxcnc" if state.profile.name == "linuxcnc" else "fanuc",
+                    rules=state.profile.cycles,
                 )  # fmt: skip
             except ProgramError as error:
                 raise ProgramError(error.message, line=line) from None
@@ -245,7 +245,7 @@ class Singles:
 
     def _repeats(self, context: Context, words: dict[str, int], line: int) -> int:
         """How many holes the block makes: its L word, or K on ISO controls."""
-        word = words.get("L", words.get("K") if self._state.profile.name != "linuxcnc" else None)
+        word = self._state.profile.cycles.counter(words)
         times = 1 if word is None else round(float(context.value[word]))
         if times < 1:
             raise ProgramError(

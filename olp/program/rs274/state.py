@@ -15,7 +15,7 @@ from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.toolpath import Frame, Touch, carried
 from olp.core.units import MM_PER_INCH
 from olp.program.frames import lever_of, touch_of
-from olp.program.rs274.profiles import Profile
+from olp.program.rs274.profiles.base import Profile
 
 NAN = float("nan")
 TOOL_CHANGE, SET_TOOL = 60, 610
@@ -99,8 +99,7 @@ class State:
         state = State(setup, profile, [NAN if p is None else p for p in setup.job.start_mm])
         state.motion = None if profile.motion is None else profile.motion * 10
         state.offset_name = setup.machine.default_work_offset
-        # LinuxCNC starts in G99, ISO controls in G98
-        state.retract = 990 if profile.name == "linuxcnc" else 980
+        state.retract = profile.initial_retract
         state.spindle = setup.machine.default_tool
         state.payload_kg = setup.job.payload_kg
         if state.spindle is not None and setup.machine.length_active:
@@ -226,7 +225,7 @@ class State:
                 raise ProgramError("M6 changes to a tool, but no T word came before it", line=line)
             self.spindle = self.selected
             self._tool(self.spindle, line, "M6")
-        if SET_TOOL in m_codes and self.profile.name == "linuxcnc":
+        if SET_TOOL in m_codes and self.profile.m61_sets_tool:
             if "Q" not in by_letter:
                 raise ProgramError("M61 needs a Q word with the tool number", line=line)
             self.spindle = self._integer(by_letter["Q"], line)
@@ -239,7 +238,7 @@ class State:
 
     def may_move(self, m10: int) -> bool:
         """M6, and M codes that are not known to leave the axes where they are."""
-        if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.name == "linuxcnc"):
+        if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.m61_sets_tool):
             return False
         return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
 
@@ -282,7 +281,7 @@ class State:
 
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
         """G4: ISO controls take its time from X, too; RS-274 from P alone, so that axis words still move."""
-        if not self.profile.cycles_apart:
+        if not self.profile.axis_dwell:
             return Effect()
         if any(a in by_letter for a in "YZ") or any(
             w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
@@ -299,7 +298,7 @@ class State:
         name = f"G{code / 10:g}"
         if "H" in by_letter:
             number = self._integer(by_letter["H"], line)
-        elif self.profile.name == "linuxcnc" and code != 432:
+        elif self.profile.length_of_spindle_tool and code != 432:
             number = self.spindle or 0
         else:
             raise ProgramError(f"{name} needs an H word with the number of the tool length", line=line)
@@ -307,7 +306,7 @@ class State:
             # nothing tells which tool is in the spindle but the length that is called up for it
             self.length_tool = number
         vector = self._tool(number, line, name)
-        if self.profile.name != "linuxcnc":
+        if self.profile.lengths_along_z:
             vector = (0.0, 0.0, vector[2])
         if code == 440:
             vector = (-vector[0], -vector[1], -vector[2])
@@ -329,7 +328,7 @@ class State:
     def _path_mode(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         name = f"G{code / 10:g}"
         tolerance, merges = None, False
-        if code == 640 and self.profile.name == "linuxcnc":
+        if code == 640 and self.profile.path_tolerance:
             if "P" in by_letter:
                 tolerance = by_letter["P"].value * self.unit_mm
                 name += f" P{by_letter['P'].value:g}"
@@ -353,7 +352,7 @@ class State:
         if "R" in by_letter and by_letter["R"].value != 0:
             raise ProgramError("G10 R rotates the work offset, which is not read yet; use R0", line=line)
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
-        if not 0 <= number <= (9 if self.profile.name == "linuxcnc" else 6):
+        if not 0 <= number <= self.profile.g10_offsets:
             raise ProgramError("G10 needs a P word with the number of a work offset, 1 for G54", line=line)
         name = self.offset_name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
         work = self._work_offset(name)
@@ -361,7 +360,7 @@ class State:
         for i, word in axis_words:
             value = self.length_mm(word)
             if kind == 2:
-                adds = self.distance == 910 and self.profile.name in ("fanuc", "haas")
+                adds = self.distance == 910 and self.profile.g10_adds
                 base[i] = base[i] + value if adds else value
             else:
                 self._capture(i, word, line, moves)

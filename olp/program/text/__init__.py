@@ -1,0 +1,1 @@
+"""Bytes, numbers, statements and edits of a text, whatever its dialect."""

@@ -1,15 +1,13 @@
-"""Tables of positions as text: how one is laid out, what its first rows tell of that, and where its cells
-are.
+"""Tables of positions as text: how one is laid out, and what its first rows tell of that.
 
 A layout is a value; files that people write make one (`olp.files.point_profile`), or the first rows of a
-table do (`told`), which then says in words what it took for granted. Bytes are never decoded but to compare
-names.
+table do (`told`), which then says in words what it took for granted. `olp.program.text.rows` reads the table.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
@@ -17,7 +15,6 @@ from typing import Literal
 from olp.core.errors import InputError
 
 Delimiter = Literal["comma", "semicolon", "tab", "space"]
-Span = tuple[int, int]
 
 MM = {"mm": 1.0, "um": 1e-3, "m": 1e3, "inch": 25.4}
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -205,102 +202,3 @@ def _named(header: Sequence[str]) -> tuple[dict[str, str | int], str | None] | N
     if not set(AXES) <= found.keys() or len(units) > 1:
         return None
     return found, next(iter(units), None)
-
-
-class Cells:
-    """Rows of a table and where the cells of each are, as positions in the bytes of the text."""
-
-    def __init__(self, data: bytes, layout: Layout, file: str = "") -> None:
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise InputError("the text is UTF-16; expected one byte a character; save it as UTF-8", line=1)
-        self.data, self.layout, self.file = data, layout, file
-        mark = DELIMITERS[layout.delimiter]
-        self._mark = None if mark is None else mark.encode()
-        self._comments = (b"#", layout.comment.encode())
-        #: where the row that was last given begins and ends
-        self.bounds: Span = (0, 0)
-        self.header: list[str] = []
-        self.header_line = 0
-        if layout.header:
-            for number, start, end in self._lines():
-                self.header = [self.text(span) for span in self.split(start, end)]
-                self.header_line = number
-                break
-
-    def place(self, role: str) -> int | None:
-        """The index of the column that holds something, None where the table has none. Raises InputError."""
-        column = self.layout.columns.get(role)
-        if column is None:
-            return None
-        if isinstance(column, int):
-            return column - 1
-        if column in self.header:
-            return self.header.index(column)
-        known = ", ".join(self.header) or "their numbers"
-        raise InputError(
-            f'there is no column "{column}"; expected one of {known}', line=self.header_line or 1
-        )
-
-    def rows(self) -> Iterator[tuple[int, list[Span]]]:
-        """Line (from 1) and cells of each row of data."""
-        for number, start, end in self._lines():
-            if number > self.header_line:
-                self.bounds = (start, end)
-                yield number, self.split(start, end)
-
-    def text(self, span: Span) -> str:
-        raw = self.data[span[0] : span[1]]
-        try:
-            return raw.decode("utf-8")
-        except UnicodeDecodeError:
-            return raw.decode("latin-1")
-
-    def split(self, start: int, end: int) -> list[Span]:
-        """Spans of the cells of a row, without blanks and quotes around them."""
-        data, mark = self.data, self._mark
-        spans = []
-        if mark is None:
-            for found in re.finditer(rb"\S+", data[start:end]):
-                spans.append(self._bare(start + found.start(), start + found.end()))
-            return spans
-        at = start
-        while True:
-            stop = at
-            while stop < end and data[stop : stop + 1] in (b" ", b"\t") and mark != b"\t":
-                stop += 1
-            if data[stop : stop + 1] == b'"':
-                closing = data.find(b'"', stop + 1, end)
-                while closing >= 0 and data[closing + 1 : closing + 2] == b'"':
-                    closing = data.find(b'"', closing + 2, end)
-                stop = end if closing < 0 else closing
-            stop = data.find(mark, stop, end)
-            stop = end if stop < 0 else stop
-            spans.append(self._bare(at, stop))
-            if stop >= end:
-                return spans
-            at = stop + 1
-
-    def _bare(self, start: int, end: int) -> Span:
-        data = self.data
-        while start < end and data[start] in b" \t":
-            start += 1
-        while end > start and data[end - 1] in b" \t":
-            end -= 1
-        if end - start > 1 and data[start] == data[end - 1] == 34:
-            return self._bare(start + 1, end - 1)
-        return start, end
-
-    def _lines(self) -> Iterator[tuple[int, int, int]]:
-        """Number, start and end of the lines that are neither empty nor comments."""
-        data = self.data
-        at = 3 if data[:3] == b"\xef\xbb\xbf" else 0
-        ending = re.compile(rb"\r\n|\n|\r")
-        number = 0
-        while at < len(data):
-            number += 1
-            found = ending.search(data, at)
-            stop, following = (len(data), len(data)) if found is None else found.span()
-            held = data[at:stop].strip()
-            if held and not held.startswith(self._comments):
-                yield number, at, stop
-            at = following

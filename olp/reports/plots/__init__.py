@@ -1,0 +1,1 @@
+"""Static plots as SVG or PNG bytes."""

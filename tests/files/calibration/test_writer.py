@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS
-from olp.core.units import AXES, shifted
+from olp.core.units import AXES, in_unit, in_unit_text, shifted
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.files.calibration.reader import load_calibration
-from olp.files.calibration.writer import calibration_files, in_unit, in_unit_text
+from olp.files.calibration.writer import calibration_files
 from olp.files.tables import read_curves
 from olp.files.write import write_files
 

@@ -392,7 +392,6 @@ def test_small_programs_in_them_are_corrected(machine: Path, perfect: Path, name
     ("val2", b"MOVES part\n", 1, "part is not in this text"),
     ("val2", b"APPROS part, 50\n", 1, "tool axis"),
     ("karel", b"MOVE NEAR p1 BY 100\n", 1, "computed"),
-    ("irl", b"MOVE LIN p1;\n", 1, "p1 is not in this text"),
 ])  # fmt: skip
 def test_what_they_do_not_know_is_refused(
     machine: Path, name: str, text: bytes, line: int, words: str

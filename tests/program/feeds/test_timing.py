@@ -22,8 +22,7 @@ from olp.files.config import load_setup
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
 from olp.program.program import Program
-from olp.program.registry import Options, read
-from olp.program.rs274.profiles import PROFILES
+from olp.program.registry import DIALECTS, Options, read
 
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"
 TOOLS = "".join(f"[tools.{n}]\nZ_mm = 50.0\n" for n in (1, 2))
@@ -43,7 +42,7 @@ def setup_of(controller: str, keys: str) -> olp.Setup:
 
 def reading(text: str, controller: str = "linuxcnc", keys: str = "", **options: bool) -> Program:
     setup = setup_of(controller, keys)
-    return read(text.encode(), setup, PROFILES[controller], Options(**options))
+    return read(text.encode(), setup, DIALECTS[controller], Options(**options))
 
 
 def timed(text: str, controller: str = "linuxcnc", keys: str = "", **options: bool) -> Timing:
@@ -123,7 +122,7 @@ def test_refused_when_timed_and_not_when_read(name: str) -> None:
 
 
 def test_words_are_needed() -> None:
-    bare = read(b"G1 X1 F60\n", setup_of("linuxcnc", ""), PROFILES["linuxcnc"], words=False)
+    bare = read(b"G1 X1 F60\n", setup_of("linuxcnc", ""), DIALECTS["linuxcnc"], words=False)
     with pytest.raises(UsageError, match="words"):
         timing(bare)
 
@@ -231,7 +230,7 @@ def test_block_delete_takes_its_words_away() -> None:
 def compare(nominal: bytes, place: Path) -> int:
     """Feeds as LinuxCNC reads them, moves matched by line and end; the number of them."""
     job = place.with_name("job.toml")
-    program = read(nominal, load_setup(place, job if job.exists() else None), PROFILES["linuxcnc"])
+    program = read(nominal, load_setup(place, job if job.exists() else None), DIALECTS["linuxcnc"])
     clock, path = timing(program), program.toolpath
     moves = linuxcnc.interpret(nominal, place, find_known=False)
     cutting = np.isin(moves.kind, (linuxcnc.FEED, linuxcnc.ARC, linuxcnc.PROBE))

@@ -20,7 +20,7 @@ from olp.core.errors import AlreadyCorrected, InputError, OlpError, ProgramError
 from olp.files.config import load_setup
 from olp.files.described import load_described
 from olp.files.point_profile import PointProfile
-from olp.program.pointlist.reader import POINT_LIST, with_layout
+from olp.program.pointlist.dialect import DIALECT, with_layout
 from olp.program.program import Program
 from olp.program.registry import read
 from olp.program.text.delimited import told
@@ -56,7 +56,7 @@ def setup_of(machine: Path, dialect: object = None):  # type: ignore[no-untyped-
 
 def positions(text: bytes, machine: Path, dialect: object = None) -> np.ndarray:
     setup = setup_of(machine, dialect)
-    return read(text, setup, dialect or POINT_LIST).toolpath.end_mm  # type: ignore[arg-type]
+    return read(text, setup, dialect or DIALECT).toolpath.end_mm  # type: ignore[arg-type]
 
 
 TABLES = [
@@ -224,7 +224,7 @@ CELLS = st.one_of(
 ))  # fmt: skip
 def test_any_bytes_are_read_or_refused(perfect: Path, data: bytes) -> None:
     try:
-        found = read(data, setup_of(perfect), POINT_LIST)
+        found = read(data, setup_of(perfect), DIALECT)
     except ProgramError:
         return
     assert found.data == data

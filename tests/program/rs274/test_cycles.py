@@ -13,7 +13,18 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.cycles import CODES, LCNC_CLEARANCE_MM, PLANES, Stroke, cycle_moves, hole_moves, levels
+from olp.program.rs274.cycles import (
+    CODES,
+    ISO_CYCLES,
+    LCNC_CLEARANCE_MM,
+    NGC_CYCLES,
+    PLANES,
+    CycleRules,
+    Stroke,
+    cycle_moves,
+    hole_moves,
+    levels,
+)
 
 HOLE = {"start": (0.0, 0.0, 5.0), "xy": (1.0, 2.0), "r": 1.0, "z": -2.0, "initial_z": 5.0}
 
@@ -36,7 +47,7 @@ def test_drill_goes_over_the_hole_down_and_home() -> None:
 def test_start_below_r_rises_first_on_linuxcnc_only() -> None:
     hole = {**HOLE, "start": (0.0, 0.0, 0.5), "initial_z": 0.5}
     assert _path(hole_moves(810, **hole, retract_to_r=False))[0] == ("rapid", 0.0, 0.0, 1.0)
-    assert _path(hole_moves(810, **hole, retract_to_r=False, profile="fanuc"))[:2] == [
+    assert _path(hole_moves(810, **hole, retract_to_r=False, rules=ISO_CYCLES))[:2] == [
         ("rapid", 1.0, 2.0, 0.5),
         ("rapid", 1.0, 2.0, 1.0),
     ]
@@ -60,7 +71,7 @@ def test_tapping_feeds_home_and_turns_the_spindle_twice() -> None:
         ("spindle", "stop"),
         ("spindle", "restore"),
     ]
-    fanuc = _path(hole_moves(840, **HOLE, retract_to_r=False, profile="fanuc"))
+    fanuc = _path(hole_moves(840, **HOLE, retract_to_r=False, rules=ISO_CYCLES))
     assert fanuc[-1] == ("rapid", 1.0, 2.0, 5.0)
     assert ("feed", 1.0, 2.0, 1.0) in fanuc
 
@@ -104,7 +115,7 @@ _level = st.integers(-3000, 3000).map(lambda n: n / 100)
 @given(
     code=st.sampled_from(sorted(CODES)),
     plane=st.sampled_from(sorted(PLANES)),
-    profile=st.sampled_from(["linuxcnc", "fanuc"]),
+    rules=st.sampled_from([NGC_CYCLES, ISO_CYCLES]),
     retract_to_r=st.booleans(),
     start=st.tuples(_level, _level, _level),
     xy=st.tuples(_level, _level),
@@ -113,14 +124,14 @@ _level = st.integers(-3000, 3000).map(lambda n: n / 100)
     initial_z=_level,
 )
 def test_every_hole_is_fed_at_its_place_and_left_at_its_level(
-    code: int, plane: int, profile: str, retract_to_r: bool, start: tuple[float, float, float],
+    code: int, plane: int, rules: CycleRules, retract_to_r: bool, start: tuple[float, float, float],
     xy: tuple[float, float], r: float, depth: float, initial_z: float,
 ) -> None:  # fmt: skip
     z = r - depth
-    assume(plane == 17 or profile == "fanuc" or code not in (740, 840))
+    assume(plane == 17 or rules is ISO_CYCLES or code not in (740, 840))
     strokes = hole_moves(
         code, start=start, xy=xy, r=r, z=z, q=0.7, p=0.1, retract_to_r=retract_to_r,
-        initial_z=initial_z, plane=plane, profile=profile,  # type: ignore[arg-type]
+        initial_z=initial_z, plane=plane, rules=rules,  # type: ignore[arg-type]
     )  # fmt: skip
     first, second, tool = PLANES[plane]
     end = strokes[-1].point

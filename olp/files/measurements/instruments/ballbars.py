@@ -8,12 +8,11 @@ import numpy as np
 from pydantic import Field
 
 from olp.calibration.observations.circles import Circles
+from olp.core.schema import NotNegative, Positive, Table, Triple
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Positive, Triple
 from olp.files.measurements.columns import read_columns
 from olp.files.measurements.instruments.base import Instrument, Plan
 from olp.files.measurements.instruments.self_described import InstrumentTable
-from olp.files.schema_base import Table
 from olp.files.write import PathLike
 
 

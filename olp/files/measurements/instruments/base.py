@@ -19,9 +19,9 @@ from olp.calibration.observations.base import Observation, Scattered
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
+from olp.core.schema import Table
 from olp.files.measurements.line_keys import LineKeys
 from olp.files.measurements.point_readings import AXIS, TOOL, PointReadings
-from olp.files.schema_base import Table
 
 #: um/m to 1
 PER_UNIT = 1e-6

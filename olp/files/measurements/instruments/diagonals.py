@@ -6,14 +6,13 @@ import numpy as np
 from pydantic import Field
 
 from olp.calibration.observations.diagonals import Diagonal
+from olp.core.schema import NotNegative, Table, Triple
 from olp.core.units import MM_PER_UM
-from olp.files.fields import NotNegative, Triple
 from olp.files.measurements.columns import read_columns
 from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan
 from olp.files.measurements.instruments.self_described import InstrumentTable
 from olp.files.measurements.line_keys import Sense
 from olp.files.measurements.readings import SENSES
-from olp.files.schema_base import Table
 from olp.files.write import PathLike
 
 

@@ -10,11 +10,10 @@ from pydantic import Field
 from olp.calibration.observations.pods import Pods
 from olp.core.arrays import Index
 from olp.core.errors import ConfigError
+from olp.core.schema import Positive, Table, Text, Triple
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
-from olp.files.fields import Positive, Text, Triple
 from olp.files.measurements.instruments.base import Instrument, Plan, points_to_fill, tools_of
 from olp.files.measurements.point_readings import directions, read_point_readings
-from olp.files.schema_base import Table
 from olp.files.toml_text import toml_lines
 
 

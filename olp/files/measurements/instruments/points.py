@@ -8,11 +8,10 @@ from pydantic import Field
 
 from olp.calibration.observations.points import Points
 from olp.core.arrays import Index
+from olp.core.schema import NotNegative, Positive, Table, Text, Triple
 from olp.core.units import MM_PER_UM, UM_PER_MM
-from olp.files.fields import NotNegative, Positive, Text, Triple
 from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan, points_to_fill, tools_of
 from olp.files.measurements.point_readings import MEASURED, read_point_readings
-from olp.files.schema_base import Table
 from olp.files.toml_text import toml_lines
 
 

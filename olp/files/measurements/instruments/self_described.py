@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from olp.files.fields import Text
-from olp.files.schema_base import Table
+from olp.core.schema import Table, Text
 
 
 class InstrumentTable(Table):

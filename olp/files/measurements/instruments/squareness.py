@@ -9,11 +9,10 @@ from pydantic import Field
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
+from olp.core.schema import Interval, Position, Positive, Table, Triple
 from olp.core.units import AXES, RAD_PER_URAD
-from olp.files.fields import Interval, Positive, Triple
 from olp.files.measurements.instruments.base import Instrument, Plan
 from olp.files.measurements.lines_said import together
-from olp.files.schema_base import Position, Table
 
 _PLANES = {"C0Y": "XY", "B0Z": "XZ", "A0Z": "YZ"}
 

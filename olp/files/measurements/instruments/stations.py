@@ -7,11 +7,10 @@ from pydantic import Field
 
 from olp.calibration.observations.lengths import Lengths
 from olp.core.arrays import Index
+from olp.core.schema import NotNegative, Positive, Table, Text, Triple
 from olp.core.units import MM_PER_UM, UM_PER_MM
-from olp.files.fields import NotNegative, Positive, Text, Triple
 from olp.files.measurements.instruments.base import PER_UNIT, UM_M, Instrument, Plan, points_to_fill, tools_of
 from olp.files.measurements.point_readings import LENGTH, read_point_readings
-from olp.files.schema_base import Table
 from olp.files.toml_text import toml_lines
 
 

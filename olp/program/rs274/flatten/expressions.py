@@ -1,8 +1,8 @@
 """Expressions of parametric programs: `#1`, `#<name>`, `[ ]`, functions and operators.
 
-Two dialects. "linuxcnc" follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC evaluates it:
+Two kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC evaluates it:
 `**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`; all from left to
-right; a sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. "fanuc" is Custom
+right; a sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. `MACRO_B` is Custom
 Macro B: `* / MOD AND`, then `+ - OR XOR`, then comparisons; FIX and FUP count by magnitude; a variable
 that was never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
 
@@ -14,12 +14,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from typing import Literal, Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
 
 from olp.core.errors import ProgramError
-
-Dialect = Literal["linuxcnc", "fanuc"]
 
 #: LinuxCNC takes two numbers as equal, and a number as whole, within this.
 EQUAL_WITHIN = 1e-4
@@ -45,15 +44,27 @@ class Parameters(Protocol):
 Expression = Callable[[Parameters], float | None]
 Binary = Callable[[float, float], float]
 
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic:
+    """How a control evaluates expressions: the operators of each `level`, the loosest first, and what
+    `operators` and `functions` do; `angle` is that of rise and run (ATAN[y]/[x]), `single_atan` whether ATAN
+    takes one argument, too. With `exact` EQ and NE ask for the same number, and a vacant variable equals a
+    vacant one only."""
+
+    levels: tuple[tuple[str, ...], ...]
+    operators: Mapping[str, Binary]
+    functions: Mapping[str, Callable[[float], float]]
+    angle: Binary
+    single_atan: bool
+    exact: bool
+
+
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _UNSIGNED = re.compile(r"\d+\.?\d*|\.\d+")
 _FUNCTION = re.compile(r"(abs|acos|asin|atan|cos|exp|fix|fup|ln|round|rnd|sin|sqrt|sqr|tan|exists)(?=\[)")
 _OPERATOR = re.compile(r"\*\*|\*|/|\+|-|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 _COMPARISONS = ("eq", "ne", "gt", "ge", "lt", "le")
-_LEVELS: dict[Dialect, tuple[tuple[str, ...], ...]] = {
-    "linuxcnc": (("and", "or", "xor"), _COMPARISONS, ("+", "-"), ("*", "/", "mod"), ("**",)),
-    "fanuc": (_COMPARISONS, ("+", "-", "or", "xor"), ("*", "/", "mod", "and")),
-}
 _MAX_DEPTH = 60
 
 
@@ -73,9 +84,9 @@ def filled(value: float | None) -> float:
 class Reader:
     """Compiles the values of one line; `at` is the position in `text`."""
 
-    def __init__(self, text: str, dialect: Dialect, at: int = 0) -> None:
+    def __init__(self, text: str, arithmetic: Arithmetic, at: int = 0) -> None:
         self.text = text
-        self.dialect: Dialect = dialect
+        self.arithmetic = arithmetic
         self.at = at
         self._depth = 0
 
@@ -152,7 +163,7 @@ class Reader:
         return self._level(0)
 
     def _level(self, level: int) -> Expression:
-        levels = _LEVELS[self.dialect]
+        levels = self.arithmetic.levels
         if level == len(levels):
             return self.value()
         left = self._level(level + 1)
@@ -164,11 +175,10 @@ class Reader:
             left = self._joined(match.group(), left, self._level(level + 1))
 
     def _joined(self, operator: str, left: Expression, right: Expression) -> Expression:
-        if self.dialect == "fanuc" and operator in ("eq", "ne"):
+        if self.arithmetic.exact and operator in ("eq", "ne"):
             same = operator == "eq"
             return lambda p: float((left(p) == right(p)) is same)
-        table = _LINUXCNC if self.dialect == "linuxcnc" else _FANUC
-        function = table[operator]
+        function = self.arithmetic.operators[operator]
 
         def joined(parameters: Parameters) -> float:
             return _finite(function(filled(left(parameters)), filled(right(parameters))), operator)
@@ -188,12 +198,12 @@ class Reader:
             if self.text.startswith("/[", self.at):
                 self.at += 1
                 run = self.bracket()
-                angle = _atan2_degrees if self.dialect == "linuxcnc" else _atan2_fanuc
+                angle = self.arithmetic.angle
                 return lambda p: angle(filled(argument(p)), filled(run(p)))
-            if self.dialect == "linuxcnc":
+            if not self.arithmetic.single_atan:
                 raise ProgramError("ATAN takes two arguments, as in ATAN[y]/[x]")
             return lambda p: math.degrees(math.atan(filled(argument(p))))
-        function = (_FUNCTIONS | _FANUC_ROUNDING if self.dialect == "fanuc" else _FUNCTIONS)[name]
+        function = self.arithmetic.functions[name]
         return lambda p: _finite(function(filled(argument(p))), name)
 
     def _expect(self, character: str) -> None:
@@ -257,7 +267,7 @@ def _atan2_degrees(rise: float, run: float) -> float:
     return math.degrees(math.atan2(rise, run))
 
 
-def _atan2_fanuc(rise: float, run: float) -> float:
+def _atan2_of_positive(rise: float, run: float) -> float:
     if rise < 0:
         raise ProgramError(
             "ATAN of a negative first argument is given in 0..360 or -180..180 as a parameter of the control "
@@ -280,7 +290,7 @@ _ARITHMETIC: dict[str, Binary] = {
     "lt": lambda a, b: float(a < b),
     "le": lambda a, b: float(a <= b),
 }
-_LINUXCNC: dict[str, Binary] = _ARITHMETIC | {
+_NGC_OPERATORS: dict[str, Binary] = _ARITHMETIC | {
     "**": _power,
     "mod": _modulo,
     "eq": lambda a, b: float(abs(a - b) < EQUAL_WITHIN),
@@ -289,7 +299,7 @@ _LINUXCNC: dict[str, Binary] = _ARITHMETIC | {
     "or": lambda a, b: float(a != 0 or b != 0),
     "xor": lambda a, b: float((a != 0) != (b != 0)),
 }
-_FANUC: dict[str, Binary] = _ARITHMETIC | {
+_MACRO_B_OPERATORS: dict[str, Binary] = _ARITHMETIC | {
     "mod": _fanuc_modulo,
     "and": _bits(lambda a, b: a & b, "AND"),
     "or": _bits(lambda a, b: a | b, "OR"),
@@ -317,7 +327,24 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqr": _guarded(math.sqrt, "SQRT"),
     "tan": lambda x: math.tan(math.radians(x)),
 }
-_FANUC_ROUNDING: dict[str, Callable[[float], float]] = {
+_BY_MAGNITUDE: dict[str, Callable[[float], float]] = {
     "fix": lambda x: float(math.trunc(x)),
     "fup": lambda x: math.copysign(math.ceil(abs(x)), x),
 }
+
+NGC = Arithmetic(
+    levels=(("and", "or", "xor"), _COMPARISONS, ("+", "-"), ("*", "/", "mod"), ("**",)),
+    operators=_NGC_OPERATORS,
+    functions=_FUNCTIONS,
+    angle=_atan2_degrees,
+    single_atan=False,
+    exact=False,
+)
+MACRO_B = Arithmetic(
+    levels=(_COMPARISONS, ("+", "-", "or", "xor"), ("*", "/", "mod", "and")),
+    operators=_MACRO_B_OPERATORS,
+    functions=_FUNCTIONS | _BY_MAGNITUDE,
+    angle=_atan2_of_positive,
+    single_atan=True,
+    exact=True,
+)

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.expressions import Dialect, Expression, Parameters, Reader
+from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader
+from olp.program.rs274.flatten.language import Language
 
 _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
 _SKIP = re.compile(r"\([^)]*\)?|;.*|[\x00-\x20]+")
@@ -91,7 +92,7 @@ def split_lines(data: bytes) -> list[bytes]:
     return [line for line in _LINE.findall(data) if line]
 
 
-def compile_line(line: bytes, number: int, dialect: Dialect) -> Line:
+def compile_line(line: bytes, number: int, language: Language) -> Line:
     """Compile one line with its end. Raises ProgramError (without a line) for a broken expression."""
     raw = line.rstrip(b"\r\n")
     eol = line[len(raw) :]
@@ -103,7 +104,7 @@ def compile_line(line: bytes, number: int, dialect: Dialect) -> Line:
     if deleted:
         at = 2 if text[1:2].isdigit() and text[2:3] else 1
     try:
-        return _compile(_Source(number, raw, eol, text, places, deleted, comments), at, dialect)
+        return _compile(_Source(number, raw, eol, text, places, deleted, comments), at, language)
     except ProgramError:
         if "#" in text or "[" in text or text[at : at + 1] == "o":
             raise
@@ -140,9 +141,9 @@ def _compact(raw: bytes) -> tuple[str, list[int], tuple[bytes, ...]]:
     return "".join(pieces).lower(), places, tuple(comments)
 
 
-def _compile(source: _Source, at: int, dialect: Dialect) -> Line:
+def _compile(source: _Source, at: int, language: Language) -> Line:
     text = source.text
-    reader = Reader(text, dialect, at)
+    reader = Reader(text, language.arithmetic, at)
     words: list[Word] = []
     assignments: list[Assignment] = []
     flow: Flow | None = None
@@ -150,25 +151,25 @@ def _compile(source: _Source, at: int, dialect: Dialect) -> Line:
         start = reader.at
         first = all(word.letter == "n" for word in words) and not assignments
         if text[start] == "#":
-            assignments.append(_assignment(reader, source.places))
+            assignments.append(_assignment(reader, source.places, language))
             continue
         if first and text[start] == "o":
             flow = _o_word(reader)
-        elif first and dialect == "fanuc":
-            flow = _macro_b(reader, assignments, source.places)
+        elif first and language.macro_b:
+            flow = _macro_b(reader, assignments, source.places, language)
         if flow is not None:
             if reader.at < len(text):
                 rest = text[reader.at :]
                 raise ProgramError(f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood")
             break
-        words.append(_word(reader, source.places, dialect))
+        words.append(_word(reader, source.places, language))
     return Line(
         source.number, source.raw, source.eol, deleted=source.deleted, words=tuple(words),
         assignments=tuple(assignments), flow=flow, comments=source.comments,
     )  # fmt: skip
 
 
-def _word(reader: Reader, places: list[int], dialect: Dialect) -> Word:
+def _word(reader: Reader, places: list[int], language: Language) -> Word:
     text, start = reader.text, reader.at
     letter = _LETTER.match(text, start)
     if letter is None:
@@ -182,7 +183,7 @@ def _word(reader: Reader, places: list[int], dialect: Dialect) -> Word:
         reader.at = at
         number, value, pointed = 0.0, reader.value(), False
         written = text[at : reader.at]
-        if dialect == "fanuc" and ("round[" in written or "rnd[" in written):
+        if language.increments_open and ("round[" in written or "rnd[" in written):
             raise ProgramError(
                 "ROUND inside a word rounds to the least increment, which is not known here; "
                 "assign the rounded value to a variable first"
@@ -190,13 +191,13 @@ def _word(reader: Reader, places: list[int], dialect: Dialect) -> Word:
     return Word(letter.group(), number, value, pointed, places[start], places[at], places[reader.at - 1] + 1)
 
 
-def _assignment(reader: Reader, places: list[int]) -> Assignment:
+def _assignment(reader: Reader, places: list[int], language: Language) -> Assignment:
     start = reader.at
     target = reader.parameter_index()
     if not reader.text.startswith("=", reader.at):
         raise ProgramError("a parameter stands where a word is expected, without '='")
     reader.at += 1
-    value = reader.unbracketed() if reader.dialect == "fanuc" else reader.value()
+    value = reader.unbracketed() if language.macro_b else reader.value()
     return Assignment(target, value, places[start], places[reader.at - 1] + 1)
 
 
@@ -230,7 +231,9 @@ def _o_word(reader: Reader) -> Flow:
     return Flow(name, label, dynamic, tuple(values))
 
 
-def _macro_b(reader: Reader, assignments: list[Assignment], places: list[int]) -> Flow | None:
+def _macro_b(
+    reader: Reader, assignments: list[Assignment], places: list[int], language: Language
+) -> Flow | None:
     text, at = reader.text, reader.at
     if text.startswith("if[", at):
         reader.at += 2
@@ -241,7 +244,7 @@ def _macro_b(reader: Reader, assignments: list[Assignment], places: list[int]) -
         if text.startswith("then", reader.at):
             reader.at += 4
             while text.startswith("#", reader.at):
-                assignments.append(_assignment(reader, places))
+                assignments.append(_assignment(reader, places, language))
             return Flow("when-then", "", None, (condition,))
         raise ProgramError("IF is followed by neither GOTO nor THEN")
     if text.startswith("while[", at):

@@ -36,7 +36,7 @@ class Walk:
         self.main = main
         self.variables = variables
         self.write = write
-        self.dialect = main.dialect
+        self.language = main.language
         self.block_delete = block_delete
         self.limit = limit
         self._subprograms = subprograms
@@ -153,7 +153,7 @@ class Walk:
         frame.taken.discard(flow.label)
 
     def _do_do(self, flow: Flow, frame: Frame, index: int) -> None:
-        if self.dialect == "fanuc":
+        if self.language.macro_b:
             frame.loops[flow.label] = index
         else:
             frame.dos[flow.label] = index
@@ -256,7 +256,7 @@ class Walk:
             data = self._subprograms(label)
             if data is None:
                 raise ProgramError(f"subprogram {label} is not in the file, and no file of it was given")
-            self._files[label] = Unit(data, self.dialect, label)
+            self._files[label] = Unit(data, self.language, label)
         unit = self._files[label]
         start = unit.definition(label, keyword)
         if start is None:
@@ -278,10 +278,10 @@ class Walk:
     def _calls(self, line: Line, frame: Frame, index: int) -> bool | None:
         """Carry out M98, M97, M99 and G65; None where the line has none, else whether the run ends."""
         codes = {(w.letter, w.number) for w in line.words if w.letter in "mg" and w.value is None}
-        saves = self.dialect == "linuxcnc" and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
+        saves = self.language.saved_modes and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
         if saves and (len(self._frames) > 1 or ("m", 73.0) in saves):
             raise ProgramError("M70, M72 and M73 act on a level of subprograms, which plain blocks lack")
-        if self.dialect == "linuxcnc" and codes & _PROFILE_CYCLES:
+        if self.language.profile_cycles and codes & _PROFILE_CYCLES:
             raise ProgramError("G70 to G72 take their profile from a subprogram, which plain blocks lack")
         if ("g", 66.0) in codes or ("g", 66.1) in codes:
             raise ProgramError("G66 calls a macro after every move, which is not unrolled; call it with G65")
@@ -309,7 +309,7 @@ class Walk:
         number = whole(target, "the program number P")
         count = self._word(line, "l")
         repeats = 1 if count is None else whole(count, "the repeat count L")
-        if self.dialect == "fanuc" and count is None and number > 9999 and not local:
+        if self.language.counts_in_p and count is None and number > 9999 and not local:
             repeats, number = divmod(number, 10_000)
         if repeats < 1:
             raise ProgramError(f"a subprogram is called {repeats} times; expected one or more")
@@ -323,7 +323,7 @@ class Walk:
             unit, start = frame.unit, frame.unit.block_number(number, index) - 1
         else:
             unit, start = self._find(str(number), "program", frame.unit)
-        keep = self.dialect == "fanuc"
+        keep = self.language.shared_locals
         self._enter(
             Frame(
                 unit,

@@ -20,9 +20,10 @@ from olp.program.rs274.cycles import (
     cycle_moves,
     levels,
 )
-from olp.program.rs274.flatten.expressions import Dialect, whole
+from olp.program.rs274.flatten.expressions import whole
+from olp.program.rs274.profiles.base import Profile
 
-#: A word with its value; None is a value whose unit is not known (no decimal point on a Fanuc control).
+#: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
 Value = tuple[str, float | None]
 
 _LINEAR = frozenset({0, 10, 20, 30, 330})
@@ -48,7 +49,7 @@ CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
 class State:
     """Modes and position of the control; `unit` None means that neither G20 nor G21 was met."""
 
-    dialect: Dialect
+    profile: Profile
     position: list[float | None] = field(default_factory=lambda: [None, None, None])
     absolute: bool = True
     unit: int | None = None
@@ -68,8 +69,7 @@ class State:
     held: dict[str, float | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        # Before G98 or G99 is met LinuxCNC retracts to R, a Fanuc to the initial level.
-        self.retract_to_r = self.dialect == "linuxcnc"
+        self.retract_to_r = self.profile.initial_retract == 990
 
     def at(self, axis: int) -> float:
         """Program position of an axis; ProgramError where it is not known."""
@@ -99,7 +99,7 @@ class State:
         """Follow one block that is not a cycle."""
         codes = self._modes(words)
         motion = codes & _MOTION
-        if self.dialect == "linuxcnc":
+        if self.profile.language.splines:
             motion |= codes & _SPLINES
         if motion or codes & {280, 300}:
             self.initial = None
@@ -152,7 +152,7 @@ class State:
                     self.spindle = int(value)
                 elif value == 6 or value >= 100:
                     self.forget()
-                elif 70 <= value <= 72 and self.dialect == "linuxcnc":
+                elif 70 <= value <= 72 and self.profile.language.saved_modes:
                     self._keep_modes(int(value))
         return codes
 
@@ -161,7 +161,8 @@ class State:
             self.compensated = False
             self.forget()
         unsetting = codes & _UNSETTING
-        if unsetting and unsetting <= _LENGTHS and self.dialect == "fanuc" and not self.odd_frame:
+        along_z = self.profile.lengths_along_z and unsetting <= _LENGTHS
+        if unsetting and along_z and not self.odd_frame:
             self.position[2] = None
         elif unsetting or self.odd_frame:
             self.forget()
@@ -225,7 +226,7 @@ class State:
         if self.motion not in CODES:
             self.initial = None
             self.held = {}
-        elif code != self.motion and self.dialect == "linuxcnc":
+        elif code != self.motion and self.profile.cycles.new_code_forgets:
             self.held = {}
         self.motion = code
         given = {letter: value for letter, value in words if letter in CYCLE_WORDS}
@@ -233,7 +234,8 @@ class State:
         if self.initial is None:
             self.initial = self.at(tool)
         depth = AXES[tool].lower()
-        turned = self.dialect == "fanuc" and self.held and self.held_absolute is not self.absolute
+        follows = self.profile.cycles.levels_follow_distance
+        turned = follows and self.held and self.held_absolute is not self.absolute
         if turned and not {depth, "r"} <= given.keys():
             raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth anew")
         self.held_absolute = self.absolute
@@ -258,22 +260,22 @@ class State:
             initial_z=self.initial,
             plane=self.plane,
             clearance=self._clearance(code, clearance),
-            profile=self.dialect,
+            rules=self.profile.cycles,
         )
         self.position = list(strokes[-1].point)
         self._after(codes)
         return strokes
 
     def _repeats(self, given: dict[str, float | None]) -> int:
-        letters = "l" if self.dialect == "linuxcnc" else "kl"
-        for letter in letters:
+        # where a block has both, the unrolled one keeps them, and the reader takes the first
+        for letter in reversed(self.profile.cycles.repeat_words.lower()):
             if letter in given:
                 count = whole(self._known(letter, given[letter]), f"the repeat count {letter.upper()}")
                 return count or self._none()
         return 1
 
     def _none(self) -> int:
-        if self.dialect == "linuxcnc":
+        if not self.profile.cycles.stores:
             raise ProgramError("the cycle is repeated L0 times; expected L1 or more")
         return 0
 
@@ -316,7 +318,7 @@ class State:
     def _clearance(self, code: int, clearance: float | None) -> float:
         if clearance is not None or code not in (730, 830):
             return clearance or 0.0
-        if self.dialect == "fanuc":
+        if self.profile.cycles.peck_by_parameter:
             raise ProgramError(
                 f"G{code // 10} pecks with a clearance that a parameter of the control sets; "
                 "give peck_clearance_mm (--peck-clearance-mm)"

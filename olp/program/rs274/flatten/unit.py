@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.expressions import Dialect
+from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Flow, Line, compile_line, split_lines
 
 _MAYBE_O = re.compile(rb"[\s/]*(?:\([^)]*\)\s*)*(?:[nN][\d\s]*)?[oO]")
@@ -19,10 +19,10 @@ _units = itertools.count()
 class Unit:
     """One text (the program or a file of a subprogram), compiled line by line when first met."""
 
-    def __init__(self, data: bytes, dialect: Dialect, file: str | None) -> None:
+    def __init__(self, data: bytes, language: Language, file: str | None) -> None:
         self.key = next(_units)
         self.file = file
-        self.dialect: Dialect = dialect
+        self.language = language
         self.lines = split_lines(data)
         self.radius_arcs = any(_RADIUS_ARC.search(line) for line in self.lines)
         self.ends_with_eol = data.endswith((b"\n", b"\r"))
@@ -33,7 +33,7 @@ class Unit:
     def line(self, index: int) -> Line:
         if index not in self._compiled:
             try:
-                self._compiled[index] = compile_line(self.lines[index], index + 1, self.dialect)
+                self._compiled[index] = compile_line(self.lines[index], index + 1, self.language)
             except ProgramError as error:
                 error.line = index + 1
                 raise
@@ -44,7 +44,7 @@ class Unit:
         if self._flows is None:
             self._flows = []
             for index, raw in enumerate(self.lines):
-                if self.dialect == "linuxcnc" and not _MAYBE_O.match(raw):
+                if not self.language.macro_b and not _MAYBE_O.match(raw):
                     continue
                 flow = self.line(index).flow
                 if flow is not None:

@@ -18,24 +18,18 @@ import re
 from collections.abc import Callable
 from decimal import Decimal
 
-from olp.core.errors import ProgramError, UsageError
+from olp.core.errors import ProgramError
 from olp.core.units import AXES
 from olp.program.rs274.cycles import Stroke
-from olp.program.rs274.flatten.expressions import Dialect, filled, whole
+from olp.program.rs274.flatten.expressions import filled, whole
+from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Line, Word
 from olp.program.rs274.flatten.run import Walk
 from olp.program.rs274.flatten.state import CYCLE_WORDS, State, Value
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables
+from olp.program.rs274.profiles.base import Profile
 
-_DIALECTS: dict[str, Dialect] = {
-    "linuxcnc": "linuxcnc",
-    "grbl": "linuxcnc",
-    "fanuc": "fanuc",
-    "haas": "fanuc",
-}
-# Words of a Fanuc that take no decimal point.
-_COUNTS = frozenset("gmnpltdhos")
 _COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
 
@@ -47,8 +41,8 @@ def no_subprograms(name: str) -> bytes | None:
 
 def flatten(
     data: bytes,
+    profile: Profile,
     *,
-    profile: str,
     subprograms: Callable[[str], bytes | None] = no_subprograms,
     block_delete: bool = False,
     expand_cycles: bool = False,
@@ -58,44 +52,37 @@ def flatten(
 ) -> bytes:
     """Plain blocks of a program; see the module for what is kept.
 
-    `profile` is the dialect: linuxcnc, grbl, fanuc or haas. `subprograms` gives the text of a program that
+    `subprograms` gives the text of a program that
     the file does not hold, by its number or lower-case name. `block_delete`: blocks with `/` are left out
     (switch on); else they count as executed. `expand_cycles` writes canned cycles as G0, G1, G4 and spindle
-    blocks; `peck_clearance` (program units) is the control's clearance of G73 and G83, needed for fanuc and
-    haas. `limit` is the largest number of blocks that the run may visit.
+    blocks; `peck_clearance` (program units) is the control's clearance of G73 and G83, needed where a
+    parameter of the control says it. `limit` is the largest number of blocks that the run may visit.
     Raises ProgramError with the line in the source (or in the subprogram, whose name it then gives as the
-    file), UsageError for an unknown profile.
+    file).
     """
-    dialect = _DIALECTS.get(profile)
-    if dialect is None:
-        raise UsageError(f"profile {profile!r} cannot be flattened; expected one of {', '.join(_DIALECTS)}")
-    writer = _Flattener(
-        dialect, expand_cycles=expand_cycles, exact_stop=profile == "linuxcnc", peck_clearance=peck_clearance
-    )
-    main = Unit(data, dialect, file)
+    writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
+    main = Unit(data, profile.language, file)
     visit = writer.block
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
     return writer.text(main)
 
 
-def number_text(value: float, letter: str, dialect: Dialect, exact: bool = False) -> str:
-    """A number that came from an expression: 10 significant digits, at most 4 decimals on a Fanuc.
+def number_text(value: float, letter: str, language: Language, exact: bool = False) -> str:
+    """A number that came from an expression: 10 significant digits, and no more decimals than are taken.
 
     `exact` gives all digits: the centre of an arc with R is the square root of a difference of its ends,
-    which loses half of them. A Fanuc reads a number without a point in least increments, so lengths get
-    one there.
+    which loses half of them. Where a number without a point counts least increments, lengths get one.
     """
-    if dialect == "fanuc" and letter in _COUNTS and letter != "g":
+    if letter in language.counts and letter != "g":
         return str(whole(value, f"the value of {letter.upper()}"))
     if not math.isfinite(value):
         raise ProgramError(f"the value of {letter.upper()} is not finite")
-    decimals = 0 if value == 0 else min(12, max(0, 9 - math.floor(math.log10(abs(value)))))
-    if dialect == "fanuc":
-        decimals = min(decimals, 4)
-    text = f"{Decimal(repr(value)):f}" if exact and dialect == "linuxcnc" else f"{value:.{decimals}f}"
+    most = language.decimals
+    decimals = 0 if value == 0 else min(most, max(0, 9 - math.floor(math.log10(abs(value)))))
+    text = f"{Decimal(repr(value)):f}" if exact and language.all_digits else f"{value:.{decimals}f}"
     if "." in text:
         text = text.rstrip("0")
-    if dialect == "linuxcnc" or letter == "g":
+    if not language.points or letter == "g":
         text = text.rstrip(".")
     elif "." not in text:
         text += "."
@@ -105,14 +92,11 @@ def number_text(value: float, letter: str, dialect: Dialect, exact: bool = False
 class _Flattener:
     """Writes the blocks that a walk visits and follows the state of the control."""
 
-    def __init__(
-        self, dialect: Dialect, *, expand_cycles: bool, exact_stop: bool, peck_clearance: float | None
-    ) -> None:
-        self.dialect: Dialect = dialect
-        self.state = State(dialect)
+    def __init__(self, profile: Profile, *, expand_cycles: bool, peck_clearance: float | None) -> None:
+        self.language, self.cycles = profile.language, profile.cycles
+        self.state = State(profile)
         self.variables = Variables(self.state)
         self.expand_cycles = expand_cycles
-        self.exact_stop = exact_stop
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
         self._out: list[tuple[bytes, bytes]] = []
@@ -164,8 +148,9 @@ class _Flattener:
 
     def _tracked(self, word: Word, value: float | None) -> float | None:
         """The value in program units; None where a missing point leaves its unit open."""
-        open_unit = self.dialect == "fanuc" and word.value is None and not word.pointed
-        if open_unit and word.letter not in _COUNTS and word.letter not in ("f", "k") and value != 0:
+        open_unit = self.language.increments_open and word.value is None and not word.pointed
+        counts = word.letter in self.language.counts or word.letter in ("f", "k")
+        if open_unit and not counts and value != 0:
             return None
         return value
 
@@ -177,7 +162,7 @@ class _Flattener:
                 # Only the position is lost; a block that asks for it refuses.
                 self.state.forget()
             return None
-        if self.dialect == "fanuc" and self.state.codes(active) & {740, 840}:
+        if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
             raise ProgramError("G74 and G84 are synchronised by the control: plain moves cannot replace them")
         return self.state.cycle(active, self.peck_clearance)
 
@@ -203,7 +188,7 @@ class _Flattener:
             if i in cut:
                 splices.append((word.start, word.end, b""))
             elif word.value is not None:
-                text = number_text(filled(value), letter, self.dialect, exact)
+                text = number_text(filled(value), letter, self.language, exact)
                 splices.append((word.value_start, word.end, text.encode()))
         for start, end, text_bytes in sorted(splices):
             inner = _COMMENT.findall(line.raw[start:end])
@@ -220,15 +205,15 @@ class _Flattener:
     def _write_strokes(
         self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float | None, ...]]
     ) -> None:
-        """Blocks of a cycle. LinuxCNC stops exactly at every corner of a cycle, whatever the path mode is."""
-        exact = self.exact_stop and self.state.path != "G61"
+        """Blocks of a cycle."""
+        exact = self.cycles.exact_corners and self.state.path != "G61"
         lines: list[str] = []
         at = list(before[2])
         spindle = self.state.spindle
         for stroke in strokes:
             if stroke.kind in ("rapid", "feed"):
                 words = [
-                    AXES[i] + number_text(v, "x", self.dialect)
+                    AXES[i] + number_text(v, "x", self.language)
                     for i, v in enumerate(stroke.point)
                     if not math.isnan(v) and v != at[i]
                 ]
@@ -237,7 +222,7 @@ class _Flattener:
                     lines.append(" ".join(["G0" if stroke.kind == "rapid" else "G1", *words]))
             elif stroke.kind == "dwell":
                 if stroke.seconds > 0:
-                    lines.append("G4 P" + number_text(stroke.seconds, "p", self.dialect))
+                    lines.append("G4 P" + number_text(stroke.seconds, "p", self.language))
             elif stroke.spindle == "stop":
                 lines.append("M5")
             else:

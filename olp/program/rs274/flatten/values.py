@@ -9,13 +9,13 @@ from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
 from olp.program.rs274.flatten.state import State
 
-_LINUXCNC_LOCAL = 30
-_LINUXCNC_FREE = 5060
-_LINUXCNC_LAST = 5602
+_NGC_LOCAL = 30
+_NGC_FREE = 5060
+_NGC_LAST = 5602
 # Turns DEBUG comments on and off, which moves nothing.
 _DEBUG_SWITCH = 5599
-_FANUC_LOCAL = 33
-_FANUC_COMMON = 1000
+_MACRO_B_LOCAL = 33
+_MACRO_B_COMMON = 1000
 _ARGUMENT_NUMBERS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, *range(17, 27))
 _ARGUMENTS = dict(zip("abcijkdefhmqrstuvwxyz", _ARGUMENT_NUMBERS, strict=True))
 _NOT_ARGUMENTS = frozenset("glnop")
@@ -33,13 +33,13 @@ class Variables:
         self.names: dict[str, float] = {}
 
     def number(self, index: int) -> float | None:
-        if self.state.dialect == "fanuc":
-            return self._fanuc(index)
-        if not 1 <= index <= _LINUXCNC_LAST:
-            raise ProgramError(f"#{index} is out of range; parameters are #1 to #{_LINUXCNC_LAST}")
-        if index <= _LINUXCNC_LOCAL:
+        if self.state.profile.language.macro_b:
+            return self._macro_b(index)
+        if not 1 <= index <= _NGC_LAST:
+            raise ProgramError(f"#{index} is out of range; parameters are #1 to #{_NGC_LAST}")
+        if index <= _NGC_LOCAL:
             return self.locals.get(index, 0.0)
-        if index <= _LINUXCNC_FREE:
+        if index <= _NGC_FREE:
             return self.common.get(index, 0.0)
         if 5420 <= index <= 5422:
             return self.state.at(index - 5420)
@@ -48,10 +48,10 @@ class Variables:
             "off line; use a free parameter (#31 to #5060)"
         )
 
-    def _fanuc(self, index: int) -> float | None:
+    def _macro_b(self, index: int) -> float | None:
         if index == 0:
             return None
-        if 0 < index <= _FANUC_LOCAL:
+        if 0 < index <= _MACRO_B_LOCAL:
             return self.locals.get(index)
         if index in self.common:
             return self.common[index]
@@ -101,19 +101,19 @@ class Variables:
             if self._predefined(target) is not None:
                 raise ProgramError(f"#<{target}> belongs to the control and cannot be set")
             (self.globals if target.startswith("_") else self.names)[target] = filled(value)
-        elif self.state.dialect == "fanuc":
-            self._assign_fanuc(target, value)
-        elif 1 <= target <= _LINUXCNC_LOCAL:
+        elif self.state.profile.language.macro_b:
+            self._assign_macro_b(target, value)
+        elif 1 <= target <= _NGC_LOCAL:
             self.locals[target] = value
-        elif 1 <= target <= _LINUXCNC_FREE or target == _DEBUG_SWITCH:
+        elif 1 <= target <= _NGC_FREE or target == _DEBUG_SWITCH:
             self.common[target] = value
         else:
             raise ProgramError(f"#{target} belongs to the control: no plain block does what setting it does")
 
-    def _assign_fanuc(self, index: int, value: float | None) -> None:
-        if 1 <= index <= _FANUC_LOCAL:
+    def _assign_macro_b(self, index: int, value: float | None) -> None:
+        if 1 <= index <= _MACRO_B_LOCAL:
             self.locals[index] = value
-        elif 100 <= index < _FANUC_COMMON:
+        elif 100 <= index < _MACRO_B_COMMON:
             self.common[index] = value
         elif index == 3000:
             raise ProgramError("the program stops here with an alarm of its own (#3000)")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.expressions import EQUAL_WITHIN, Dialect, Reader
+from olp.program.rs274.flatten.expressions import EQUAL_WITHIN, MACRO_B, NGC, Arithmetic, Reader
 
 
 class _Table:
@@ -25,8 +25,8 @@ class _Table:
         return name == "a"
 
 
-def value(text: str, dialect: Dialect = "linuxcnc") -> float | None:
-    reader = Reader(text.replace(" ", "").lower(), dialect)
+def value(text: str, arithmetic: Arithmetic = NGC) -> float | None:
+    reader = Reader(text.replace(" ", "").lower(), arithmetic)
     result = reader.value()(_Table())
     assert reader.at == len(reader.text)
     return result
@@ -87,7 +87,7 @@ def test_rs274_values(text: str, expected: float) -> None:
     ],
 )
 def test_macro_b_values(text: str, expected: float) -> None:
-    assert value(text, "fanuc") == pytest.approx(expected, abs=1e-12)
+    assert value(text, MACRO_B) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_refusals_say_what_was_found(text: str, found: str) -> None:
 
 def test_angle_that_depends_on_a_parameter_of_the_control_is_refused() -> None:
     with pytest.raises(ProgramError, match="parameter"):
-        value("ATAN[-1]/[1]", "fanuc")
+        value("ATAN[-1]/[1]", MACRO_B)
 
 
 _number = st.integers(-9999, 9999).map(lambda n: n / 100)
@@ -143,10 +143,10 @@ def _tree() -> st.SearchStrategy[tuple[str, float]]:
     return st.recursive(leaf, join, max_leaves=12)
 
 
-@given(tree=_tree(), dialect=st.sampled_from(["linuxcnc", "fanuc"]))
-def test_arithmetic_is_that_of_doubles(tree: tuple[str, float], dialect: Dialect) -> None:
+@given(tree=_tree(), arithmetic=st.sampled_from([NGC, MACRO_B]))
+def test_arithmetic_is_that_of_doubles(tree: tuple[str, float], arithmetic: Arithmetic) -> None:
     text, expected = tree
-    assert value(text, dialect) == expected
+    assert value(text, arithmetic) == expected
 
 
 @given(a=_number, b=_number)
@@ -160,7 +160,7 @@ def test_modulo_fix_and_comparison_laws(a: float, b: float) -> None:
     assert value(f"FIX[{a}]") == math.floor(a)
     assert value(f"FUP[{a}]") == math.ceil(a)
     assert value(f"[{a} EQ {b}]") == float(abs(a - b) < EQUAL_WITHIN)
-    equal, less, more = (value(f"[{a} {op} {b}]", "fanuc") for op in ("EQ", "LT", "GT"))
+    equal, less, more = (value(f"[{a} {op} {b}]", MACRO_B) for op in ("EQ", "LT", "GT"))
     assert (equal or 0) + (less or 0) + (more or 0) == 1
 
 

@@ -7,20 +7,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError, UsageError
-from olp.program.rs274.flatten.unroll import flatten, number_text
+from olp.program.registry import named
+from olp.program.rs274.flatten.language import MACRO_B, NGC
+from olp.program.rs274.flatten.unroll import number_text
+
+
+def flatten(data: bytes, *, profile: str, **options: object) -> bytes:
+    dialect = named(profile)
+    assert dialect.unroller is not None
+    return dialect.unroller(data, dialect, **options)
 
 
 def lcnc(text: str, **options: object) -> str:
-    return flatten(text.encode(), profile="linuxcnc", **options).decode()  # type: ignore[arg-type]
+    return flatten(text.encode(), profile="linuxcnc", **options).decode()
 
 
 def fanuc(text: str, **options: object) -> str:
-    return flatten(text.encode(), profile="fanuc", **options).decode()  # type: ignore[arg-type]
+    return flatten(text.encode(), profile="fanuc", **options).decode()
 
 
 def refusal(text: str, profile: str = "linuxcnc", **options: object) -> ProgramError:
     with pytest.raises(ProgramError) as caught:
-        flatten(text.encode(), profile=profile, file="p.ngc", **options)  # type: ignore[arg-type]
+        flatten(text.encode(), profile=profile, file="p.ngc", **options)
     return caught.value
 
 
@@ -268,10 +276,10 @@ def test_cycles_of_linuxcnc_stop_exactly_and_give_the_path_mode_back() -> None:
 
 @given(st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-3 or x == 0))
 def test_number_text_keeps_ten_digits(value: float) -> None:
-    text = number_text(value, "x", "linuxcnc")
+    text = number_text(value, "x", NGC)
     assert float(text) == pytest.approx(value, rel=1e-9, abs=1e-12)
     assert "e" not in text
-    assert text == number_text(float(text), "x", "linuxcnc")
-    assert float(number_text(value, "x", "linuxcnc", exact=True)) == value
-    assert "." in number_text(value, "x", "fanuc")
-    assert float(number_text(value, "x", "fanuc")) == pytest.approx(value, abs=0.5001e-4)
+    assert text == number_text(float(text), "x", NGC)
+    assert float(number_text(value, "x", NGC, exact=True)) == value
+    assert "." in number_text(value, "x", MACRO_B)
+    assert float(number_text(value, "x", MACRO_B)) == pytest.approx(value, abs=0.5001e-4)

@@ -12,6 +12,7 @@ from judge import linuxcnc
 
 from olp.core.errors import ProgramError
 from olp.program.rs274.flatten.unroll import flatten
+from olp.program.rs274.profiles.linuxcnc import DIALECT
 
 pytestmark = [
     pytest.mark.oracle,
@@ -38,7 +39,7 @@ def moves(data: bytes, *, joined: bool) -> np.ndarray:
 
 
 def assert_same(source: bytes, *, expand_cycles: bool = False) -> bytes:
-    plain = flatten(source, profile="linuxcnc", expand_cycles=expand_cycles)
+    plain = flatten(source, DIALECT, expand_cycles=expand_cycles)
     before, after = moves(source, joined=expand_cycles), moves(plain, joined=expand_cycles)
     assert before.shape == after.shape
     np.testing.assert_allclose(after, before, rtol=0, atol=1e-6)
@@ -60,7 +61,7 @@ def _samples() -> list[Path]:
 def test_installed_sample(path: Path, expand_cycles: bool) -> None:
     source = path.read_bytes()
     try:
-        plain = flatten(source, profile="linuxcnc", expand_cycles=expand_cycles)
+        plain = flatten(source, DIALECT, expand_cycles=expand_cycles)
     except ProgramError as error:
         assert error.line is not None
         assert 1 <= error.line <= source.count(b"\n") + 1

@@ -1,0 +1,174 @@
+"""Options of several verbs: each is defined once, and a verb says what its help tells."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from olp.cli.common import DIALECT
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Length(click.FloatRange):
+    """A finite number above zero."""
+
+    def __init__(self) -> None:
+        super().__init__(min=0.0, min_open=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+def machine_option(says: str = "The machine file.", *, required: bool = False) -> Callable[[F], F]:
+    """-m, alone where a verb takes no job."""
+    return click.option("-m", "--machine", metavar="machine.toml", required=required, help=says)
+
+
+def setup_options(function: F) -> F:
+    """-m, -j and --dialect, which every verb that needs a machine takes."""
+    function = click.option(
+        "--dialect",
+        metavar="NAME",
+        expose_value=False,
+        callback=_keep_dialect,
+        help="The dialect, such as apt, or a file that describes it. Default: what text and ending say.",
+    )(function)
+    function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
+    return machine_option()(function)
+
+
+def _keep_dialect(context: click.Context, _: click.Parameter, value: str | None) -> None:
+    context.meta[DIALECT] = value
+
+
+def _day(
+    ctx: click.Context, parameter: click.Parameter, value: datetime.datetime | None
+) -> datetime.date | None:
+    return None if value is None else value.date()
+
+
+def date_option(of: str = "run") -> Callable[[F], F]:
+    """--date, which is compared with the validity of the calibration."""
+    return day_option(f"The day of the {of}, to be compared with valid_until of the calibration.")
+
+
+def day_option(says: str, name: str = "--date") -> Callable[[F], F]:
+    """--date and other days."""
+    return click.option(
+        name, type=click.DateTime(["%Y-%m-%d"]), callback=_day, metavar="YYYY-MM-DD", help=says
+    )
+
+
+def output_option(metavar: str, says: str | None = None, **settings: Any) -> Callable[[F], F]:
+    """-o."""
+    return click.option("-o", "--output", metavar=metavar, help=says, **settings)
+
+
+def json_option(says: str = "Print the report as JSON.") -> Callable[[F], F]:
+    """--json."""
+    return click.option("--json", "as_json", is_flag=True, help=says)
+
+
+def quiet_option(says: str) -> Callable[[F], F]:
+    """-q; its help says what is left out."""
+    return click.option("-q", "--quiet", is_flag=True, help=says)
+
+
+def force_option(what: str = "output files") -> Callable[[F], F]:
+    """--force; its help says what may be overwritten."""
+    return click.option("--force", is_flag=True, help=f"Overwrite {what}.")
+
+
+def plot_option(says: str) -> Callable[[F], F]:
+    """--plot."""
+    return click.option("--plot", metavar="FILE", help=says)
+
+
+def report_option(
+    metavar: str = "FILE", says: str = "Also write the report: .html, .json or .md."
+) -> Callable[[F], F]:
+    """--report."""
+    return click.option("--report", "report_file", metavar=metavar, help=says)
+
+
+def outside_box_option(refused: str, held: str) -> Callable[[F], F]:
+    """--outside-box; its help says what becomes of what is outside."""
+    return click.option(
+        "--outside-box",
+        type=click.Choice(["refuse", "hold"]),
+        default="refuse",
+        show_default=True,
+        help=f"Outside the calibrated box: {refused}, or {held}.",
+    )
+
+
+fail_on_option = click.option(
+    "--fail-on",
+    type=click.Choice(["info", "warning", "error", "never"]),
+    default="error",
+    show_default=True,
+    help="Exit with 1 where a finding is at least this severe.",
+)
+contour_option = click.option(
+    "--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."
+)
+tolerance_option = click.option(
+    "--tolerance-um",
+    type=Length(),
+    default=1.0,
+    show_default=True,
+    help="How far the corrected path may be from the nominal one, rounding apart.",
+)
+flatten_option = click.option(
+    "--flatten", is_flag=True, help="Write out loops, subprograms and expressions first."
+)
+
+
+def unroll_options(function: F) -> F:
+    """--flatten, --expand-cycles and what that needs."""
+    for option in (
+        click.option(
+            "--peck-clearance-mm",
+            type=Length(),
+            help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; "
+            "for --expand-cycles.",
+        ),
+        click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves."),
+        flatten_option,
+    ):
+        function = option(function)
+    return function
+
+
+def confidence_options(function: F) -> F:
+    """What every verb that looks at uncertainties has in common."""
+    for option in (
+        click.option(
+            "--within-um",
+            type=Length(),
+            help="The tolerance of the part: how probable is it that the tip stays within? "
+            "Default: --tolerance-um.",
+        ),
+        click.option(
+            "--only-sure-components",
+            is_flag=True,
+            help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def proof_options(function: F) -> F:
+    """What `correct` and `verify` have in common."""
+    for option in (fail_on_option, json_option(), date_option(), contour_option, tolerance_option):
+        function = option(function)
+    return function

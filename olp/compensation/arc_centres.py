@@ -1,0 +1,135 @@
+"""Arcs as they are written: their centres, solved again from the end points after rounding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
+from olp.compensation.rows import Rows
+from olp.compensation.writer import Writer
+from olp.core.arrays import Array, Index, Mask
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag
+
+_AXES = np.array(PLANES)
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """One part of an arc as it will be written, positions in mm."""
+
+    row: int
+    move: int
+    line: int
+    start: Array
+    end: Array
+    centre: Array
+    sweep: float
+    plane: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArcRows:
+    """The same in columns."""
+
+    row: Index
+    move: Index
+    line: npt.NDArray[np.int32]
+    start: Array
+    end: Array
+    centre: Array
+    sweep: Array
+    plane: npt.NDArray[np.int8]
+
+    def pick(self, which: Mask) -> ArcRows:
+        return ArcRows(*(getattr(self, name)[which] for name in ArcRows.__slots__))
+
+    def one(self, i: int) -> Arc:
+        return Arc(
+            int(self.row[i]), int(self.move[i]), int(self.line[i]), self.start[i], self.end[i],
+            self.centre[i], float(self.sweep[i]), int(self.plane[i]),
+        )  # fmt: skip
+
+
+def solve(writer: Writer, rows: Rows) -> ArcRows:
+    """The corrected arcs among rows, with their centres from the emitted end points and the bent path between
+    them. Raises ProgramError where the last digit decides what an arc is."""
+    path, plan = writer.path, writer.plan
+    arc_row = np.flatnonzero(rows.arc & ~rows.take_up & ((rows.flag & np.uint8(Flag.PASS)) == 0))
+    move = rows.move[arc_row]
+    arc = np.searchsorted(path.arcs.move, move)
+    reach = plan.reach[rows.first + arc_row]
+    before = np.maximum(arc_row - 1, 0)
+    begin = np.where((rows.move[before] == move) & (arc_row > 0), plan.reach[rows.first + before], 0.0)
+    pieces = Pieces(arc, begin, reach)
+    start = np.where((arc_row > 0)[:, None], rows.emitted[before], rows.entry)
+    end = rows.emitted[arc_row]
+    plane = path.arcs.plane[arc]
+    sweep = path.arcs.sweep_rad[arc] * (reach - begin)
+    centre = np.zeros((len(arc_row), 3))
+    kept = np.zeros(len(arc_row), bool)
+    tools = path.tool_mm()
+    for part, count in sample_groups(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm):
+        bend = sampled(path, writer.model, writer.targets, pieces.pick(part), tools, count)
+        best, _ = fit(bend, plane[part], start[part], end[part], sweep[part])
+        equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
+        centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
+        # an arc that is only shifted keeps its words
+        shift = bend.command[:, 0] - bend.point[:, 0]
+        alike = np.abs(start[part] - bend.point[:, 0] - end[part] + bend.point[:, -1]).max(axis=1) < 1e-7
+        absolute = writer.program.arc_slots.absolute[arc[part]]
+        kept[part] = bend.rigid & alike & (~absolute | (np.abs(shift).max(axis=1) < 1e-9))
+    kept &= rows.head[arc_row] & (reach == 1.0)
+    _check_sweep(start, end, centre, sweep, plane, path.line[move])
+    solved = ArcRows(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)
+    return solved.pick(~kept)
+
+
+def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8], short: Mask) -> Array:
+    """Centres moved along their chords until both radii are equal, for arcs `short` of half a circle."""
+    rows = np.arange(len(start))
+    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
+    d0, d1 = end[rows, first] - start[rows, first], end[rows, second] - start[rows, second]
+    length = np.hypot(d0, d1)
+    long = short & (length > 0)
+    safe = np.where(long, length, 1.0)
+    d0, d1 = d0 / safe, d1 / safe
+    away0 = centre[rows, first] - (start[rows, first] + end[rows, first]) / 2
+    away1 = centre[rows, second] - (start[rows, second] + end[rows, second]) / 2
+    along = np.where(long, away0 * d0 + away1 * d1, 0.0)
+    moved = centre.copy()
+    moved[rows, first] -= along * d0
+    moved[rows, second] -= along * d1
+    return moved
+
+
+def _check_sweep(
+    start: Array,
+    end: Array,
+    centre: Array,
+    sweep: Array,
+    plane: npt.NDArray[np.int8],
+    line: npt.NDArray[np.int32],
+) -> None:
+    """A tiny arc must not turn into a whole circle, nor the other way round, by rounding."""
+    rows = np.arange(len(start))
+    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
+    a0 = np.arctan2(start[rows, second] - centre[rows, second], start[rows, first] - centre[rows, first])
+    a1 = np.arctan2(end[rows, second] - centre[rows, second], end[rows, first] - centre[rows, first])
+    turn = np.where(sweep > 0, a1 - a0, a0 - a1) % (2 * np.pi)
+    turn[turn < 1e-9] = 2 * np.pi
+    off = np.abs(np.abs(sweep) - turn)
+    off = np.abs(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
+    whole = np.abs(sweep) > np.pi
+    flipped = (np.abs(sweep) < 2 * np.pi + 1e-9) & (whole != (turn > np.pi)) & (off < 0.5)
+    bad = np.flatnonzero((off > 1.0) | (flipped & (np.minimum(np.abs(sweep), turn) < 0.1)))
+    if bad.size:
+        raise ProgramError(
+            "an arc is so short that the last digit decides whether it is a whole circle; let the machine "
+            "take more digits (least_increment_mm), or write this arc as a line",
+            line=int(line[bad[0]]),
+        )

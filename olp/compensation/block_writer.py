@@ -1,0 +1,214 @@
+"""Writes a plan back into a program of blocks of words (RS-274): words changed and inserted, blocks inserted,
+nothing else."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.block_arcs import arc_edits
+from olp.compensation.digits import AxisRows, absolute, incremental
+from olp.compensation.holes import HoleWords
+from olp.compensation.inserted_blocks import block_edits
+from olp.compensation.rows import Rows
+from olp.compensation.writer import Task, Writer
+from olp.core.arrays import Index, Mask
+from olp.core.toolpath import Flag
+from olp.program.text.edits import EditList, Edits
+
+_BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
+
+
+class BlockWriter(Writer):
+    """A writer of blocks, whose words may be omitted: per axis, what is written and what is inserted."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self._hole_words = HoleWords(self.program.holes)
+        self._next_capture = 0
+
+    def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
+        edits: list[Edits] = []
+        columns = self._columns(rows)
+        for a, b in pairwise(self._breaks(rows)):
+            if rows.flag[a] & np.uint8(Flag.CYCLE):
+                edits += self._hole_words.edits(self, rows, a, b)
+            else:
+                self._digits(rows, columns, a, b)
+        self._after_block_delete(rows)
+        edits += [*self._word_edits(rows), *arc_edits(self, rows), *self._captures(rows)]
+        return self._spliced(edits, begin, end)
+
+    def _breaks(self, rows: Rows) -> list[int]:
+        """Where the way of counting changes: G90 and G91, units, canned cycles."""
+        key = (rows.flag & np.uint8(Flag.INCREMENTAL | Flag.CYCLE)).astype(np.int64)
+        key += (self.frame_unit_mm[self.path.frame[rows.move]] > 2) * 256
+        cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
+        if cycle.any():
+            key = np.where(cycle, -1 - self.path.line[rows.move].astype(np.int64), key)
+        changes = np.flatnonzero(key[1:] != key[:-1]) + 1
+        return [0, *changes.tolist(), len(rows.move)]
+
+    def _columns(self, rows: Rows) -> list[AxisRows]:
+        """Per axis, what its digits are made from."""
+        path, words = self.path, self.words
+        part = slice(rows.first, rows.first + len(rows.move))
+        frame = path.frame[rows.move]
+        one = len(frame) > 0 and bool((frame == frame[0]).all())
+        unit = self.frame_unit_mm[frame[:1]] if one else self.frame_unit_mm[frame]
+        control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
+        offset = self.frame_offset_mm[frame[0]] if one else self.frame_offset_mm[frame]
+        out = []
+        for axis in range(3):
+            nominal = path.end_mm[rows.move, axis]
+            slot = np.where(rows.head, self.program.slot[rows.move, axis], -1)
+            given = slot >= 0
+            out.append(
+                AxisRows(
+                    command=self.plan.command_mm[part, axis],
+                    nominal=nominal,
+                    given=given,
+                    raw=self.plan.raw[part, axis],
+                    reset=control & np.isnan(nominal),
+                    word=np.where(given, words.mantissa[slot], 0),
+                    decimals=np.where(given, self.style.decimals(slot, axis, unit), 0).astype(np.int8),
+                    offset=float(offset[axis]) if one else offset[:, axis],
+                    unit=1.0,
+                )
+            )
+        return out
+
+    def _digits(self, rows: Rows, columns: list[AxisRows], a: int, b: int) -> None:
+        """Digits of rows a..b, which all count the same way."""
+        unit = float(self.frame_unit_mm[self.path.frame[rows.move[a]]])
+        counting = bool(rows.flag[a] & np.uint8(Flag.INCREMENTAL))
+        for axis, column in enumerate(columns):
+            before = float(rows.emitted[a - 1, axis]) if a else float(rows.entry[axis])
+            part = column.part(a, b, unit)
+            if counting:
+                digits = incremental(part, before, self.style.grid(axis, unit))
+            else:
+                digits = absolute(part, before, self.style.least(axis, unit), self.style.usual(axis, unit))
+            rows.put(a, b, axis, digits)
+
+    def _after_block_delete(self, rows: Rows) -> None:
+        """The first block after `/` blocks must not rely on a word that was inserted in them."""
+        deleted = (rows.flag & np.uint8(Flag.DELETED)) != 0
+        if not deleted.any():
+            return
+        ends = np.flatnonzero(deleted[:-1] & ~deleted[1:]) + 1
+        for row in ends.tolist():
+            begin = row - 1
+            while begin >= 0 and deleted[begin]:
+                begin -= 1
+            before = rows.emitted[begin] if begin >= 0 else rows.entry
+            for axis in range(3):
+                moved = not abs(rows.emitted[row - 1, axis] - before[axis]) < 1e-9
+                given = rows.head[row] and self.program.slot[rows.move[row], axis] >= 0
+                nominal_moved = self._nominal_moved(rows, begin, row, axis)
+                if not moved or given or np.isnan(rows.emitted[row, axis]):
+                    continue
+                if nominal_moved or rows.flag[row] & np.uint8(Flag.INCREMENTAL):
+                    continue
+                self._force(rows, row, axis)
+
+    def _nominal_moved(self, rows: Rows, begin: int, row: int, axis: int) -> bool:
+        end = self.path.end_mm
+        before = end[rows.move[begin], axis] if begin >= 0 else self.path.start_mm[axis]
+        return not abs(end[rows.move[row - 1], axis] - before) < 1e-9
+
+    def _force(self, rows: Rows, row: int, axis: int) -> None:
+        frame = int(self.path.frame[rows.move[row]])
+        unit, offset = float(self.frame_unit_mm[frame]), float(self.frame_offset_mm[frame, axis])
+        decimals = self.style.usual(axis, unit)
+        rows.mantissa[row, axis] = round((rows.emitted[row, axis] - offset) / unit * 10**decimals)
+        rows.decimals[row, axis] = decimals
+        rows.write[row, axis] = True
+
+    # -- edits -------------------------------------------------------------------------------------
+
+    def _word_edits(self, rows: Rows) -> list[Edits]:
+        """Replaced and inserted axis words of the blocks that are there, and inserted blocks."""
+        program, words = self.program, self.words
+        out: list[Edits] = []
+        head = np.flatnonzero(rows.head & ((rows.flag & _BYPASS) == 0))
+        slot = program.slot[rows.move[head]]
+        write = rows.write[head]
+        for axis in range(3):
+            mine = slot[:, axis]
+            replace = np.flatnonzero(write[:, axis] & (mine >= 0))
+            index = mine[replace]
+            out.append(
+                Edits(
+                    words.number[index].astype(np.int64),
+                    words.end[index].astype(np.int64),
+                    rows.mantissa[head[replace], axis],
+                    rows.decimals[head[replace], axis],
+                    np.zeros(len(replace), np.int32),
+                    np.zeros(len(replace), np.int32),
+                )
+            )
+            self.tally.changed_words += len(replace)
+        missing = write & (slot < 0)
+        at = np.flatnonzero(missing.any(axis=1))
+        if at.size:
+            out += self._insertions(rows, head[at], slot[at], missing[at])
+        tails = np.flatnonzero(~rows.head & ((rows.flag & _BYPASS) == 0))
+        if tails.size:
+            out += block_edits(self, rows, tails)
+        return out
+
+    def _insertions(self, rows: Rows, row: Index, slot: npt.NDArray[np.int32], missing: Mask) -> list[Edits]:
+        """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
+        words = self.words
+        ends = np.where(slot >= 0, words.end[slot], -1)
+        place = ends.max(axis=1).astype(np.int64)
+        last = np.take_along_axis(slot, ends.argmax(axis=1)[:, None], axis=1)[:, 0]
+        none = np.flatnonzero(place < 0)
+        for i in none.tolist():
+            line = int(self.path.line[rows.move[row[i]]])
+            last[i] = self.style.last_word(line)
+            place[i] = words.end[last[i]]
+        style = self.style.separators(last, self.program)
+        out = []
+        for axis in range(3):
+            for which in np.unique(style[missing[:, axis]]).tolist():
+                chosen = np.flatnonzero(missing[:, axis] & (style == which))
+                prefix = self.prefixes(self.style.separator(which, axis))
+                count = len(chosen)
+                order = np.full(count, axis + 1, np.int32)
+                out.append(
+                    Edits(
+                        place[chosen], place[chosen], rows.mantissa[row[chosen], axis],
+                        rows.decimals[row[chosen], axis], np.full(count, prefix, np.int32), order,
+                    )
+                )  # fmt: skip
+                self.tally.inserted_words += count
+        return out
+
+    def _captures(self, rows: Rows) -> list[Edits]:
+        """Words that store the present position (G92, G10 L20) move with the correction of that position."""
+        edits = EditList(self.prefixes)
+        captures = self.program.captures
+        final = rows.first + len(rows.move) == len(self.plan)
+        while self._next_capture < len(captures):
+            capture = captures[self._next_capture]
+            if capture.moves > int(rows.move[-1]) + 1 and not final:
+                break
+            self._next_capture += 1
+            nominal = self.path.end_mm[capture.moves - 1, capture.axis] if capture.moves else None
+            row = int(np.searchsorted(rows.move, capture.moves, "left")) - 1
+            emitted = rows.emitted[row, capture.axis] if row >= 0 else rows.entry[capture.axis]
+            delta = 0.0 if nominal is None else (emitted - nominal) / capture.unit_mm
+            grid = self.style.grid(capture.axis, capture.unit_mm)
+            written = self.style.decimals_of(capture.word, capture.axis, capture.unit_mm)
+            digits = max(grid, written)
+            own = int(self.words.mantissa[capture.word]) * 10 ** (digits - written)
+            new = own + round(delta * 10**digits)
+            if new != own:
+                start, end = int(self.words.number[capture.word]), int(self.words.end[capture.word])
+                edits.add(start, end, new, digits)
+                self.tally.changed_words += 1
+        return [edits.done()]

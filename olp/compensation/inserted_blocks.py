@@ -1,0 +1,158 @@
+"""Inserted blocks: the later parts of subdivided moves, and words of the old block that change with them.
+
+Each part is a line of its own behind the block, or in front of it to take up backlash before an arc.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.rows import Rows
+from olp.compensation.writer import Writer
+from olp.core.arrays import Index, Mask
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Flag, Kind
+from olp.program.text.edits import BARE, EditList, Edits
+
+#: M words that act when their block has ended
+_END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
+
+
+def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
+    """New blocks for the later parts of subdivided moves; plain words, modal codes hold."""
+    line_no = writer.path.line[rows.move[tails]]
+    arc = rows.arc[tails]
+    straight = ~arc | rows.take_up[tails]
+    before = rows.before[tails]
+    place = np.where(
+        before, writer.program.line_start[line_no - 1], writer.program.line_end[line_no - 1]
+    ).astype(np.int64)
+    lead = _leads(writer, line_no, arc & straight, before)
+    write = rows.write[tails]
+    first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
+    columns: list[Edits] = []
+    for axis in range(3):
+        chosen = np.flatnonzero(write[:, axis] & straight)
+        letter = b"XYZ"[axis : axis + 1]
+        begins = first_axis[chosen] == axis
+        prefix = np.full(len(chosen), writer.prefixes(b" " + letter), np.int32)
+        starts = {
+            int(p): writer.prefixes(writer.prefixes.table[int(p)] + letter)
+            for p in np.unique(lead[chosen[begins]])
+        }
+        prefix[begins] = [starts[int(p)] for p in lead[chosen[begins]]]
+        row = tails[chosen]
+        columns.append(
+            Edits(
+                place[chosen], place[chosen], rows.mantissa[row, axis], rows.decimals[row, axis], prefix,
+                (row * 8 + 16 + axis).astype(np.int32),
+            )
+        )  # fmt: skip
+    empty = (first_axis < 0) & straight
+    # a part whose rounded end is where it began needs no block
+    np.subtract.at(writer.parts, rows.move[tails[empty]], 1)
+    edits = EditList(writer.prefixes)
+    for i in np.flatnonzero(before & ~empty).tolist():
+        start, tail, line = int(place[i]), int(tails[i]), int(line_no[i])
+        _check_take_up(writer, rows, tail)
+        suffix = _feed_of(writer, line) + writer.program.eol(line)
+        edits.add(start, start, BARE, 0, suffix, rows.serial(tail) + 5)
+        if rows.head[tail + 1]:
+            _arc_word(writer, rows, tail + 1, edits)
+    writer.tally.inserted_blocks += int((~empty).sum())
+    _inverse_time(writer, rows, tails, edits)
+    _end_words(writer, rows, tails[~before], edits)
+    return [*columns, edits.done()]
+
+
+def _leads(writer: Writer, line_no: npt.NDArray[np.int32], turning: Mask, before: Mask) -> Index:
+    """Prefix of the first word of each inserted block: line end, `/` and, to take up backlash at an
+    arc, G1."""
+    prefixes = writer.prefixes
+    lines, which = np.unique(line_no, return_inverse=True)
+    table = np.zeros((len(lines), 3), np.int64)
+    for i, line in enumerate(lines.tolist()):
+        start = writer.style.block_start(line)
+        deleted = start[len(writer.program.eol(line)) :]
+        table[i] = (prefixes(start), prefixes(start + b"G1 "), prefixes(deleted + b"G1 "))
+    return np.asarray(table[which, np.where(before, 2, np.where(turning, 1, 0))], np.int64)
+
+
+def _check_take_up(writer: Writer, rows: Rows, row: int) -> None:
+    if rows.flag[row] & np.uint8(Flag.INVERSE_TIME):
+        raise ProgramError(
+            "an arc in G93 needs a step that takes up lost motion before it, which has no time of its "
+            "own; program the arc in G94",
+            line=int(writer.path.line[rows.move[row]]),
+        )
+
+
+def _feed_of(writer: Writer, line: int) -> bytes:
+    """The F word of a block, for the block that is put before it."""
+    index = writer.style.word(line, "F")
+    if index is None:
+        return b""
+    return b" " + writer.program.data[int(writer.words.start[index]) : int(writer.words.end[index])]
+
+
+def _arc_word(writer: Writer, rows: Rows, row: int, edits: EditList) -> None:
+    """G2 or G3 for an arc block that relied on the modal code which the block before it changed."""
+    move = int(rows.move[row])
+    line = int(writer.path.line[move])
+    code = 2 if writer.path.kind[move] == Kind.ARC_CW else 3
+    index = writer.words.of_line(line)
+    if any(
+        writer.words.letter[i] == 71 and writer.words.mantissa[i] == code and not writer.words.decimals[i]
+        for i in index
+    ):
+        return
+    slot = writer.program.slot[move]
+    first = [int(writer.words.start[s]) for s in slot if s >= 0]
+    start = min(first or [int(writer.words.start[i]) for i in index if writer.words.letter[i] != ord("N")])
+    edits.add(start, start, BARE, 0, b"G%d " % code, rows.serial(row - 1) + 6)
+
+
+def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
+    """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
+    timed = np.flatnonzero((rows.flag[tails] & np.uint8(Flag.INVERSE_TIME)) != 0)
+    for move in np.unique(rows.move[tails[timed]]).tolist():
+        part = np.flatnonzero(rows.move == move)
+        line = int(writer.path.line[move])
+        index = writer.style.word(line, "F")
+        if index is None:
+            raise ProgramError("a block in G93 needs its own F word", line=line)
+        value = float(writer.words.mantissa[index]) / 10.0 ** int(writer.words.decimals[index])
+        reach = writer.plan.reach[rows.first + part]
+        share = np.maximum(np.diff(reach, prepend=0.0), 1e-6)
+        decimals = max(int(writer.words.decimals[index]), 4)
+        feeds = np.rint(value / share * 10**decimals).astype(np.int64)
+        place = int(writer.program.line_end[line - 1])
+        kept = [i for i, r in enumerate(part.tolist()) if rows.head[r] or rows.write[r].any()]
+        for i in kept:
+            row = int(part[i])
+            if rows.head[row]:
+                start, end = int(writer.words.number[index]), int(writer.words.end[index])
+                prefix, order = b"", 0
+            else:
+                start = end = place
+                prefix, order = b" F", rows.serial(row) + 5
+            edits.add(start, end, int(feeds[i]), decimals, prefix, order)
+
+
+def _end_words(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
+    """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last."""
+    for move in np.unique(rows.move[tails]).tolist():
+        line = int(writer.path.line[move])
+        moved = [
+            i for i in writer.words.of_line(line)
+            if writer.words.letter[i] == 77 and not writer.words.decimals[i]
+            and int(writer.words.mantissa[i]) in _END_M
+        ]  # fmt: skip
+        if not moved:
+            continue
+        place = int(writer.program.line_end[line - 1])
+        for k, i in enumerate(moved):
+            start, end = int(writer.words.start[i]), int(writer.words.end[i])
+            edits.add(start, end, BARE, 0)
+            edits.add(place, place, BARE, 0, b" " + writer.program.data[start:end], 2**30 + k)

@@ -1,0 +1,99 @@
+"""The levers on which the angles of an axis act.
+
+Contribution of axis j: E_j(q) + eps_j(q) x [L_j(P, t) - L_j(P_line(q), t_line)] with L_j the tool vector plus
+the axes after j toward the tool, plus axis j itself where it carries the workpiece. Every translation
+component returns its measured value on its own line; so each row has a lever of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.interpolation import Column
+from olp.core.machine import Vector
+from olp.core.units import AXES
+
+#: Component errors of an axis in this order.
+DIRECTIONS = "XYZABC"
+
+#: The third coordinate: the lever of angle a on row i is coordinate _OTHER[i, a].
+_OTHER = {(i, a): 3 - i - a for i in range(3) for a in range(3) if i != a}
+
+#: First order: eps_a adds sign * eps_a * lever_k to row i, as (i, a, k, sign).
+CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
+
+
+class Measured(Protocol):
+    """What was measured along a line of one axis: names of components, and where and with what."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def line_mm(self) -> Vector | None: ...
+    @property
+    def tool_mm(self) -> Vector: ...
+    @property
+    def reference(self) -> str: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Lever:
+    """Coordinate k is q_k + t_k - offset_k where `moves`, t_k - offset_k elsewhere; lengths in mm."""
+
+    moves: tuple[bool, bool, bool]
+    offset_mm: Vector
+
+    def at(self, position: list[Array], tool: list[Column]) -> list[Column]:
+        """Three columns, from columns of axis positions and of the tool vector."""
+        arms = [tool[k] - self.offset_mm[k] for k in range(3)]
+        return [position[k] + arms[k] if self.moves[k] else arms[k] for k in range(3)]
+
+    def reach_mm(self, box_mm: Array, tool_mm: Array) -> Array:
+        """(3,) largest absolute coordinate in the box for tool vectors (m, 3)."""
+        arms = tool_mm - np.array(self.offset_mm)
+        moves = np.array(self.moves)[:, None]
+        ends = np.where(moves, box_mm, 0.0)
+        return np.asarray(np.abs(ends.T[:, None, :] + arms[None, :, :]).max(axis=(0, 1)))
+
+
+Levers = tuple[tuple[tuple[int, ...], Lever], ...]
+
+
+def levers_of(
+    curves: Sequence[Measured], datum_mm: Vector, axis: str, after: str, carries: bool, tool_terms: bool
+) -> Levers:
+    """The levers of what was measured of one axis, `after` it in the chain toward the tool."""
+    holder = {name: curve for curve in curves for name in curve.names}
+    default = curves[0] if len(curves) == 1 else None
+
+    def lever(sources: list[Measured | None]) -> Lever:
+        """Of one row, coordinate by coordinate from the curve it was measured with."""
+        moves, offset = [False] * 3, [0.0] * 3
+        for k, source in enumerate(sources):
+            tool = source.tool_mm[k] if source is not None and tool_terms else 0.0
+            own = AXES[k] == axis
+            table = own and carries and source is not None and source.reference == "table"
+            moves[k] = AXES[k] in after or table
+            line = source.line_mm if source is not None and not own else None
+            # On its own line an axis stands where it stands; seen from a reflector on its table, it has moved
+            # from the datum.
+            at = (datum_mm if line is None else line)[k] if moves[k] else 0.0
+            offset[k] = at + tool
+        return Lever((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
+
+    rows: dict[Lever, list[int]] = {}
+    for i in range(3):
+        measured = holder.get(f"E{AXES[i]}{axis}", default)
+        # A row without a curve is zero on the lines on which the angles were measured.
+        sources: list[Measured | None] = [measured] * 3
+        if measured is None:
+            for a, name in enumerate("ABC"):
+                if a != i:
+                    sources[_OTHER[i, a]] = holder.get(f"E{name}{axis}")
+        rows.setdefault(lever(sources), []).append(i)
+    return tuple((tuple(members), lever) for lever, members in rows.items())

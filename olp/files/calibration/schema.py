@@ -1,0 +1,86 @@
+"""The keys of a calibration file: its head, the tables of every error source, and how well all is known."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationInfo, create_model, field_validator
+
+from olp.core.schema import Interval, NotNegative, Table, Text, Triple, refusal
+from olp.errormodel.sources.registry import SOURCES
+from olp.files.fields import SIGN, IsoNames, Sign
+
+
+class CovarianceTable(Table):
+    file: Text | None = Field(
+        default=None,
+        description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
+        "this file; the sigma columns and keys if left out",
+    )
+    growth_per_year: NotNegative = Field(
+        default=0.0,
+        description="the share of themselves by which standard uncertainties grow in a year after measured: "
+        "0.5 makes half as much again",
+    )
+    temperature_K: NotNegative = Field(
+        default=0.0,
+        description="the standard uncertainty of the temperatures of scales and workpiece, in K",
+    )
+
+
+class CalibrationHead(Table):
+    """What a calibration states of itself."""
+
+    schema_: Literal["olp-calibration-1"] = Field(
+        alias="schema", description='the format, "olp-calibration-1"'
+    )
+    machine: Text = Field(description="the name in the machine file that this calibration belongs to")
+    measured: datetime.date = Field(description="the date of measuring, such as 2026-05-14, without quotes")
+    valid_until: datetime.date | None = Field(
+        default=None, description="the last date of validity, such as 2027-05-14, without quotes"
+    )
+    temperature_degC: float = Field(description="the temperature of scales while measuring, in degC")
+    sign: Sign = Field(description=f'the sign of all values, "{SIGN}"')
+    model: Literal["rigid-body", "huddersfield"] = Field(description='"rigid-body" or "huddersfield"')
+    datum_mm: Triple = Field(description="the axis positions from which levers count, [X, Y, Z] in mm")
+    box_mm: Annotated[tuple[Interval, Interval, Interval], Field(strict=False)] = Field(
+        description="the calibrated axis positions, [[min, max], [min, max], [min, max]] of X, Y, Z in mm"
+    )
+    active_during_measurement: IsoNames = Field(
+        default=frozenset(),
+        description="the errors that the control corrected while measuring, a list of ISO 230-1 names",
+    )
+    payload_kg: NotNegative = Field(
+        default=0.0, description="the payload on the machine while measuring, in kg; 0 if left out"
+    )
+
+    @field_validator("valid_until")
+    @classmethod
+    def _not_before_measured(cls, value: datetime.date | None, info: ValidationInfo) -> datetime.date | None:
+        measured = info.data.get("measured")
+        if value is not None and measured is not None and value < measured:
+            raise refusal(f"= {value} is before measured = {measured}; expected a later date")
+        return value
+
+
+_TABLES: dict[str, Any] = {source.key: source.schema for source in SOURCES if source.schema is not None}
+_TABLES["covariance"] = (
+    CovarianceTable | None,
+    Field(default=None, description="the table [covariance]: how well all this is known"),
+)
+
+#: A calibration file: its head, and a key of every registered source.
+CalibrationFile: type[CalibrationHead] = create_model(
+    "CalibrationFile",
+    __base__=CalibrationHead,
+    __module__=__name__,
+    __doc__="olp-calibration-1: the measured errors of one machine, actual minus commanded.",
+    **_TABLES,
+)
+
+
+def covariance_of(file: CalibrationHead) -> CovarianceTable:
+    """The table [covariance]; its defaults where the file has none."""
+    stated: CovarianceTable | None = vars(file)["covariance"]
+    return stated or CovarianceTable()

@@ -1,0 +1,151 @@
+"""Tables of numbers under named columns: read as one, whatever they hold, with every problem and its line.
+
+What differs from table to table is a value (`Wanted`): how lines become cells, what names are right, what a
+cell may hold, and the words for what is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.core.arrays import Array, Index
+from olp.core.errors import InputError
+from olp.files.problems import Problem, config_error, nearest
+from olp.program.text import rows
+from olp.program.text.rows import CSV, Form, place_of
+
+#: A data row: its line in the file and the number in each column.
+Row = tuple[int, list[float]]
+#: A data row as it is written.
+Record = tuple[int, list[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a table has to be.
+
+    `nothing` is said of a file without a header. `header` gives what is wrong with names of columns, from
+    their line and themselves; `number` the number in a cell by the name of its column, and what is wrong with
+    it. `one` and `many` end what is said of a row with more or fewer cells than columns, `many` where it has
+    more.
+    """
+
+    nothing: str
+    header: Callable[[int, Sequence[str]], list[Problem]]
+    number: Callable[[str, str], tuple[float, str | None]]
+    one: str = ""
+    many: str = ""
+    form: Form = CSV
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """The text of a table, the line of its header, its names, and the rows as written and as numbers: those
+    with as many cells as columns. `problems` are those of the rows."""
+
+    text: str
+    line: int
+    header: tuple[str, ...]
+    records: tuple[Record, ...]
+    rows: tuple[Row, ...]
+    problems: tuple[Problem, ...]
+
+    @property
+    def lines(self) -> Index:
+        """(n,) the line of each row."""
+        return np.array([line for line, _ in self.rows], np.int64)
+
+    @property
+    def table(self) -> Array:
+        """(n, columns) the numbers."""
+        return np.array([numbers for _, numbers in self.rows], float).reshape(-1, len(self.header))
+
+    @property
+    def columns(self) -> Mapping[str, Array]:
+        """(n,) numbers by name."""
+        return dict(zip(self.header, self.table.T, strict=True))
+
+
+def read_sheet(data: bytes, file: str, wanted: Wanted) -> Sheet:
+    """A table and what is wrong with its rows. Raises ConfigError where the file is no text or holds nothing,
+    and with the problems of its header."""
+    text = decoded(data, file)
+    try:
+        records = list(wanted.form.rows(text))
+    except InputError as error:
+        raise config_error([(error.line, error.message)], file) from None
+    if not records:
+        raise config_error([(None, wanted.nothing)], file)
+    line, header = records[0]
+    found = wanted.header(line, header)
+    if found:
+        raise config_error(found, file)
+    problems: list[Problem] = []
+    numbers: list[Row] = []
+    for at, cells in records[1:]:
+        if len(cells) != len(header):
+            hint = wanted.many if len(cells) > len(header) else ""
+            problems.append((at, f"{len(cells)} values under {len(header)} columns{wanted.one}{hint}"))
+            continue
+        said = [wanted.number(name, cell) for name, cell in zip(header, cells, strict=True)]
+        problems += [(at, wrong) for _, wrong in said if wrong]
+        numbers.append((at, [number for number, _ in said]))
+    return Sheet(text, line, tuple(header), tuple(records[1:]), tuple(numbers), tuple(problems))
+
+
+def decoded(data: bytes, file: str) -> str:
+    """The text of a file. Raises ConfigError with the line of the first byte that is not UTF-8."""
+    try:
+        return rows.decoded(data)
+    except InputError as error:
+        raise config_error([(error.line, error.message)], file) from None
+
+
+def finite(cell: str) -> float:
+    """The finite number in a cell, else not a number."""
+    try:
+        value = float(cell) if "_" not in cell else math.nan
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
+def names(
+    line: int, header: Sequence[str], wrong: Callable[[int, str], str | None], first: int = 1
+) -> list[Problem]:
+    """What is wrong with the names of columns from the `first` on: those that stand before as well, and those
+    of which `wrong` says it, from their number and name."""
+    problems: list[Problem] = []
+    for number, name in enumerate(header[first - 1 :], first):
+        if header.index(name) < number - 1:
+            problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
+        elif said := wrong(number, name):
+            problems.append((line, f'column {number} is "{name}"; {said}'))
+    return problems
+
+
+def unknown(name: str, known: Sequence[str], more: str = "") -> str | None:
+    """What is said of a name that is not among the known ones."""
+    if name in known:
+        return None
+    near = nearest(name, known)
+    return (f"did you mean {near}?" if near else f"expected one of {', '.join(known)}") + more
+
+
+def missing(line: int, header: Sequence[str], needed: Sequence[str]) -> list[Problem]:
+    """The needed columns that a header does not name."""
+    return [(line, f"the column {name} is missing") for name in needed if name not in header]
+
+
+def place_in(header: Sequence[str], column: str | int, file: str, hint: str = "") -> int:
+    """The index of a column. Raises InputError, with a hint, where no column bears its name."""
+    place = place_of(column, header)
+    if place is None:
+        near = nearest(str(column), header)
+        known = f"did you mean {near}?" if near else f"expected one of {', '.join(header) or 'their numbers'}"
+        raise InputError(f'there is no column "{column}"; {known}{hint}', file=file)
+    return place

@@ -1,0 +1,66 @@
+"""The rules of reported points that become true ones."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from olp.findings.rule import Rule, Severity
+
+_rule = partial(Rule, topic="results", gate=False)
+
+RULES = (
+    _rule(
+        "OLP621",
+        "taken for granted",
+        Severity.INFO,
+        "What the file does not state was told from its rows, such as which columns hold what, or which side "
+        "of the tip touched.",
+        "Look whether it is so; state it in the header, or in a profile (--profile).",
+        "`X;Y;Z` in the first row, and no profile.",
+    ),
+    _rule(
+        "OLP622",
+        "values carried uncorrected",
+        Severity.WARNING,
+        "These values come from several touches that the file does not hold one by one, or were evaluated "
+        "from such values, so they still hold the machine's error beside points that do not.",
+        "Let the machine write its touch points, correct those, and evaluate the features from them.",
+        "`FA(BORE)=FEAT/CIRCLE,INNER,CART,50.0021,..` in DMIS output.",
+    ),
+    _rule(
+        "OLP623",
+        "touch not known",
+        Severity.WARNING,
+        "The error of a machine changes over the radius of a tip, and the file does not say on which side of "
+        "the tip the surface was, or whether points are centres.",
+        'Give columns I, J, K (out of the surface), or point = "centre" in the profile.',
+        "A tip of 4 mm radius where the error changes by 50 um/m: 0.2 um.",
+    ),
+    _rule(
+        "OLP624",
+        "rotation of a frame set on the raw machine",
+        Severity.WARNING,
+        "A frame whose directions come from touches on the raw machine is turned by the machine's errors at "
+        "those touches; only its zero can be corrected from one place.",
+        "Correct the points of the alignment too (--frame machine), fit the frame to them, and state it with "
+        'set_by = "true".',
+        "A part aligned along an edge by two touches 400 mm apart.",
+    ),
+    _rule(
+        "OLP625",
+        "compensation active while measuring",
+        Severity.WARNING,
+        "The file says that the control or its program compensated while it was measured. That is right only "
+        "if the calibration was measured with the same compensation active.",
+        "Look whether active_during_measurement and the table [thermal] of the calibration say the same.",
+        "`TECOMP/ON` in DMIS, or `# volumetric compensation: on`.",
+    ),
+    _rule(
+        "OLP626",
+        "no stamp",
+        Severity.WARNING,
+        "Without a comment that says so, nothing keeps a corrected file from being corrected again.",
+        "Keep corrected files apart, or let the profile allow a comment (stamp = true).",
+        "`stamp = false` in a profile.",
+    ),
+)

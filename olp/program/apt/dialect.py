@@ -1,0 +1,36 @@
+"""The dialect of APT and cutter-location data: how its texts are detected, read and marked."""
+
+from __future__ import annotations
+
+import re
+
+from olp.core.machine import Setup
+from olp.program.apt.table import TABLE
+from olp.program.dialect import Dialect, Options, StatementDialect
+from olp.program.program import Program
+from olp.program.text.signs import POINTS_BY_SLASH
+
+
+def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
+    from olp.program.apt.reader import read
+
+    return read(data, setup, dialect, options, words=words)
+
+
+DIALECT = StatementDialect(
+    name="apt",
+    table=TABLE,
+    title="APT and cutter-location data (ISO 4343, ISO 3592)",
+    path_mode="the post-processor's",
+    reader=_read,
+    endings=("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"),
+    sign=re.compile(
+        rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
+        rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
+        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/|UNITS?[ \t]*/[ \t]*(?:MM|INCH(?:ES)?)[ \t]*\r?$|"
+        rb"GOTO[ \t]*/[-+.\dED \t]+(?:,[-+.\dED \t]+){5})"
+    ),
+    shared_sign=POINTS_BY_SLASH,
+    comment=(b"$$ ", b""),
+    first=(b"%", b"$$*", b"PARTNO"),
+)

@@ -1,0 +1,24 @@
+"""How a registered control is read and unrolled; what does it is loaded when it is first used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from olp.core.machine import Setup
+from olp.program.dialect import Options
+from olp.program.program import Program
+from olp.program.rs274.profiles.base import Profile
+
+
+def read_blocks(data: bytes, setup: Setup, profile: Profile, options: Options, *, words: bool) -> Program:
+    """`olp.program.rs274.reader.read`."""
+    from olp.program.rs274.reader import read
+
+    return read(data, setup, profile, options, words=words)
+
+
+def unroll_blocks(data: bytes, profile: Profile, **options: Any) -> bytes:
+    """`olp.program.rs274.flatten.unroll.flatten`."""
+    from olp.program.rs274.flatten.unroll import flatten
+
+    return flatten(data, profile, **options)

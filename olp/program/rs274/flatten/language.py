@@ -1,0 +1,50 @@
+"""The two languages of parametric RS-274 programs: O-words of LinuxCNC, and Custom Macro B."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from olp.program.rs274.flatten import expressions
+from olp.program.rs274.flatten.expressions import Arithmetic
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Language:
+    """How the parametric programs of a control are read, and how plain blocks are written for it.
+
+    - `macro_b`: IF, WHILE, DO, END and GOTO steer the run without O-words, the right side of an assignment
+      needs no brackets, and variables are numbered as in Macro B: #1 to #33 local, vacant until set.
+    - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
+    - `splines`: G5 to G5.3 are modal motion.
+    - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
+      the local variables of its caller.
+    - `increments_open`: what a number without a point counts is not known off line, and so is what ROUND in a
+      word rounds to.
+    - Numbers are written with at most `decimals`, or with `all_digits` where that is asked for; `counts` are
+      letters of whole numbers, `points` whether others get a point.
+    """
+
+    arithmetic: Arithmetic
+    macro_b: bool
+    saved_modes: bool
+    profile_cycles: bool
+    splines: bool
+    counts_in_p: bool
+    shared_locals: bool
+    increments_open: bool
+    decimals: int
+    all_digits: bool
+    counts: frozenset[str]
+    points: bool
+
+
+NGC = Language(
+    arithmetic=expressions.NGC, macro_b=False, saved_modes=True, profile_cycles=True, splines=True,
+    counts_in_p=False, shared_locals=False, increments_open=False, decimals=12, all_digits=True,
+    counts=frozenset(), points=False,
+)  # fmt: skip
+MACRO_B = Language(
+    arithmetic=expressions.MACRO_B, macro_b=True, saved_modes=False, profile_cycles=False, splines=False,
+    counts_in_p=True, shared_locals=True, increments_open=True, decimals=4, all_digits=False,
+    counts=frozenset("gmnpltdhos"), points=True,
+)  # fmt: skip

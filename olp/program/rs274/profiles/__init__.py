@@ -1,0 +1,1 @@
+"""The controls that read RS-274, one file each."""

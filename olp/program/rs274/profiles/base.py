@@ -1,0 +1,157 @@
+"""What a profile of the RS-274 family is: what each word of a control means to the path.
+
+One table per profile decides for the interpreter, the support matrix of `olp inspect` and the
+documentation alike. G codes are keyed by ten times their number (G5.1 is 51).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+from enum import IntEnum
+
+from olp.program.dialect import Dialect, Row, Support
+from olp.program.rs274.cycles import CycleRules
+from olp.program.rs274.flatten.language import Language
+
+
+class Act(IntEnum):
+    """What a G code does to the reading of a program."""
+
+    CARRY = 0  #: nothing: its bytes are carried
+    MOTION = 1
+    PLANE = 2
+    DISTANCE = 3
+    ARC_DISTANCE = 4
+    FEED = 5
+    RETRACT = 6
+    EVENT = 7  #: changes frames, units, tools or path mode; handled block by block
+    REFUSE = 8
+
+
+_SUPPORT = {Act.CARRY: Support.CARRIED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile(Dialect):
+    """One control's reading of word-address text.
+
+    - `codes` and `refusals`: what becomes of each G code, and why it is refused; `harmless_m` are the M codes
+      that leave the axes where they are.
+    - `motion`, `initial_retract`: G codes that are in force at the start (None: none).
+    - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
+      100 mm/min all the same.
+    - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
+      `g10_adds`: in G91 G10 L2 adds to the offset.
+    - `cycles_apart`: canned cycles and G80 are a modal group of their own.
+    - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
+    - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does;
+      a G0 begins and ends at rest, and M5 and M9 come after the motion of their block.
+    - `m61_sets_tool`: M61 Q says which tool is in the spindle. `length_of_spindle_tool`: G43 without H takes
+      the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
+    - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
+      G21. `m_with_motion`: M codes carried out along with the motion, without a rest.
+    - `cycles`, `language`: how canned cycles are made, and parametric programs are written.
+    - `written_ending`: the ending of files that are written for the control.
+    """
+
+    first: tuple[bytes, ...] = (b"%", b"O|:")
+    payload_comments: bool = True
+    written_ending: str = "nc"
+    codes: Mapping[int, Act]
+    refusals: Mapping[int, str]
+    harmless_m: frozenset[int]
+    motion: int | None = None
+    initial_retract: int
+    increments_without_point: bool = False
+    feed_without_point: bool = False
+    g52_is_g92: bool = False
+    g10_offsets: int = 6
+    g10_adds: bool = False
+    cycles_apart: bool = False
+    axis_dwell: bool = False
+    exact_stop: bool = False
+    m61_sets_tool: bool = False
+    length_of_spindle_tool: bool = False
+    lengths_along_z: bool = False
+    feed_words_end: bool = False
+    feed_before_unit: bool = False
+    m_with_motion: frozenset[int] = frozenset()
+    cycles: CycleRules
+    language: Language
+
+    def dwell_s(self, number: float, *, pointed: bool) -> float:
+        """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
+        return number / 1000.0 if self.increments_without_point and not pointed else number
+
+    def rows(self) -> Sequence[Row]:
+        return [
+            Row(
+                f"G{code / 10:g}",
+                _SUPPORT.get(act, Support.READ),
+                self.refusals.get(code, "is no code of this control") if act is Act.REFUSE else "",
+            )
+            for code, act in sorted(self.codes.items())
+        ]
+
+
+#: Why codes are refused, where a control has no other reason.
+REFUSALS: Mapping[int, str] = {
+    50: "G5 is a spline or a high-speed mode of this control",
+    51: "G5.1 is a spline or a smoothing mode",
+    52: "G5.2 is a NURBS block",
+    53: "G5.3 is a NURBS block",
+    60: "G6 is a spline block",
+    70: "G7 (diameter mode) belongs to lathes",
+    71: "G7.1 (cylindrical interpolation) moves a rotary axis",
+    101: "G10.1 is not known here",
+    120: "G12 (circular pocket or polar interpolation) is a cycle of the control",
+    121: "G12.1 (polar interpolation) moves a rotary axis",
+    130: "G13 is a cycle of the control",
+    160: "G16 (polar coordinates) is not read yet",
+    310: "G31 (skip) ends where a signal comes",
+    330: "G33 cuts a thread, which a correction would distort",
+    331: "G33.1 (rigid tapping) is synchronous with the spindle",
+    434: "G43.4 (tool centre point control) needs rotary axes",
+    510: "G51 (scaling) is not read yet",
+    511: "G51.1 (mirror image) is not read yet",
+    650: "G65 calls a macro",
+    660: "G66 calls a macro",
+    680: "G68 (rotation) is not read yet",
+    682: "G68.2 (tilted plane) is not read yet",
+    760: "G76 threads or fine-bores, which a correction would distort",
+    870: "G87 (back boring) moves off axis inside the control",
+    880: "G88 waits for a person inside the control",
+    281: "G28.1 stores the present position, and no word of it can be edited",
+    301: "G30.1 stores the present position, and no word of it can be edited",
+    410: "G41 (cutter compensation) makes the path inside the control",
+    411: "G41.1 (cutter compensation) makes the path inside the control",
+    420: "G42 (cutter compensation) makes the path inside the control",
+    421: "G42.1 (cutter compensation) makes the path inside the control",
+}
+
+CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
+CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
+PROBES = frozenset({382, 383, 384, 385})
+
+
+def g_codes(*, carry: set[int], extra: dict[int, Act], without: Set[int] = frozenset()) -> dict[int, Act]:
+    """The table of a control: the usual codes, those whose bytes it carries, those it has besides or treats
+    in another way, without those it does not have."""
+    codes = dict.fromkeys((0, 10, 20, 30, 800, *CYCLES, *PROBES), Act.MOTION)
+    codes |= dict.fromkeys((330, 331, 760, 870, 880), Act.REFUSE)
+    codes |= dict.fromkeys((170, 180, 190), Act.PLANE)
+    codes |= dict.fromkeys((900, 910), Act.DISTANCE)
+    codes |= dict.fromkeys((930, 940, 950), Act.FEED)
+    codes |= dict.fromkeys((980, 990), Act.RETRACT)
+    codes |= dict.fromkeys((40, 100, 200, 210, 280, 300, 430, 490, 520, 530, 610, 640, 920), Act.EVENT)
+    codes |= dict.fromkeys(range(540, 600, 10), Act.EVENT)
+    codes |= dict.fromkeys((400, 960, 970, *carry), Act.CARRY)
+    codes |= dict.fromkeys(REFUSALS, Act.REFUSE)
+    codes |= extra
+    return {code: act for code, act in codes.items() if code not in without}
+
+
+#: M codes of ISO 6983 that leave the axes where they are.
+ISO_M = frozenset({0, 1, 2, 3, 4, 5, 7, 8, 9, 19, 30, 48, 49})
+ARC_DISTANCE: Mapping[int, Act] = dict.fromkeys((901, 911), Act.ARC_DISTANCE)

@@ -1,0 +1,33 @@
+"""Grbl 1.1 and its descendants, which have no canned cycles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from olp.program.rs274.cycles import NGC_CYCLES
+from olp.program.rs274.entry import read_blocks, unroll_blocks
+from olp.program.rs274.flatten.language import NGC
+from olp.program.rs274.profiles.base import CYCLES, ISO_M, REFUSALS, Act, Profile, g_codes
+
+_EXTRA = {431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE}
+_LACKING = {
+    *(281, 300, 301, 330, 331, 410, 411, 420, 421, 430, 520, 640, 760, 870, 880, 950, 960, 970, 980, 990),
+    *CYCLES,
+}
+
+DIALECT = Profile(
+    name="grbl",
+    title="Grbl 1.1 and its descendants",
+    reader=read_blocks,
+    unroller=unroll_blocks,
+    codes=g_codes(carry=set(), extra=_EXTRA, without=_LACKING),
+    refusals=REFUSALS,
+    harmless_m=ISO_M | {56},
+    motion=0,
+    initial_retract=990,
+    cycles=replace(NGC_CYCLES, exact_corners=False),
+    language=NGC,
+    path_mode="junction deviation of the control ($11)",
+    inch_decimals=5,
+    free_digits=1,
+)

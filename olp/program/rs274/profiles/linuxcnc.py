@@ -1,0 +1,35 @@
+"""LinuxCNC and other RS274/NGC interpreters."""
+
+from __future__ import annotations
+
+from olp.program.rs274.cycles import NGC_CYCLES
+from olp.program.rs274.entry import read_blocks, unroll_blocks
+from olp.program.rs274.flatten.language import NGC
+from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
+
+_EVENTS = dict.fromkeys((431, 432, 591, 592, 593, 611, 921, 922, 923), Act.EVENT)
+
+DIALECT = Profile(
+    name="linuxcnc",
+    title="LinuxCNC and other RS274/NGC interpreters",
+    reader=read_blocks,
+    unroller=unroll_blocks,
+    codes=g_codes(carry={80}, extra={**_EVENTS, **ARC_DISTANCE}),
+    refusals=REFUSALS,
+    harmless_m=ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
+    initial_retract=990,
+    g52_is_g92=True,
+    g10_offsets=9,
+    m61_sets_tool=True,
+    length_of_spindle_tool=True,
+    feed_words_end=True,
+    feed_before_unit=True,
+    m_with_motion=frozenset({62, 63, 67}),
+    cycles=NGC_CYCLES,
+    language=NGC,
+    path_mode="G64 without tolerance, LinuxCNC's default",
+    path_tolerance=True,
+    written_ending="ngc",
+    inch_decimals=5,
+    free_digits=1,
+)

@@ -1,0 +1,202 @@
+"""Reads delimited tables: which lines hold data, and the cells of each.
+
+Tables that are only read become texts (`Form`); of those that are edited the bytes of each cell are kept
+(`Cells`), so that what nobody changes stays as it was. What columns a table needs, and what is said of
+numbers that are none, is known by whoever reads it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from olp.core.errors import InputError
+from olp.program.text.delimited import DELIMITERS, Layout
+from olp.program.text.numbers import Number, number
+
+Span = tuple[int, int]
+
+
+def decoded(data: bytes) -> str:
+    """The text of a file. Raises InputError with the line of the first byte that is not UTF-8."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        sentence = f"byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
+        raise InputError(sentence, line=data[: error.start].count(b"\n") + 1) from None
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """How text becomes rows. `mark` stands between cells, None for any blanks; lines that begin with one of
+    `comments` hold no data, and what follows `remark` in a line is none. `loose` quotes may stand behind
+    blanks. `strict` lines end at line ends alone, others at whatever Unicode calls a break."""
+
+    mark: str | None = ","
+    comments: tuple[str, ...] = ("#",)
+    remark: str | None = None
+    loose: bool = False
+    strict: bool = False
+
+    def lines(self, text: str) -> Iterator[tuple[int, str]]:
+        """Every line and its number, from 1, without its end and without remarks."""
+        found = io.StringIO(text, newline=None) if self.strict else text.splitlines()
+        for index, line in enumerate(found, 1):
+            whole = line.removesuffix("\n")
+            yield index, whole if self.remark is None else whole.split(self.remark, 1)[0]
+
+    def holds(self, line: str) -> bool:
+        """Whether a line is neither empty nor a comment."""
+        return bool(line.strip()) and not line.lstrip().startswith(self.comments)
+
+    def cells(self, line: str) -> list[str]:
+        """The cells of a line, without blanks around them. Raises InputError where they are none."""
+        if self.mark is None:
+            return line.split()
+        try:
+            row = next(csv.reader([line], delimiter=self.mark, skipinitialspace=self.loose))
+        except csv.Error as error:
+            raise InputError(f"is no table of comma-separated values ({error})") from None
+        return [cell.strip() for cell in row]
+
+    def rows(self, text: str, behind: int = 0) -> Iterator[tuple[int, list[str]]]:
+        """Number and cells of each line that holds data, behind so many lines."""
+        for line, whole in self.lines(text):
+            if line > behind and self.holds(whole):
+                yield line, self.cells(whole)
+
+
+#: CSV as instruments write it, and CSV as people do
+CSV = Form()
+LOOSE_CSV = Form(loose=True, strict=True)
+
+
+def form_of(layout: Layout) -> Form:
+    """The form of tables that are laid out so."""
+    return Form(DELIMITERS[layout.delimiter], (layout.comment, "#"), loose=True, strict=True)
+
+
+def place_of(column: str | int, header: Sequence[str]) -> int | None:
+    """The index of a column by its number from 1 or its name; None where no column bears the name."""
+    if isinstance(column, int):
+        return column - 1
+    return header.index(column) if column in header else None
+
+
+def no_number(place: int, cell: str, decimal: str) -> str:
+    """What is said of a cell that should hold a number."""
+    return f'column {place + 1} is "{cell[:40]}"; expected a number with a decimal {decimal}'
+
+
+class Cells:
+    """Rows of a table and where the cells of each are, as positions in the bytes of the text. Bytes are never
+    decoded but to compare names. Raises InputError for UTF-16."""
+
+    def __init__(self, data: bytes, layout: Layout) -> None:
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise InputError("the text is UTF-16; expected one byte a character; save it as UTF-8", line=1)
+        self.data, self.layout = data, layout
+        self.decimal = b"," if layout.decimal == "comma" else b"."
+        mark = DELIMITERS[layout.delimiter]
+        self._mark = None if mark is None else mark.encode()
+        self._comments = (b"#", layout.comment.encode())
+        #: where the row that was last given begins and ends
+        self.bounds: Span = (0, 0)
+        self.header: list[str] = []
+        self.header_line = 0
+        if layout.header:
+            for line, start, end in self._lines():
+                self.header = [self.text(span) for span in self.split(start, end)]
+                self.header_line = line
+                break
+
+    def place(self, role: str) -> int | None:
+        """The index of the column that holds something, None where the table has none. Raises InputError."""
+        column = self.layout.columns.get(role)
+        if column is None:
+            return None
+        place = place_of(column, self.header)
+        if place is None:
+            known = ", ".join(self.header) or "their numbers"
+            raise InputError(
+                f'there is no column "{column}"; expected one of {known}', line=self.header_line or 1
+            )
+        return place
+
+    def rows(self) -> Iterator[tuple[int, list[Span]]]:
+        """Line (from 1) and cells of each row of data."""
+        for line, start, end in self._lines():
+            if line > self.header_line:
+                self.bounds = (start, end)
+                yield line, self.split(start, end)
+
+    def number(self, row: Sequence[Span], place: int) -> Number | str:
+        """The number in a cell of a row, or what is wrong with it."""
+        if place >= len(row):
+            return f"{len(row)} columns; expected at least {place + 1} between {self.layout.delimiter}s"
+        found = number(self.data[slice(*row[place])], self.decimal)
+        return no_number(place, self.text(row[place]), self.layout.decimal) if found is None else found
+
+    def word(self, row: Sequence[Span], place: int | None) -> str:
+        """The text of a cell of a row, nothing where there is none."""
+        return self.text(row[place]) if place is not None and place < len(row) else ""
+
+    def text(self, span: Span) -> str:
+        raw = self.data[span[0] : span[1]]
+        try:
+            return raw.decode("utf-8")
+        except UnicodeDecodeError:
+            return raw.decode("latin-1")
+
+    def split(self, start: int, end: int) -> list[Span]:
+        """Spans of the cells of a row, without blanks and quotes around them."""
+        data, mark = self.data, self._mark
+        spans = []
+        if mark is None:
+            for found in re.finditer(rb"\S+", data[start:end]):
+                spans.append(self._bare(start + found.start(), start + found.end()))
+            return spans
+        at = start
+        while True:
+            stop = at
+            while stop < end and data[stop : stop + 1] in (b" ", b"\t") and mark != b"\t":
+                stop += 1
+            if data[stop : stop + 1] == b'"':
+                closing = data.find(b'"', stop + 1, end)
+                while closing >= 0 and data[closing + 1 : closing + 2] == b'"':
+                    closing = data.find(b'"', closing + 2, end)
+                stop = end if closing < 0 else closing
+            stop = data.find(mark, stop, end)
+            stop = end if stop < 0 else stop
+            spans.append(self._bare(at, stop))
+            if stop >= end:
+                return spans
+            at = stop + 1
+
+    def _bare(self, start: int, end: int) -> Span:
+        data = self.data
+        while start < end and data[start] in b" \t":
+            start += 1
+        while end > start and data[end - 1] in b" \t":
+            end -= 1
+        if end - start > 1 and data[start] == data[end - 1] == 34:
+            return self._bare(start + 1, end - 1)
+        return start, end
+
+    def _lines(self) -> Iterator[tuple[int, int, int]]:
+        """Number, start and end of the lines that are neither empty nor comments."""
+        data = self.data
+        at = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+        ending = re.compile(rb"\r\n|\n|\r")
+        number = 0
+        while at < len(data):
+            number += 1
+            found = ending.search(data, at)
+            stop, following = (len(data), len(data)) if found is None else found.span()
+            held = data[at:stop].strip()
+            if held and not held.startswith(self._comments):
+                yield number, at, stop
+            at = following

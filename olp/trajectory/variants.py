@@ -1,0 +1,215 @@
+"""Planning the same program several times: under other tolerances, and under accelerations that keep a
+deviation bounded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.errors import CannotCompute, OlpError, UsageError
+from olp.core.machine import Setup
+from olp.core.progress import Progress
+from olp.program.feeds.moves import lengths_mm
+from olp.program.feeds.timing import PathControl, path_modes
+from olp.program.feeds.words import Shared, check_feeds, write_feeds
+from olp.program.program import Program
+from olp.program.registry import Options, read
+from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
+from olp.trajectory.inertia import Inertial, capped, sure
+from olp.trajectory.plan import Trajectory, plan
+from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.usage import LineUse, SlowPlaces, usage
+
+#: plans that a bound on the inertial deviation may take before it is made sure of
+_TRIALS = 3
+#: share by which a peak of acceleration may pass between the places that are looked at
+_UNSEEN = 1e-4
+#: lines that a report names
+_LINES = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A program as it is to be planned: its text read, the path tolerance where it names none, and the
+    stretches that it drives."""
+
+    name: str
+    setup: Setup
+    program: Program
+    blend_mm: float
+    blend_from: str
+    block_delete: bool
+    contour: bool
+    legs: tuple[Route, ...]
+
+    def rewritten(self, data: bytes) -> Case:
+        """Another text in place of this one's, read in the same way. Raises ProgramError."""
+        options = Options(block_delete=self.block_delete, contour=self.contour)
+        program = read(data, self.setup, self.program.dialect, options)
+        # the machine's mode at the start is no word of the text
+        modes = (*(m for m in self.program.path_modes if m.line == 0), *program.path_modes)
+        return replace(self, program=replace(program, path_modes=modes)).driven()
+
+    def driven(self) -> Case:
+        """The same with its stretches."""
+        legs = routes(self.program, blend_mm=self.blend_mm, block_delete=self.block_delete)
+        return replace(self, legs=legs)
+
+    def scaled(self, factor: float) -> Case:
+        """The same with all path tolerances, also those that the program names, times a factor."""
+        modes = tuple(
+            mode if mode.tolerance_mm is None else replace(mode, tolerance_mm=mode.tolerance_mm * factor)
+            for mode in self.program.path_modes
+        )
+        program = replace(self.program, path_modes=modes)
+        return replace(self, program=program, blend_mm=self.blend_mm * factor).driven()
+
+    def tolerances(self) -> dict[str, Any]:
+        """Which path tolerances are in use, and where they come from."""
+        modes = path_modes(self.program, block_delete=self.block_delete)
+        path = self.program.toolpath
+        blends = [m for m in modes if m.control == PathControl.BLEND]
+        stated = {m.stated_mm * 1e3 for m in blends if m.stated_mm is not None}
+        first = int(path.line[0]) if len(path) else 0
+        bare = not modes or modes[0].line > first or any(m.stated_mm is None for m in blends)
+        return {
+            "stated_um": sorted(stated),
+            "default_um": self.blend_mm * 1e3 if bare else None,
+            "default_from": self.blend_from if bare else None,
+            "exact_stop_at_start": bool(modes) and modes[0].line == 0,
+        }
+
+    def chords_mm(self) -> float:
+        """What the chords that stand for arcs may leave the arcs by."""
+        if not len(self.program.toolpath.arcs):
+            return 0.0
+        stated = self.tolerances()
+        widest = max((v for v in (*stated["stated_um"], stated["default_um"]) if v), default=0.0) * 1e-3
+        return CHORD_SHARE * max(widest, EXACT_MM)
+
+    def untimed(self) -> dict[str, Any]:
+        """Moves from or to places that only the control knows: how many, and their first lines."""
+        path = self.program.toolpath
+        line = path.line[np.isnan(lengths_mm(path))]
+        return {"moves": len(line), "lines": np.unique(line)[:_LINES].tolist()}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A case planned within limits: a trajectory a stretch, and what they use of the limits."""
+
+    case: Case
+    limits: AxisLimits
+    trajectories: tuple[Trajectory, ...]
+    lines: LineUse
+    slow: tuple[SlowPlaces, ...]
+
+    @property
+    def duration_s(self) -> float:
+        return sum(t.duration_s for t in self.trajectories)
+
+    @property
+    def blending_mm(self) -> float:
+        """How far the motion is from the chords of the path, at most."""
+        return max((leg.deviation_mm for t in self.trajectories for leg in t.legs), default=0.0)
+
+
+def planned(case: Case, limits: AxisLimits, tell: Progress, what: str = "plan") -> Plan:
+    """Plan every stretch of a case. Raises CannotCompute as `olp.trajectory.plan.plan`."""
+    trajectories = _motions(case.legs, limits, tell, what)
+    found = [usage(t, leg) for t, leg in zip(trajectories, case.legs, strict=True)]
+    lines = LineUse.joined([lines for lines, _ in found])
+    return Plan(case, limits, trajectories, lines, tuple(slow for _, slow in found))
+
+
+def _motions(legs: Sequence[Route], limits: AxisLimits, tell: Progress, what: str) -> tuple[Trajectory, ...]:
+    edges = np.cumsum([0, *map(len, legs)]) / max(sum(map(len, legs)), 1)
+    return tuple(
+        plan(leg, limits, lambda _, share, a=a, b=b: tell(what, a + share * (b - a)))  # type: ignore[misc]
+        for leg, (a, b) in zip(legs, pairwise(edges.tolist()), strict=True)
+    )
+
+
+def within_inertial(
+    case: Case, limits: AxisLimits, compliance: Array, most_mm: float, tell: Progress
+) -> Plan:
+    """Plan with accelerations so low that the inertial deviation keeps to `most_mm` everywhere.
+
+    What each axis alone may shift the tool by is lowered by what the plan before was too large by; where that
+    does not settle, it is set so that no motion at all can exceed the bound. Raises UsageError for a machine
+    without compliance, and a bound that is not above 0.
+    """
+    if not most_mm > 0.0:
+        raise UsageError(f"the inertial deviation is bounded to {most_mm * 1e3:g} um; expected more than 0")
+    if not compliance.any():
+        raise UsageError(
+            "the machine file states no compliance, so inertial deviation cannot be bounded; give "
+            "compliance_um_per_m_s2 in [axes.X], [axes.Y] or [axes.Z]"
+        )
+    certain = sure(limits, compliance, most_mm) * (1.0 - 2.0 * _UNSEEN)
+    size = np.sqrt((compliance * compliance).sum(axis=0))
+    cap = float((size * limits.acceleration).max())
+    for trial in range(_TRIALS + 1):
+        cap = certain if trial == _TRIALS else max(cap, certain)
+        found = planned(case, capped(limits, compliance, cap), tell, "plan" if trial == 0 else "bound")
+        largest = max((Inertial.of(t.motion, compliance).most_mm for t in found.trajectories), default=0.0)
+        if largest * (1.0 + _UNSEEN) <= most_mm:
+            return found
+        # a cap above what was reached bound nothing
+        cap = min(cap, largest) * (most_mm / largest) * (1.0 - 1e-3)
+    raise CannotCompute(f"no plan keeps the inertial deviation within {most_mm * 1e3:g} um")
+
+
+def with_feeds(found: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[str, Any]]:
+    """The text with the planned feeds in its F words, read back, and a report of it; `duration_s` is what the
+    text takes, planned once more.
+
+    Raises ProgramError for a feed that cannot be written, CannotCompute where it does not read back.
+    """
+    case, lines = found.case, found.lines
+    fed = np.flatnonzero((lines.feed_length_mm > 0.0) & (lines.feed_seconds > 0.0))
+    planned_s = lines.feed_seconds[fed]
+    try:
+        written = write_feeds(
+            case.program, lines.line[fed], planned_s, planned_s - lines.lost_s()[fed], shared=shared,
+            block_delete=case.block_delete,
+        )  # fmt: skip
+    except OlpError as error:
+        raise (error.in_file(case.name) if case.name else error) from None
+    other = case.rewritten(written.data)
+    check_feeds(case.program, other.program, block_delete=case.block_delete)
+    again = planned(other, found.limits, tell, "feeds")
+    return written.data, {
+        "words": written.words,
+        "changed": written.changed,
+        "shared": written.shared,
+        "rule": shared,
+        "slower_lines": written.slower,
+        "kept_lines": list(written.kept),
+        "duration_s": again.duration_s,
+    }
+
+
+def blend_study(case: Case, found: Plan, factors: Sequence[float], tell: Progress) -> list[dict[str, Any]]:
+    """Time and path deviation at multiples of the tolerances in use; `found` is the plan at 1."""
+    rows = []
+    path = case.tolerances()
+    used_um = [v for v in (*path["stated_um"], path["default_um"]) if v]
+    for factor in factors:
+        other = (
+            found if factor == 1.0 else planned(case.scaled(factor), found.limits, tell, f"blend x{factor:g}")
+        )
+        rows.append(
+            {
+                "factor": factor,
+                "tolerance_um": [v * factor for v in used_um],
+                "duration_s": other.duration_s,
+                "deviation_um": other.blending_mm * 1e3,
+            }
+        )
+    return rows

@@ -1,0 +1,250 @@
+"""`calibrate export`: a calibration as the compensation table of a control, and what each would leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from olp.calibration.control_tables.controls import Control
+from olp.calibration.control_tables.residuals import CORRECT, Left, along, in_box, left_by
+from olp.core.errors import InputError, OlpError, UsageError
+from olp.core.machine import Machine, Setup
+from olp.core.progress import silent
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.build import build
+from olp.errormodel.calibration import Calibration, Reference
+from olp.files.calibration.reader import load_calibration
+from olp.files.control_tables.base import Exported, Given, Sense
+from olp.files.control_tables.registry import FORMATS, format_named, read_table, write_table
+from olp.files.sources import Sources
+from olp.findings.catalogue import Finding
+from olp.program.registry import read
+from olp.reports.report import number
+from olp.workflows.control_table import given_of
+from olp.workflows.correct import CorrectOptions, corrected
+from olp.workflows.session import Loaded, PathLike, Session
+
+#: Points over the box, and the seed of their places: figures of two calls can be compared.
+POINTS, SEED = 4000, 1
+_MAIN = Path("table")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TableExport:
+    """The files of a table, findings, and the report as a mapping ("olp-tables-1"): what each way leaves, and
+    `compensated_by_controller` as it has to stand in the machine file once the table is active."""
+
+    files: Mapping[Path, bytes]
+    findings: tuple[Finding, ...]
+    notes: tuple[str, ...]
+    report: dict[str, Any]
+
+
+def export_table(
+    machine: PathLike | Setup | None,
+    kind: str,
+    target: PathLike,
+    job: PathLike | None = None,
+    *,
+    calibration: PathLike | None = None,
+    program: PathLike | bytes | None = None,
+    sense: Sense | None = None,
+    comp_type: int | None = None,
+    axis_names: Mapping[str, str] | None = None,
+    reference: Reference | None = None,
+    most_rows: int | None = None,
+    chain: str | None = None,
+) -> TableExport:
+    """Write the calibration of a machine, or a calibration file alone, as the table of a control.
+
+    The report says what the table would leave over the calibrated box and, with `program`, along it; the
+    figures are of the table as it is written, read back. Raises UsageError, InputError.
+    """
+    source = _source(machine, job, calibration, chain)
+    given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
+    form = format_named(kind)
+    written = write_table(source.rest, kind, Path(target), given)
+    control = _control(written, kind, given, source)
+    report = _report(source, {form.key: control}, program)
+    corrects = sorted(written.corrects | source.compensated)
+    report["compensated_by_controller"] = corrects
+    findings = (*source.findings, *written.findings)
+    report["findings"] = [finding.as_dict() for finding in findings]
+    return TableExport(written.files, findings, written.notes, report)
+
+
+def compare_tables(
+    machine: PathLike | Setup | None,
+    job: PathLike | None = None,
+    *,
+    calibration: PathLike | None = None,
+    program: PathLike | bytes | None = None,
+    reference: Reference | None = None,
+    most_rows: int | None = None,
+    chain: str | None = None,
+) -> dict[str, Any]:
+    """What each format of tables would leave, next to a corrected program ("olp-tables-1"). Nothing is
+    written; where a sense or a reference has to be stated, the figures are those of the right one."""
+    source = _source(machine, job, calibration, chain)
+    controls: dict[str, Control] = {}
+    said: dict[str, list[dict[str, object]]] = {}
+    for key, form in FORMATS.items():
+        given = given_of(
+            source.machine, chain, form.sense or "error", None, None, None,
+            reference or "functional-point", most_rows,
+        )  # fmt: skip
+        written = write_table(source.rest, key, _MAIN.with_suffix(form.ending), given)
+        controls[key] = _control(written, key, given, source)
+        said[key] = [f.as_dict() for f in written.findings if f.code not in ("OLP874", "OLP875")]
+    report = _report(source, controls, program)
+    report["formats"] = {
+        key: {"title": form.title, "status": form.status, "holds": form.holds, "findings": said[key]}
+        for key, form in FORMATS.items()
+    }
+    report["findings"] = [finding.as_dict() for finding in source.findings]
+    return report
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Source:
+    """What a table is made of: `rest` is the calibration without what the control corrects already."""
+
+    sources: Sources
+    machine: Machine | None
+    loaded: Loaded | None
+    chain: str
+    rest: Calibration
+    model: ErrorModel
+    tools_mm: np.ndarray
+    increment_mm: np.ndarray
+    compensated: frozenset[str]
+    findings: tuple[Finding, ...]
+
+
+def _source(
+    machine: PathLike | Setup | None, job: PathLike | None, calibration: PathLike | None, chain: str | None
+) -> _Source:
+    if (machine is None and job is None) == (calibration is None):
+        raise UsageError(
+            "name either a machine file with -m, whose calibration is taken, or a calibration with -c"
+        )
+    sources = Sources()
+    if calibration is not None:
+        alone = load_calibration(calibration, read=sources.read)
+        model = build(alone, chain or "FXYZ", outside="hold")
+        return _Source(
+            sources, None, None, chain or "FXYZ", alone, model, np.zeros((1, 3)), np.full(3, 1e-3),
+            frozenset(), (),
+        )  # fmt: skip
+    if chain is not None:
+        raise UsageError("--chain goes with -c; the machine file states its own chain")
+    loaded = Session.start(machine, job, sources=sources).loaded("hold")
+    described = loaded.setup.machine
+    skip = described.compensated_by_controller - loaded.calibration.active_during_measurement
+    findings = []
+    if skip:
+        message = f"{', '.join(sorted(skip))} stand in compensated_by_controller and are not in the new table"
+        findings.append(Finding("OLP876", message, count=len(skip)))
+    levers = {tool.lever_mm for tool in described.tools.values() if tool.lever_mm is not None}
+    return _Source(
+        sources, described, loaded, described.chain, _without(loaded.calibration, skip), loaded.model,
+        np.array(sorted(levers) or [(0.0, 0.0, 0.0)]), np.array(described.least_increment_mm),
+        described.compensated_by_controller, tuple(findings),
+    )  # fmt: skip
+
+
+def _without(calibration: Calibration, skip: frozenset[str]) -> Calibration:
+    curves = []
+    for curve in calibration.curves:
+        parts = [
+            {n: v for n, v in part.items() if n not in skip}
+            for part in (curve.columns, curve.forward, curve.backward)
+        ]
+        if any(parts):
+            curves.append(replace(curve, columns=parts[0], forward=parts[1], backward=parts[2]))
+    return replace(
+        calibration,
+        curves=tuple(curves),
+        squareness={n: 0.0 if n in skip else v for n, v in calibration.squareness.items()},
+        cyclic=tuple(c for c in calibration.cyclic if c.component not in skip),
+    )
+
+
+def _control(written: Exported, kind: str, given: Given, source: _Source) -> Control:
+    """The control with the table as it stands in the written bytes; values beyond a table's end hold."""
+    given = replace(given, travel_mm=np.array(source.rest.box_mm))
+    main = next(iter(written.files))
+    if not written.corrects:
+        return format_named(kind).control(Calibration("", source.rest.box_mm), source.chain)
+    found = read_table(main, kind, given, lambda path: written.files[path])
+    return format_named(kind).control(found.calibration, source.chain)
+
+
+def _report(
+    source: _Source, controls: Mapping[str, Control], program: PathLike | bytes | None
+) -> dict[str, Any]:
+    box = np.asarray(source.model.box_mm, float)
+    places = in_box(box, source.tools_mm, POINTS, SEED)
+    report: dict[str, Any] = {
+        "schema": "olp-tables-1",
+        "machine": source.rest.machine,
+        "box": {
+            "points": POINTS, "seed": SEED, "box_mm": box.tolist(), "tools_mm": source.tools_mm.tolist(),
+            "left": _figures(left_by(source.model, controls, places, source.increment_mm)),
+        },
+    }  # fmt: skip
+    if program is not None:
+        report["program"] = _along(source, controls, program, box)
+    return report
+
+
+def _along(
+    source: _Source, controls: Mapping[str, Control], program: PathLike | bytes, box: np.ndarray
+) -> dict[str, Any]:
+    """What is left along a program; what correcting leaves is the proof of a correction really done."""
+    loaded = source.loaded
+    if loaded is None:
+        raise UsageError("a program is read with its machine; name the machine file with -m")
+    text = source.sources.source(program)
+    text.load()
+    with text.errors("<program>"):
+        loaded = loaded.reading(text)
+        path = read(text.data, loaded.setup, loaded.dialect, words=False).toolpath
+    places = along(path, box, source.chain)
+    if places.counted is None or not places.counted.any():
+        raise InputError("has no cutting move whose axes are all known", file=text.name or "<program>")
+    out: dict[str, Any] = {
+        "name": text.short,
+        "points": int(places.counted.sum()),
+        "left": _figures(left_by(source.model, controls, places)),
+        "refused": None,
+    }
+    try:
+        options = CorrectOptions(outside_box="hold")
+        run = corrected(source.sources, text, loaded, options, silent)
+        after = run.report["deviation"]["after"]["between"]
+        out["left"][CORRECT] = {**after, "rms_in_frame_um": None}
+    except OlpError as error:
+        out["refused"] = str(error.in_file(text.name or "<program>"))
+        out["left"][CORRECT] = dict.fromkeys(("rms_um", "max_um", "rms_in_frame_um"))
+    return out
+
+
+def _figures(found: Mapping[str, Left]) -> dict[str, Any]:
+    return {name: left.as_dict() for name, left in found.items()}
+
+
+def left_lines(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
+    """Rows of a table of figures: way, over the box (rms, max, rms in a frame), along the program (same)."""
+    rows = []
+    for name, box in report["box"]["left"].items():
+        row = [name, *(number(box[key]) for key in ("rms_um", "max_um", "rms_in_frame_um"))]
+        if "program" in report:
+            left = report["program"]["left"][name]
+            row += [number(left[key]) for key in ("rms_um", "max_um", "rms_in_frame_um")]
+        rows.append(tuple(row))
+    return rows

@@ -1,0 +1,34 @@
+"""`calibrate postures`: a point held in several postures, from a file to errors of tool vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.calibration.iso230 import postures
+from olp.calibration.iso230.postures import PostureFit
+from olp.core.errors import ConfigError
+from olp.core.machine import Setup
+from olp.files.measurements.postures import read_postures
+from olp.workflows.session import PathLike, Session
+
+
+def fit_postures(
+    source: PathLike, machine: PathLike | Setup | None = None, *, reference: str | None = None
+) -> PostureFit:
+    """Errors of tool vectors from a point held in several postures. With a machine its tools give the nominal
+    vectors, and where it has a calibration, the errors at each posture are taken out first. Raises
+    InputError, ConfigError."""
+    session = None if machine is None else Session.start(machine)
+    found = read_postures(source, None if session is None else session.setup.machine.tools)
+    error = None
+    if session is not None and session.setup.machine.calibration is not None:
+        model = session.loaded("refuse").model
+        outside = ~model.inside(found.axis_mm)
+        if outside.any():
+            row = int(np.flatnonzero(outside)[0])
+            raise ConfigError(
+                f"posture {row + 1} is outside the calibrated box; leave it out, or call without the machine",
+                file=str(source),
+            )
+        error = model.error(found.axis_mm, found.lever_mm)
+    return postures.fit(found, error, reference)

@@ -1,0 +1,44 @@
+"""Report files of measured lines and of the calibration made from them: HTML, JSON or Markdown by their
+ending."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path as FilePath
+
+from olp import __version__
+from olp.calibration.iso230.evaluation import Evaluated, evaluate_all
+from olp.core.errors import ConfigError
+from olp.reports import calibration as report_calibration
+from olp.reports.calibration import FitSummary
+from olp.reports.document import in_form
+from olp.reports.report import to_json
+from olp.workflows.calibrate_fit import FittedCalibration
+
+
+def evaluation(found: Evaluated, name: str, date: datetime.date | None) -> bytes:
+    """The report of an evaluation in the form that `name` ends in."""
+    ending = FilePath(name).suffix.lower()
+    if ending == ".json":
+        return to_json(found.as_dict())
+    plots = report_calibration.plots_of(found) if ending == ".html" else {}
+    return in_form(report_calibration.evaluation(found, plots, __version__, date), name)
+
+
+def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> bytes:
+    """The report of `olp calibrate fit` in the form that `name` ends in."""
+    ending = FilePath(name).suffix.lower()
+    report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
+    if ending == ".json":
+        return to_json(report)
+    measurements = fitted.fit.measurements
+    try:
+        found = evaluate_all(measurements)
+    except ConfigError:
+        # lines of single runs have no ISO 230-2 figures; the fit says what they gave
+        found = Evaluated(measurements, (), (), (), (), (), ())
+    summary = FitSummary(fitted.fit, fitted.calibration, report, fitted.findings)
+    plots: dict[str, bytes] = {}
+    if ending == ".html":
+        plots = report_calibration.fit_plots(summary) | report_calibration.plots_of(found)
+    return in_form(report_calibration.calibration(found, summary, plots, __version__, date), name)

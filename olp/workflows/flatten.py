@@ -1,0 +1,60 @@
+"""A program with its loops, subprograms and expressions unrolled."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from olp.core.errors import UsageError
+from olp.core.machine import Setup
+from olp.files.sources import Source, Sources
+from olp.program.dialect import Dialect
+from olp.workflows.session import PathLike, opened
+
+
+def flatten(
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    expand_cycles: bool = False,
+) -> bytes:
+    """Unroll loops, subprograms, expressions and, if asked, canned cycles into plain blocks. Not lossless."""
+    session, source = opened(program, machine, job, "<program>")
+    with source.errors("<program>"):
+        setup, dialect = session.reading(source)
+        return unrolled(session.sources, source, setup, dialect, expand_cycles=expand_cycles)
+
+
+def unrolled(
+    sources: Sources,
+    program: Source,
+    setup: Setup,
+    dialect: Dialect,
+    *,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
+) -> bytes:
+    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
+
+    With `expand_cycles` canned cycles are written out too, with `peck_clearance_mm` above the last peck on
+    controls that keep it in a parameter. Payloads that the job gives by line become comments first, as lines
+    are others afterwards. Raises UsageError for a dialect that has none of them.
+    """
+    from olp.program.directives import with_payloads
+
+    if dialect.unroller is None:
+        raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
+    data = with_payloads(program.data, setup.job.payloads, dialect.comment)
+
+    def beside(wanted: str) -> bytes | None:
+        if not program.name:
+            return None
+        for suffix in ("", ".ngc", ".nc"):
+            candidate = Path(program.name).parent / f"{wanted}{suffix}"
+            if candidate.is_file():
+                return sources.read(candidate)
+        return None
+
+    return dialect.unroller(
+        data, dialect, subprograms=beside, expand_cycles=expand_cycles, peck_clearance=peck_clearance_mm
+    )

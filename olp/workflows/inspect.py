@@ -1,0 +1,102 @@
+"""`inspect`: what a program does, and the error of the machine at a place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from olp.checks import correction as checks
+from olp.compensation.stamp import find_stamp
+from olp.core.errors import ConfigError
+from olp.core.machine import Setup
+from olp.core.toolpath import Kind, carried
+from olp.files.sources import Source
+from olp.program.registry import read
+from olp.workflows.session import PathLike, Session, opened
+
+
+def inspect(
+    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None
+) -> dict[str, Any]:
+    """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
+    matrix."""
+    session, source = opened(program, machine, job, "<program>")
+    return run(session, source)
+
+
+def run(session: Session, program: Source) -> dict[str, Any]:
+    """As `inspect`, in a session."""
+    with program.errors("<program>"):
+        setup, dialect = session.reading(program)
+        found = read(program.data, setup, dialect)
+    path = found.toolpath
+    with np.errstate(all="ignore"):
+        known = path.end_mm[np.isfinite(path.end_mm).all(axis=1)]
+    ranges = {
+        axis: [float(known[:, i].min()), float(known[:, i].max())] if len(known) else None
+        for i, axis in enumerate("XYZ")
+    }
+    findings = checks.program_findings(found, setup, contour=False)
+    return {
+        "name": program.short,
+        "dialect": dialect.name,
+        "dialect_title": dialect.title,
+        "lines": found.lines,
+        "moves": {kind.name.lower(): int((path.kind == kind).sum()) for kind in Kind},
+        "cycles": len(found.holes),
+        "axis_range_mm": ranges,
+        "tools": sorted({f.tool for f in path.frames if f.tool is not None}),
+        "work_offsets": sorted({f.work_offset for f in path.frames}),
+        "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
+        "path_modes": [
+            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in found.path_modes
+        ],
+        "stamped": find_stamp(program.data) is not None,
+        "findings": [f.as_dict() for f in findings],
+        "support": dialect.support(),
+    }
+
+
+def error_at(
+    machine: PathLike | Setup,
+    position_mm: tuple[float, float, float],
+    tool: int | tuple[float, float, float] | None = None,
+    job: PathLike | None = None,
+) -> dict[str, Any]:
+    """The error at one axis position: actual minus commanded at the tip, and what it is made of.
+
+    `tool` is a tool number or a tool vector in mm (gauge point to tip); the default is the tool in the
+    spindle at the start.
+    """
+    return error_of(Session.start(machine, job), position_mm, tool)
+
+
+def error_of(
+    session: Session,
+    position_mm: tuple[float, float, float],
+    tool: int | tuple[float, float, float] | None = None,
+) -> dict[str, Any]:
+    """As `error_at`, in a session."""
+    loaded = session.loaded("refuse")
+    at = np.array([position_mm], float)
+    inside = loaded.model.inside(at)
+    if not inside.all():
+        axis = "XYZ"[int(np.flatnonzero(~inside[0])[0])]
+        raise ConfigError(
+            f"{axis} = {at[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose a place in it"
+        )
+    vector = session.lever(tool)
+    payload = loaded.setup.job.payload_kg
+    lever = np.array(carried(vector, payload))
+    return {
+        "position_mm": [float(v) for v in position_mm],
+        "tool_mm": [float(v) for v in vector],
+        "payload_kg": payload,
+        "error_um": (loaded.model.error(at, lever)[0] * 1e3).tolist(),
+        "rotation_urad": (loaded.model.rotation(at, None, payload)[0] * 1e6).tolist(),
+        "sources": [
+            {"name": source, "error_um": (part[0] * 1e3).tolist()}
+            for source, part in loaded.model.contributions(at, lever)
+        ],
+    }

@@ -1,0 +1,222 @@
+"""The proof of a correction in a run: what `correct` and `verify` share, from two programs to the report."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from olp.checks import correction as checks
+from olp.checks import state
+from olp.checks.model import model_findings
+from olp.compensation.invert import TOLERANCE_MM
+from olp.compensation.plan import Limits
+from olp.compensation.planning import plan
+from olp.compensation.style import fewest_decimals
+from olp.core.arrays import Index
+from olp.core.errors import OlpError, naming
+from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
+from olp.core.toolpath import Toolpath
+from olp.core.units import MM_PER_UM, UM_PER_MM
+from olp.findings.catalogue import Finding
+from olp.program.program import Program
+from olp.proof.proof import ROUNDING_SHARE, Proof, prove
+from olp.uncertainty.spread import Confidence
+from olp.workflows.confidence import Assessment, assess
+from olp.workflows.session import Loaded
+
+_PROVES = (
+    "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
+    "the error model at those commands brings the tip to the nominal path, at and between the way-points",
+)
+_DOES_NOT_PROVE = (
+    "that the calibration still describes the machine: measure a circle or a diagonal to see that",
+    "what the control does between blocks (blending, following error) and what the process does to the part",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProofOptions:
+    """What every verb that proves a correction takes: the numerical tolerance, the tolerance of the part
+    (`within_um`, default `tolerance_um`), and the day of the run."""
+
+    tolerance_um: float = 1.0
+    contour: bool = False
+    within_um: float | None = None
+    only_sure_components: bool = False
+    date: datetime.date | None = None
+
+    def proof(self) -> dict[str, Any]:
+        """These values alone, as the keywords of another verb's options."""
+        return {f.name: getattr(self, f.name) for f in fields(ProofOptions)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
+    report ("olp-report-1"), the findings, and how sure it is where the calibration states uncertainties."""
+
+    text: bytes
+    nominal: Program
+    corrected: Program
+    proof: Proof
+    passed: Index
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
+
+
+def verify_programs(
+    nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions
+) -> Run:
+    """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError
+    where the second is no correction of the first."""
+    (first, name), (second, other) = nominal, corrected
+    limits = Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
+    with naming(name or "<nominal>"):
+        rows = plan(first.toolpath, loaded.model, limits)
+    digit = last_digit_mm(second, loaded.setup)
+    try:
+        proof = prove(
+            first, second, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
+            passed=rows.passed,
+        )  # fmt: skip
+    except OlpError as error:
+        raise error.in_file(other or "<corrected>") from None
+    sure = confidence_of(loaded, first, second, proof, rows.passed, options, silent)
+    findings = (
+        *calibration_findings(loaded, options.date),
+        *checks.proof_findings(proof, rows.passed),
+        *checks.between_findings(first, proof, loaded.model),
+        *checks.program_findings(first, loaded.setup, contour=options.contour),
+        *(sure[2] if sure else ()),
+        *findings_of_model(first.toolpath, loaded, limits.tolerance_mm),
+    )
+    report = report_of(first, (first.data, name), loaded, proof, findings, options.tolerance_um)
+    if sure:
+        report["uncertainty"] = sure[1]
+    return Run(second.data, first, second, proof, rows.passed, report, findings, sure[0] if sure else None)
+
+
+def confidence_of(
+    loaded: Loaded, nominal: Program, corrected: Program, proof: Proof, passed: Index, options: ProofOptions,
+    tell: Progress,
+) -> Assessment | None:  # fmt: skip
+    """How sure a proof is; None where the calibration states no uncertainty."""
+    return assess(
+        loaded, nominal, corrected, proof.groups, passed, options.within_um or options.tolerance_um,
+        options.date, tell, asked=options.within_um is not None,
+    )  # fmt: skip
+
+
+def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
+    """Travel, and the calibrated box under the code `outside`, of the corrected path, with the nominal
+    lines."""
+    path = replace(proof.written, line=proof.nominal.line[proof.owner()])
+    found = state.travel_findings(path, loaded.setup.machine)
+    return found if outside is None else [*found, *state.box_findings(path, loaded.model.box_mm, outside)]
+
+
+def calibration_findings(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
+    days = loaded.setup.machine.sanity.calibration_days
+    return state.calibration_findings(loaded.calibration, date, days)
+
+
+def findings_of_model(path: Toolpath, loaded: Loaded, tolerance_mm: float) -> list[Finding]:
+    sanity = loaded.setup.machine.sanity
+    return model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
+
+
+def report_of(
+    program: Program,
+    source: tuple[bytes, str],
+    loaded: Loaded,
+    proof: Proof,
+    findings: tuple[Finding, ...],
+    tolerance_um: float,
+) -> dict[str, Any]:
+    """The report ("olp-report-1") as far as a proof alone can fill it."""
+    data, name = source
+    machine, calibration = loaded.setup.machine, loaded.calibration
+    size = proof.size_mm()
+    bend = float(
+        np.where(proof.after.judged & proof.cutting & ~proof.lean, proof.after.bend, 0.0).max(initial=0.0)
+    )
+    return {
+        "schema": "olp-report-1",
+        "program": {
+            "name": Path(name).name if name else "",
+            "sha256": hashlib.sha256(data).hexdigest(),
+            "lines": program.lines,
+            "dialect": loaded.dialect.name,
+            "moves": len(program.toolpath),
+        },
+        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
+        "calibration": {
+            "measured": calibration.measured,
+            "valid_until": calibration.valid_until,
+            "model": calibration.model,
+            "temperature_degC": calibration.temperature_degC,
+            "sha256": loaded.digest,
+        },
+        "tolerance_um": tolerance_um,
+        "deviation": {
+            "before": proof.before.summary(proof.cutting),
+            "after": proof.after.summary(proof.cutting & ~proof.lean),
+            "path_max_um": float(size.max(initial=0.0)) * 1e3,
+            "allowed_um": proof.allowed_mm * 1e3,
+            "holds": proof.holds,
+        },
+        "budget_um": _budget(bend, proof, program, loaded),
+        "orientation": checks.orientation(program.toolpath, loaded.model),
+        "sources": checks.sources(program.toolpath, loaded.model),
+        "worst": checks.worst_blocks(program, proof),
+        "findings": [f.as_dict() for f in findings],
+        "proves": list(_PROVES),
+        "does_not_prove": list(_DOES_NOT_PROVE),
+    }
+
+
+def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> dict[str, float]:
+    """What remains, by where it comes from, in um; the largest of each, of the random part two standard
+    deviations. The control rounds to its least increment where the digits written are not multiples of it."""
+    machine, repeatability = loaded.setup.machine, loaded.calibration.repeatability_mm
+    units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
+    halves = [
+        0.5 * least
+        if any(
+            not _multiple(10.0 ** -fewest_decimals(least, u, loaded.dialect.inch_decimals) * u, least)
+            for u in units
+        )
+        else 0.0
+        for least in machine.least_increment_mm
+    ]
+    budget = {
+        "model_and_chords": bend_mm,
+        "inversion": TOLERANCE_MM,
+        "rounding": ROUNDING_SHARE * proof.digit_mm,
+        "increment": float(np.linalg.norm(halves)),
+    }
+    if repeatability is not None:
+        budget["random_2_sigma"] = 2.0 * float(np.linalg.norm(repeatability))
+    return {name: value * UM_PER_MM for name, value in budget.items()}
+
+
+def _multiple(length_mm: float, of_mm: float) -> bool:
+    return abs(length_mm / of_mm - round(length_mm / of_mm)) < 1e-6 and length_mm > 0.5 * of_mm
+
+
+def last_digit_mm(program: Program, setup: Setup) -> float:
+    """The coarsest last digit that the corrected program is written with."""
+    units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
+    inch = program.dialect.inch_decimals
+    return max(
+        10.0 ** -fewest_decimals(least, unit, inch) * unit
+        for least in setup.machine.least_increment_mm
+        for unit in units
+    )

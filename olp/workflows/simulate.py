@@ -1,0 +1,84 @@
+"""`simulate`: the path of the tip that the uncompensated machine would take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from olp.compensation.plan import zero_shifts
+from olp.core.arrays import Array
+from olp.core.machine import Setup
+from olp.files.sources import Source
+from olp.program.registry import Options, read
+from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulateOptions:
+    """What `simulate` takes; see there."""
+
+    step_mm: float = 1.0
+    outside_box: Outside = "hold"
+    contour: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation:
+    """(n, 3) tip positions of the real machine in the program's first work frame, and the line of each."""
+
+    points_mm: Array
+    line: Array
+    frame: str
+
+    def to_csv(self) -> bytes:
+        """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment."""
+        rows = [f"# frame={self.frame}", "X_mm,Y_mm,Z_mm,line"]
+        rows += [
+            f"{x:.6f},{y:.6f},{z:.6f},{int(n)}"
+            for (x, y, z), n in zip(self.points_mm.tolist(), self.line.tolist(), strict=True)
+        ]
+        return ("\n".join(rows) + "\n").encode()
+
+
+def simulate(
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    step_mm: float = 1.0,
+    outside_box: Literal["refuse", "hold"] = "hold",
+    contour: bool = False,
+) -> Simulation:
+    """The path of the tip that the uncompensated machine would really take, in the program's first work
+    frame."""
+    session, source = opened(program, machine, job, "<program>")
+    options = SimulateOptions(step_mm=step_mm, outside_box=outside_box, contour=contour)
+    return run(session, source, options)
+
+
+def run(session: Session, program: Source, options: SimulateOptions) -> Simulation:
+    """As `simulate`, in a session."""
+    with program.errors("<program>"):
+        loaded = session.loaded(options.outside_box).reading(program)
+    return simulated(program, loaded, options)
+
+
+def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simulation:
+    """As `simulate`, of a program whose dialect is settled in `loaded`."""
+    from olp.proof.deviation import Tracer
+
+    with program.errors("<program>"):
+        reading = Options(contour=options.contour)
+        path = read(program.data, loaded.setup, loaded.dialect, reading, words=False).toolpath
+        shift = zero_shifts(path.frames, loaded.model)
+    if not len(path):
+        return Simulation(np.zeros((0, 3)), np.zeros(0), "")
+    actual, move = Tracer.trace(path, loaded.model, options.step_mm)
+    home = path.frames[int(path.frame[0])]
+    lengths = path.per_frame([f.length_mm for f in path.frames])
+    tip = actual - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
+    actual = home.tip_mm(tip)
+    known = np.isfinite(actual).all(axis=1)
+    return Simulation(actual[known], path.line[move[known]].astype(np.float64), home.work_offset)

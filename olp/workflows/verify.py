@@ -1,0 +1,89 @@
+"""`verify`: a corrected program proved from the two texts alone."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from olp.core.machine import Setup
+from olp.core.progress import Progress, silent
+from olp.files.sources import Source
+from olp.findings.catalogue import Finding
+from olp.program.program import Program
+from olp.program.registry import Options, read
+from olp.uncertainty.spread import Confidence
+from olp.workflows.proof import ProofOptions, verify_programs
+from olp.workflows.session import Loaded, Outside, PathLike, Session
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifyOptions(ProofOptions):
+    """What `verify` takes; see there."""
+
+    outside_box: Outside = "hold"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verification:
+    """The proof of a corrected program from two texts alone; `confidence` as in Correction."""
+
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+    confidence: Confidence | None = None
+
+
+def verify(
+    nominal: PathLike | bytes,
+    corrected: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    tolerance_um: float = 1.0,
+    outside_box: Literal["refuse", "hold"] = "hold",
+    contour: bool = False,
+    within_um: float | None = None,
+    only_sure_components: bool = False,
+    date: datetime.date | None = None,
+    progress: Progress | None = None,
+) -> Verification:
+    """Hold a corrected program against the nominal one, from the two texts and the machine's files alone.
+
+    Raises ProgramError where the second is no correction of the first.
+    """
+    session = Session.start(machine, job)
+    options = VerifyOptions(
+        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, within_um=within_um,
+        only_sure_components=only_sure_components, date=date,
+    )  # fmt: skip
+    texts = session.sources.source(nominal), session.sources.source(corrected)
+    return run(session, *texts, options, progress)
+
+
+def run(
+    session: Session,
+    nominal: Source,
+    corrected: Source,
+    options: VerifyOptions,
+    progress: Progress | None = None,
+) -> Verification:
+    """As `verify`, in a session."""
+    tell = progress or silent
+    loaded = session.loaded(options.outside_box, only_sure=options.only_sure_components)
+    for source in (nominal, corrected):
+        source.load()
+    with nominal.errors():
+        loaded = loaded.reading(nominal)
+    programs = []
+    for source in (nominal, corrected):
+        tell("read", 0.0)
+        with source.errors("<program>"):
+            programs.append(_read(source, loaded, options))
+    done = verify_programs(
+        (programs[0], nominal.name), (programs[1], corrected.name), loaded, options
+    )
+    return Verification(done.report, done.findings, done.confidence)
+
+
+def _read(source: Source, loaded: Loaded, options: VerifyOptions) -> Program:
+    return read(source.data, loaded.setup, loaded.dialect, Options(contour=options.contour))

@@ -1,0 +1,168 @@
+"""What each dialect says: one table of cases for the suites that run over all dialects.
+
+A dialect joins with a `Case`: how it says points, distances and comments, which characters it is made of, and
+where real programs of it are.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.program import registry
+from olp.program.rs274.profiles.base import Profile
+
+NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
+Lines = list[str]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One dialect. `coordinates` finds the numbers of motion statements, its groups the three of them;
+    `support` are the kinds of statements that it has."""
+
+    name: str
+    controller: str
+    alphabet: str
+    head: Lines
+    tail: Lines
+    point: Callable[[Sequence[float], int], str]
+    distance: Callable[[Sequence[float], int], str] | None
+    comment: Callable[[str], str]
+    coordinates: re.Pattern[bytes]
+    specimens: tuple[str, ...]
+    examples: tuple[bytes, ...] = ()
+    keys: str = ""
+    support: frozenset[str] = frozenset({"corrected", "read", "carried", "refused"})
+
+    def program(self, points: np.ndarray, digits: int) -> bytes:
+        said = [self.point(p, digits) for p in points.tolist()]
+        return ("\n".join([*self.head, *said, *self.tail]) + "\n").encode()
+
+
+def _words(values: Sequence[float], digits: int) -> str:
+    return " ".join(f"{a}{v:.{digits}f}" for a, v in zip("XYZ", values, strict=True))
+
+
+def _list(values: Sequence[float], digits: int) -> str:
+    return ",".join(f"{v:.{digits}f}" for v in values)
+
+
+_positions = itertools.count(1)
+
+
+def _karel(values: Sequence[float], digits: int) -> str:
+    """A position of its own, and the move there."""
+    name = f"p{next(_positions)}"
+    return f"{name} = POS({_list(values, digits)},0,180,0,config)\nMOVE TO {name}"
+
+
+def _rs274(name: str) -> Case:
+    return Case(
+        name, name, "GXYZIJKRFMTNSPQHLDO%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!",
+        ["G21 G90 G17 G54 G94 F600"], ["M2"],
+        lambda p, d: f"G1 {_words(p, d)}", lambda p, d: f"G91 G1 {_words(p, d)}",
+        lambda text: f"({text})",
+        re.compile(rb"(?m)^G1 X(" + NUMBER + rb") Y(" + NUMBER + rb") Z(" + NUMBER + rb")"),
+        ("gcode_cncjs/*",) if name == "linuxcnc" else ("gcode_fanuc*/*",) if name == "fanuc" else (),
+        (b"%\n%\n", b"\xef\xbb\xbfG21\nG0 X1\n"),
+    )  # fmt: skip
+
+
+#: A control of this family needs no case of its own.
+RS274 = tuple(name for name, d in registry.DIALECTS.items() if isinstance(d, Profile))
+CASES = {
+    **{name: _rs274(name) for name in RS274},
+    "apt": Case(
+        "apt", "apt", "GOTDLAFRMCIEUNSP/,.+-$ 0123456789\r\n\t=()'",
+        ["PARTNO TEST", "UNITS/MM", "FEDRAT/600,MMPM"], ["FINI"],
+        lambda p, d: f"GOTO/{_list(p, d)}", lambda p, d: f"GODLTA/{_list(p, d)}",
+        lambda text: f"$$ {text}",
+        re.compile(rb"(?m)^GOTO/(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
+        ("apt_cldata/*",),
+        (
+            b"GOTO/1,2,3$", b"GOTO/1,2,$\n3", b"GOTO/1.$\n5,2,3", b"$$ $\nGOTO/1,2,3\n",
+            b"GOTO/1,2,3,0,0,1\nGOTO/4,5,6",
+            b"CIRCLE/0,0,0,0,0,1\nGOTO/1,0,0", b"GODLTA/1\nGOTO/1,2,3\nGODLTA/-2", b"RAPID\nGOTO/1,2,3",
+            b"GOTO/1E2,2D0,3", b"GOTO/1E999,0,0",
+            b"INDIRV/1,0,0\nTLON,GOFWD/(CIRCLE/0,0,0,1),ON,(LINE/0,0,0,1,0,0)",
+            b"CYCLE/DRILL,DEPTH,5,CLEAR,1\nGOTO/1,2,3\nCYCLE/OFF\nGOTO/2,3,4", b"PPRINT $\nGOTO/1,2,3",
+            b"\xef\xbb\xbfGOTO/1,2,3\r\nGOTO/1,2,4\r\n", b"GOTO/1,2,3\rGOTO/1,2,4\r", b"LOADTL/1\nGOTO/0,0,0",
+            b"$$-> CSYS / 1,0,0,0, $\n0,1,0,0, $\n0,0,1,0\nGOTO/1,2,3\n", b"GOTO/99999999999999999999,1,2",
+        ),
+    ),
+    "dmis": Case(
+        "dmis", "dmis", "GOTPMEASCRDUNI/,.+-$ 0123456789\r\n\t=()'F",
+        ["DMISMN/'TEST',05.2", "UNITS/MM,ANGDEC", "MODE/PROG,MAN"], ["ENDFIL"],
+        lambda p, d: f"GOTO/{_list(p, d)}", None,
+        lambda text: f"$$ {text}",
+        re.compile(rb"(?m)^GOTO/(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
+        ("dmis/*",),
+        (
+            b"GOTO/CART,1,2,3", b"MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3,0,0,1\nENDMES", b"PTMEAS/CART,1,2,3",
+            b"F(A)=FEAT/POINT,CART,1,2,3,0,0,1\nGOTO/1,2,$\n3", b"MEAS/POINT,F(A),1\nENDMES\nGOTO/1,2,3",
+            b"MODE/MAN\nGOTO/1,2,3", b"IF/(A .EQ. 1)\nGOTO/1,2,3\nENDIF",
+            b"TEXT/OPER,'GOTO/1,2,$$'\nGOTO/1,2,3",
+            b"$$ a $\nGOTO/1,2,3", b"D(A)=DATSET/DAT(A),ZDIR\nGOTO/1,2,3", b"BEGIN/CHFILE\nX = 3\nEND/CHFILE",
+        ),
+    ),
+    "list": Case(
+        "list", "list", "XYZ_mminch,;.+-# 0123456789\r\n\t\"eE=",
+        ["X_mm,Y_mm,Z_mm"], [],
+        _list, None, lambda text: f"# {text}",
+        re.compile(rb"(?m)^(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")"),
+        (),
+        (
+            b"X_mm;Y_mm;Z_mm\n1,5;2,5;3,5\n", b"X_inch Y_inch Z_inch\n 1.50  2.5  -3\n", b"1,2,3",
+            b"X_mm,Y_mm,Z_mm", b'X_mm,Y_mm,Z_mm\n"1","2","3"', b"X_mm,Y_mm,Z_mm\n1,2,3,\n",
+            b"\xef\xbb\xbfX_mm,Y_mm,Z_mm\r\n1e1,2E-1,.5\r", b"X_mm,Y_mm,Z_mm\n1,2,\n",
+            b"# frame=G55\nX_mm,Y_mm,Z_mm\n1,2,3", b"X_mm,Y_mm,Z_mm\n1e99,2,3",
+            b"X_mm,Y_mm,Z_mm\n" + b"0" * 50 + b"1,2,3", b'X_mm,Y_mm,Z_mm\n"1,2,3',
+        ),
+    ),
+    "kawasaki-as": Case(
+        "kawasaki-as", "kawasaki-as", "LMOVETRANSPOINDW().,;\"+-= #0123456789\r\n\tp",
+        [".PROGRAM test()", "SPEED 100 MM/S ALWAYS"], [".END"],
+        lambda p, d: f"LMOVE TRANS({_list(p, d)})", lambda p, d: f"DRAW {_list(p, d)}",
+        lambda text: f"; {text}",
+        re.compile(rb"(?m)^LMOVE TRANS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\)"),
+        (),
+        (
+            b"LMOVE p\n.TRANS\np 1 2 3\n.END", b"LMOVE TRANS(1,2,3,0,180,0) ; x",
+            b"JMOVE #a\nLMOVE TRANS(1,2,3)",
+            b'PRINT ";"\nLMOVE TRANS(1,2,3)', b"LMOVE TRANS(1E400,2,3)", b"DRAW 1,2,3",
+            b".TRANS\np 1 2 3\np 1 2 3\n.END\nLMOVE p", b"TOOL 99\nLMOVE TRANS(1,2,3)",
+            b"LMOVE TRANS(1,2,3)\rLMOVE TRANS(1,2,3)",
+        ),
+    ),
+    "val2": Case(
+        "val2", "val2", "MOVESTRANSPD().,;\"+-= #0123456789\r\n\tp",
+        ["SPEED 100 ALWAYS"], [],
+        lambda p, d: f"MOVES TRANS({_list(p, d)})", lambda p, d: f"DRAW {_list(p, d)}",
+        lambda text: f"; {text}",
+        re.compile(rb"(?m)^MOVES TRANS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\)"),
+        (),
+        (b"10 SET a = TRANS(1,2,3)\n20 MOVES a\n30 MOVES a", b"MOVE #p\nMOVES TRANS(1,2,3)"),
+    ),
+    "karel": Case(
+        "karel", "karel", "MOVETPSDLYIN().,;'+-= #$0123456789\r\n\tp",
+        ["PROGRAM test", "BEGIN"], ["END test"],
+        _karel, None, lambda text: f"-- {text}",
+        re.compile(rb"(?m)^p\d+ = POS\((" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb"),"),
+        (),
+        (
+            b"p = POS(1,2,3,0,180,0,c)\nMOVE TO p\nMOVE TO p", b"MOVE TO p", b"MOVE NEAR p BY 100",
+            b"p = POS(1,2,3,0,180,0,c)\np = POS(1,2,3,0,180,0,c)\nMOVE TO p -- 'x'", b"$MOTYPE = LINEAR",
+        ),
+        support=frozenset({"corrected", "carried", "refused"}),
+    ),
+}  # fmt: skip
+#: Named frames of the test's machines.
+FRAMES = {
+    name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
+    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3")
+}
