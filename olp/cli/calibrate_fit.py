@@ -107,13 +107,15 @@ def command(
 
 def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
     """The report as people read it: lines by the names of their files."""
-    shown = dict(report)
-    for key in ("sets_of_points", "stations", "sets_of_pods"):
-        shown[key] = [{**row, "name": Path(row["name"]).name} for row in report[key]]
-    for key in ("lines_of_lengths", "lines_of_angles", "diagonals_and_circles"):
-        shown[key] = [
-            {"name": f"{row['name']} {Path(row['file']).name}"}
-            | {k: value for k, value in row.items() if k not in ("name", "file")}
-            for row in report[key]
-        ]
-    return shown
+
+    def named(row: Any) -> Any:
+        if not isinstance(row, Mapping) or "name" not in row:
+            return row
+        words = [row["name"], *([row["file"]] if "file" in row else [])]
+        name = " ".join([*words[:-1], Path(words[-1]).name])
+        return {"name": name} | {k: value for k, value in row.items() if k not in ("name", "file")}
+
+    return {
+        key: [named(row) for row in value] if isinstance(value, list) else value
+        for key, value in report.items()
+    }

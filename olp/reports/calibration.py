@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import Fit
+from olp.calibration.estimator.fitted import Fit
 from olp.calibration.iso230.conventions import angle_words
 from olp.calibration.iso230.evaluation import Evaluated
 from olp.calibration.iso230.positioning import Evaluation, scale_of
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line, LineState
 from olp.core.arrays import Array
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration
@@ -58,8 +58,8 @@ def fitted_lines(fit: Fit) -> tuple[Fitted, ...]:
     """Each line of a fit beside its curve. Readings are the curve plus what the fit left of them, so their
     zero, slope, drift and reversal are out."""
     out = []
-    for result in fit.lines:
-        line = result.line
+    for result in fit.of(LineState):
+        line = result.state.observation
         x = np.linspace(line.target_mm.min(), line.target_mm.max(), _DENSE)
         rows = fit.curve(line.component, x)
         sigma = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", rows, fit.covariance, rows, optimize=True), 0.0))
@@ -335,10 +335,12 @@ def fit_plots(summary: FitSummary) -> dict[str, bytes]:
     """The plots of a fit as SVG; those of lines where it had any."""
     curves = calibration_curves(summary.calibration)
     out = {"curves": curves[curves.index(b"<svg") :]}
-    results = sorted(summary.fit.lines, key=lambda r: _place_in_order(r.line))
+    results = sorted(
+        summary.fit.of(LineState), key=lambda r: _place_in_order(r.state.observation)
+    )
     if results:
         out["fitted"] = plots_calibration.fitted(fitted_lines(summary.fit))
-        out["residuals"] = plots_calibration.residuals([(r.line, r.residual) for r in results])
+        out["residuals"] = plots_calibration.residuals([(r.state.observation, r.residual) for r in results])
     return out
 
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 from olp.calibration.iso230 import ballbar
 from olp.calibration.iso230.ballbar import CircleFit
-from olp.files.measurements.instruments import read_circles
+from olp.calibration.observations.circles import SKIP_DEG
+from olp.files.measurements.instruments.ballbars import read_circles
 from olp.workflows.session import PathLike
 
 
-def fit_ballbar(sources: Sequence[PathLike], *, skip_deg: float = ballbar.SKIP_DEG) -> tuple[CircleFit, ...]:
+def fit_ballbar(sources: Sequence[PathLike], *, skip_deg: float = SKIP_DEG) -> tuple[CircleFit, ...]:
     """Squareness, scale and servo mismatch and lost motion from circles, a file each. Raises InputError,
     ConfigError."""
     return tuple(ballbar.fit(read_circles(source), skip_deg=skip_deg) for source in sources)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from olp.calibration.iso230 import diagonals
 from olp.calibration.iso230.diagonals import DiagonalFit
-from olp.files.measurements.instruments import read_diagonal
+from olp.files.measurements.instruments.diagonals import read_diagonal
 from olp.workflows.session import PathLike
 
 

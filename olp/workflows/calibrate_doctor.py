@@ -10,7 +10,7 @@ from typing import Any
 from olp.calibration.diagnosis.deciding import Advice, advise
 from olp.calibration.diagnosis.doctor import Diagnosis, Verdict, diagnose
 from olp.calibration.estimator.covariance import sigmas_at
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.units import UM_PER_MM

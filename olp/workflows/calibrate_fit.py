@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of, sigmas_of
+from olp.calibration.estimator.findings import findings_of
+from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import map_findings, map_summary, residual_map
-from olp.calibration.estimator.summary import findings_of, summary
-from olp.calibration.observations.readings import MapWish, Measurements
+from olp.calibration.estimator.summary import summary
+from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.progress import Progress

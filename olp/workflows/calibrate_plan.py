@@ -16,7 +16,10 @@ from olp.calibration.design import layout
 from olp.calibration.design.prediction import Planned, Prediction, predict
 from olp.calibration.design.visiting import move_s, order
 from olp.calibration.diagnosis.deciding import offsets
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Machine, Setup, Vector
@@ -192,8 +195,9 @@ def _passes(planned: Planned, machine: Machine, wait_s: float, box: Array) -> It
         if own:
             k, line = AXES.index(axis), own[0]
             yield _line_pass(axis, k, line, machine, wait_s, box, len(own))
-    for cloud in layout.scattered(taken):
-        if cloud in taken.lengths[1:]:
+    rays = taken.of(Lengths)
+    for cloud in taken.scattered:
+        if any(cloud is later for later in rays[1:]):
             # stations see the same points one after the other
             continue
         vectors = list(dict.fromkeys(map(tuple, cloud.tool_mm.tolist())))
@@ -201,11 +205,11 @@ def _passes(planned: Planned, machine: Machine, wait_s: float, box: Array) -> It
             rows = np.flatnonzero((cloud.tool_mm == np.array(vector)).all(axis=1))
             places = cloud.axis_mm[rows]
             rows = rows[order(places, machine.axes)]
-            label = "stations" if taken.lengths else cloud.source
+            label = "stations" if rays else cloud.source
             yield Pass(
                 f"{label}-{number}", _approached(cloud.axis_mm[rows], box), _waits(len(rows), wait_s),
                 f"reflector at X {vector[0]:g} Y {vector[1]:g} Z {vector[2]:g} from the gauge point",
-                cloud.source, rows, max(1, len(taken.lengths)),
+                cloud.source, rows, max(1, len(rays)),
             )  # fmt: skip
 
 
@@ -248,9 +252,9 @@ def _seconds(run: Pass, machine: Machine) -> float:
 def _set_up(planned: Planned) -> float:
     taken = planned.measurements
     minutes = SET_UP_MIN["line"] * len(taken.lines)
-    minutes += SET_UP_MIN["station"] * (len(taken.points) + len(taken.lengths))
-    minutes += sum(SET_UP_MIN["station"] * pods.count for pods in taken.pods)
-    for cloud in layout.scattered(taken):
+    minutes += SET_UP_MIN["station"] * (len(taken.of(Points)) + len(taken.of(Lengths)))
+    minutes += sum(SET_UP_MIN["station"] * pods.count for pods in taken.of(Pods))
+    for cloud in taken.scattered:
         minutes += SET_UP_MIN["reflector"] * len(np.unique(cloud.tool_mm, axis=0))
     return minutes
 

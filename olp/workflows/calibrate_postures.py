@@ -8,7 +8,7 @@ from olp.calibration.iso230 import postures
 from olp.calibration.iso230.postures import PostureFit
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
-from olp.files.measurements.instruments import read_postures
+from olp.files.measurements.postures import read_postures
 from olp.workflows.session import PathLike, Session
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from olp.calibration.diagnosis.refinement import Refinement, refine
 from olp.calibration.estimator.covariance import sigmas_at
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.comparison.nominal import nominal_of
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError

@@ -68,7 +68,7 @@ def run(method: Method, family: str, seeds: int) -> None:
         lengths = rays(machine, seed, method.stations, 250) if method.stations else ()
         pods = (two_pods(machine, seed, method.directions),) if method.directions else ()
         taken = dataclasses.replace(
-            measurements, lines=lines, squares=squares, points=points, lengths=lengths, pods=pods
+            measurements, observations=(*lines, *points, *lengths, *pods), squares=squares
         )
         begin = time.process_time()
         found = fit(taken, machine.chain)

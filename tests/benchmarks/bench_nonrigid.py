@@ -21,7 +21,7 @@ from judge import simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.nonrigid import nonrigid
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 
 SEEDS = 12
 
@@ -37,7 +37,7 @@ def run(family: str, bends: bool, n: int, seeds: int) -> None:
     for seed in range(seeds):
         m = simulated.machine(seed, family, CHAINS[seed % len(CHAINS)])
         m = simulated.bent(m) if bends else m
-        before = fit(Measurements("simulated", points=(cloud(m, seed, n, 5.0),)), m.chain)
+        before = fit(Measurements("simulated", (cloud(m, seed, n, 5.0),)), m.chain)
         begin = time.process_time()
         found = nonrigid(before)
         spent += time.process_time() - begin

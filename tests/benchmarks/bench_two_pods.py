@@ -33,7 +33,7 @@ from judge import simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
 from olp.errormodel.sources.maps import DeviationMap
@@ -120,14 +120,13 @@ def methods(m: simulated.Machine, seed: int, kind: str) -> dict[str, Errors]:
     out["equation (1), levers from the lines"] = equation_1(m, lines, simulated.LINE)
     out["estimator, lines"] = fit(laser, CHAIN).error
     for n in (250, 1000):
-        pods = Measurements("gantry", pods=(two_pods(m, seed, n),))
+        pods = Measurements("gantry", (two_pods(m, seed, n),))
         found = fit(pods, CHAIN)
         out[f"estimator, two pods, {n} points"] = found.error
         if n == 1000:
             out["the same, map where evident"] = mapped(nonrigid(found))
-    both = Measurements(
-        "gantry", laser.lines, laser.squares, periods_mm=laser.periods_mm, pods=(two_pods(m, seed, 250),)
-    )
+    taken = (*laser.lines, two_pods(m, seed, 250))
+    both = Measurements("gantry", taken, laser.squares, periods_mm=laser.periods_mm)
     out["estimator, lines and two pods"] = fit(both, CHAIN).error
     return out
 

@@ -27,7 +27,7 @@ from judge import simulated
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 from olp.core.progress import silent
 from olp.core.toolpath import Frame, Toolpath
 from olp.errormodel.build import build

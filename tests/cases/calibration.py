@@ -8,8 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from judge import simulated
 
-from olp.calibration.estimator.adjustment import Fit
-from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points, Square
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
 #: tools of the judgement: the one measured with, and one that no line has seen
@@ -31,7 +35,7 @@ def measurements_of(
     names = sorted({t.square for t in taken if t.square})
     x, y, z = ((p,) for p in periods) if periods else ((), (), ())
     squares = tuple(Square(name, 0.0, simulated.SQUARE_SIGMA) for name in names)
-    return Measurements("simulated", tuple(line_of(t) for t in taken), squares, (), (x, y, z))
+    return Measurements("simulated", tuple(line_of(t) for t in taken), squares, (x, y, z))
 
 
 def case(seed: int, family: str, chain: str | None = None) -> tuple[simulated.Machine, Measurements]:

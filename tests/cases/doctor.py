@@ -12,7 +12,7 @@ from cases.calibration import CHAINS
 from judge import simulated
 
 from olp.calibration.diagnosis.doctor import Diagnosis, diagnose
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.errormodel.calibration import Calibration, Curve
 
 AXES = "XYZ"

@@ -14,7 +14,8 @@ from olp.calibration.diagnosis.refinement import Refinement, refine
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of
-from olp.calibration.observations.readings import Measurements, Points
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.sensitivity import Sensitivity
@@ -25,7 +26,7 @@ def start(seed: int, family: str, quick: bool) -> tuple[simulated.Machine, Calib
     """A machine with the calibration that its lines gave, or that of 60 points of 20 um taken in an hour."""
     machine, measurements = case(seed, family)
     if quick:
-        measurements = Measurements("simulated", points=(run(machine, 7 * seed, 60, 0.020),))
+        measurements = Measurements("simulated", (run(machine, 7 * seed, 60, 0.020),))
     measurements = dataclasses.replace(measurements, measured=datetime.date(2026, 5, 14))
     found = fit(measurements, machine.chain)
     calibration = calibration_of(found, None)

@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 
 import olp
 from olp.calibration.iso230.evaluation import evaluate_all
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.cli import main
 from olp.core.errors import ConfigError
 from olp.files.measurements.reader import load_measurements
@@ -201,7 +202,7 @@ def test_squareness_of_a_check_goes_into_a_fit(tmp_path: Path) -> None:
     plan = folder / "measurements.toml"
     plan.write_text(plan.read_text("utf-8") + "\n" + (tmp_path / "s.toml").read_text("utf-8"), "utf-8")
     found = load_measurements([folder])
-    assert [reading.component for reading in found.squareness] == ["C0Y"]
+    assert [reading.component for reading in found.of(SquarenessReading)] == ["C0Y"]
     both = olp.fit_calibration(folder, folder / "machine.toml")
     alone = olp.fit_calibration(LINES, LINES / "machine.toml")
     sigma = [

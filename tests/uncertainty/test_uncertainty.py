@@ -17,10 +17,11 @@ from judge import simulated
 from judge.uncertain import sampled
 
 import olp
-from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.observations.measurements import Measurements
 from olp.core.errors import ConfigError
 from olp.core.progress import silent
 from olp.core.toolpath import Frame, Toolpath

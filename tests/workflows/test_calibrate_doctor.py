@@ -18,7 +18,7 @@ from judge import simulated
 from olp.calibration.diagnosis.arrangements import arrangements, scaled
 from olp.calibration.diagnosis.deciding import advise
 from olp.calibration.diagnosis.doctor import diagnose
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS

@@ -13,6 +13,9 @@ from judge import simulated
 from judge.model import JudgeModel
 
 import olp
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import ConfigError
 from olp.files.measurements.reader import files_of_measurements, load_measurements
@@ -147,7 +150,7 @@ POINTS = "X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm\n" + "".join(
 def test_points_of_a_tracker(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("# a comment\n" + POINTS)
     planned(tmp_path, '[[points]]\nfile = "t.csv"\nsigma_um = 8.0\ntool_mm = [0, 0, -90]\n')
-    (found,) = load_measurements([tmp_path]).points
+    (found,) = load_measurements([tmp_path]).of(Points)
     assert found.axis_mm.shape == found.measured_mm.shape == (8, 3)
     assert found.tool_mm[3].tolist() == [0.0, 0.0, -90.0]
     assert found.sigma == 0.008
@@ -159,7 +162,7 @@ def test_lengths_from_a_station(tmp_path: Path) -> None:
     head = "X_mm,Y_mm,Z_mm,length_mm,tool_X_mm,tool_Y_mm,tool_Z_mm\n"
     (tmp_path / "s.csv").write_text(head + "".join(rows))
     planned(tmp_path, '[[stations]]\nfile = "s.csv"\nsigma_um = 0.2\nsigma_um_m = 0.3\n')
-    (found,) = load_measurements([tmp_path]).lengths
+    (found,) = load_measurements([tmp_path]).of(Lengths)
     assert found.length_mm[-1] == 1500.0
     assert found.sigma_mm[-1] == pytest.approx(0.2e-3 + 0.3e-6 * 1500.0)
     assert found.tool_mm[-1].tolist() == [50.0, 0.0, -90.0]
@@ -173,7 +176,7 @@ def test_directions_from_pods(tmp_path: Path) -> None:
     pods = '[[pods]]\nfile = "p.csv"\nsigma_urad = 10.0\n[[pods.baselines]]\nbetween = [1, {}]\n'
     pods += "length_mm = 4000.0\n"
     planned(tmp_path, pods.format(2) + "sigma_um = 10.0\n")
-    (found,) = load_measurements([tmp_path]).pods
+    (found,) = load_measurements([tmp_path]).of(Pods)
     assert np.degrees(found.azimuth_rad[-1]) == pytest.approx([15.0, -17.0])
     assert np.degrees(found.elevation_rad[-1]) == pytest.approx([1.0, 2.0])
     assert found.baselines == ((0, 1, 4000.0, 0.01),)

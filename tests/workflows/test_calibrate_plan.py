@@ -19,7 +19,8 @@ from olp.calibration.design import layout
 from olp.calibration.design.prediction import predict
 from olp.calibration.design.visiting import move_s, order
 from olp.calibration.estimator.adjustment import fit
-from olp.calibration.observations.readings import Measurements, Points
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Axis
@@ -118,7 +119,7 @@ def test_a_prediction_is_what_comes_out() -> None:
         machine = simulated.machine(seed, "smooth")
         machine.half = {}
         at, tool, place = simulated.points(machine, seed, 120, 0.005)
-        fitted = fit(Measurements("m", points=(Points(at, tool, place, 0.005),)), "FXYZ")
+        fitted = fit(Measurements("m", (Points(at, tool, place, 0.005),)), "FXYZ")
         after.append(left(machine, fitted, tools[0], 400).after_framed)
     assert 0.7 < np.median(after) / (1e3 * found.rms_mm) < 1.4
 
@@ -179,7 +180,7 @@ def test_a_plan_of_points_can_be_filled_in(tmp_path: Path) -> None:
             assert (run.places_mm[:, k] >= low).all() and (run.places_mm[:, k] <= high).all()
     filled(tmp_path, lambda v, n, rng: np.add(v[:3], v[3:]) + rng.normal(0, 0.008, 3))
     taken = load_measurements([tmp_path / "measurements.toml"], "FXYZ")
-    assert len(taken.points[0].axis_mm) == plan.chosen.planned.measurements.points[0].axis_mm.shape[0]
+    assert len(taken.scattered[0].axis_mm) == plan.chosen.planned.measurements.scattered[0].axis_mm.shape[0]
     programs = [p for p in files if p.suffix == ".ngc"]
     assert len(programs) == 3
     for program in programs:
@@ -211,7 +212,7 @@ def test_plans_of_other_instruments_load(tmp_path: Path, instrument: str) -> Non
         path.write_bytes(data)
     filled(tmp_path, lambda v, n, rng: rng.uniform(1000, 1200, n) if n == 1 else rng.uniform(1, 20, n))
     taken = load_measurements([tmp_path / "measurements.toml"], "FXYZ")
-    count = sum(len(x.axis_mm) for x in (*taken.lengths, *taken.pods))
+    count = sum(len(x.axis_mm) for x in taken.scattered)
     assert count == {"pods": 40, "multilateration": 240}[instrument]
 
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from judge import simulated
 
 from olp.calibration.diagnosis.refinement import refine
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import ConfigError
 from olp.errormodel.build import build

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
 
@@ -9,15 +10,16 @@ import numpy as np
 
 from olp.calibration.design.prediction import Planned
 from olp.calibration.iso230.separation import aliased
-from olp.calibration.observations.lengths import Station
-from olp.calibration.observations.pods import Pose
-from olp.calibration.observations.readings import Lengths, Line, Measurements, Pods, Points, Square
+from olp.calibration.observations.base import Noise
+from olp.calibration.observations.lengths import Lengths, LengthsState, Station
+from olp.calibration.observations.lines import Line, LineState, Square
+from olp.calibration.observations.pods import Pods, PodsState, Pose
+from olp.calibration.observations.points import Points, PointsState
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import Vector
 from olp.core.units import AXES
 
-Scattered = Points | Lengths | Pods
 #: Lines: mm between targets, targets at least, runs there and back.
 STEP_MM, FEWEST, RUNS = 100.0, 11, 5
 #: Targets leave equal steps by a random part of this where no period is stated.
@@ -31,6 +33,8 @@ LENGTH, LENGTH_SCALE, POD, BASELINE = 0.2e-3, 0.3e-6, 10e-6, 0.01
 #: Stations stand so far off the box, as a share of its longest side.
 _OFF = 0.4
 _TRIES = 40
+#: Drift of a line over one run, as a share of the noise of a reading.
+_DRIFT = 0.5
 
 
 def hypercube(box_mm: Array, n: int, seed: int) -> Array:
@@ -46,7 +50,7 @@ def hypercube(box_mm: Array, n: int, seed: int) -> Array:
 def points(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
     """Points of a tracker with each tool vector in turn."""
     at, tool = _scattered(box_mm, tools, n, seed)
-    return Planned(Measurements(machine, points=(Points(at, tool, at + tool, sigma, source="points"),)))
+    return Planned(machine, (PointsState(Points(at, tool, at + tool, sigma, source="points")),))
 
 
 def lengths(
@@ -54,12 +58,12 @@ def lengths(
 ) -> Planned:
     """Lengths from stations about the box, one after the other, with n points each."""
     at, tool = _scattered(box_mm, tools, n, seed)
-    rays, known = [], []
+    rays = []
     for k, place in enumerate(_around(box_mm, stations)):
         far = np.linalg.norm(at + tool - place, axis=1)
-        rays.append(Lengths(at, tool, far, sigma + LENGTH_SCALE * far, source=f"station {k + 1}"))
-        known.append(Station(place, 0.0))
-    return Planned(Measurements(machine, lengths=tuple(rays)), stations=tuple(known))
+        read = Lengths(at, tool, far, sigma + LENGTH_SCALE * far, source=f"station {k + 1}")
+        rays.append(LengthsState(read, Station(place, 0.0)))
+    return Planned(machine, tuple(rays))
 
 
 def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
@@ -82,7 +86,7 @@ def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: fl
         at, tool, np.stack(azimuth, axis=1), np.stack(elevation, axis=1), sigma,
         ((0, 1, size, BASELINE),), "pods",
     )  # fmt: skip
-    return Planned(Measurements(machine, pods=(directions,)), poses=(tuple(poses),))
+    return Planned(machine, (PodsState(directions, tuple(poses)),))
 
 
 def lines(
@@ -93,7 +97,7 @@ def lines(
     middle = np.round(box_mm.mean(axis=1), 1)
     place = (float(middle[0]), float(middle[1]), float(middle[2]))
     targets = [_targets(box_mm[k], periods_mm[k], seed + k) for k in range(3)]
-    found: list[Line] = []
+    found: list[LineState] = []
 
     def add(name: str, square: str | None = None, reflector: Vector = tool) -> None:
         axis = AXES.index(name[2])
@@ -102,21 +106,20 @@ def lines(
         n = len(there)
         half = 0.5 * float(np.ptp(targets[axis]))
         sigma = ANGLE if name[1] in "ABC" else LASER if name[1] == name[2] else LASER + LASER_SCALE * half
-        found.append(
-            Line(
-                name,
-                np.tile(there, RUNS),
-                np.zeros(n * RUNS),
-                np.repeat(np.arange(1, RUNS + 1), n),
-                np.tile(side, RUNS),
-                place,
-                reflector,
-                square=square,
-                sigma=sigma,
-                sigma_scale=LASER_SCALE if name[1] == name[2] else 0.0,
-                source=f"{name.lower()}.csv",
-            )
+        line = Line(
+            name,
+            np.tile(there, RUNS),
+            np.zeros(n * RUNS),
+            np.repeat(np.arange(1, RUNS + 1), n),
+            np.tile(side, RUNS),
+            place,
+            reflector,
+            square=square,
+            sigma=sigma,
+            sigma_scale=LASER_SCALE if name[1] == name[2] else 0.0,
+            source=f"{name.lower()}.csv",
         )
+        found.append(LineState(line, Noise(sigma, _DRIFT * sigma, None)))
 
     for a in AXES:
         add(f"E{a}{a}")
@@ -129,19 +132,12 @@ def lines(
     add("EYZ", "square YZ", (tool[0] + ASIDE_MM, tool[1], tool[2]))
     squares = tuple(Square(f"square {a}{b}", 0.0, SQUARE) for a, b in itertools.combinations(AXES, 2))
     x, y, z = (tuple(map(float, p)) for p in periods_mm)
-    return Planned(Measurements(machine, tuple(found), squares, (), (x, y, z)))
+    return Planned(machine, tuple(found), squares, (x, y, z))
 
 
 def together(first: Planned, second: Planned) -> Planned:
     """Lines of the one with the points of the other."""
-    a, b = first.measurements, second.measurements
-    both = Measurements(a.machine, a.lines, a.squares, (), a.periods_mm, points=(*a.points, *b.points))
-    return Planned(both)
-
-
-def scattered(taken: Measurements) -> tuple[Scattered, ...]:
-    """All that measurements hold beside lines."""
-    return (*taken.points, *taken.lengths, *taken.pods)
+    return dataclasses.replace(first, states=(*first.states, *second.states))
 
 
 def _scattered(box_mm: Array, tools: Sequence[Vector], n: int, seed: int) -> tuple[Array, Array]:

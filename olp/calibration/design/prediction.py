@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import POINT_CELLS, Fit, mean_slopes
+from olp.calibration.estimator.adjustment import POINT_CELLS
 from olp.calibration.estimator.basis import CurveSpace, Spline
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.model import mean_slopes
 from olp.calibration.estimator.normal import Normal, solve
 from olp.calibration.estimator.parameters import Parameters, Place, frame_columns
 from olp.calibration.estimator.prior import POSE, Prior
 from olp.calibration.estimator.summary import squareness_unseen, unseen
-from olp.calibration.observations.lengths import Station, lengths_block
-from olp.calibration.observations.lines import Noise, line_block, square_names
-from olp.calibration.observations.pods import Pose, pods_block
-from olp.calibration.observations.points import points_block
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.base import State
+from olp.calibration.observations.lines import Square, square_names
+from olp.calibration.observations.measurements import Measurements
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES
@@ -27,17 +27,22 @@ from olp.core.units import AXES
 _PLACES = 150
 #: Size and second differences of curves of machines that are off by 0.1 mm or so (mm, rad).
 TYPICAL = {"positioning": (0.03, 6e-3), "straightness": (0.012, 2.5e-3), "angle": (2e-5, 5e-6)}
-#: Drift of a line over one run, as a share of the noise of a reading.
-_DRIFT = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Planned:
-    """Measurements with nominal readings; where stations and pods would stand."""
+    """Observations with nominal readings, and where their stations and pods would stand."""
 
-    measurements: Measurements
-    stations: tuple[Station, ...] = ()
-    poses: tuple[tuple[Pose, ...], ...] = ()
+    machine: str
+    states: tuple[State, ...]
+    squares: tuple[Square, ...] = ()
+    periods_mm: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]] = ((), (), ())
+
+    @property
+    def measurements(self) -> Measurements:
+        """As they would be taken."""
+        taken = tuple(state.observation for state in self.states)
+        return Measurements(self.machine, taken, self.squares, self.periods_mm)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,25 +65,13 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
         parameters, {}, {name: squares.get(name, (0.0, POSE)) for name in parameters.shared}, dict(TYPICAL)
     )
     theta = np.zeros(parameters.size)
-    blocks = [
-        line_block(line, parameters, Noise(line.sigma, _DRIFT * line.sigma, None)) for line in taken.lines
-    ]
-    blocks += [points_block(cloud, parameters) for cloud in taken.points]
-    blocks += [
-        lengths_block(rays, parameters, theta, station)
-        for rays, station in zip(taken.lengths, planned.stations, strict=True)
-    ]
-    blocks += [
-        pods_block(pods, parameters, theta, list(poses))
-        for pods, poses in zip(taken.pods, planned.poses, strict=True)
-    ]
     normal = Normal.of(parameters.size)
-    for block in blocks:
-        normal.add(block)
+    for state in planned.states:
+        normal.add(state.block(parameters, theta))
     precision, logdet = prior.precision()
     solved = solve(normal, precision, logdet)
     found = Fit(
-        taken, parameters, theta, solved.covariance, prior, (), (), (), (), (), box_mm,
+        taken, parameters, theta, solved.covariance, prior, (), (), box_mm,
         mean_slopes(parameters), 0.0, 1.0, {},
     )  # fmt: skip
     after, worst = _spread(parameters, solved.covariance, box_mm, tools)

@@ -21,7 +21,7 @@ from olp.calibration.diagnosis.factors import (
     factors_of,
 )
 from olp.calibration.estimator.parameters import frame_columns
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES

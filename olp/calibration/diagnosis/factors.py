@@ -15,8 +15,7 @@ import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence, solve
 from olp.calibration.estimator.parameters import LEVER_MM, frame_columns
-from olp.calibration.observations.points import deviations
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points, deviations
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.errormodel.base import ErrorModel

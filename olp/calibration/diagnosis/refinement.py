@@ -13,8 +13,8 @@ from olp.calibration.estimator.covariance import principal
 from olp.calibration.estimator.curves import DIGITS
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of, solve
 from olp.calibration.estimator.parameters import LEVER_MM, frame_columns
-from olp.calibration.estimator.screening import OUTLIER, SHARE
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.base import OUTLIER, SHARE
+from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.rigid_fit import fit_frame

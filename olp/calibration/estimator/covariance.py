@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import Fit
 from olp.calibration.estimator.basis import Kink
 from olp.calibration.estimator.curves import DIGITS
+from olp.calibration.estimator.fitted import Fit
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
@@ -64,14 +65,8 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
         at = own.stop
         variance = fit.between_targets(name, q) if kind == "mean" else np.zeros(len(table))
         entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))
-    kinds = {
-        "lines": fit.lines,
-        "points": fit.points,
-        "lengths": fit.lengths,
-        "directions": fit.pods,
-        "diagonals and circles": fit.radial,
-    }
-    taken = ", ".join(f"{len(files)} of {kind}" for kind, files in kinds.items() if files)
+    kinds = Counter(result.state.noun for result in fit.results if result.state.noun)
+    taken = ", ".join(f"{files} of {kind}" for kind, files in kinds.items())
     words = (
         f"the adjustment of readings ({taken}): {len(factor)} numbers, {factor.shape[1]} principal "
         f"components, which drop at most {100.0 * dropped:.2f} % of a variance"

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import Fit
 from olp.calibration.estimator.basis import Kink, Step
+from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.parameters import Place
 from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant

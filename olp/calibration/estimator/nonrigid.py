@@ -15,11 +15,10 @@ from itertools import product
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import Fit, LengthsResult, PodsResult, PointsResult
 from olp.calibration.estimator.field import REACH, Modes
+from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.marginal import Learnt, Noise, alone_of, learn, log_evidence, part_of
 from olp.calibration.estimator.widened import FOLDS, Adjustment, Reduced, solver_of, straight, wide
-from olp.calibration.observations.readings import Lengths, Pods, Points
 from olp.core.arrays import Array
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
@@ -118,8 +117,7 @@ def nonrigid(fit: Fit, *, noise: Noise = "learnt", progress: Progress | None = N
     what is believed of the curves with them.
     """
     tell = progress or silent
-    sets: list[Points | Lengths | Pods] = [r.points for r in fit.points]
-    sets += [*(r.lengths for r in fit.lengths), *(r.pods for r in fit.pods)]
+    sets = [result.state.observation for result in fit.scattered]
     count = sum(len(taken.axis_mm) for taken in sets)
     tools = np.concatenate([np.zeros((0, 3)), *(taken.tool_mm for taken in sets)])
     tools = np.unique(np.round(tools, 3), axis=0)
@@ -227,16 +225,14 @@ def _mapped(work: Adjustment, learnt: Learnt, found: NonRigid, processes: tuple[
     change[:size, size:] = taken
     results, chi_square = work.left(whole)
     prior = work.believed(learnt.coordinates, learnt.log_variance(modes), learnt.noise)
-    readings = work.count + sum(len(r.line.value) for r in fit.lines) + len(fit.measurements.squareness)
+    readings = sum(len(result.residual) for result in fit.results)
     used = len(x) - float(np.einsum("ij,ji->", covariance, prior))
     whole, joint = change @ whole, change @ joint @ change.T
     moved = dataclasses.replace(
         fit,
         theta=whole[:size],
         covariance=joint[:size, :size],
-        points=tuple(r for r in results if isinstance(r, PointsResult)),
-        lengths=tuple(r for r in results if isinstance(r, LengthsResult)),
-        pods=tuple(r for r in results if isinstance(r, PodsResult)),
+        results=results,
         chi_square=chi_square,
         freedom=max(readings - used, 1.0),
     )

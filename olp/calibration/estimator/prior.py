@@ -12,7 +12,7 @@ from olp.calibration.estimator.basis import slope_grid
 from olp.calibration.estimator.normal import Normal, evidence
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
-from olp.calibration.observations.readings import FRAME_MM
+from olp.calibration.observations.points import FRAME_MM
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 

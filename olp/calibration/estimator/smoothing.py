@@ -15,8 +15,8 @@ import numpy as np
 
 from olp.calibration.estimator.basis import Feature, Kink, Spline, Step, Wave
 from olp.calibration.estimator.normal import Block, Chunk, Normal
-from olp.calibration.observations.lines import Noise, drift_ramps, targets_of
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.base import Noise
+from olp.calibration.observations.lines import Line, drift_ramps, targets_of
 from olp.core.arrays import Array
 
 #: Candidates for the standard deviation of second differences: mm or rad.

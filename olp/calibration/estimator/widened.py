@@ -3,22 +3,17 @@ curves, field, and the unknowns that it has for itself, kept apart by folds so t
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import Fit, LengthsResult, PodsResult, PointsResult
 from olp.calibration.estimator.field import Modes
-from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.estimator.parameters import Parameters
-from olp.calibration.observations.lengths import lengths_block
-from olp.calibration.observations.lines import line_block, squareness_block
-from olp.calibration.observations.pods import CHUNK, pods_block
-from olp.calibration.observations.points import points_block
-from olp.calibration.observations.radial import radial_block
-from olp.calibration.observations.readings import Lengths, Pods, Points
+from olp.calibration.observations.base import Result, ScatteredState, left
 from olp.core.arrays import Array, Index
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
@@ -89,22 +84,18 @@ class Adjustment:
         self.size, self.own = fit.parameters.size, 3 * modes.size
         both = Both(fit.parameters, modes)
         theta = np.concatenate([fit.theta, np.zeros(self.own)])
-        sets: list[tuple[Points | Lengths | Pods, Block]] = [
-            *((r.points, points_block(r.points, both)) for r in fit.points),
-            *((r.lengths, lengths_block(r.lengths, both, theta, r.station)) for r in fit.lengths),
-            *((r.pods, pods_block(r.pods, both, theta, list(r.poses))) for r in fit.pods),
-        ]
-        self.sets = sets
-        local = [len(block.precision) for _, block in sets]
+        sets = [(r.state, r.state.block(both, theta)) for r in fit.scattered]
+        self.blocks = [block for _, block in sets]
+        local = [len(block.precision) for block in self.blocks]
         self.total = both.size + sum(local)
         gram = np.zeros((FOLDS + 1, self.total + 1, self.total + 1))
         counts = np.zeros(FOLDS + 1)
         nuisance = np.zeros(self.total)
         at = both.size
-        for (taken, block), count in zip(sets, local, strict=True):
+        for (state, block), count in zip(sets, local, strict=True):
             nuisance[at : at + count] = block.precision
             columns = [*range(both.size), *range(at, at + count), self.total]
-            folds = _folds(taken)
+            folds = _folds(state)
             start = 0
             for chunk in block.chunks():
                 part = folds[start : start + len(chunk.y)]
@@ -115,15 +106,10 @@ class Adjustment:
                     counts[k] += len(table)
             at += count
         self.sums = _Sums(gram, counts)
-        self.count = float(counts.sum())
         self.free = int(np.sum(nuisance[both.size :] == 0.0))
         other = Normal.of(self.size)
-        for result in fit.lines:
-            other.add(line_block(result.line, fit.parameters, result.noise))
-        for reading in fit.measurements.squareness:
-            other.add(squareness_block(reading, fit.parameters))
-        for radial in fit.radial:
-            other.add(radial_block(radial.taken, fit.parameters, radial.noise))
+        for block in self._other_blocks():
+            other.add(block)
         fit.prior.push(other)
         self.lines = other.H
         self.prior = np.diag(nuisance)
@@ -189,23 +175,25 @@ class Adjustment:
         out[inner, inner] += np.exp(-log_variance)
         return np.asarray(out)
 
-    def left(self, x: Array) -> tuple[list[PointsResult | LengthsResult | PodsResult], float]:
-        """The sets of readings with what curves and field x leave of them, and chi-square of all readings."""
-        fit, chi_square = self.fit, 0.0
-        results: list[PointsResult | LengthsResult | PodsResult] = []
-        sets: list[PointsResult | LengthsResult | PodsResult] = [*fit.points, *fit.lengths, *fit.pods]
-        for old, (_, block) in zip(sets, self.sets, strict=True):
-            _, residual, sigma = residuals_of(block, x)
-            square = float(np.sum((residual / sigma) ** 2))
-            chi_square += square
-            results.append(dataclasses.replace(old, residual=residual, chi_square=square))
-        others = [line_block(r.line, fit.parameters, r.noise) for r in fit.lines]
-        others += [squareness_block(r, fit.parameters) for r in fit.measurements.squareness]
-        others += [radial_block(r.taken, fit.parameters, r.noise) for r in fit.radial]
-        for block in others:
-            _, residual, sigma = residuals_of(block, x)
-            chi_square += float(np.sum((residual / sigma) ** 2))
-        return results, chi_square
+    def left(self, x: Array) -> tuple[tuple[Result[Any], ...], float]:
+        """The results of all observations, with what curves and field x leave of the scattered ones, and
+        chi-square of all readings."""
+        blocks = iter(self.blocks)
+        results, chi_square = [], 0.0
+        for result in self.fit.results:
+            if isinstance(result.state, ScatteredState):
+                result = Result.of(result.state, next(blocks), x)
+                chi_square += result.chi_square
+            results.append(result)
+        for block in self._other_blocks():
+            chi_square += left(block, x)[1]
+        return tuple(results), chi_square
+
+    def _other_blocks(self) -> list[Block]:
+        """Of the observations that the field is no part of."""
+        fit = self.fit
+        states = [r.state for r in fit.results if not isinstance(r.state, ScatteredState)]
+        return [state.block(fit.parameters, fit.theta) for state in states]
 
 
 def _table(chunk: Chunk, use: np.ndarray) -> Array:
@@ -213,18 +201,11 @@ def _table(chunk: Chunk, use: np.ndarray) -> Array:
     return np.asarray(table / chunk.sigma[use, None])
 
 
-def _folds(taken: Points | Lengths | Pods) -> Index:
+def _folds(state: ScatteredState) -> Index:
     """The fold from 1 of every reading, in the order of its block; 0 is never held out. All readings of a
     point are in one fold."""
-    n = len(taken.axis_mm)
-    fold = 1 + np.random.default_rng(n).permutation(n) % FOLDS
-    if isinstance(taken, Points):
-        return np.repeat(fold, 3)
-    if isinstance(taken, Lengths):
-        return fold
-    parts = [np.repeat(fold[start : start + CHUNK], 2) for start in range(0, n, CHUNK)]
-    whole = [np.tile(part, taken.count) for part in parts]
-    return np.concatenate([*whole, np.zeros(len(taken.baselines), np.int64)])
+    n = len(state.observation.axis_mm)
+    return state.spread_over_rows(1 + np.random.default_rng(n).permutation(n) % FOLDS)
 
 
 def solver_of(matrix: Array) -> Callable[[Array], Array]:

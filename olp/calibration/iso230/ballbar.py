@@ -19,67 +19,17 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.iso230.conventions import LEAN
-from olp.calibration.observations.readings import SquarenessReading
+from olp.calibration.observations.circles import PLANES, SKIP_DEG, UNKNOWNS, Circles, columns
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
-from olp.core.machine import ZERO, Vector
-from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 
-#: First and second axis of each plane, counter-clockwise seen from + of the third, and its squareness.
-PLANES = {"XY": (0, 1, "C0Y"), "YZ": (1, 2, "A0Z"), "ZX": (2, 0, "B0Z")}
-UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "lost_1", "lost_2")
-#: Readings this near to where an axis turns round are left out of the fit: there friction makes spikes.
-SKIP_DEG = 2.5
-_PLACES, _FEWEST = 720, 8
+_PLACES = 720
 #: A circle of radius R sees the slope R^2 / 2 of x^3, a mean line over +-s the slope 3 s^2 / 5.
 _MEAN_LINE = float(np.sqrt(5.0 / 6.0))
 _SHARE, _RANK, _TOO_MUCH = 1e-6, 1e-9, 5.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Circles:
-    """Radial readings of circles about one centre, in one set-up.
-
-    `angle_rad` (n,) from the first axis of `plane` toward the second, `value` (n,) radius less `radius_mm`
-    in mm, `direction` (n,) +1 counter-clockwise or -1, `run` (n,). `centre_mm` are axis positions, `tool_mm`
-    the tool vector; `feed_mm_s` along the circle, 0 where not known; `sigma` of one reading in mm. Raises
-    ConfigError.
-    """
-
-    plane: str
-    radius_mm: float
-    centre_mm: Vector
-    angle_rad: Array
-    value: Array
-    run: Index
-    direction: Index
-    tool_mm: Vector = ZERO
-    feed_mm_s: float = 0.0
-    sigma: float = 0.0
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        if self.plane not in PLANES:
-            raise ConfigError(f"plane {self.plane!r}; expected XY, YZ or ZX", file=self.source)
-        n = len(self.angle_rad)
-        if (
-            not self.radius_mm > 0.0
-            or n < _FEWEST
-            or any(len(c) != n for c in (self.value, self.run, self.direction))
-        ):
-            raise ConfigError(
-                f"circle of radius {self.radius_mm:g} mm with {n} readings; expected a radius above 0 and at "
-                f"least {_FEWEST} readings",
-                file=self.source,
-            )
-        if not np.isin(self.direction, (-1, 1)).all():
-            raise ConfigError("a direction is neither +1 (counter-clockwise) nor -1", file=self.source)
-
-    @property
-    def names(self) -> tuple[str, str]:
-        first, second, _ = PLANES[self.plane]
-        return AXES[first], AXES[second]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -227,16 +177,6 @@ def _alike(circles: Circles, residual: Array, used: Array) -> float:
             square += float(rest @ rest)
     alike = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
     return float(np.sqrt((1.0 + alike) / (1.0 - alike)))
-
-
-def columns(circles: Circles) -> Array:
-    """(n, 8) change of a reading for 1 mm of each of UNKNOWNS."""
-    t, d = circles.angle_rad, circles.direction.astype(float)
-    c, s = np.cos(t), np.sin(t)
-    return np.column_stack((
-        np.ones(len(t)), c, s, np.cos(2 * t), np.sin(2 * t), d * np.sin(2 * t),
-        0.5 * d * np.sign(s) * c, -0.5 * d * np.sign(c) * s,
-    ))  # fmt: skip
 
 
 def _figures(circles: Circles, found: Array) -> tuple[dict[int, float], float | None]:

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.iso230.conventions import AXES_OF, LEAN
-from olp.calibration.iso230.positioning import Statistics, statistics, targets_of
-from olp.calibration.observations.readings import SquarenessReading
-from olp.core.arrays import Array, Index
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.squareness import SquarenessReading
+from olp.core.arrays import Array
 from olp.core.errors import ConfigError
-from olp.core.machine import SQUARENESS, ZERO, Vector
+from olp.core.machine import SQUARENESS
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 
@@ -32,85 +32,6 @@ _SHARE = 1e-6
 _RANK = 1e-9
 #: a residual sum this many standard deviations above its expectation
 _TOO_MUCH = 4.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Diagonal:
-    """Readings along the straight line between two axis positions, rows in the order of time.
-
-    `distance_mm` (n,) from the start, `value` (n,) actual minus commanded along the line in mm, `run` and
-    `direction` as in a `Line` (+1: approached from the start). `sigma` is the standard uncertainty of one
-    reading in mm, `sigma_scale` that of the laser's scale. Raises ConfigError.
-    """
-
-    start_mm: Vector
-    end_mm: Vector
-    distance_mm: Array
-    value: Array
-    run: Index
-    direction: Index
-    tool_mm: Vector = ZERO
-    sigma: float = 0.0
-    sigma_scale: float = 0.0
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        length = self.length_mm
-        if not np.isfinite(length) or length <= 0.0:
-            raise ConfigError("diagonal: start and end are one place", file=self.source)
-        if np.count_nonzero(np.abs(self.unit) > 1e-9) < 2:
-            raise ConfigError(
-                f"diagonal: only {self.name.strip('0')} moves; expected a diagonal in two or three axes",
-                file=self.source,
-            )
-        n = len(self.distance_mm)
-        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction)):
-            raise ConfigError(f"diagonal: {n} readings; expected at least 2", file=self.source)
-        if self.distance_mm.min() < -1.0 or self.distance_mm.max() > length + 1.0:
-            raise ConfigError(
-                f"diagonal: targets from {self.distance_mm.min():g} to {self.distance_mm.max():g} mm, but "
-                f"start and end are {length:g} mm apart; expected distances from the start",
-                file=self.source,
-            )
-
-    @property
-    def length_mm(self) -> float:
-        return float(np.linalg.norm(np.subtract(self.end_mm, self.start_mm)))
-
-    @property
-    def unit(self) -> Array:
-        """(3,) direction from start to end."""
-        return np.asarray(np.subtract(self.end_mm, self.start_mm) / self.length_mm)
-
-    @property
-    def name(self) -> str:
-        """As ISO 230-6 names diagonals: P or N for each axis as it goes up in the last axis that moves; 0
-        for an axis that stands."""
-        u = self.unit
-        moving = np.flatnonzero(np.abs(u) > 1e-9)
-        u = u * np.sign(u[moving[-1]])
-        return "".join("0" if abs(v) <= 1e-9 else "P" if v > 0 else "N" for v in u)
-
-    def evaluate(self) -> Statistics:
-        """E, B, R ... along the diagonal, as ISO 230-6 takes them from ISO 230-2. Raises ConfigError."""
-        return statistics(self.distance_mm, self.value, self.direction, f"diagonal {self.name}", self.source)
-
-    def elongation(self) -> tuple[float, float]:
-        """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty:
-        from the scatter of the readings (`sigma` where that is more) or, where that is larger, from how far
-        the means of the targets are off the line."""
-        x = self.distance_mm - self.distance_mm.mean()
-        spread = float(x @ x)
-        if spread == 0.0:
-            raise ConfigError(f"diagonal {self.name}: one target; expected at least 2", file=self.source)
-        slope = float(x @ self.value) / spread
-        rest = self.value - self.value.mean() - slope * x
-        noise = float(np.sqrt(rest @ rest / max(len(x) - 2, 1)))
-        target, place = targets_of(self.distance_mm)
-        means = np.bincount(place, rest) / np.bincount(place)
-        bow = float(np.sqrt(means @ means / (len(target) - 2))) if len(target) > 2 else 0.0
-        apart = float(np.sqrt(((target - target.mean()) ** 2).sum()))
-        return slope, max(max(noise, self.sigma) / np.sqrt(spread), bow / apart)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.iso230.positioning import scale_of, targets_of
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Machine

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD, UM_PER_MM

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from olp.calibration.iso230.go_return import Reversal, reversal_of
 from olp.calibration.iso230.positioning import scale_of, targets_of
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.errormodel.calibration import Cyclic

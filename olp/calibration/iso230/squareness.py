@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from olp.calibration.iso230.conventions import AXES_OF, LEAN
-from olp.calibration.observations.readings import Line, Square, SquarenessReading
+from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD

@@ -6,20 +6,77 @@ first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.normal import Block, Chunk, residuals_of
 from olp.calibration.estimator.parameters import Unknowns
-from olp.calibration.observations.readings import Lengths
-from olp.core.arrays import Array
-from olp.core.errors import CannotCompute
+from olp.calibration.observations.base import (
+    Advance,
+    Noise,
+    Outlier,
+    Scattered,
+    ScatteredState,
+    rms,
+    slips_of,
+    without,
+)
+from olp.core.arrays import Array, Index
+from olp.core.errors import CannotCompute, ConfigError
+from olp.core.units import UM_PER_MM
 
 CHUNK = 4000
 #: Gauss and Newton have arrived where no station moves by more than this.
 STILL_MM = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lengths(Scattered):
+    """Lengths that a tracking interferometer read from one station, whose place and dead length nobody knows.
+
+    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
+    point to the reflector, `length_mm` (n,) the readings, `sigma_mm` (n,) or one number their standard
+    uncertainty, `sigma_scale` that of their common scale (mm/mm). Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    length_mm: Array
+    sigma_mm: Array
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        length = np.array(self.length_mm, float)
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "length_mm": length,
+            "sigma_mm": np.array(np.broadcast_to(self.sigma_mm, length.shape), float),
+            "row": np.array(self.row, np.int64) if len(self.row) else np.arange(1, len(axis) + 1),
+        }
+        if length.shape != (len(axis),) or axis.shape[1:] != (3,) or len(axis) < 5:
+            raise ConfigError(
+                f"{length.size} lengths; expected at least 5 from a station, each with three axis positions",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()):
+            raise ConfigError("a length is not finite; leave the row out", file=self.source or None)
+        if not np.all(columns["sigma_mm"] > 0.0):
+            raise ConfigError(
+                "the uncertainty of the lengths is not stated; expected sigma_um", file=self.source or None
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+    def start(self, noise: Noise | None = None) -> LengthsState:
+        return LengthsState(self, first_station(self))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +88,49 @@ class Station:
 
     def moved(self, by: Array) -> Station:
         return Station(self.place_mm + by[:3], self.dead_mm + float(by[3]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LengthsState(ScatteredState):
+    """Lengths in an adjustment, and where their station is thought to be."""
+
+    noun = "lengths"
+    tally = "lengths"
+    observation: Lengths
+    station: Station
+
+    @property
+    def section(self) -> str:
+        return "stations"
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return lengths_block(self.observation, parameters, theta, self.station)
+
+    def step(self, block: Block, theta: Array) -> Advance:
+        values = residuals_of(block, theta)[0]
+        return Advance(values, bool(np.abs(values[:3]).max() < STILL_MM))
+
+    def slips(self, block: Block, theta: Array, settled: bool) -> Sequence[Outlier]:
+        # before the stations stand still, a residual may be theirs
+        if not settled:
+            return ()
+        return slips_of(block, theta, self.observation.source, self.observation.row, "length")
+
+    def moved(self, step: Advance, slips: Sequence[Outlier]) -> LengthsState:
+        kept = without(self.observation, self.observation.row, slips)
+        return LengthsState(kept, self.station.moved(step.values))
+
+    def spread_over_rows(self, places: Index) -> Index:
+        return places
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        return {
+            "name": self.observation.source or "station",
+            "lengths": len(residual),
+            "place_mm": self.station.place_mm.tolist(),
+            "residual_um": rms(residual) * UM_PER_MM,
+            "chi_square_per_length": chi_square / len(residual),
+        }
 
 
 def first_station(lengths: Lengths) -> Station:

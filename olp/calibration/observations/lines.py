@@ -1,4 +1,4 @@
-"""Lines, squares and values of squareness as rows of the adjustment.
+"""Lines and squares as rows of the adjustment.
 
 A line's zero is not known, nor is the slope of a straightness: that of the line it was read against. Two
 lines that were read against the legs of one square share one such slope and the square's own error. A
@@ -8,18 +8,33 @@ of time, linear during each run.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
-from olp.calibration.observations.readings import Line, SquarenessReading
-from olp.core.arrays import Array
+from olp.calibration.observations.base import (
+    OUTLIER,
+    SHARE,
+    Noise,
+    Observation,
+    Outlier,
+    Screened,
+    State,
+    rms,
+    scatter_words,
+    unit_of,
+)
+from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
+from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES
 
+Reference = Literal["functional-point", "table"]
 #: Targets this close are one.
 SAME_MM = 0.05
 #: No instrument reads better than this: 10 nm, 10 nrad.
@@ -28,14 +43,141 @@ LEAST = 1e-5, 1e-8
 DRIFT = 2e-3, 2e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Standard deviation of a reading about its drift, and that of the drift over one run; mm or rad.
-    `spread` is what the runs themselves show, None without repeated readings."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Line(Observation):
+    """One component error read at targets along one axis, rows in the order of time.
 
-    sigma: float
-    drift: float
-    spread: float | None
+    `component` is an ISO 230-1 name such as EXX (positioning), EYX (straightness) or EBX (angle); the moving
+    axis is its last letter. `target_mm` (n,) axis positions, `value` (n,) in mm or rad, `run` (n,) from 1,
+    `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` is where the other axes
+    stood (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference` "table"
+    the reflector stayed fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
+    straightness. Straightness lines that name the same `square` were read against its two legs.
+    `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
+    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 is not known: the spread of the runs
+    tells. `source` is the file and `row` (n,) the line of each reading in it. Raises ConfigError.
+    """
+
+    component: str
+    target_mm: Array
+    value: Array
+    run: Index
+    direction: Index
+    line_mm: Vector
+    tool_mm: Vector = ZERO
+    reference: Reference = "functional-point"
+    square: str | None = None
+    sigma: float = 0.0
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    instrument: str = ""
+
+    def __post_init__(self) -> None:
+        if not len(self.row):
+            object.__setattr__(self, "row", np.arange(1, len(self.target_mm) + 1))
+        for name, kind in (
+            ("target_mm", float),
+            ("value", float),
+            ("run", np.int64),
+            ("direction", np.int64),
+            ("row", np.int64),
+        ):
+            column = np.array(getattr(self, name), dtype=kind)
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+        label = f"line {self.component}"
+        n = len(self.target_mm)
+        if self.component not in COMPONENTS:
+            raise ConfigError(
+                f"{label}: expected an ISO 230-1 name such as EXX, EYX or EBX", file=self.source
+            )
+        if n < 2 or any(len(c) != n for c in (self.value, self.run, self.direction, self.row)):
+            raise ConfigError(
+                f"{label}: {n} readings; expected at least 2, each with all columns", file=self.source
+            )
+        if not (np.isfinite(self.target_mm).all() and np.isfinite(self.value).all()):
+            raise ConfigError(f"{label}: a reading is not finite; leave the row out", file=self.source)
+        if not np.isin(self.direction, (-1, 1)).all():
+            raise ConfigError(f"{label}: a direction is neither +1 nor -1", file=self.source)
+
+    @property
+    def axis(self) -> int:
+        """0, 1, 2 for a line along X, Y, Z."""
+        return AXES.index(self.component[2])
+
+    @property
+    def quantity(self) -> Literal["positioning", "straightness", "angle"]:
+        if self.component[1] in "ABC":
+            return "angle"
+        return "positioning" if self.component[1] == self.component[2] else "straightness"
+
+    def reach(self, axis: int) -> Array:
+        return self.target_mm if axis == self.axis else np.zeros(0)
+
+    def screened(self) -> Screened:
+        """Without readings far outside the spread of their repetitions, and the noise of the others. Raises
+        ConfigError where neither repetitions nor the line tell the noise."""
+        return _screened(self)
+
+    def start(self, noise: Noise | None = None) -> LineState:
+        return LineState(self, noise or noise_of(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineState(State):
+    """A line in an adjustment, with the noise of its readings. One row a reading."""
+
+    noun = "lines"
+    observation: Line
+    noise: Noise
+
+    @property
+    def section(self) -> str:
+        return "lines_of_angles" if self.observation.quantity == "angle" else "lines_of_lengths"
+
+    @property
+    def component(self) -> str:
+        return self.observation.component
+
+    @property
+    def label(self) -> str:
+        return self.observation.source or self.observation.component
+
+    @property
+    def count(self) -> int:
+        return len(self.observation.value)
+
+    def block(self, parameters: Parameters, theta: Array) -> Block:
+        return line_block(self.observation, parameters, self.noise)
+
+    def scatter(self) -> str | None:
+        return scatter_words(self.label, self.noise, self.observation.sigma, *unit_of(self.component))
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        unit, scale = unit_of(self.component)
+        return {
+            "name": self.component,
+            "file": self.observation.source,
+            "readings": self.count,
+            f"sigma_reading_{unit}": self.noise.sigma * scale,
+            f"drift_a_run_{unit}": self.noise.drift * scale,
+            f"residual_{unit}": rms(residual) * scale,
+            "chi_square_per_reading": chi_square / self.count,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Square:
+    """An optical or mechanical square that two straightness lines share.
+
+    `error_rad` is by how much the angle between its legs, both along + of their axes, differs from 90 degrees
+    (more is +), as its certificate says; `sigma_rad` its standard uncertainty.
+    """
+
+    name: str
+    error_rad: float = 0.0
+    sigma_rad: float = 0.0
 
 
 def noise_of(line: Line) -> Noise:
@@ -158,20 +300,49 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
     return Block.of(chunk, columns, np.array(precision), line.source or line.component)
 
 
-def squareness_block(reading: SquarenessReading, parameters: Parameters) -> Block:
-    """A value of squareness: minus or plus the sum of the mean slopes of both lines."""
-    earlier, later, sign = SHEAR[reading.component]
-    parts = []
-    for moving, along, span in ((earlier, later, reading.span_mm[0]), (later, earlier, reading.span_mm[1])):
-        q = np.linspace(*span, 101)
-        weight = (q - q.mean()) / float(((q - q.mean()) ** 2).sum())
-        position = np.tile(np.array(reading.line_mm), (len(q), 1))
-        position[:, moving] = q
-        for axis in range(3):
-            for part, values in parameters.displacement(along, axis, position, np.array(reading.tool_mm)):
-                parts.append((part, sign * (weight @ values)[None, :]))
-    parts.append((parameters.slices[reading.component], np.ones((1, 1))))
-    rows, columns = gathered(parts, 1)
-    sigma = max(reading.sigma_rad, LEAST[1])
-    chunk = Chunk(rows, np.array([reading.value_rad]), np.array([sigma]), np.zeros((1, 0)))
-    return Block.of(chunk, columns, np.zeros(0), reading.source or reading.component)
+def _screened(line: Line) -> Screened:
+    outliers: list[Outlier] = []
+    noise = noise_of(line)
+    use = np.ones(len(line.value), bool)
+    for _ in range(max(1, int(SHARE * len(use)))):
+        some = _part(line, use)
+        noise = noise_of(some)
+        rest = _about_group(some)
+        worst = int(np.argmax(np.abs(rest)))
+        if abs(rest[worst]) <= OUTLIER * noise.sigma:
+            break
+        k = int(np.flatnonzero(use)[worst])
+        use[k] = False
+        off = float(abs(rest[worst]) / noise.sigma)
+        outliers.append(Outlier(line.source, int(line.row[k]), line.component, float(line.value[k]), off))
+    return Screened(_part(line, use), noise, tuple(outliers))
+
+
+def _part(line: Line, use: np.ndarray) -> Line:
+    if use.all():
+        return line
+    columns = ("target_mm", "value", "run", "direction", "row")
+    return dataclasses.replace(line, **{name: getattr(line, name)[use] for name in columns})
+
+
+def _about_group(line: Line) -> Array:
+    """(n,) deviation from the others of the same target and direction, freed of the level of its run; zero
+    where fewer than three were read."""
+    group = group_of(line)
+    rest = line.value.copy()
+    for _ in range(3):
+        for labels in (group, line.run - line.run.min()):
+            rest -= _medians(rest, labels)[labels]
+    counts = np.bincount(group)[group]
+    return np.where(counts >= 3, rest, 0.0)
+
+
+def _medians(values: Array, labels: np.ndarray) -> Array:
+    """Median of the values of each label from 0."""
+    ordered = values[np.lexsort((values, labels))]
+    counts = np.bincount(labels)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    last = len(ordered) - 1
+    below, above = starts + np.maximum(counts - 1, 0) // 2, starts + counts // 2
+    middle = 0.5 * (ordered[np.minimum(below, last)] + ordered[np.minimum(above, last)])
+    return np.asarray(np.where(counts > 0, middle, 0.0))

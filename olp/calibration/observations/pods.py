@@ -7,18 +7,26 @@ points and follow by Gauss and Newton.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from olp.calibration.estimator.normal import Block, Chunk
+from olp.calibration.estimator.normal import Block, Chunk, residuals_of
 from olp.calibration.estimator.parameters import Unknowns
-from olp.calibration.observations.readings import Pods
-from olp.core.arrays import Array
-from olp.core.errors import CannotCompute
+from olp.calibration.observations.base import (
+    Advance,
+    Noise,
+    Outlier,
+    Scattered,
+    ScatteredState,
+)
+from olp.core.arrays import Array, Index
+from olp.core.errors import CannotCompute, ConfigError
 from olp.core.rigid_fit import fit_points, rotation_of
+from olp.core.units import RAD_PER_URAD
 
 CHUNK = 2000
 #: Gauss and Newton have arrived where no pod moves by more than this.
@@ -28,6 +36,60 @@ LEVER_MM = 1000.0
 _STEPS, _AROUND = 30, (-0.7, 0.5, 1.7)
 #: A pose whose directions miss the nominal points by more than this (rad) is no pose.
 _FOUND_RAD = 2e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pods(Scattered):
+    """Directions in which pods or theodolites saw the reflector, each in its own frame that nobody knows.
+
+    `axis_mm` (n, 3) and `tool_mm` (n, 3) or (3,) as for Points; `azimuth_rad` and `elevation_rad` (n, k) of k
+    pods, `sigma` the standard uncertainty of an angle in rad. `baselines` are known distances: (pod, pod from
+    0, mm, standard uncertainty in mm); without one nobody knows the scale. Raises ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    azimuth_rad: Array
+    elevation_rad: Array
+    sigma: float
+    baselines: tuple[tuple[int, int, float, float], ...] = ()
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "azimuth_rad": np.array(self.azimuth_rad, float),
+            "elevation_rad": np.array(self.elevation_rad, float),
+        }
+        shape = columns["azimuth_rad"].shape
+        if (
+            len(shape) != 2
+            or shape[0] != len(axis)
+            or shape != columns["elevation_rad"].shape
+            or len(axis) < 6
+        ):
+            raise ConfigError(
+                f"{len(axis)} points of pods; expected at least 6, each with both angles of every pod",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()) or not self.sigma > 0.0:
+            raise ConfigError(
+                "an angle is not finite, or sigma is not above 0; leave such rows out",
+                file=self.source or None,
+            )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+    @property
+    def count(self) -> int:
+        """How many pods."""
+        return int(self.azimuth_rad.shape[1])
+
+    def start(self, noise: Noise | None = None) -> PodsState:
+        return PodsState(self, first_poses(self))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,13 +104,57 @@ class Pose:
         return Pose(self.place_mm + step[:3], self.rotation @ rotation_of(-step[3:] / LEVER_MM))
 
 
-def first_poses(pods: Pods) -> list[Pose]:
+@dataclass(frozen=True, slots=True, eq=False)
+class PodsState(ScatteredState):
+    """Directions in an adjustment, and the poses of their pods. Two rows (rad) of each point and pod, then
+    one (mm) of each baseline."""
+
+    noun = "directions"
+    tally = ""
+    observation: Pods
+    poses: tuple[Pose, ...]
+
+    @property
+    def section(self) -> str:
+        return "sets_of_pods"
+
+    @property
+    def label(self) -> str:
+        return self.observation.source or "pods"
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return pods_block(self.observation, parameters, theta, self.poses)
+
+    def step(self, block: Block, theta: Array) -> Advance:
+        values = residuals_of(block, theta)[0].reshape(-1, 6)
+        return Advance(values, bool(np.abs(values[:, :3]).max() < STILL_MM))
+
+    def moved(self, step: Advance, slips: Sequence[Outlier]) -> PodsState:
+        moved = [pose.moved(turn) for pose, turn in zip(self.poses, step.values, strict=True)]
+        return PodsState(self.observation, tuple(moved))
+
+    def spread_over_rows(self, places: Index) -> Index:
+        pods = self.observation
+        parts = [np.repeat(places[start : start + CHUNK], 2) for start in range(0, len(places), CHUNK)]
+        whole = [np.tile(part, pods.count) for part in parts]
+        return np.concatenate([*whole, np.zeros(len(pods.baselines), np.int64)])
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        return {
+            "name": self.label,
+            "directions": 2 * self.observation.azimuth_rad.size,
+            "sigma_urad": self.observation.sigma / RAD_PER_URAD,
+            "chi_square_per_reading": chi_square / len(residual),
+        }
+
+
+def first_poses(pods: Pods) -> tuple[Pose, ...]:
     """Poses from the nominal points, as if the machine had no errors. Raises CannotCompute."""
     tip = pods.axis_mm + pods.tool_mm
-    return [_resected(tip, pods, k) for k in range(pods.count)]
+    return tuple(_resected(tip, pods, k) for k in range(pods.count))
 
 
-def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: list[Pose]) -> Block:
+def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: Sequence[Pose]) -> Block:
     """The directions of all pods and the distances between them, linearised where the machine's errors are
     `theta`. Six unknowns a pod: shift, and turn times LEVER_MM."""
     size, unknowns = parameters.size, 6 * pods.count

@@ -8,22 +8,139 @@ probed are such points too: commanded is where it found them, measured where its
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import LEVER_MM, Unknowns, frame_columns
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.base import (
+    Advance,
+    Noise,
+    Outlier,
+    Scattered,
+    ScatteredState,
+    rms,
+    slips_of,
+    without,
+)
 from olp.core.arrays import Array, Index
+from olp.core.errors import ConfigError
 from olp.core.rigid_fit import Rigid, fit_frame
+from olp.core.units import UM_PER_MM
 
+#: Points in the frame of the machine are nearer than this to where they were commanded.
+FRAME_MM = 10.0
 #: Points whose rows are made at once: 30 MB with 600 parameters.
 CHUNK = 2000
 #: No coordinate is known better than this: 1 nm.
 LEAST_MM = 1e-6
 #: Cosine of the elevation from which a pole counts as near.
 STEEP = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points(Scattered):
+    """Places of the reflector as one set-up of a tracker (or any instrument of coordinates) saw them.
+
+    `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
+    point to the reflector, `measured_mm` (n, 3) its places in the instrument's frame, which nobody knows, but
+    which is the same for all of these points; with `known_frame` they are in the frame of the machine, that
+    of the axis positions and tool vectors, as TCP points are against a simulation model. `sigma` is the
+    standard uncertainty of a coordinate in mm, or `covariance_mm2` (n, 3, 3) that of the coordinates of each
+    point, and `sigma` their root mean square; `sigma_scale` that of the instrument's scale (mm/mm). Raises
+    ConfigError.
+    """
+
+    axis_mm: Array
+    tool_mm: Array
+    measured_mm: Array
+    sigma: float
+    sigma_scale: float = 0.0
+    source: str = ""
+    row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    known_frame: bool = False
+    covariance_mm2: Array | None = None
+
+    def __post_init__(self) -> None:
+        axis = np.atleast_2d(np.array(self.axis_mm, float))
+        columns = {
+            "axis_mm": axis,
+            "tool_mm": np.array(np.broadcast_to(self.tool_mm, axis.shape), float),
+            "measured_mm": np.atleast_2d(np.array(self.measured_mm, float)),
+            "row": np.array(self.row, np.int64) if len(self.row) else np.arange(1, len(axis) + 1),
+        }
+        if columns["measured_mm"].shape != axis.shape or axis.shape[1:] != (3,) or len(axis) < 4:
+            raise ConfigError(
+                f"{len(axis)} points; expected at least 4, each with three axis positions and three "
+                "coordinates",
+                file=self.source or None,
+            )
+        if not all(np.isfinite(column).all() for column in columns.values()):
+            raise ConfigError("a point is not finite; leave the row out", file=self.source or None)
+        if not self.sigma > 0.0:
+            raise ConfigError(
+                "the uncertainty of the points is not stated; expected sigma_um", file=self.source or None
+            )
+        if self.covariance_mm2 is not None:
+            columns["covariance_mm2"] = np.array(self.covariance_mm2, float)
+            if columns["covariance_mm2"].shape != (len(axis), 3, 3):
+                raise ConfigError("expected a 3 by 3 covariance of each point", file=self.source or None)
+        if self.known_frame:
+            off = np.linalg.norm(columns["measured_mm"] - axis - columns["tool_mm"], axis=1)
+            if off.max() > FRAME_MM:
+                raise ConfigError(
+                    f"a point is {off.max():.4g} mm off where it was commanded, row "
+                    f"{columns['row'][int(off.argmax())]}; expected places in the machine's frame within "
+                    f'{FRAME_MM:g} mm, or no frame = "known"',
+                    file=self.source or None,
+                )
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+    @property
+    def framed(self) -> bool:
+        return self.known_frame
+
+    def start(self, noise: Noise | None = None) -> PointsState:
+        return PointsState(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointsState(ScatteredState):
+    """Points in an adjustment: no unknowns but those that the rows eliminate. Three rows a point."""
+
+    noun = "points"
+    tally = "points"
+    observation: Points
+
+    @property
+    def section(self) -> str:
+        return "sets_of_points"
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return points_block(self.observation, parameters)
+
+    def slips(self, block: Block, theta: Array, settled: bool) -> Sequence[Outlier]:
+        return slips_of(block, theta, self.observation.source, self.observation.row, "point")
+
+    def moved(self, step: Advance, slips: Sequence[Outlier]) -> PointsState:
+        return PointsState(without(self.observation, self.observation.row, slips))
+
+    def spread_over_rows(self, places: Index) -> Index:
+        return np.repeat(places, 3)
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        return {
+            "name": self.label,
+            "points": self.count,
+            "sigma_coordinate_um": self.observation.sigma * UM_PER_MM,
+            "residual_um": rms(residual) * UM_PER_MM,
+            "chi_square_per_coordinate": chi_square / (3 * self.count),
+        }
 
 
 def points_block(points: Points, parameters: Unknowns) -> Block:

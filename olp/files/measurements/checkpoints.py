@@ -17,13 +17,14 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from olp.calibration.observations.readings import Points
+from olp.calibration.observations.points import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Positive, Table, Triple
 from olp.core.units import MM_PER_UM
+from olp.files.measurements.instruments.base import PER_UNIT
 from olp.files.measurements.point_readings import DEVIATION, MEASURED, parse_point_readings
-from olp.files.measurements.reader import PER_UNIT, load_measurements
+from olp.files.measurements.reader import load_measurements
 from olp.files.measurements.stated import stated_as
 from olp.files.problems import config_error
 from olp.files.write import PathLike, read_bytes
@@ -58,7 +59,7 @@ def load_checkpoints(
     """
     source = FilePath(path)
     if source.is_dir() or source.suffix.lower() == ".toml":
-        found = load_measurements([source]).points
+        found = load_measurements([source]).of(Points)
         if len(found) != 1:
             raise ConfigError(
                 f"holds {len(found)} sets of points; expected one; name its file", file=str(path)

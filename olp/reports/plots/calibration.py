@@ -16,7 +16,7 @@ from olp.calibration.iso230.go_return import Reversal
 from olp.calibration.iso230.positioning import Evaluation, scale_of
 from olp.calibration.iso230.separation import Separation
 from olp.calibration.iso230.squareness import slope_of
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array, Index
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.reports.plots.base import Format, drawn

@@ -11,13 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import simulated
 
-from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.basis import CurveSpace, Kink, Spline, Step
 from olp.calibration.estimator.curves import calibration_of, sigmas_of
+from olp.calibration.estimator.findings import findings_of
+from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of, solve
-from olp.calibration.estimator.summary import findings_of, unseen
-from olp.calibration.observations.lines import drift_ramps, group_of, noise_of
-from olp.calibration.observations.readings import Line, Measurements, SquarenessReading
+from olp.calibration.estimator.summary import unseen
+from olp.calibration.observations.lengths import LengthsState
+from olp.calibration.observations.lines import Line, drift_ramps, group_of, noise_of
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.pods import PodsState
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.build import build
 from olp.findings.catalogue import Finding
@@ -38,7 +43,7 @@ def told(found: Fit, code: str) -> list[Finding]:
 
 def without(measurements: Measurements, *names: str) -> Measurements:
     kept = tuple(line for line in measurements.lines if line.component not in names)
-    return dataclasses.replace(measurements, lines=kept)
+    return measurements.with_lines(kept)
 
 
 # -- simulated machines ----------------------------------------------------------------------------------
@@ -118,7 +123,7 @@ def test_zeros_and_slopes_of_instruments_mean_nothing(
             tilt = 40e-6 if line.axis < "XYZ".index(line.component[1]) else -40e-6
         value = line.value + (0.01 * k if line.quantity != "angle" else 1e-5 * k) + tilt * line.target_mm
         moved.append(dataclasses.replace(line, value=value))
-    again = fit(dataclasses.replace(measurements, lines=tuple(moved)), "FXYZ")
+    again = fit(measurements.with_lines(tuple(moved)), "FXYZ")
     at = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (100, 3))
     assert np.abs(again.error(at, TOOLS[1]) - found.error(at, TOOLS[1])).max() < 0.01 * UM
 
@@ -132,10 +137,10 @@ def test_what_points_leave_alone_and_with_lines() -> None:
     for seed in range(2):
         machine, measurements = case(seed, "smooth")
         points = cloud(machine, seed, 120, 5.0)
-        found = fit(Measurements("m", points=(points,)), machine.chain)
+        found = fit(Measurements("m", (points,)), machine.chain)
         alone += [left(machine, found, tool, 400) for tool in FRESH]
         few = cloud(machine, seed, 40, 8.0)
-        found = fit(dataclasses.replace(measurements, points=(few,)), machine.chain)
+        found = fit(measurements.also((few,)), machine.chain)
         both += [left(machine, found, tool, 400) for tool in FRESH]
     assert np.median([one.after_framed for one in alone]) <= 6.0
     assert np.median([one.after_framed for one in both]) <= 3.5
@@ -148,14 +153,14 @@ def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None
     of one offset otherwise than its own displacement does. Two offsets hide the turn about their line."""
     last = chain.replace("F", "")[2]
     machine = simulated.machine(1, "smooth", chain)
-    one = fit(Measurements("m", points=(cloud(machine, 1, 250, 5.0, [(30.0, 0.0, 9.0)]),)), chain)
+    one = fit(Measurements("m", (cloud(machine, 1, 250, 5.0, [(30.0, 0.0, 9.0)]),)), chain)
     assert set(unseen(one)) == {hidden, *(f"E{d}{last}" for d in "ABC")}
     assert all("one offset" in finding.message for finding in told(one, "OLP801"))
     line = [(0.0, 0.0, -80.0), (0.0, 0.0, -400.0)]
-    along_z = fit(Measurements("m", points=(cloud(machine, 1, 250, 5.0, line),)), chain)
+    along_z = fit(Measurements("m", (cloud(machine, 1, 250, 5.0, line),)), chain)
     assert set(unseen(along_z)) == {f"EC{last}", *([hidden] if hidden[1] == "C" else [])}
     assert "on one line" in told(along_z, "OLP801")[0].message
-    three = fit(Measurements("m", points=(cloud(machine, 1, 250, 5.0),)), chain)
+    three = fit(Measurements("m", (cloud(machine, 1, 250, 5.0),)), chain)
     assert not unseen(three)
 
 
@@ -164,7 +169,7 @@ def test_where_the_instrument_stands_means_nothing() -> None:
     points = cloud(machine, 2, 60, 5.0)
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     moved = dataclasses.replace(points, measured_mm=points.measured_mm @ turn.T + 1234.5)
-    first, second = (fit(Measurements("m", points=(p,)), "FXYZ") for p in (points, moved))
+    first, second = (fit(Measurements("m", (p,)), "FXYZ") for p in (points, moved))
     at = np.random.default_rng(1).uniform(first.box_mm[:, 0], first.box_mm[:, 1], (50, 3))
     assert first.error(at, FRESH[0]) == pytest.approx(second.error(at, FRESH[0]), abs=1e-6)
 
@@ -174,7 +179,7 @@ def test_a_point_that_slipped_is_left_out_and_named() -> None:
     points = cloud(machine, 2, 150, 5.0)
     measured = points.measured_mm.copy()
     measured[17] += 0.2
-    found = fit(Measurements("m", points=(dataclasses.replace(points, measured_mm=measured),)), "FXYZ")
+    found = fit(Measurements("m", (dataclasses.replace(points, measured_mm=measured),)), "FXYZ")
     assert [outlier.row for outlier in found.outliers] == [18]
     assert "points.csv: row 18" in told(found, "OLP802")[0].message
 
@@ -184,10 +189,10 @@ def test_a_forgotten_scale_is_caught_by_chi_square() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     points = cloud(machine, 0, 60, 5.0)
     points = dataclasses.replace(points, measured_mm=points.measured_mm * (1.0 + 5e-5))
-    forgotten = fit(dataclasses.replace(measurements, points=(points,)), "FXYZ")
+    forgotten = fit(measurements.also((points,)), "FXYZ")
     assert told(forgotten, "OLP808") or forgotten.outliers
     known = dataclasses.replace(points, sigma_scale=5e-5)
-    assert not told(fit(dataclasses.replace(measurements, points=(known,)), "FXYZ"), "OLP808")
+    assert not told(fit(measurements.also((known,)), "FXYZ"), "OLP808")
 
 
 # -- lengths from stations -------------------------------------------------------------------------------
@@ -198,12 +203,12 @@ def test_what_lengths_leave() -> None:
     left_same, left_other = [], []
     for seed in range(2):
         machine = simulated.machine(seed, "smooth", ("FXYZ", "YFXZ")[seed])
-        found = fit(Measurements("m", lengths=rays(machine, seed, 6, 250)), machine.chain)
+        found = fit(Measurements("m", rays(machine, seed, 6, 250)), machine.chain)
         left_same.append(left(machine, found, simulated.OFFSETS[0], 400).after_framed)
         left_other.append(left(machine, found, FRESH[1], 400).after_framed)
         places = simulated.stations(machine, seed, 6)
-        for result, place in zip(found.lengths, places, strict=True):
-            assert result.station.place_mm == pytest.approx(place, abs=0.05)
+        for result, place in zip(found.of(LengthsState), places, strict=True):
+            assert result.state.station.place_mm == pytest.approx(place, abs=0.05)
         assert not told(found, "OLP808")
     assert np.median(left_same) <= 0.9
     assert np.median(left_other) <= 1.2
@@ -215,7 +220,7 @@ def test_a_length_that_slipped_is_left_out_and_named() -> None:
     wrong = all_rays[2].length_mm.copy()
     wrong[33] += 0.05
     bad = (*all_rays[:2], dataclasses.replace(all_rays[2], length_mm=wrong), *all_rays[3:])
-    found = fit(Measurements("m", lengths=bad), "FXYZ")
+    found = fit(Measurements("m", bad), "FXYZ")
     assert [(outlier.source, outlier.row) for outlier in found.outliers] == [("station-2.csv", 34)]
     assert not told(found, "OLP808")
 
@@ -226,7 +231,7 @@ def test_lengths_of_points_in_a_plane_are_refused() -> None:
     flat = one.axis_mm.copy()
     flat[:, 2] = -900.0 + 0.2 * flat[:, 0]
     with pytest.raises(CannotCompute, match="one plane"):
-        fit(Measurements("m", lengths=(dataclasses.replace(one, axis_mm=flat),)), "FXYZ")
+        fit(Measurements("m", (dataclasses.replace(one, axis_mm=flat),)), "FXYZ")
 
 
 # -- directions from pods --------------------------------------------------------------------------------
@@ -237,9 +242,9 @@ def test_what_two_pods_leave() -> None:
     rows = []
     for seed, n in ((0, 250), (1, 250)):
         machine = simulated.machine(seed, "smooth", "FXYZ")
-        found = fit(Measurements("m", pods=(two_pods(machine, seed, n),)), "FXYZ")
+        found = fit(Measurements("m", (two_pods(machine, seed, n),)), "FXYZ")
         rows += [left(machine, found, tool, 400).after_framed for tool in FRESH]
-        for pose, place in zip(found.pods[0].poses, simulated.PODS, strict=True):
+        for pose, place in zip(found.of(PodsState)[0].state.poses, simulated.PODS, strict=True):
             assert pose.place_mm == pytest.approx(place, abs=0.5)
         assert not told(found, "OLP808")
     assert np.median(rows) <= 25.0
@@ -250,8 +255,8 @@ def test_without_a_distance_the_scale_stays_unknown() -> None:
     differences."""
     machine = simulated.machine(1, "smooth", "FXYZ")
     pods = two_pods(machine, 1, 1000, [(0.0, 0.0, -100.0)])
-    known = fit(Measurements("m", pods=(pods,)), "FXYZ")
-    free = fit(Measurements("m", pods=(dataclasses.replace(pods, baselines=()),)), "FXYZ")
+    known = fit(Measurements("m", (pods,)), "FXYZ")
+    free = fit(Measurements("m", (dataclasses.replace(pods, baselines=()),)), "FXYZ")
 
     def scales(found: Fit, weights: tuple[float, float, float]) -> float:
         """Standard uncertainty of a combination of the scales of X, Y, Z, in um/m."""
@@ -273,7 +278,7 @@ def test_without_a_distance_the_scale_stays_unknown() -> None:
 def test_roll_of_z_without_its_lines_is_said_to_be_unknown() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     kept = [line for line in measurements.lines if abs(line.tool_mm[0]) < 1.0]
-    found = fit(dataclasses.replace(measurements, lines=tuple(kept)), "FXYZ")
+    found = fit(measurements.with_lines(tuple(kept)), "FXYZ")
     assert list(unseen(found)) == ["ECZ"]
     (finding,) = told(found, "OLP801")
     assert "ECZ" in finding.message and "um" in finding.message
@@ -287,7 +292,7 @@ def test_roll_of_z_without_its_lines_is_said_to_be_unknown() -> None:
 def test_straightness_without_a_square_leaves_squareness_unknown() -> None:
     _, measurements = case(0, "smooth", "FXYZ")
     lines = [dataclasses.replace(line, square=None) for line in measurements.lines]
-    plain = dataclasses.replace(measurements, lines=tuple(lines), squares=())
+    plain = dataclasses.replace(measurements.with_lines(tuple(lines)), squares=())
     found = fit(plain, "FXYZ")
     assert {f.message.split()[0] for f in told(found, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
 
@@ -309,7 +314,7 @@ def test_a_reading_of_squareness_does_what_a_square_does() -> None:
         )
     lines = [dataclasses.replace(line, square=None) for line in measurements.lines]
     found = fit(
-        dataclasses.replace(measurements, lines=tuple(lines), squares=(), squareness=tuple(readings)), "FXYZ"
+        dataclasses.replace(measurements.with_lines(lines).also(readings), squares=()), "FXYZ"
     )
     for name in ("C0Y", "B0Z", "A0Z"):
         functional = found.squareness(name)
@@ -377,7 +382,7 @@ def test_lost_motion_that_is_not_becomes_a_direction_column(
             more = line.direction * 4.0 * UM * np.sin(np.pi * line.target_mm / 3000.0)
             line = dataclasses.replace(line, value=line.value + more)
         lines.append(line)
-    found = fit(dataclasses.replace(measurements, lines=tuple(lines)), "FXYZ")
+    found = fit(measurements.with_lines(tuple(lines)), "FXYZ")
     calibration = calibration_of(found)
     assert calibration.backlash_mm[0] == 0.0
     assert calibration.backlash_mm[1] > 0.0
@@ -395,7 +400,7 @@ def test_a_slip_is_left_out_and_named(one: tuple[simulated.Machine, Measurements
     value = lines[k].value.copy()
     value[77] += 40 * UM
     lines[k] = dataclasses.replace(lines[k], value=value)
-    again = fit(dataclasses.replace(measurements, lines=tuple(lines)), "FXYZ")
+    again = fit(measurements.with_lines(tuple(lines)), "FXYZ")
     assert [(o.source, o.row) for o in again.outliers] == [("eyx.csv", 78)]
     (finding,) = told(again, "OLP802")
     assert finding.lines == (78,) and "eyx.csv" in finding.message
@@ -411,7 +416,7 @@ def test_runs_that_scatter_more_than_stated_are_said(
         dataclasses.replace(line, sigma=0.1 * UM) if line.component == "EXX" else line
         for line in measurements.lines
     ]
-    found = fit(dataclasses.replace(measurements, lines=tuple(lines)), "FXYZ")
+    found = fit(measurements.with_lines(tuple(lines)), "FXYZ")
     (finding,) = told(found, "OLP803")
     assert finding.message.startswith("exx.csv")
 
@@ -475,7 +480,7 @@ def test_a_wrong_sense_of_one_line_does_not_fit() -> None:
     )
     for sign, expected in ((1.0, 0), (-1.0, 1)):
         turned = dataclasses.replace(other, value=sign * other.value)
-        found = fit(dataclasses.replace(measurements, lines=(*measurements.lines, turned)), "FXYZ")
+        found = fit(measurements.with_lines((*measurements.lines, turned)), "FXYZ")
         assert len(told(found, "OLP808")) == expected
 
 

@@ -13,13 +13,15 @@ from click.testing import CliRunner
 from judge import simulated
 
 import olp
-from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.field import Modes, matern
+from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.marginal import log_evidence
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import residual_map
 from olp.calibration.estimator.widened import Adjustment
-from olp.calibration.observations.readings import MapWish, Measurements, Points
+from olp.calibration.observations.measurements import MapWish, Measurements
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import CannotCompute
 from olp.errormodel.build import build
@@ -32,7 +34,7 @@ def places(n: int = 500) -> np.ndarray:
 
 
 def of_points(machine: simulated.Machine, seed: int, n: int, **more: object) -> Fit:
-    return fit(Measurements("simulated", points=(cloud(machine, seed, n, 5.0, **more),)), machine.chain)
+    return fit(Measurements("simulated", (cloud(machine, seed, n, 5.0, **more),)), machine.chain)
 
 
 @pytest.fixture(scope="module")
@@ -92,14 +94,14 @@ def test_nothing_is_invented_on_rigid_machines(family: str, seed: int) -> None:
 def test_noise_that_was_stated_too_small_is_no_field() -> None:
     points = cloud(simulated.machine(203, "smooth"), 203, 120, 5.0)
     lying = dataclasses.replace(points, sigma=0.5 * points.sigma)
-    found = nonrigid(fit(Measurements("simulated", points=(lying,)), "FXYZ"))
+    found = nonrigid(fit(Measurements("simulated", (lying,)), "FXYZ"))
     assert not found.processes
     assert found.noise > 1.2
 
 
 def test_directions_of_pods_show_a_sag_too() -> None:
     machine = simulated.bent(simulated.machine(2, "smooth"), sag_mm=0.15)
-    found = nonrigid(before := fit(Measurements("simulated", pods=(two_pods(machine, 2, 250),)), "FXYZ"))
+    found = nonrigid(before := fit(Measurements("simulated", (two_pods(machine, 2, 250),)), "FXYZ"))
     assert "DZ" in [process.coordinate for process in found.processes]
     at, tool = places(), np.array(FRESH[0])
     after = left_um(machine, found.fit.error(at, tool) + found.value(at), tool)
@@ -114,7 +116,7 @@ def test_too_few_points_or_points_in_a_plane_make_no_map() -> None:
     whole = cloud(machine, 3, 200, 5.0)
     use = whole.axis_mm[:, 2] > -200.0
     low = Points(whole.axis_mm[use], whole.tool_mm[use], whole.measured_mm[use], whole.sigma)
-    found = fit(Measurements("simulated", points=(low,)), "FXYZ")
+    found = fit(Measurements("simulated", (low,)), "FXYZ")
     wide = dataclasses.replace(found, box_mm=BOX)
     assert "along Z" in nonrigid(wide).reason
 
@@ -146,7 +148,7 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
             work.reduced(), modes, log + np.array([np.log(size), 0.0, 0.0, 0.0]), np.log(1.3)
         )[0]
 
-    points = before.points[0].points
+    points = before.scattered[0].state.observation
     (_, block), size = work.sets[0], before.parameters.size
     (chunk,) = block.chunks()
     nominal = chunk.local @ chunk.local.T  # the frame: any
@@ -193,7 +195,7 @@ def test_without_a_field_the_adjustment_is_that_of_the_fit() -> None:
 
 def test_the_map_loses_no_more_than_stated(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
     _, before, found = bent
-    wanted = Measurements("simulated", points=before.measurements.points, map=MapWish(within_mm=2e-4))
+    wanted = Measurements("simulated", before.measurements.observations, map=MapWish(within_mm=2e-4))
     fitted = olp.fit_calibration(dataclasses.replace(wanted, chain=before.parameters.chain))
     (described,) = fitted.calibration.maps
     assert described.sigma is not None

@@ -14,7 +14,7 @@ from judge import nullspace, simulated
 
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.summary import scale_unseen, scales_open, squareness_unseen, unseen
-from olp.calibration.observations.readings import Measurements
+from olp.calibration.observations.measurements import Measurements
 
 ORDERS = ["".join(order) for order in permutations("XYZ")]
 CHAINS = [order[:k] + "F" + order[k:] for k in range(4) for order in ORDERS]
@@ -50,7 +50,7 @@ def test_angles_that_offsets_of_the_reflector_hide(chain: str, offsets: str) -> 
     hidden = nullspace.open_names(changes, names)
     assert len(changes) == 4 * len(angles(hidden))
     assert len(changes) in {"one offset": (16,), "collinear": (4, 8), "three": (0,)}[offsets]
-    found = fit(Measurements("m", points=(points,)), chain)
+    found = fit(Measurements("m", (points,)), chain)
     said = set(unseen(found))
     assert said == angles(hidden)
     words = {"one offset": "one offset", "collinear": "on one line", "three": ""}[offsets]
@@ -109,8 +109,8 @@ def test_angles_alone_leave_the_scale_open(chain: str) -> None:
     (stretch,) = open_scales(changes, names)
     assert stretch == pytest.approx([1.0, 1.0, 1.0], abs=1e-3)
     assert len(changes) == 17
-    free = fit(Measurements("m", pods=(dataclasses.replace(pods, baselines=()),)), chain)
-    known = fit(Measurements("m", pods=(pods,)), chain)
+    free = fit(Measurements("m", (dataclasses.replace(pods, baselines=()),)), chain)
+    known = fit(Measurements("m", (pods,)), chain)
     assert scale_unseen(free) is not None and scale_unseen(known) is None
     (change,) = scales_open(free)[0]
     assert change == pytest.approx([1.0, 1.0, 1.0], abs=0.15)
@@ -137,7 +137,7 @@ def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None
     changes = nullspace.open_changes(table[:, first], zeros)
     assert len(changes) == 2
     assert np.abs(changes[:, 3:]).max() < 1e-6 * np.abs(changes).max()
-    found = fit(Measurements("m", diagonals=lines), chain)
+    found = fit(Measurements("m", lines), chain)
     assert not squareness_unseen(found)
     changes_said, (seen,) = scales_open(found)
     assert len(changes_said) == 2
@@ -168,7 +168,7 @@ def test_a_ball_bar_in_one_direction_cannot_tell_squareness(chain: str) -> None:
             own.append(circle.direction * np.sin(2.0 * circle.angle_rad))
             seen += 1 - len(nullspace.open_changes(column[:, None], np.stack(own, axis=1)))
         assert seen == closed
-        found = fit(dataclasses.replace(bare, circles=runs), chain)
+        found = fit(bare.also(runs), chain)
         assert len(squareness_unseen(found)) == 3 - closed
 
 
@@ -195,7 +195,7 @@ def forgotten(kind: str, seed: int) -> tuple[Measurements, Measurements]:
             )
             for part in (slice(0, 60), slice(60, 120))
         ]  # fmt: skip
-        return Measurements("m", points=(joined,)), Measurements("m", points=tuple(halves))
+        return Measurements("m", (joined,)), Measurements("m", tuple(halves))
     if kind == "the error of a square":
         tilted = [
             dataclasses.replace(line, value=line.value + 60e-6 * line.target_mm)
@@ -203,7 +203,7 @@ def forgotten(kind: str, seed: int) -> tuple[Measurements, Measurements]:
             else line
             for line in lines.lines
         ]
-        all_in = dataclasses.replace(lines, lines=tuple(tilted), points=(cloud(machine, seed, 120, 5.0),))
+        all_in = lines.with_lines(tilted).also((cloud(machine, seed, 120, 5.0),))
         honest = [
             dataclasses.replace(square, sigma_rad=100e-6) if square.name == "SXY" else square
             for square in lines.squares
@@ -213,8 +213,8 @@ def forgotten(kind: str, seed: int) -> tuple[Measurements, Measurements]:
     # its readings are 30 % too large
     wrong = dataclasses.replace(circle, value=1.3 * circle.value)
     return (
-        dataclasses.replace(lines, circles=(wrong, *rest)),
-        dataclasses.replace(lines, circles=(circle, *rest)),
+        lines.also((wrong, *rest)),
+        lines.also((circle, *rest)),
     )
 
 

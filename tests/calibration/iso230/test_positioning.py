@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.calibration.iso230.positioning import evaluate, findings_of, reference_line
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError
 
 UM = 1e-3

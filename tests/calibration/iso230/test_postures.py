@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from olp.calibration.iso230 import ballbar, diagonals, postures
+from olp.calibration.observations.diagonals import Diagonal
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
-from olp.files.measurements.instruments import read_circles, read_diagonal, read_postures
+from olp.files.measurements.instruments.ballbars import read_circles
+from olp.files.measurements.instruments.diagonals import read_diagonal
+from olp.files.measurements.postures import read_postures
 
 POINT = np.array([400.0, 300.0, -500.0])
 
@@ -99,7 +102,7 @@ def test_without_repetition_an_uncertainty_must_be_stated() -> None:
         postures.fit(bare)
     assert postures.fit(once).sigma_mm["left"] == pytest.approx([2**0.5 * 1e-6] * 3)
     two, way = np.array([0.0, 100.0]), np.ones(2, int)
-    plain = diagonals.Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), way, way)
+    plain = Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), way, way)
     with pytest.raises(ConfigError, match="nothing is repeated"):
         diagonals.fit([plain])
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from olp.calibration.iso230.go_return import backlash_toml, findings_of, program, reversal_of
 from olp.calibration.iso230.separation import SEEN, Separation, aliased, seen, separate
-from olp.calibration.observations.readings import Line
+from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Axis, Machine
 

@@ -14,7 +14,10 @@ from hypothesis import strategies as st
 
 from olp.calibration.iso230 import ballbar, diagonals, squareness
 from olp.calibration.iso230.conventions import AXES_OF, CONVENTIONS, angle_words, from_iso, to_iso
-from olp.calibration.observations.readings import Line, Square, SquarenessReading
+from olp.calibration.observations.circles import PLANES, Circles
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.squareness import SquarenessReading
 from olp.compensation.invert import invert
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import SQUARENESS
@@ -172,7 +175,7 @@ def test_words_of_an_angle_are_true(component: str) -> None:
 
 def diagonal(  # type: ignore[no-untyped-def]
     machine, start, end, noise: float = 0.0, laser: float = 0.0, seed: int = 0
-) -> diagonals.Diagonal:
+) -> Diagonal:
     share = np.linspace(0.0, 1.0, 11)
     start, end = np.array(start, float), np.array(end, float)
     at = start + share[:, None] * (end - start)
@@ -180,7 +183,7 @@ def diagonal(  # type: ignore[no-untyped-def]
     distance = share * np.linalg.norm(end - start)
     value = machine.error(at, np.array(TOOL)) @ unit + laser * distance
     value = np.tile(value, 2) + np.random.default_rng(seed).normal(0, 1, 22) * noise
-    return diagonals.Diagonal(
+    return Diagonal(
         tuple(start), tuple(end), np.tile(distance, 2), value, np.repeat([1, 2], 11), np.ones(22, int), TOOL,
         sigma=max(noise, 1e-5),
     )  # fmt: skip
@@ -189,7 +192,7 @@ def diagonal(  # type: ignore[no-untyped-def]
 LOW, HIGH = BOX[:, 0], BOX[:, 1]
 
 
-def body(machine, **options: float) -> list[diagonals.Diagonal]:  # type: ignore[no-untyped-def]
+def body(machine, **options: float) -> list[Diagonal]:  # type: ignore[no-untyped-def]
     out = []
     for k, signs in enumerate(((1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, 1))):
         s = np.array(signs)
@@ -198,7 +201,7 @@ def body(machine, **options: float) -> list[diagonals.Diagonal]:  # type: ignore
     return out
 
 
-def faces(machine) -> list[diagonals.Diagonal]:  # type: ignore[no-untyped-def]
+def faces(machine) -> list[Diagonal]:  # type: ignore[no-untyped-def]
     out = []
     for i, j in AXES_OF.values():
         for sign in (1, -1):
@@ -255,7 +258,7 @@ def test_a_wrong_sign_of_one_diagonal_is_noticed() -> None:
     machine = model(ANGLES, (30.0, -20.0, 10.0))
     taken = body(machine) + faces(machine)
     bad = taken[4]
-    taken[4] = diagonals.Diagonal(
+    taken[4] = Diagonal(
         bad.start_mm, bad.end_mm, bad.distance_mm, -bad.value, bad.run, bad.direction, bad.tool_mm, bad.sigma
     )
     assert "OLP857" in {f.code for f in diagonals.fit(taken).findings}
@@ -287,10 +290,10 @@ def test_wrong_diagonals_are_refused() -> None:
 
 def circles(
     plane: str, ways: tuple[int, ...], seed: int = 0, noise: float = 0.0, servo: float = 0.0
-) -> ballbar.Circles:
+) -> Circles:
     """A machine with squareness, scale mismatch and lost motion, whose axes lag; laps run in."""
     machine = model(ANGLES, (30.0, -20.0, 10.0), backlash_mm=(8e-3, 5e-3, 3e-3))
-    first, second, _ = ballbar.PLANES[plane]
+    first, second, _ = PLANES[plane]
     centre, radius, n = BOX.mean(axis=1), 150.0, 720
     random = np.random.default_rng(seed)
     parts = []
@@ -308,13 +311,13 @@ def circles(
         rows = slice(n // 4, None)
         parts.append((t[rows], value[rows], np.full(n, run), np.full(n, d)))
     t, value, run_of, way = (np.concatenate(c) for c in zip(*parts, strict=True))
-    return ballbar.Circles(plane, radius, tuple(centre), t, value, run_of, way, TOOL, 50.0, 2e-4, "c.csv")
+    return Circles(plane, radius, tuple(centre), t, value, run_of, way, TOOL, 50.0, 2e-4, "c.csv")
 
 
-@pytest.mark.parametrize("plane", ballbar.PLANES)
+@pytest.mark.parametrize("plane", PLANES)
 def test_both_ways_separate_squareness_and_servo_mismatch(plane: str) -> None:
     found = ballbar.fit(circles(plane, (1, -1), noise=2e-4, servo=3e-3))
-    first, second, name = ballbar.PLANES[plane]
+    first, second, name = PLANES[plane]
     reading = found.reading()
     assert reading is not None
     assert reading.component == name
@@ -340,7 +343,7 @@ def test_a_circle_sees_the_mean_lines_over_its_span() -> None:
     value = (size[0] * y**3 * x + size[1] * x**3 * y) / radius
     t, value = np.tile(t, 2), np.tile(value, 2)
     way = np.repeat([1, -1], 360)
-    found = ballbar.fit(ballbar.Circles("XY", radius, (0, 0, 0), t, value, np.ones(720, int), way)).reading()
+    found = ballbar.fit(Circles("XY", radius, (0, 0, 0), t, value, np.ones(720, int), way)).reading()
     assert found is not None
     (low, high), _ = found.span_mm
     q = np.linspace(low, high, 4001)
@@ -363,7 +366,7 @@ def test_one_way_gives_no_squareness_and_says_so() -> None:
 def test_a_quarter_circle_is_uncertain_or_undetermined() -> None:
     whole = circles("XY", (1, -1), noise=2e-4)
     rows = np.abs(np.angle(np.exp(1j * (whole.angle_rad - np.pi / 4)))) < np.pi / 5
-    part = ballbar.Circles(
+    part = Circles(
         "XY", 150.0, whole.centre_mm, whole.angle_rad[rows], whole.value[rows], whole.run[rows],
         whole.direction[rows], TOOL,
     )  # fmt: skip
@@ -381,7 +384,7 @@ def test_circle_fit_is_linear_and_orderless(seed: int, order: list[int]) -> None
     one, other = random.normal(0, 1e-3, (2, 200))
 
     def values(value: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        made = ballbar.Circles("ZX", 100.0, (0, 0, 0), t[rows], value[rows], np.ones(200, int), way[rows])
+        made = Circles("ZX", 100.0, (0, 0, 0), t[rows], value[rows], np.ones(200, int), way[rows])
         return ballbar.fit(made).value
 
     straight, mixed = np.arange(200), random.permutation(200)

@@ -11,13 +11,15 @@ import pytest
 from cases.calibration import FRESH, TOOLS, case, cloud, left
 from judge import simulated
 
-from olp.calibration.estimator.adjustment import Fit, fit
+from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.curves import calibration_of
-from olp.calibration.estimator.summary import findings_of, summary
-from olp.calibration.iso230.ballbar import Circles
-from olp.calibration.iso230.diagonals import Diagonal
-from olp.calibration.observations.points import polar_points
-from olp.calibration.observations.readings import Measurements, Points
+from olp.calibration.estimator.findings import findings_of
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.summary import summary
+from olp.calibration.observations.circles import Circles
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points, polar_points
 from olp.core.errors import ConfigError
 from olp.errormodel.build import build
 from olp.files.measurements.reader import files_of_measurements, load_measurements
@@ -47,7 +49,7 @@ def test_points_in_the_frame_of_the_machine_show_all_of_the_error(chain: str, wi
     machine, measurements = case(2, "smooth", chain)
     lines = measurements if with_lines else Measurements("m")
     points = in_the_frame(machine, 2, 120, 5.0)
-    found = fit(dataclasses.replace(lines, points=(points,)), chain, datum_mm=(1000.0, 500.0, -200.0))
+    found = fit(lines.also((points,)), chain, datum_mm=(1000.0, 500.0, -200.0))
     at = np.random.default_rng(2).uniform(found.box_mm[:, 0], found.box_mm[:, 1], (300, 3))
     model = build(calibration_of(found), chain)
     for tool in (*TOOLS, *FRESH):
@@ -64,7 +66,7 @@ def test_points_in_the_frame_of_the_machine_show_all_of_the_error(chain: str, wi
 def test_an_unknown_frame_beside_a_known_one_keeps_its_own() -> None:
     machine = simulated.machine(1, "smooth", "FXYZ")
     known, other = in_the_frame(machine, 1, 100, 5.0), cloud(machine, 1, 100, 5.0)
-    both = fit(Measurements("m", points=(known, other)), "FXYZ")
+    both = fit(Measurements("m", (known, other)), "FXYZ")
     at = np.random.default_rng(2).uniform(both.box_mm[:, 0], both.box_mm[:, 1], (200, 3))
     true = machine.error(at, np.array(FRESH[0])) + SHIFT + np.cross(TURN, at + np.array(FRESH[0]))
     assert simulated.rms_um(true - both.error(at, FRESH[0])) < 6.0
@@ -102,7 +104,7 @@ def test_a_ball_plate_in_any_pose_is_a_set_of_points() -> None:
             stop = place - vector - machine.error(stop, vector)
         own = own + rng.normal(0.0, 0.5 * UM, own.shape)
         sets.append(Points(stop, vector, own, 0.5 * UM, source=f"pose-{k}.csv"))
-    found = fit(Measurements("m", points=tuple(sets)), "FXYZ")
+    found = fit(Measurements("m", tuple(sets)), "FXYZ")
     result = left(machine, found, FRESH[0], 400)
     assert result.before_framed > 40.0
     assert result.after_framed < 4.0
@@ -134,7 +136,7 @@ def test_a_polar_station_weighs_distance_and_angles_as_they_are() -> None:
         points = polar_points(*taken, sigma_mm=np.array(0.5 * UM), sigma_rad=10e-6, source="polar.csv")
         plain = dataclasses.replace(points, covariance_mm2=None)
         for cloud_, out in ((points, weighed), (plain, alike)):
-            found = fit(Measurements("m", points=(cloud_,)), "FXYZ")
+            found = fit(Measurements("m", (cloud_,)), "FXYZ")
             result = left(machine, found, FRESH[1], 400)
             out.append(result.after_framed)
             if cloud_ is points:
@@ -151,11 +153,11 @@ def test_a_polar_slip_is_named_and_alike_weights_are_points() -> None:
     slipped = distance.copy()
     slipped[30] += 0.2
     points = polar_points(at, tool, slipped, azimuth, elevation, sigma_mm=np.array(5 * UM), sigma_rad=2e-6)
-    found = fit(Measurements("m", points=(points,)), "FXYZ")
+    found = fit(Measurements("m", (points,)), "FXYZ")
     assert [o.row for o in found.outliers] == [31]
     plain = cloud(machine, 0, 60, 5.0)
     same = dataclasses.replace(plain, covariance_mm2=np.tile(np.eye(3) * plain.sigma**2, (60, 1, 1)))
-    first, second = (fit(Measurements("m", points=(p,)), "FXYZ") for p in (plain, same))
+    first, second = (fit(Measurements("m", (p,)), "FXYZ") for p in (plain, same))
     at = machine.box.mean(axis=1)[None] + np.array([[300.0, 200.0, 100.0]])
     assert first.error(at, FRESH[0]) == pytest.approx(second.error(at, FRESH[0]), abs=1e-7)
 
@@ -192,7 +194,7 @@ def circles_of(machine: simulated.Machine, seed: int, *, both: bool = True) -> t
 
 def no_square(measurements: Measurements) -> Measurements:
     lines = tuple(dataclasses.replace(line, square=None) for line in measurements.lines)
-    return dataclasses.replace(measurements, lines=lines, squares=())
+    return dataclasses.replace(measurements.with_lines(lines), squares=())
 
 
 @pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "XYZF"])
@@ -204,8 +206,8 @@ def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
     square = left(machine, fit(measurements, chain), TOOLS[0], 400).after_framed
     alone = fit(bare, chain)
     assert len(told(alone, "OLP806")) == 3
-    for more in ({"circles": circles_of(machine, 0)}, {"diagonals": diagonals_of(machine, 0)}):
-        found = fit(dataclasses.replace(bare, **more), chain)  # type: ignore[arg-type]
+    for more in (circles_of(machine, 0), diagonals_of(machine, 0)):
+        found = fit(bare.also(more), chain)
         assert not told(found, "OLP806") and not told(found, "OLP808")
         result = left(machine, found, TOOLS[0], 400)
         assert result.after_framed < max(4.0, 1.5 * square)
@@ -219,7 +221,7 @@ def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
 def test_a_ball_bar_in_one_direction_leaves_squareness_unseen() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     bare = no_square(measurements)
-    one_way = fit(dataclasses.replace(bare, circles=circles_of(machine, 0, both=False)), "FXYZ")
+    one_way = fit(bare.also(circles_of(machine, 0, both=False)), "FXYZ")
     assert {words.split()[0] for words in told(one_way, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
 
 
@@ -227,7 +229,7 @@ def test_a_diagonal_read_in_the_wrong_sense_does_not_fit() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     first, *rest = diagonals_of(machine, 0)
     wrong = dataclasses.replace(first, value=-first.value)
-    found = fit(dataclasses.replace(measurements, diagonals=(wrong, *rest)), "FXYZ")
+    found = fit(measurements.also((wrong, *rest)), "FXYZ")
     assert told(found, "OLP808")
 
 
@@ -235,11 +237,11 @@ def test_no_uncertainty_is_refused() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     first = circles_of(machine, 0)[0]
     with pytest.raises(ConfigError, match="sigma_um"):
-        fit(dataclasses.replace(measurements, circles=(dataclasses.replace(first, sigma=0.0),)), "FXYZ")
+        fit(measurements.also((dataclasses.replace(first, sigma=0.0),)), "FXYZ")
     d = diagonals_of(machine, 0, 1)[0]
     once = Diagonal(d.start_mm, d.end_mm, d.distance_mm[:42], d.value[:42], d.run[:42], d.direction[:42])
     with pytest.raises(ConfigError, match="no repeated readings"):
-        fit(dataclasses.replace(measurements, diagonals=(once,)), "FXYZ")
+        fit(measurements.also((once,)), "FXYZ")
 
 
 # -- files -----------------------------------------------------------------------------------------------
@@ -260,7 +262,7 @@ def test_tables_of_points_and_polar_stations(tmp_path: Path) -> None:
     )
     plan = tmp_path / "measurements.toml"
     plan.write_text(PLAN + tables)
-    known, polar = load_measurements([plan]).points
+    known, polar = load_measurements([plan]).of(Points)
     assert known.known_frame and not polar.known_frame
     assert np.linalg.norm(polar.measured_mm[-1]) == pytest.approx(2500.0)
     assert polar.covariance_mm2 is not None
@@ -287,8 +289,8 @@ def test_tables_of_diagonals_and_ball_bars(tmp_path: Path) -> None:
     plan = tmp_path / "measurements.toml"
     plan.write_text(PLAN + '[[diagonals]]\nfile = "d.csv"\n[[ballbars]]\nfile = "c.csv"\n')
     found = load_measurements([plan])
-    assert found.diagonals[0].value[1] == -0.005
-    assert found.circles[0].value[10] == pytest.approx(0.001)
+    assert found.of(Diagonal)[0].value[1] == -0.005
+    assert found.of(Circles)[0].value[10] == pytest.approx(0.001)
     names = {Path(name).name for name in files_of_measurements([plan])}
     assert names == {"measurements.toml", "d.csv", "c.csv"}
     (tmp_path / "d.csv").write_text("target_mm,run,direction,value_um\n0,1,1,0\n")

@@ -1,0 +1,188 @@
+"""What a person should know about an adjustment: what was not seen, readings left out, misfits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from olp.calibration.estimator.adjustment import MISFIT
+from olp.calibration.estimator.curves import joints_of
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.prior import class_of
+from olp.calibration.estimator.summary import cost_um, scale_unseen, scales_open, squareness_unseen, unseen
+from olp.calibration.observations.base import unit_of
+from olp.core.arrays import Array
+from olp.core.machine import COMPONENTS, SQUARENESS, Vector
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.findings.catalogue import Finding
+
+#: Correlations from here on are told, the strongest of them.
+STRONG, MOST_PAIRS = 0.9, 8
+#: A square is as stated up to so many standard deviations.
+SQUARE_OFF = 4.0
+#: Offsets of the reflector that differ by less than this are one.
+ONE_OFFSET_MM = 1.0
+_LISTED = 10
+
+
+def findings_of(
+    fit: Fit, tools: Sequence[Vector], travel_mm: Sequence[tuple[float, float]] | None
+) -> tuple[Finding, ...]:
+    """What a person should know about an adjustment."""
+    return (
+        *_unseen_findings(fit, tools),
+        *_scale_findings(fit),
+        *_outlier_findings(fit),
+        *_scatter_findings(fit),
+        *_step_findings(fit),
+        *_correlation_findings(fit),
+        *_box_findings(fit, travel_mm),
+        *_misfit_findings(fit),
+        *(
+            Finding("OLP853", f"{name}, period {period:g} mm: {reason}")
+            for (name, period), reason in fit.cyclic_unseen.items()
+        ),
+    )
+
+
+def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
+    for name, sigma in unseen(fit).items():
+        unit, scale = unit_of(name)
+        arm = f", and {sigma * 1e5:.2g} um more for 100 mm of tool" if name[1] in "ABC" else ""
+        like = {"angle": "angles", "straightness": "straightness", "positioning": "positioning"}[
+            class_of(name)
+        ]
+        yield Finding(
+            "OLP801",
+            f"{name} stands as zero: as large as other {like} of this machine ({sigma * scale:.2g} {unit}) "
+            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}"
+            + _why(fit, name),
+        )
+    for name in squareness_unseen(fit):
+        yield Finding(
+            "OLP806",
+            f"{name} stands as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
+        )
+
+
+def _scale_findings(fit: Fit) -> Iterator[Finding]:
+    scale = scale_unseen(fit)
+    if scale is not None:
+        yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
+        return
+    changes, known = scales_open(fit)
+    if len(changes) == 1:
+        yield Finding("OLP809", f"scales that change by {_of_scales(changes[0])} change no reading")
+    elif len(changes) == 2:
+        words = _of_scales(known[0])
+        yield Finding("OLP809", f"of the scales of X, Y and Z one combination is known alone: {words}")
+
+
+def _of_scales(row: Array) -> str:
+    return ", ".join(f"{part:+.2f} {axis}" for axis, part in zip(AXES, row.tolist(), strict=True))
+
+
+def _why(fit: Fit, name: str) -> str:
+    """What points with too few offsets of the reflector have to do with an angle that they do not see."""
+    seen = [result.state.observation.tool_mm for result in fit.scattered]
+    if not seen or name[1] in AXES:
+        return ""
+    tools = np.concatenate(seen)
+    size = np.linalg.svd(tools - tools.mean(axis=0), compute_uv=False)
+    if size[0] < ONE_OFFSET_MM * math.sqrt(len(tools)):
+        return "; the points have one offset of the reflector"
+    if size[1] < ONE_OFFSET_MM * math.sqrt(len(tools)):
+        return "; the offsets of the reflector lie on one line, and the turn about that line moves no point"
+    return ""
+
+
+def _outlier_findings(fit: Fit) -> Iterator[Finding]:
+    files = dict.fromkeys((o.source, o.component) for o in fit.outliers)
+    for source, component in files:
+        own = [o for o in fit.outliers if (o.source, o.component) == (source, component)]
+        unit, scale = unit_of(component) if component in COMPONENTS else ("um", UM_PER_MM)
+        rows = ", ".join(f"row {o.row} ({o.value * scale:.2f} {unit})" for o in own[:_LISTED])
+        more = f" and {len(own) - _LISTED} more" if len(own) > _LISTED else ""
+        yield Finding(
+            "OLP802",
+            f"{source or component}: {rows}{more}, up to {max(o.deviations for o in own):.0f} sigma off",
+            own[0].row, tuple(o.row for o in own[:_LISTED]), len(own),
+        )  # fmt: skip
+
+
+def _scatter_findings(fit: Fit) -> Iterator[Finding]:
+    for result in fit.results:
+        words = result.state.scatter()
+        if words is not None:
+            yield Finding("OLP803", words)
+
+
+def _step_findings(fit: Fit) -> Iterator[Finding]:
+    for name in COMPONENTS:
+        unit, scale = unit_of(name)
+        for step, height in joints_of(fit, name):
+            yield Finding(
+                "OLP804",
+                f"{name} jumps by {height * scale:+.1f} {unit} between {name[2]} {step.low_mm:g} and "
+                f"{step.high_mm:g} mm",
+            )
+
+
+def _correlation_findings(fit: Fit) -> Iterator[Finding]:
+    """Of squareness, and of what each curve does from one end of the box to the other."""
+    functionals = {name: fit.squareness(name) for name in SQUARENESS}
+    hidden = {**unseen(fit), **squareness_unseen(fit)}
+    for name in COMPONENTS:
+        if name not in hidden:
+            ends = fit.curve(name, fit.box_mm[AXES.index(name[2])])
+            functionals[name] = ends[1] - ends[0]
+    names = [name for name in functionals if name not in hidden]
+    rows = np.stack([functionals[name] for name in names])
+    joint = rows @ fit.covariance @ rows.T
+    size = np.sqrt(np.maximum(np.diag(joint), 1e-300))
+    pairs = [
+        (float(joint[i, j] / size[i] / size[j]), names[i], names[j])
+        for i, j in combinations(range(len(names)), 2)
+    ]
+    strong = sorted((p for p in pairs if abs(p[0]) > STRONG), key=lambda p: -abs(p[0]))[:MOST_PAIRS]
+    for value, first, second in strong:
+        yield Finding("OLP805", f"{first} and {second}: correlation {value:+.2f}")
+
+
+def _box_findings(fit: Fit, travel_mm: Sequence[tuple[float, float]] | None) -> Iterator[Finding]:
+    for axis, letter in enumerate(AXES if travel_mm is not None else ""):
+        assert travel_mm is not None
+        low, high = fit.box_mm[axis]
+        if low > travel_mm[axis][0] + 1e-6 or high < travel_mm[axis][1] - 1e-6:
+            yield Finding(
+                "OLP807",
+                f"{letter} {low:g} to {high:g} mm of the travel, {travel_mm[axis][0]:g} to "
+                f"{travel_mm[axis][1]:g} mm",
+            )
+
+
+def _misfit_findings(fit: Fit) -> Iterator[Finding]:
+    # one square among thousands of readings is nothing to chi-square as a whole
+    for square in fit.measurements.squares:
+        part = fit.parameters.slices.get(f"error of square {square.name}")
+        if part is None:
+            continue
+        value, variance = float(fit.theta[part][0]), float(fit.covariance[part, part][0, 0])
+        off = abs(value - square.error_rad)
+        if off > SQUARE_OFF * math.sqrt(max(square.sigma_rad**2 - variance, 0.01 * square.sigma_rad**2)):
+            yield Finding(
+                "OLP808",
+                f"the error of square {square.name} comes out as {value / RAD_PER_URAD:.1f} urad, "
+                f"{square.error_rad / RAD_PER_URAD:.1f} +- {square.sigma_rad / RAD_PER_URAD:.2g} is stated",
+            )
+    if fit.misfit > MISFIT:
+        named = [result for result in fit.results if result.state.noun]
+        parts = [(result.chi_square / len(result.residual), result.state.label) for result in named]
+        value, source = max(parts)
+        yield Finding(
+            "OLP808",
+            f"chi-square is {fit.chi_square / fit.freedom:.2f} a degree of freedom, {value:.2f} in {source}",
+        )

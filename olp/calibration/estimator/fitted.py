@@ -1,0 +1,160 @@
+"""What an adjustment gives: the errors of a machine with their covariance, and what each observation left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from olp.calibration.estimator.basis import Step
+from olp.calibration.estimator.parameters import CROSS, LEVER_MM, Parameters, frame_columns
+from olp.calibration.estimator.prior import Prior
+from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
+from olp.calibration.observations.measurements import Measurements
+from olp.core.arrays import Array
+from olp.core.units import AXES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """theta with its covariance and layout; see `error`, `sigma`, `design`. `results` are those of all
+    observations.
+
+    `slopes` are the mean slopes of the straightness curves on lines through the datum, as functionals of
+    theta: the gauge takes them as squareness. `box_mm` (3, 2) is what the lines covered. `cyclic_unseen` says
+    by component why a period was not fitted.
+    """
+
+    measurements: Measurements
+    parameters: Parameters
+    theta: Array
+    covariance: Array
+    prior: Prior
+    results: tuple[Result[Any], ...]
+    outliers: tuple[Outlier, ...]
+    box_mm: Array
+    slopes: Mapping[str, Array]
+    chi_square: float
+    freedom: float
+    cyclic_unseen: Mapping[tuple[str, float], str]
+
+    def of(self, kind: type[S]) -> tuple[Result[S], ...]:
+        """The results of a kind of state, such as LineState."""
+        return tuple(result for result in self.results if isinstance(result.state, kind))
+
+    @property
+    def scattered(self) -> tuple[Result[ScatteredState], ...]:
+        """The results of readings all over the volume."""
+        return tuple(result for result in self.results if isinstance(result.state, ScatteredState))
+
+    @property
+    def misfit(self) -> float:
+        """By how many standard deviations chi-square is above what noise gives: by its cube root, which is
+        nearly normal (E. B. Wilson and M. M. Hilferty, 1931)."""
+        part = 2.0 / (9.0 * self.freedom)
+        ratio = self.chi_square / self.freedom
+        return float((ratio ** (1.0 / 3.0) - (1.0 - part)) / np.sqrt(part))
+
+    def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3, size) dependence of the error on theta, in the frame of the machine where some points were
+        seen in it, else in the gauge of the datum: on lines through it X has no mean slope, nor has Y towards
+        Z."""
+        position = np.atleast_2d(np.asarray(axis_mm, float))
+        out = self.parameters.design(position, np.asarray(tool_mm, float), play)
+        if self.parameters.framed:
+            return out
+        turn = self.turn
+        arm = position - np.array(self.parameters.datum_mm)
+        for row in range(3):
+            k, m = (row + 1) % 3, (row + 2) % 3
+            out[:, row] += arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
+        return out
+
+    @property
+    def turn(self) -> Array:
+        """(3, size) rotation of the frame that the gauge asks for, as functionals of theta."""
+        return np.stack([-self.slopes["EZY"], self.slopes["EZX"], -self.slopes["EYX"]])
+
+    def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
+        """(n, 3) estimated error in mm, to first order."""
+        return np.asarray(self.design(axis_mm, tool_mm, play) @ self.theta)
+
+    def sigma(self, axis_mm: Array, tool_mm: Array) -> Array:
+        """(n, 3) standard uncertainty of `error` in mm."""
+        position, tool = np.atleast_2d(np.asarray(axis_mm, float)), np.asarray(tool_mm, float)
+        rows = self.design(position, tool)
+        variance = np.einsum("nik,kl,nil->ni", rows, self.covariance, rows, optimize=True)
+        for name in self.parameters.spaces:
+            axis = AXES.index(name[2])
+            between = self.between_targets(name, position[:, axis])
+            if not between.any():
+                continue
+            if name[1] in AXES:
+                variance[:, AXES.index(name[1])] += between
+                continue
+            for i, a, k, _ in CROSS:
+                if "ABC"[a] == name[1]:
+                    variance[:, i] += between * self.parameters.lever(i, axis, k, position, tool) ** 2
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def between_targets(self, name: str, q: Array) -> Array:
+        """(n,) variance of a component at q (n,) because nobody knows where between two targets a step is:
+        with probability u it lies before q, so J^2 u (1 - u)."""
+        space = self.parameters.spaces[name]
+        raw = space.gauge @ self.theta[self.parameters.slices[name]]
+        total = np.zeros(len(q))
+        for feature, jump in zip(space.features, raw[space.spline.count :], strict=True):
+            if isinstance(feature, Step):
+                u = feature.values(q)
+                total += jump**2 * u * (1.0 - u)
+        return total
+
+    def curve(self, name: str, q: Array) -> Array:
+        """(n, size) mean of a component at q (n,) on its own line, in the gauge of the datum, without cyclic
+        terms, as functionals of theta."""
+        out = np.zeros((len(q), self.parameters.size))
+        out[:, self.parameters.slices[name]] = self.parameters.spaces[name].values(q)
+        if name in self.slopes:
+            axis = AXES.index(name[2])
+            out -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+        if self.parameters.framed:
+            out += self._of_frame(name, q)
+        return out
+
+    def _of_frame(self, name: str, q: Array) -> Array:
+        """(n, size) what the frame adds to a component: its shift to X, its turn to straightness, and that
+        of the tool to the angles of the axis that bears it."""
+        out = np.zeros((len(q), self.parameters.size))
+        start, axis = self.parameters.slices["frame"].start, AXES.index(name[2])
+        if name[1] not in AXES:
+            if not self.parameters.after(axis):
+                out[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_MM
+            return out
+        row = AXES.index(name[1])
+        if not self.parameters.after(axis):
+            # its angles count from the tool of its line
+            tool = np.array([self.parameters.places[name].tool_mm])
+            out[:, start + 6 : start + 9] = frame_columns(tool)[0, row, 3:]
+        if axis == 0:
+            out[:, start + row] = 1.0
+        if row != axis:
+            # the turn that the gauge took out comes back
+            k = 3 - row - axis
+            sign = 1.0 if (axis - k) % 3 == 1 else -1.0
+            turn = -self.turn[k]
+            turn[start + 3 + k] += 1.0 / LEVER_MM
+            out += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
+        return out
+
+    def squareness(self, name: str) -> Array:
+        """(size,) a squareness in the gauge of the datum, as functional of theta."""
+        out = np.zeros(self.parameters.size)
+        out[self.parameters.slices[name]] = 1.0
+        first, second, sign = {
+            "C0Y": ("EXY", "EYX", -1.0),
+            "B0Z": ("EXZ", "EZX", 1.0),
+            "A0Z": ("EYZ", "EZY", -1.0),
+        }[name]
+        return np.asarray(out + sign * (self.slopes[first] + self.slopes[second]))

@@ -1,0 +1,225 @@
+"""Which unknowns the readings of a machine ask for: the reach of its curves, their cells and shapes, cyclic
+terms, and the places where displacements were measured. Lines say most of it: they read one curve alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.estimator.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
+from olp.calibration.estimator.parameters import Parameters, Place
+from olp.calibration.estimator.prior import POSE
+from olp.calibration.estimator.smoothing import Shape, shape_of
+from olp.calibration.iso230.separation import aliased
+from olp.calibration.observations.base import Noise, Observation, Scattered
+from olp.calibration.observations.lines import Line, square_names, targets_of
+from olp.calibration.observations.measurements import Measurements
+from olp.core.arrays import Array
+from olp.core.errors import CannotCompute
+from olp.core.machine import COMPONENTS, ZERO, Vector
+from olp.core.progress import Progress
+from olp.core.units import AXES
+
+#: Cells of the spline of a curve: as many as a line has targets between these.
+FEWEST, MOST = 6, 48
+HALF_CELLS = 5
+#: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
+SWEEP = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """What holds throughout an adjustment. `lines` each with its noise, `box_mm` (3, 2) what the readings
+    cover, `waves` the cyclic terms to begin with and `unseen` why others cannot be seen."""
+
+    chain: str
+    datum_mm: Vector
+    box_mm: Array
+    lines: Sequence[tuple[Line, Noise]]
+    splines: Sequence[Spline]
+    shapes: Mapping[str, Shape]
+    waves: Mapping[str, tuple[Wave, ...]]
+    unseen: Mapping[tuple[str, float], str]
+    framed: bool
+
+    @classmethod
+    def of(
+        cls, measurements: Measurements, observations: Sequence[Observation],
+        lines: Sequence[tuple[Line, Noise]], chain: str, travel_mm: Sequence[tuple[float, float]] | None,
+        datum_mm: Vector | None, cells: int, tell: Progress,
+    ) -> Model:  # fmt: skip
+        """The model for observations; `cells` are those of axes without lines. Raises CannotCompute where
+        nothing tells of an axis."""
+        own = [line for line, _ in lines]
+        ranges, box = _ranges(own, observations, travel_mm)
+        x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
+        splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
+        waves, unseen = _waves(measurements, own, observations)
+        shapes = _shapes(lines, splines, waves, tell)
+        framed = any(taken.framed for taken in observations)
+        return cls(chain, (x, y, z), box, lines, splines, shapes, waves, unseen, framed)
+
+    def parameters(self, waves: Mapping[str, tuple[Wave, ...]]) -> Parameters:
+        """The layout of theta with some cyclic terms."""
+        own_lines = [line for line, _ in self.lines]
+        spaces, halves, places = {}, {}, {}
+        for name in COMPONENTS:
+            axis = AXES.index(name[2])
+            spline, shape = self.splines[axis], self.shapes.get(name)
+            kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
+            spaces[name] = CurveSpace.of(spline, shape.features if shape else (), self.datum_mm[axis], kind)
+            if shape is not None and shape.half != "none":
+                half = _half(spline)
+                gauge = np.eye(half.count) if shape.half == "curve" else np.ones((half.count, 1))
+                halves[name] = CurveSpace(half, (), gauge)
+            if name[1] in AXES:
+                own = [line for line in own_lines if line.component == name]
+                near = own or [line for line in own_lines if line.axis == axis and line.quantity != "angle"]
+                place = _place(near[0]) if near else Place(self.datum_mm, ZERO)
+                at = list(place.line_mm)
+                at[axis] = self.datum_mm[axis]
+                places[name] = Place((at[0], at[1], at[2]), place.tool_mm)
+        shared = sorted({n for line in own_lines if line.square is not None for n in square_names(line)})
+        return Parameters(
+            self.chain, self.datum_mm, spaces, places, halves, dict(waves), tuple(shared), self.framed
+        )
+
+
+def squares_of(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:
+    """Prior mean and standard deviation of the shared nuisances, rad."""
+    known = {f"error of square {s.name}": (s.error_rad, max(s.sigma_rad, 1e-9)) for s in measurements.squares}
+    return {name: known.get(name, (0.0, POSE)) for name in parameters.shared}
+
+
+def _ranges(
+    lines: Sequence[Line],
+    observations: Sequence[Observation],
+    travel_mm: Sequence[tuple[float, float]] | None,
+) -> tuple[list[tuple[float, float]], Array]:
+    """What the readings of each axis reach together, and the box: what every component with lines covers, or
+    the points where an axis has no lines."""
+    ranges, box = [], np.zeros((3, 2))
+    for axis in range(3):
+        own = [line for line in lines if line.axis == axis]
+        reached = [q for q in (taken.reach(axis) for taken in observations) if len(q)]
+        if not reached:
+            raise CannotCompute(
+                f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
+                "every axis, or points"
+            )
+        low = min(float(q.min()) for q in reached)
+        high = max(float(q.max()) for q in reached)
+        ranges.append((low, high))
+        sides = [] if own else [(low, high)]
+        for name in {line.component for line in own}:
+            same = [line for line in own if line.component == name]
+            side = (
+                min(float(line.target_mm.min()) for line in same),
+                max(float(line.target_mm.max()) for line in same),
+            )
+            if side[1] - side[0] > SWEEP * (high - low):
+                sides.append(side)
+        limits = travel_mm[axis] if travel_mm is not None else (-np.inf, np.inf)
+        box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
+        if box[axis, 0] >= box[axis, 1]:
+            raise CannotCompute(
+                f"the readings along {AXES[axis]} have no length in common in the travel; expected them over "
+                "the same length"
+            )
+    return ranges, box
+
+
+def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float], cells: int) -> Spline:
+    own = [len(targets_of(line)) for line in lines if line.axis == axis]
+    long = [
+        len(targets_of(line))
+        for line in lines
+        if line.axis == axis and np.ptp(line.target_mm) > SWEEP * (span[1] - span[0])
+    ]
+    if not own:
+        return Spline(*span, cells)
+    return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
+
+
+def _half(spline: Spline) -> Spline:
+    return Spline(spline.low_mm, spline.high_mm, HALF_CELLS)
+
+
+def _shapes(
+    lines: Sequence[tuple[Line, Noise]],
+    splines: Sequence[Spline],
+    waves: Mapping[str, tuple[Wave, ...]],
+    tell: Progress,
+) -> dict[str, Shape]:
+    """The shape of every component with lines: each by itself, then again where others have their steps."""
+    shapes: dict[str, Shape] = {}
+    for again in (False, True):
+        for k, name in enumerate(COMPONENTS):
+            tell("shapes of curves", (k + again * len(COMPONENTS)) / (2 * len(COMPONENTS)))
+            own = _own_lines(name, lines)
+            others = [s for other, s in shapes.items() if other[2] == name[2] and other != name]
+            joints = sorted(
+                {f for shape in others for f in shape.features if isinstance(f, Step)},
+                key=lambda step: step.low_mm,
+            )
+            if own and (joints or not again):
+                spline = splines[AXES.index(name[2])]
+                shapes[name] = shape_of(
+                    own, spline, _half(spline), waves.get(name, ()), joints if again else ()
+                )
+    return shapes
+
+
+def _waves(
+    measurements: Measurements, lines: Sequence[Line], observations: Sequence[Observation]
+) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
+    """Cyclic terms that the targets can see, and why others cannot be seen."""
+    waves: dict[str, tuple[Wave, ...]] = {}
+    unseen: dict[tuple[str, float], str] = {}
+    for name in COMPONENTS:
+        own = [targets_of(line) for line in lines if line.component == name]
+        if name[1] == name[2]:
+            scattered = [taken for taken in observations if isinstance(taken, Scattered)]
+            own += [np.unique(taken.reach(AXES.index(name[2]))) for taken in scattered]
+        for period in measurements.periods_mm[AXES.index(name[2])] if own else ():
+            reasons = [aliased(targets, period) for targets in own]
+            if None in reasons:
+                waves[name] = (*waves.get(name, ()), Wave(period))
+            else:
+                unseen[name, period] = str(reasons[0])
+    return waves, unseen
+
+
+def _own_lines(name: str, lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Line, Noise]]:
+    """The lines of a component that were taken at its own place."""
+    own = [(line, noise) for line, noise in lines if line.component == name]
+    if not own:
+        return []
+    place = _place(own[0][0])
+    return [(line, noise) for line, noise in own if name[1] in "ABC" or _place(line) == place]
+
+
+def _place(line: Line) -> Place:
+    at = list(line.line_mm)
+    at[line.axis] = 0.0
+    return Place((at[0], at[1], at[2]), line.tool_mm)
+
+
+def mean_slopes(parameters: Parameters) -> dict[str, Array]:
+    """Mean slopes of the straightness curves on lines through the datum with no tool."""
+    slopes: dict[str, Array] = {}
+    for name in COMPONENTS:
+        if name[1] not in AXES or name[1] == name[2]:
+            continue
+        axis, row = AXES.index(name[2]), AXES.index(name[1])
+        spline = parameters.spaces[name].spline
+        position = np.tile(np.array(parameters.datum_mm), (len(slope_grid(spline)), 1))
+        position[:, axis] = slope_grid(spline)
+        out = np.zeros(parameters.size)
+        for part, values in parameters.displacement(row, axis, position, np.zeros(3)):
+            if part != parameters.slices.get(f"wave {name}"):
+                out[part] += slope_weights(spline) @ values
+        slopes[name] = out
+    return slopes

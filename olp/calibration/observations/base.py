@@ -1,0 +1,258 @@
+"""What an instrument has to say of itself so that the one adjustment can use it.
+
+An `Observation` is what was read, as a value. In an adjustment it is a `State`: the readings that were kept
+and the present values of the unknowns that it has for itself (a zero, the place of a station). The estimator,
+the report and the prediction of a plan loop over these two and name no kind.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from olp.calibration.estimator.normal import Block, residuals_of
+from olp.calibration.estimator.parameters import Parameters, Unknowns
+from olp.core.arrays import Array, Index
+from olp.core.units import RAD_PER_URAD, UM_PER_MM
+
+#: A reading whose residual is so many standard deviations is left out, at most this share of a set.
+OUTLIER, SHARE = 6.0, 0.05
+#: The runs may spread by so much more than stated.
+SCATTER = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviation of a reading about its drift, and that of the drift over one run; mm or rad.
+    `spread` is what the runs themselves show, None without repeated readings."""
+
+    sigma: float
+    drift: float
+    spread: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """A reading left out: its file, the line there, and how many standard deviations it is off. `value` is in
+    rad where `component` is an angular error, else in mm."""
+
+    source: str
+    row: int
+    component: str
+    value: float
+    deviations: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screened:
+    """An observation without the readings that their own repetitions speak against; `noise` is None where
+    only `start` knows it."""
+
+    observation: Observation
+    noise: Noise | None = None
+    outliers: tuple[Outlier, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Advance:
+    """By how much a solution moves the own unknowns of an observation, and whether that is nothing."""
+
+    values: Array
+    small: bool = True
+
+
+STILL = Advance(np.zeros(0))
+
+
+class Observation(ABC):
+    """Readings of one instrument in one set-up. A frozen value with the file that it came from."""
+
+    __slots__ = ()
+    source: str
+
+    @property
+    def framed(self) -> bool:
+        """Whether it was taken in the frame of the machine, so that it shows shift and turn of the axes."""
+        return False
+
+    def screened(self) -> Screened:
+        """Without the readings that their own repetitions speak against. Raises ConfigError."""
+        return Screened(self)
+
+    @abstractmethod
+    def reach(self, axis: int) -> Array:
+        """(n,) positions of an axis in mm that its readings tell of, none where they tell nothing."""
+
+    @abstractmethod
+    def start(self, noise: Noise | None = None) -> State:
+        """Where the adjustment begins, as if the machine had no errors. `noise` is that of `screened`. Raises
+        ConfigError and CannotCompute where the readings cannot be used."""
+
+
+class State(ABC):
+    """An observation within an adjustment. A frozen value; each step of the adjustment makes a new one.
+
+    `noun` is what a sentence counts it as (several of them), "" for one that no sentence counts; `tally` the
+    sum of the report that it counts in, `section` the table of the report that holds its `row`, "" for none.
+    """
+
+    __slots__ = ()
+    noun: ClassVar[str] = ""
+    tally: ClassVar[str] = "readings"
+    observation: Observation
+
+    @property
+    def section(self) -> str:
+        return ""
+
+    @property
+    def component(self) -> str:
+        """The ISO 230-1 name of the error that all readings are of, "" where they are of several."""
+        return ""
+
+    @property
+    def label(self) -> str:
+        """Its file, or what stands for it."""
+        return self.observation.source or self.noun
+
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """How many readings, as people count them."""
+
+    @abstractmethod
+    def block(self, parameters: Parameters, theta: Array) -> Block:
+        """Its rows of the design matrix, linearised where the errors are `theta` (size,) and its own unknowns
+        as they are here. Raises ConfigError and CannotCompute."""
+
+    def step(self, block: Block, theta: Array) -> Advance:
+        """How its own unknowns move with a solution."""
+        return STILL
+
+    def slips(self, block: Block, theta: Array, settled: bool) -> Sequence[Outlier]:
+        """Readings that do not fit a solution; `settled` says that no observation moves any more."""
+        return ()
+
+    def moved(self, step: Advance, slips: Sequence[Outlier]) -> State:
+        """After a step and without readings."""
+        return self
+
+    def scatter(self) -> str | None:
+        """A sentence where runs spread by more than is stated."""
+        return None
+
+    def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
+        """Its row of the report from its residuals and their sum of squares, with units in the keys."""
+        return {}
+
+
+S = TypeVar("S", bound=State)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result(Generic[S]):
+    """An observation after the fit: residuals in the order of its rows (mm or rad), and the sum of squares of
+    the standardised ones."""
+
+    state: S
+    residual: Array
+    chi_square: float
+
+    @classmethod
+    def of(cls, state: S, block: Block, theta: Array) -> Result[S]:
+        return cls(state, *left(block, theta))
+
+    def row(self) -> dict[str, Any]:
+        return self.state.row(self.residual, self.chi_square)
+
+
+class Scattered(Observation):
+    """Readings at places all over the volume: `axis_mm` (n, 3) axis positions, `tool_mm` (n, 3) the vectors
+    to the reflector. A smooth field beside the curves is looked for in these."""
+
+    __slots__ = ()
+    axis_mm: Array
+    tool_mm: Array
+
+    def reach(self, axis: int) -> Array:
+        return np.asarray(self.axis_mm[:, axis])
+
+    @abstractmethod
+    def start(self, noise: Noise | None = None) -> ScatteredState: ...
+
+
+class ScatteredState(State):
+    """Scattered readings within an adjustment."""
+
+    __slots__ = ()
+    observation: Scattered
+
+    @property
+    def count(self) -> int:
+        return len(self.observation.axis_mm)
+
+    @abstractmethod
+    def block(self, parameters: Unknowns, theta: Array) -> Block: ...
+
+    @abstractmethod
+    def spread_over_rows(self, places: Index) -> Index:
+        """A number of each place (n,), from 1, as that of each row of the block; 0 for rows of no place."""
+
+
+T = TypeVar("T", bound=Scattered)
+
+
+def left(block: Block, theta: Array) -> tuple[Array, float]:
+    """Residuals of a block and the sum of squares of the standardised ones."""
+    _, residual, sigma = residuals_of(block, theta)
+    return residual, float(np.sum((residual / sigma) ** 2))
+
+
+def slips_of(block: Block, theta: Array, source: str, rows: Index, word: str) -> list[Outlier]:
+    """Places whose residual is no noise, the worst ones first; `rows` (n,) are their lines in the file, and
+    the block has as many rows for each."""
+    _, residual, sigma = residuals_of(block, theta)
+    rest = residual.reshape(len(rows), -1)
+    off = np.abs(residual / sigma).reshape(rest.shape).max(axis=1)
+    worst = np.argsort(-off)[: max(1, int(SHARE * len(off)))]
+    return [
+        Outlier(source, int(rows[k]), word, float(np.linalg.norm(rest[k])), float(off[k]))
+        for k in worst.tolist()
+        if off[k] > OUTLIER and off[k] > 0.3 * off.max()
+    ]
+
+
+def without(cloud: T, rows: Index, slips: Sequence[Outlier]) -> T:
+    """The places whose lines `rows` (n,) are not those of slips."""
+    use = ~np.isin(rows, [slip.row for slip in slips])
+    columns = {f.name: getattr(cloud, f.name) for f in dataclasses.fields(cloud)}  # type: ignore[arg-type]
+    kept = {
+        name: column[use]
+        for name, column in columns.items()
+        if isinstance(column, np.ndarray) and len(column) == len(use)
+    }
+    return dataclasses.replace(cloud, **kept)  # type: ignore[type-var]
+
+
+def scatter_words(label: str, noise: Noise, sigma: float, unit: str, scale: float) -> str | None:
+    """What is wrong where runs spread by more than the stated `sigma`; `scale` takes it to `unit`."""
+    if noise.spread is None or sigma <= 0.0 or noise.spread <= SCATTER * sigma:
+        return None
+    return (
+        f"{label}: runs spread by {noise.spread * scale:.2g} {unit}, sigma is stated as "
+        f"{sigma * scale:.2g} {unit}"
+    )
+
+
+def unit_of(name: str) -> tuple[str, float]:
+    """The unit in which people read a component, and the factor to it."""
+    return ("urad", 1.0 / RAD_PER_URAD) if name[1] in "ABC" else ("um", UM_PER_MM)
+
+
+def rms(residual: Array) -> float:
+    return float(np.sqrt(np.mean(residual**2)))

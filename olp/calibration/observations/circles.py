@@ -1,0 +1,148 @@
+"""Circles of a ball-bar as rows of the adjustment.
+
+A ball-bar has an unknown centre and radius, servo mismatch and lost motion of both axes: in one direction
+servo mismatch and squareness are one column, so squareness stays unseen then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from olp.calibration.estimator.normal import Block
+from olp.calibration.estimator.parameters import Unknowns
+from olp.calibration.observations.base import Noise, Observation
+from olp.calibration.observations.radial import AlongState, along_block
+from olp.core.arrays import Array, Index
+from olp.core.errors import ConfigError
+from olp.core.machine import ZERO, Vector
+from olp.core.units import AXES
+
+#: First and second axis of each plane, counter-clockwise seen from + of the third, and its squareness.
+PLANES = {"XY": (0, 1, "C0Y"), "YZ": (1, 2, "A0Z"), "ZX": (2, 0, "B0Z")}
+UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "lost_1", "lost_2")
+#: Readings this near to where an axis turns round are left out of the fit: there friction makes spikes.
+SKIP_DEG = 2.5
+_FEWEST = 8
+
+#: All of UNKNOWNS of a circle but scale and square, which the machine's errors explain.
+_NUISANCE = [k for k, name in enumerate(UNKNOWNS) if name not in ("scale", "square")]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Circles(Observation):
+    """Radial readings of circles about one centre, in one set-up.
+
+    `angle_rad` (n,) from the first axis of `plane` toward the second, `value` (n,) radius less `radius_mm`
+    in mm, `direction` (n,) +1 counter-clockwise or -1, `run` (n,). `centre_mm` are axis positions, `tool_mm`
+    the tool vector; `feed_mm_s` along the circle, 0 where not known; `sigma` of one reading in mm. Raises
+    ConfigError.
+    """
+
+    plane: str
+    radius_mm: float
+    centre_mm: Vector
+    angle_rad: Array
+    value: Array
+    run: Index
+    direction: Index
+    tool_mm: Vector = ZERO
+    feed_mm_s: float = 0.0
+    sigma: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.plane not in PLANES:
+            raise ConfigError(f"plane {self.plane!r}; expected XY, YZ or ZX", file=self.source)
+        n = len(self.angle_rad)
+        if (
+            not self.radius_mm > 0.0
+            or n < _FEWEST
+            or any(len(c) != n for c in (self.value, self.run, self.direction))
+        ):
+            raise ConfigError(
+                f"circle of radius {self.radius_mm:g} mm with {n} readings; expected a radius above 0 and at "
+                f"least {_FEWEST} readings",
+                file=self.source,
+            )
+        if not np.isin(self.direction, (-1, 1)).all():
+            raise ConfigError("a direction is neither +1 (counter-clockwise) nor -1", file=self.source)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        first, second, _ = PLANES[self.plane]
+        return AXES[first], AXES[second]
+
+    def reach(self, axis: int) -> Array:
+        return np.asarray(circle_places(self)[:, axis])
+
+    def start(self, noise: Noise | None = None) -> CirclesState:
+        return CirclesState(self, Noise(self.sigma, 0.0, None))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CirclesState(AlongState):
+    """Circles in an adjustment. One row a reading away from the reversals."""
+
+    observation: Circles
+    noise: Noise
+
+    @property
+    def name(self) -> str:
+        return f"circle {self.observation.plane}"
+
+    @property
+    def count(self) -> int:
+        return int(circle_used(self.observation).sum())
+
+    def block(self, parameters: Unknowns, theta: Array) -> Block:
+        return circle_block(self.observation, parameters)
+
+
+def columns(circles: Circles) -> Array:
+    """(n, 8) change of a reading for 1 mm of each of UNKNOWNS."""
+    t, d = circles.angle_rad, circles.direction.astype(float)
+    c, s = np.cos(t), np.sin(t)
+    return np.column_stack((
+        np.ones(len(t)), c, s, np.cos(2 * t), np.sin(2 * t), d * np.sin(2 * t),
+        0.5 * d * np.sign(s) * c, -0.5 * d * np.sign(c) * s,
+    ))  # fmt: skip
+
+
+def circle_places(circles: Circles) -> Array:
+    """(n, 3) commanded axis positions."""
+    return np.asarray(np.array(circles.centre_mm) + circles.radius_mm * _outward(circles))
+
+
+def _outward(circles: Circles) -> Array:
+    first, second, _ = PLANES[circles.plane]
+    out = np.zeros((len(circles.angle_rad), 3))
+    out[:, first], out[:, second] = np.cos(circles.angle_rad), np.sin(circles.angle_rad)
+    return out
+
+
+def circle_used(circles: Circles) -> np.ndarray:
+    """(n,) readings away from where an axis turns round: there friction makes spikes."""
+    quarter = np.abs((circles.angle_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4)
+    return np.asarray(quarter > np.radians(SKIP_DEG))
+
+
+def circle_block(circles: Circles, parameters: Unknowns) -> Block:
+    """The readings of all circles about one centre, one row each. Raises ConfigError."""
+    if circles.sigma <= 0.0:
+        raise ConfigError(
+            f"circle {circles.plane} states no uncertainty; expected sigma_um", file=circles.source
+        )
+    used = circle_used(circles)
+    if used.sum() < 2 * len(UNKNOWNS):
+        raise ConfigError(
+            f"circle {circles.plane}: {int(used.sum())} readings away from the reversals; expected at least "
+            f"{2 * len(UNKNOWNS)}",
+            file=circles.source,
+        )
+    free = columns(circles)[:, _NUISANCE]
+    return along_block(
+        circle_places(circles)[used], _outward(circles)[used], circles.tool_mm, circles.value[used],
+        circles.sigma, free[used], [], parameters, circles.source or f"circle {circles.plane}",
+    )  # fmt: skip

@@ -1,0 +1,62 @@
+"""Readings along lines by lasers, levels, autocollimators, straightedges: tables [[lines]]."""
+
+from __future__ import annotations
+
+from olp.calibration.observations.lines import Line
+from olp.core.arrays import Index
+from olp.core.errors import ConfigError
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.files.measurements.instruments.base import UM_M, Instrument, Plan
+from olp.files.measurements.line_keys import LineTable
+from olp.files.measurements.line_profile import load_line_profile, read_line
+from olp.files.measurements.lines_said import as_line, merged, stated_of
+from olp.files.measurements.readings import check_component
+from olp.files.toml_text import toml_lines
+
+
+class LineFiles(Instrument[LineTable, Line]):
+    key = "lines"
+    table = LineTable
+    words = "tables [[lines]]"
+    gives = Line
+    plans = True
+
+    def read(self, table: LineTable, plan: Plan) -> Line:
+        path = plan.beside(table.file)
+        profile = table.profile or plan.defaults.profile
+        readings = read_line(path, load_line_profile(plan.beside(profile)) if profile else None)
+        stated, places = stated_of(readings.keys, str(path))
+        component = table.component or stated.component or readings.component
+        if component is None:
+            raise ConfigError("component is missing; expected a name such as EXX in the plan or the file")
+        check_component(readings, component)
+        said = merged(table, stated, plan.defaults, places, str(path))
+        if readings.sense_known and table.sense is not None:
+            raise ConfigError(
+                "sense is stated by the profile and by the line; expected it once", file=str(plan.path)
+            )
+        return as_line(readings, component, said, plan.vertical, plan.chain, str(path))
+
+    def asked(self, taken: Line, name: str) -> list[str]:
+        angle = taken.quantity == "angle"
+        sigma = round(taken.sigma / RAD_PER_URAD if angle else taken.sigma * UM_PER_MM, 6)
+        values: dict[str, object] = {
+            "file": name,
+            "component": taken.component,
+            "line_mm": {a: taken.line_mm[k] for k, a in enumerate(AXES) if a != taken.component[2]},
+            "tool_mm": list(taken.tool_mm),
+            "sense": "actual-minus-commanded",
+            "square": taken.square,
+            "sigma_urad" if angle else "sigma_um": sigma,
+            "sigma_scale_um_m": round(taken.sigma_scale * UM_M, 6) if taken.sigma_scale else None,
+        }
+        return ["[[lines]]", *toml_lines(values)]
+
+    def empty(self, taken: Line, rows: Index) -> bytes:
+        lines = [f"target_mm,run,direction,value_{'urad' if taken.quantity == 'angle' else 'um'}"]
+        columns = zip(
+            taken.target_mm[rows].tolist(), taken.run[rows].tolist(), taken.direction[rows].tolist(),
+            strict=True,
+        )  # fmt: skip
+        lines += [f"{q:g},{run},{side}," for q, run, side in columns]
+        return ("\n".join(lines) + "\n").encode()

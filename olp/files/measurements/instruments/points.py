@@ -1,0 +1,63 @@
+"""Points of a tracker or any instrument of coordinates: tables [[points]]."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from olp.calibration.observations.points import Points
+from olp.core.arrays import Index
+from olp.core.schema import NotNegative, Positive, Table, Text, Triple
+from olp.core.units import MM_PER_UM, UM_PER_MM
+from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan, points_to_fill, tools_of
+from olp.files.measurements.point_readings import MEASURED, read_point_readings
+from olp.files.toml_text import toml_lines
+
+
+class PointsTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
+        "measured_X_mm, measured_Y_mm, measured_Z_mm (in the instrument's frame), relative to this file"
+    )
+    sigma_um: Positive = Field(description="the standard uncertainty of a coordinate, in um")
+    frame: Literal["unknown", "known"] = Field(
+        default="unknown",
+        description='"unknown" (the instrument\'s own), or "known": measured_ columns are in the frame of '
+        "the machine, as TCP points are against a simulation model",
+    )
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
+        "tool_X_mm, tool_Y_mm, tool_Z_mm of the file",
+    )
+    sigma_scale_um_m: NotNegative = Field(
+        default=0.0, description="the standard uncertainty of the instrument's scale, in um/m"
+    )
+
+
+class PointFiles(Instrument[PointsTable, Points]):
+    key = "points"
+    table = PointsTable
+    words = "tables [[points]]: each one set-up of a tracker"
+    gives = Points
+    plans = True
+
+    def read(self, table: PointsTable, plan: Plan) -> Points:
+        readings = read_point_readings(plan.beside(table.file))
+        return Points(
+            axis_mm=readings.axis_mm,
+            tool_mm=tools_of(readings, table.tool_mm, plan.defaults),
+            measured_mm=readings.measured,
+            sigma=table.sigma_um * MM_PER_UM,
+            sigma_scale=table.sigma_scale_um_m * PER_UNIT,
+            source=readings.file,
+            row=readings.row,
+            known_frame=table.frame == "known",
+        )
+
+    def asked(self, taken: Points, name: str) -> list[str]:
+        return ["[[points]]", *toml_lines({"file": name, "sigma_um": round(taken.sigma * UM_PER_MM, 6)})]
+
+    def empty(self, taken: Points, rows: Index) -> bytes:
+        return points_to_fill(taken, rows, MEASURED)

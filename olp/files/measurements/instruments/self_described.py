@@ -1,0 +1,14 @@
+"""The table of a file that says in comments how it was taken."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from olp.core.schema import Table, Text
+
+
+class InstrumentTable(Table):
+    file: Text = Field(
+        description="the path of a CSV file that says in comments how it was taken, as "
+        "`olp calibrate diagonals` and `olp calibrate ballbar` read it, relative to this file"
+    )

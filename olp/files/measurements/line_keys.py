@@ -1,0 +1,102 @@
+"""What may be said of one line: in a plan, in its [defaults], or in the file of readings itself."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from olp.core.machine import COMPONENTS
+from olp.core.schema import NotNegative, Position, Positive, Table, Text, Triple, refusal
+from olp.files.fields import IsoNames, shown
+from olp.files.measurements.readings import SENSES
+
+
+def _sense(value: object) -> object:
+    if value not in SENSES:
+        raise refusal(
+            f"= {shown(value)} is no sense; expected one of " + ", ".join(f'"{sense}"' for sense in SENSES)
+        )
+    return value
+
+
+Sense = Annotated[str, Field(json_schema_extra={"enum": list(SENSES)}), BeforeValidator(_sense)]
+Instrument = Literal["laser", "level", "autocollimator", "straightedge", "other"]
+
+
+class LineKeys(Table):
+    """What may be said of one line, in a plan, in its [defaults], or in the file itself."""
+
+    line_mm: Position = Field(
+        default_factory=Position,
+        description="where the other two axes stood, such as { Y = 700.0, Z = -600.0 } in mm",
+    )
+    tool_mm: Triple | None = Field(
+        default=None, description="the vector from the gauge point to the reflector, [X, Y, Z] in mm"
+    )
+    reference: Literal["functional-point", "table"] | None = Field(
+        default=None,
+        description='"functional-point" (reflector at the tool) or "table" (it stayed on a moving table)',
+    )
+    square: Text | None = Field(
+        default=None, description="the name of the square whose leg the straightness was read against"
+    )
+    sense: Sense | None = Field(
+        default=None,
+        description='"actual-minus-commanded" or "commanded-minus-actual" of the tool relative to the '
+        'workpiece; "table-motion ..." in front: of the table itself',
+    )
+    sigma_um: NotNegative | None = Field(
+        default=None,
+        description="the standard uncertainty of one reading in um; from the spread of the runs if left out",
+    )
+    sigma_urad: NotNegative | None = Field(
+        default=None, description="the same of a reading of an angle, in urad"
+    )
+    sigma_scale_um_m: NotNegative | None = Field(
+        default=None,
+        description="the standard uncertainty of the scale of a positioning line (wavelength), in um/m",
+    )
+    instrument: Instrument | None = Field(
+        default=None, description='"laser", "level", "autocollimator", "straightedge" or "other"'
+    )
+    reflector: Text | None = Field(default=None, description="words on the optics, kept for the report")
+    profile: Text | None = Field(
+        default=None, description="the profile that says how the file is laid out, relative to the plan"
+    )
+
+
+class LineTable(LineKeys):
+    file: Text = Field(description="the path of the file of readings, relative to this file")
+    component: Literal[COMPONENTS] | None = Field(  # type: ignore[valid-type]
+        default=None,
+        description='the ISO 230-1 name of what was read, such as "EXX"; the file may say it instead',
+    )
+
+
+class Stated(LineKeys):
+    """Keys that a file of readings states about itself in comments."""
+
+    component: Literal[COMPONENTS] | None = Field(  # type: ignore[valid-type]
+        default=None, description='the ISO 230-1 name of what was read, such as "EXX"'
+    )
+    machine: Text | None = Field(default=None, description="the name of the machine")
+    measured: datetime.date | None = Field(
+        default=None, description="the date of measuring, such as 2026-05-14"
+    )
+    temperature_degC: float | None = Field(
+        default=None, description="the temperature of the scales while measuring, in degC"
+    )
+    active_during_measurement: IsoNames | None = Field(
+        default=None, description="the errors that the control corrected while measuring"
+    )
+    period_mm: list[Positive] = Field(
+        default=[], description="the periods of screw and scale of this axis, [..] in mm"
+    )
+    square_error_urad: float | None = Field(
+        default=None, description="by how much the square's angle is more than 90 degrees, in urad"
+    )
+    square_sigma_urad: NotNegative | None = Field(
+        default=None, description="the standard uncertainty of the square's angle, in urad"
+    )

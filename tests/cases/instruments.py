@@ -1,0 +1,169 @@
+"""Readings that each registered instrument would take of a machine whose errors are a function of axis
+positions (n, 3) and tool vectors, worked out from what the instrument measures and from nothing else. What
+only the instrument knows (a zero, a centre, where it stands) is in the readings too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from olp.calibration.observations.base import Observation
+from olp.calibration.observations.circles import PLANES, Circles
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points, polar_points
+from olp.calibration.observations.squareness import SquarenessReading
+
+Error = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Readings = tuple[Observation, ...]
+
+BOX = ((0.0, 1000.0), (0.0, 800.0), (-500.0, 0.0))
+DATUM = (500.0, 400.0, -250.0)
+LEVER = (0.0, 0.0, -100.0)
+TOOLS = np.array([LEVER, (80.0, 0.0, -150.0), (0.0, 90.0, -60.0)])
+N = 60
+
+
+def places() -> tuple[np.ndarray, np.ndarray]:
+    low, high = np.array(BOX).T
+    at = np.random.default_rng(7).uniform(low, high, (N, 3)).round(1)
+    return at, TOOLS[np.arange(N) % len(TOOLS)]
+
+
+def lines(error: Error) -> Readings:
+    """Positioning, straightness, and pitch from two offsets of the reflector; three runs, both directions."""
+    there = np.linspace(0.0, 1000.0, 11)
+    q = np.tile(np.concatenate([there, there[::-1]]), 3)
+    run, side = np.repeat([1, 2, 3], 22), np.tile(np.repeat([1, -1], 11), 3)
+    at = np.tile(np.array(DATUM), (len(q), 1))
+    at[:, 0] = q
+    tool, higher = np.array(LEVER), np.add(LEVER, (0.0, 0.0, 1000.0))
+    plain = error(at, tool)
+    values = {
+        "EXX": plain[:, 0] + 0.02,
+        "EYX": plain[:, 1] - 0.03 + 2e-5 * q,
+        "EBX": (error(at, higher) - plain)[:, 0] / 1000.0,
+    }
+    return tuple(
+        Line(
+            name, q, value, run, side, DATUM, LEVER, sigma=1e-7 if name[1] in "ABC" else 1e-4,
+            source=f"{name.lower()}.csv",
+        )
+        for name, value in values.items()
+    )  # fmt: skip
+
+
+def points(error: Error) -> Readings:
+    at, tool = places()
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    seen = (at + tool + error(at, tool)) @ turn.T + (1000.0, -2000.0, 300.0)
+    return (Points(at, tool, seen, 0.5e-3, source="points.csv"),)
+
+
+def _rays(error: Error, place: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
+    at, tool = places()
+    ray = at + tool + error(at, tool) - np.array(place)
+    return at, tool, ray
+
+
+def polar(error: Error) -> Readings:
+    at, tool, ray = _rays(error, (-700.0, -1800.0, 200.0))
+    azimuth, elevation = (
+        np.arctan2(ray[:, 1], ray[:, 0]),
+        np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1])),
+    )
+    distance = np.linalg.norm(ray, axis=1)
+    return (
+        polar_points(
+            at,
+            tool,
+            distance,
+            azimuth,
+            elevation,
+            sigma_mm=np.array(0.5e-3),
+            sigma_rad=0.5e-6,
+            source="polar.csv",
+        ),
+    )
+
+
+def stations(error: Error) -> Readings:
+    found = []
+    for k, place in enumerate([(-700.0, -900.0, 100.0), (1800.0, -600.0, -400.0)]):
+        at, tool, ray = _rays(error, place)
+        length = np.linalg.norm(ray, axis=1)
+        found.append(Lengths(at, tool, length - 100.0, 0.1e-3 + 0.1e-6 * length, source=f"station {k + 1}"))
+    return tuple(found)
+
+
+def pods(error: Error) -> Readings:
+    stands = [(-300.0, -1200.0, -300.0), (1300.0, -1200.0, -300.0)]
+    azimuth, elevation = [], []
+    for place in stands:
+        at, tool, ray = _rays(error, place)
+        azimuth.append(np.arctan2(ray[:, 1], ray[:, 0]))
+        elevation.append(np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1])))
+    apart = float(np.linalg.norm(np.subtract(*stands)))
+    return (
+        Pods(
+            at,
+            tool,
+            np.stack(azimuth, axis=1),
+            np.stack(elevation, axis=1),
+            0.2e-6,
+            ((0, 1, apart, 0.01),),
+            "pods",
+        ),
+    )
+
+
+def diagonals(error: Error) -> Readings:
+    start, end = np.array([0.0, 0.0, -500.0]), np.array([1000.0, 800.0, 0.0])
+    far = float(np.linalg.norm(end - start))
+    there = np.linspace(0.0, far, 21)
+    d = np.tile(np.concatenate([there, there[::-1]]), 2)
+    unit = (end - start) / far
+    run, side = np.repeat([1, 2], 42), np.tile(np.repeat([1, -1], 21), 2)
+    value = error(start + d[:, None] * unit, np.array(LEVER)) @ unit + 0.05 + 0.002 * side
+    return (
+        Diagonal(tuple(start), tuple(end), d, value, run, side, LEVER, sigma=1e-4, source="diagonal.csv"),
+    )
+
+
+def ballbars(error: Error) -> Readings:
+    angle = np.tile(np.radians(np.arange(0.0, 360.0, 4.0)), 2)
+    way = np.repeat([1, -1], 90)
+    found = []
+    for plane, (first, second, _) in PLANES.items():
+        out = np.zeros((len(angle), 3))
+        out[:, first], out[:, second] = np.cos(angle), np.sin(angle)
+        value = np.einsum("ni,ni->n", error(np.array(DATUM) + 150.0 * out, np.array(LEVER)), out)
+        value += 0.02 + 0.003 * out[:, first] - 0.004 * out[:, second] + 0.001 * way * np.sin(2.0 * angle)
+        run = np.ones(len(angle), int)
+        found.append(
+            Circles(
+                plane, 150.0, DATUM, angle, value, run, way, LEVER, sigma=1e-4, source=f"circle-{plane}.csv"
+            )
+        )
+    return tuple(found)
+
+
+def squareness(error: Error) -> Readings:
+    """Minus the slopes of Y over X and of X over Y together: by how much Y leans to -X."""
+    slopes = []
+    for moving, along in ((0, 1), (1, 0)):
+        q = np.linspace(*BOX[moving], 101)
+        at = np.tile(np.array(DATUM), (len(q), 1))
+        at[:, moving] = q
+        slopes.append(np.polyfit(q - q.mean(), error(at, np.array(LEVER))[:, along], 1)[0])
+    value = -float(sum(slopes))
+    return (SquarenessReading("C0Y", value, DATUM, (BOX[0], BOX[1]), LEVER, 1e-7, "plan.toml"),)
+
+
+#: By the key of the instrument's tables in a plan.
+EXAMPLES: Mapping[str, Callable[[Error], Readings]] = {
+    f.__name__: f for f in (lines, points, polar, stations, pods, diagonals, ballbars, squareness)
+}
