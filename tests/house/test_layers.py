@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import graphlib
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -156,3 +157,9 @@ def _for_types(tree: ast.Module, node: ast.AST) -> bool:
     """The import stands under `if TYPE_CHECKING:`."""
     blocks = [n for n in ast.walk(tree) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
     return any(node is inner for block in blocks for inner in ast.walk(block))
+
+
+def test_what_moved_is_where_the_page_says() -> None:
+    rows = re.findall(r"^\| `(\S+)` \| `(\S+)` \|$", PAGE.with_name("moved.md").read_text("utf-8"), re.M)
+    assert len(rows) > 250
+    assert [new for _, new in rows if not (PACKAGE.parent / new).is_file()] == []
