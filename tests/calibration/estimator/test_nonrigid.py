@@ -149,7 +149,7 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
         )[0]
 
     points = before.scattered[0].state.observation
-    (_, block), size = work.sets[0], before.parameters.size
+    block, size = work.blocks[0], before.parameters.size
     (chunk,) = block.chunks()
     nominal = chunk.local @ chunk.local.T  # the frame: any
 

@@ -1,1 +1,1 @@
-"""Files of measurements of each instrument, one file an instrument, and the list of them."""
+"""Instruments as files: one file each, its tables in a plan, its readings, both ways."""
