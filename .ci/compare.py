@@ -58,6 +58,7 @@ say = sys.stdout.write
 
 # -- the server: one process a side and job, a fork a step ---------------------------------------------------
 
+
 def serve() -> None:
     """Requests, one a line, on what was stdin; answers on what was stdout."""
     import gc
@@ -70,7 +71,13 @@ def serve() -> None:
     del sys.path[0]
     import olp
 
-    for name in ["scipy.interpolate", "scipy.optimize", "scipy.spatial", "scipy.stats.qmc", "matplotlib.figure"]:
+    for name in [
+        "scipy.interpolate",
+        "scipy.optimize",
+        "scipy.spatial",
+        "scipy.stats.qmc",
+        "matplotlib.figure",
+    ]:
         importlib.import_module(name)
     for module in pkgutil.walk_packages(olp.__path__, "olp."):
         if not module.name.endswith("__main__"):
@@ -89,6 +96,7 @@ def serve() -> None:
         code, seconds = _wait(child, request["timeout"])
         answers.write(f"{code} {seconds}\n".encode())
 
+
 def _wait(child: int, timeout: float) -> tuple[object, float]:
     """Exit code and CPU time."""
     end, pause = time.monotonic() + timeout, 0.002
@@ -103,6 +111,7 @@ def _wait(child: int, timeout: float) -> tuple[object, float]:
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
     return "timeout", timeout
+
 
 def _step(request: dict[str, Any]) -> None:
     """One step, in a child."""
@@ -141,6 +150,7 @@ def _step(request: dict[str, Any]) -> None:
     sys.stderr.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))
 
+
 class Server:
     """The other end."""
 
@@ -170,6 +180,7 @@ class Server:
         code, seconds = self._answer().split()
         return code, normal(out.read_bytes()), normal(err.read_bytes()), float(seconds)
 
+
 def normal(text: bytes) -> bytes:
     """Output without places in the source."""
     text = re.sub(rb"Traceback \(most recent call last\):\n(?:  .*\n)+", b"Traceback\n", text)
@@ -177,7 +188,9 @@ def normal(text: bytes) -> bytes:
     text = re.sub(rb"(?m)^\S+\.py:\d+: (\w*Warning: .*\n)(?:  .*\n)?", rb"\1", text)
     return re.sub(rb" at 0x[0-9a-f]+", b" at 0x", text)
 
+
 # -- both sides ----------------------------------------------------------------------------------------------
+
 
 @dataclass
 class Place:
@@ -240,6 +253,7 @@ class Place:
             "LC_ALL": "C.UTF-8", "TERM": "dumb", "COLUMNS": "100", "NO_COLOR": "1",
         }  # fmt: skip
 
+
 @dataclass
 class Case:
     """Folders and files to copy, texts to write, and steps: (kind, words or text, stdin)."""
@@ -265,6 +279,7 @@ class Case:
         stated = ["2", place.commit, str(place.work), sys.version, self.name, files, self.steps]
         return hashlib.sha256(repr(stated).encode()).hexdigest()[:24]
 
+
 @dataclass
 class Done:
     """What a step did; files that it made or changed, None for those it removed."""
@@ -278,12 +293,15 @@ class Done:
     def parts(self) -> dict[str, bytes | None]:
         return {"exit code": self.code.encode(), "stdout": self.stdout, "stderr": self.stderr} | self.files
 
+
 def title(step: tuple[str, Any, bytes]) -> str:
     text = step[1] if isinstance(step[1], str) else " ".join(step[1])
     return f"{step[0]} {text}".replace("\n", " / ")
 
+
 def read_all(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
 
 def put(folder: Path, name: str, data: bytes | None) -> None:
     path = folder / name
@@ -292,6 +310,7 @@ def put(folder: Path, name: str, data: bytes | None) -> None:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
+
 
 def perform(case: Case, server: Server, place: Place, base: list[Done] | None) -> list[Done]:
     """Run all steps; on the side of the tree, go on from what the base left after each."""
@@ -322,7 +341,9 @@ def perform(case: Case, server: Server, place: Place, base: list[Done] | None) -
         rest.unlink()
     return done
 
+
 # -- differences ---------------------------------------------------------------------------------------------
+
 
 def lines(data: bytes | None) -> list[str]:
     """A part as lines for people."""
@@ -336,6 +357,7 @@ def lines(data: bytes | None) -> list[str]:
         with contextlib.suppress(ValueError):
             text = json.dumps(json.loads(text), indent=1)
     return text.splitlines() + ([] if text.endswith("\n") else ["(no end of line)"])
+
 
 def difference(a: Done, b: Done, keep: Path) -> list[str]:
     out: list[str] = []
@@ -354,6 +376,7 @@ def difference(a: Done, b: Done, keep: Path) -> list[str]:
             if data is not None:
                 put(keep, f"{name.replace('/', '_')}.{side}", data)
     return out
+
 
 # -- the cases -----------------------------------------------------------------------------------------------
 
@@ -466,13 +489,16 @@ for name, call in {
         print(name, type(error).__name__, error, [c.__name__ for c in type(error).__mro__], getattr(error, "__dict__", ""))
 """
 
+
 def olp(text: str, stdin: bytes = b"") -> tuple[str, Any, bytes]:
     return "olp", shlex.split(text), stdin
+
 
 def each(text: str) -> list[tuple[str, Any, bytes]]:
     """A step a line; lines that begin with `!` start an interpreter of their own."""
     found = [line.strip() for line in text.strip().splitlines() if line.strip()]
     return [("start", shlex.split(t[1:]), b"") if t[0] == "!" else olp(t) for t in found]
+
 
 def short_tour(program: str, setup: str, size: int = 0, more: str = "") -> list[tuple[str, Any, bytes]]:
     p, out = shlex.quote(program), f"out{Path(program).suffix}"
@@ -482,6 +508,7 @@ def short_tour(program: str, setup: str, size: int = 0, more: str = "") -> list[
         check {p} {setup} --format json {DAY}
         {f"retime {p} {setup} --json --lines lines.csv -o t.csv --cycle-ms 20" if size < 14_000 else ""}
         correct {p} {setup} -o flat{out} --flatten --expand-cycles --peck-clearance-mm 0.5 --diff {DAY}""")
+
 
 def tour(program: str, setup: str, size: int) -> list[tuple[str, Any, bytes]]:
     """All verbs; what takes long only on small programs."""
@@ -504,6 +531,7 @@ def tour(program: str, setup: str, size: int) -> list[tuple[str, Any, bytes]]:
         view {p} {setup} --corrected out{e} --measured corrected.csv -o w.html\ncorrect {p} {setup} -o d{e} --review rv.html -q
     """) if size < 9000 else [])  # fmt: skip
 
+
 def of_programs(source: Path) -> list[Case]:
     """The jobs of the repository."""
     programs, cases = source / "programs", []
@@ -520,7 +548,11 @@ def of_programs(source: Path) -> list[Case]:
         for path in sorted((programs / folder).iterdir()):
             if path.name in main:
                 own = f"-j {here}/{main[path.name]}"
-                case(f"{folder}/{path.name}", f"{folder} {also}", tour(f"{here}/{path.name}", own, path.stat().st_size))
+                case(
+                    f"{folder}/{path.name}",
+                    f"{folder} {also}",
+                    tour(f"{here}/{path.name}", own, path.stat().st_size),
+                )
             elif path.suffix not in (".toml", ".csv"):
                 case(f"{folder}/{path.name}", f"{folder} {also}", short_tour(f"{here}/{path.name}", setup))
         machine = f"{here}/machine.toml"
@@ -536,7 +568,9 @@ def of_programs(source: Path) -> list[Case]:
                                 ("heidenhain", "--sense correction"), ("heidenhain", "--sense error")):  # fmt: skip
                 words = f"--format {name} {sense} -m {machine}"
                 again = words.replace("--most-rows 20", "")
-                steps += each(f"calibrate export {words} -o {name}/t.tab\ncalibrate export {words} -o t.tab --force --json")
+                steps += each(
+                    f"calibrate export {words} -o {name}/t.tab\ncalibrate export {words} -o t.tab --force --json"
+                )
                 steps += each(f"calibrate import t.tab {again} -o i.toml --force --measured 2026-05-14")
             case(f"{folder}/machine", f"{folder} {also}", steps)
     lines, checks = "programs/gantry-lines", "programs/gantry-checks"
@@ -554,13 +588,20 @@ def of_programs(source: Path) -> list[Case]:
         correct programs/gantry-plate/plate.ngc {m} -o q.ngc --only-sure-components --report p.html -q
         check programs/gantry-plate/plate.ngc {m} --within-um 8\nverify programs/gantry-plate/plate.ngc p.ngc {m} --json
         view programs/gantry-plate/plate.ngc {m} -o v.html --no-time"""))  # fmt: skip
-    case("gantry-lines/plan", "gantry-lines", each(f"""calibrate plan {m} --json {DAY}
+    case(
+        "gantry-lines/plan",
+        "gantry-lines",
+        each(f"""calibrate plan {m} --json {DAY}
         calibrate plan {m} --uncertainty-um 8 --instrument lines -o plan\ncalibrate plan {m} --instrument pods --points 40 -q
-        calibrate plan {m} --instrument tracker --points 60 --sigma-um 10 --period-x 10 -o plan2 {DAY}"""))
+        calibrate plan {m} --instrument tracker --points 60 --sigma-um 10 --period-x 10 -o plan2 {DAY}"""),
+    )
     diagonals = " ".join(f"{checks}/diagonal-{d}.csv" for d in ("nnp", "npp", "pnp", "ppp"))
     reads = "\n".join(f"calibrate read {lines}/{f.name} {o}" for f in sorted((programs / "gantry-lines").glob("*.*"))
                       for o in ("", "--json", f"--profile {lines}/laser.toml") if f.suffix != ".toml")  # fmt: skip
-    case("gantry-checks", "gantry-lines gantry-checks gantry-plate", each(f"""
+    case(
+        "gantry-checks",
+        "gantry-lines gantry-checks gantry-plate",
+        each(f"""
         calibrate evaluate {lines}\ncalibrate evaluate {lines} {m} --json --zone minimum-zone {DAY}
         calibrate evaluate {lines} --report e.html --plot e.svg\ncalibrate evaluate {lines} --report e.md
         calibrate ballbar {checks}/ballbar-xy.csv -o s.toml --plot b.svg\ncalibrate ballbar {checks}/ballbar-xy.csv --json
@@ -572,19 +613,45 @@ def of_programs(source: Path) -> list[Case]:
         calibrate postures -m programs/gantry-plate/machine.toml --program t.ngc --tools 1,2,3 --point 100,100,-100
         calibrate squareness\ncalibrate squareness --json\ncalibrate squareness C0Y=12.5 B0Z=-3 --from klipper
         calibrate squareness C0Y=20 --from larger-than-90 --json\ncalibrate squareness --frame C0Y=141.5,141.3,100
-        calibrate formats\ncalibrate formats --json\n{reads}"""))
+        calibrate formats\ncalibrate formats --json\n{reads}"""),
+    )
     return cases
+
 
 def of_words(source: Path) -> list[Case]:
     """Help, schemas, explanations, new machines, wrong calls, and the Python names."""
     text = "\n".join(p.read_text() for p in sorted((source / "olp").rglob("*.py")))
     codes = sorted(set(re.findall(r'"(OLP\d{3})"', text)))
     files = [p.stem for p in sorted((source / "olp/cli").glob("*.py"))]
-    groups = [f"calibrate {p.removeprefix('calibrate_').replace('_', '-')}" for p in files if p.startswith("calibrate_")]
-    verbs = ["init", "inspect", "correct", "verify", "simulate", "retime", "check", "view", "compare", "calibrate", "schema", "explain"]
+    groups = [
+        f"calibrate {p.removeprefix('calibrate_').replace('_', '-')}"
+        for p in files
+        if p.startswith("calibrate_")
+    ]
+    verbs = [
+        "init",
+        "inspect",
+        "correct",
+        "verify",
+        "simulate",
+        "retime",
+        "check",
+        "view",
+        "compare",
+        "calibrate",
+        "schema",
+        "explain",
+    ]
     helps = [f"!{verb} --help" for verb in ["", *verbs, *groups]]
-    schemas = [f"schema {n}" for n in ("machine", "calibration", "job", "measurements", "points", "dialect", "nothing")]
-    explained = [f"explain {c} {o}" for c in codes for o in ("", "--json")] + ["explain", "explain --json", "explain OLP999"]
+    schemas = [
+        f"schema {n}"
+        for n in ("machine", "calibration", "job", "measurements", "points", "dialect", "nothing")
+    ]
+    explained = [f"explain {c} {o}" for c in codes for o in ("", "--json")] + [
+        "explain",
+        "explain --json",
+        "explain OLP999",
+    ]
     mill = source / "programs/haas-mill"
     p, m = "mill/bracket.nc", "-m mill/machine.toml"
     wrong = each(f"""nothing\n{chr(10).join(f'{v} --no-such-option' for v in [*verbs, *groups])}
@@ -637,16 +704,23 @@ def of_words(source: Path) -> list[Case]:
         Case("python/calls", [(mill, "programs/haas-mill")], [("python", CALLS, b"")]),
     ]
 
+
 def of_readme(source: Path) -> list[Case]:
     """Every command and example of the README."""
     fence = re.compile(r"(<!-- [^\n]* -->\n)?^```(\w+)\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
     blocks = fence.findall((source / "README.md").read_text("utf-8"))
-    texts = {b.splitlines()[0].removeprefix("# "): b.encode() for _, kind, b in blocks if kind in ("toml", "csv")}
+    texts = {
+        b.splitlines()[0].removeprefix("# "): b.encode() for _, kind, b in blocks if kind in ("toml", "csv")
+    }
     kinds = {"sh": "shell", "python": "python"}
     asked = [(kinds[kind], body) for mark, kind, body in blocks if kind in kinds and "set-up" not in mark]
     names = ["-".join(re.findall(r"[a-z.-]+", body)[:8]) for _, body in asked]
     copy = [(source / "programs", "programs")]
-    return [Case(f"readme/{k:02}-{name}"[:90], copy, [(*step, b"")], texts) for k, (step, name) in enumerate(zip(asked, names, strict=True))]
+    return [
+        Case(f"readme/{k:02}-{name}"[:90], copy, [(*step, b"")], texts)
+        for k, (step, name) in enumerate(zip(asked, names, strict=True))
+    ]
+
 
 def of_made(made: Path) -> list[Case]:
     """What the base's tests write: a job for each finding, random machines and programs."""
@@ -655,14 +729,20 @@ def of_made(made: Path) -> list[Case]:
         words = shlex.join(json.loads((folder / "options.json").read_text()))
         nominal = "--nominal nominal.ngc" if (folder / "nominal.ngc").exists() else ""
         setup = "-m machine.toml -j job.toml"
-        steps = each(f"check part.ngc {setup} {nominal} {words}\ncheck part.ngc {setup} {nominal} {words} --format json")
+        steps = each(
+            f"check part.ngc {setup} {nominal} {words}\ncheck part.ngc {setup} {nominal} {words} --format json"
+        )
         steps += each(f"correct part.ngc {setup} -o out.ngc --json {words}")
-        steps += each(f"verify nominal.ngc part.ngc {setup}" if nominal else f"simulate part.ngc {setup} --step-mm 20")
+        steps += each(
+            f"verify nominal.ngc part.ngc {setup}" if nominal else f"simulate part.ngc {setup} --step-mm 20"
+        )
         cases.append(Case(f"gate/{folder.name}", [(folder, "")], steps))
     for folder in sorted((made / "random").iterdir()):
         m, steps = "-m machine.toml", []
         for name in ("part.ngc", "post.ngc", "post.apt"):
-            steps += each(f"correct {name} {m} -o out.{name} --json {DAY}\nverify {name} out.{name} {m} --json")
+            steps += each(
+                f"correct {name} {m} -o out.{name} --json {DAY}\nverify {name} out.{name} {m} --json"
+            )
         steps += each(f"""correct part.ngc {m} -o split.ngc --split-rapids --tolerance-um 0.2 -q
             correct part.ngc {m} -o cycles.ngc --expand-cycles --diff -q\nsimulate part.ngc {m} --step-mm 5
             retime motion.ngc {m} --json --lines l.csv\ncheck part.ngc {m} --format json\ninspect machine.toml --json
@@ -679,9 +759,14 @@ def of_made(made: Path) -> list[Case]:
         "irl": "MOVE LIN p1;\n",
     }
     for name, text in described.items():
-        steps = short_tour("demo.as", f"-m machine.toml -j job.toml --dialect {name}") + each("inspect demo.as -m machine.toml")
-        cases.append(Case(f"described/{name}", [(made / "machines/linuxcnc", "")], steps, {"demo.as": text.encode()}))
+        steps = short_tour("demo.as", f"-m machine.toml -j job.toml --dialect {name}") + each(
+            "inspect demo.as -m machine.toml"
+        )
+        cases.append(
+            Case(f"described/{name}", [(made / "machines/linuxcnc", "")], steps, {"demo.as": text.encode()})
+        )
     return cases
+
 
 def of_golden(source: Path, shared: Path) -> list[Case]:
     cases = []
@@ -690,10 +775,15 @@ def of_golden(source: Path, shared: Path) -> list[Case]:
         steps = each("inspect machine.toml --json\ninspect machine.toml\ninspect machine.toml --plot c.svg")
         if (folder / "expected.json").exists():
             for point in json.loads((folder / "expected.json").read_text())["points"][:12]:
-                steps += each(f"inspect machine.toml --json --at {' '.join(str(v) for v in point['axis_mm'])}")
-            steps += each("calibrate export -m machine.toml --compare\ncalibrate export -m machine.toml --format isg -o t.csv")
+                steps += each(
+                    f"inspect machine.toml --json --at {' '.join(str(v) for v in point['axis_mm'])}"
+                )
+            steps += each(
+                "calibrate export -m machine.toml --compare\ncalibrate export -m machine.toml --format isg -o t.csv"
+            )
         cases.append(Case(f"golden/{folder.name}", [(folder, "")], steps))
     return cases
+
 
 def of_repro(shared: Path) -> list[Case]:
     """Known defects: they stay as they are until they are mended on purpose."""
@@ -702,7 +792,11 @@ def of_repro(shared: Path) -> list[Case]:
     for path in sorted((shared / "repro").rglob("*")):
         part = path.relative_to(shared / "repro")
         skip = part.parts[:2] in (("interpreter", "7"), ("interpreter", "9"))
-        if (path.suffix not in endings and "synthetos" not in path.name) or skip or part.parts[0] == "calibration":
+        if (
+            (path.suffix not in endings and "synthetos" not in path.name)
+            or skip
+            or part.parts[0] == "calibration"
+        ):
             continue
         near = [*path.parent.glob("*.toml"), *path.parent.glob("*/machine*.toml")]
         near += (path.parents[1] / "machine").glob("*.toml") if part.parts[0] == "interpreter" else []
@@ -722,23 +816,38 @@ def of_repro(shared: Path) -> list[Case]:
                 case.texts[str(calibration.relative_to(top))] = text.encode()
                 for axis in "XYZ" if "x.csv" in text else "":  # and its curves are not there
                     curve = f"{axis}_mm,E{axis}{axis}_um\n-5000,0\n0,2\n5000,9\n"
-                    case.texts[str(calibration.with_name(f"{axis.lower()}.csv").relative_to(top))] = curve.encode()
+                    case.texts[str(calibration.with_name(f"{axis.lower()}.csv").relative_to(top))] = (
+                        curve.encode()
+                    )
             cases.append(case)
     for folder in sorted(p for p in (shared / "repro/calibration").iterdir() if p.is_dir()):
         files = {p.name for p in folder.iterdir()}
         steps = each("calibrate evaluate . --json\ncalibrate read exx.csv") if "exx.csv" in files else []
         if "machine.toml" in files:
             m = "-m machine.toml"
-            steps += each(f"calibrate fit . {m} -o calibration.toml --force --json\ncalibrate fit . {m} -o b.toml --report f.md")
+            steps += each(
+                f"calibrate fit . {m} -o calibration.toml --force --json\ncalibrate fit . {m} -o b.toml --report f.md"
+            )
         if "points.csv" in files:
-            steps += each(f"calibrate doctor calibration.toml points.csv {m} --sigma-um 8 -o right.toml --json\ninspect machine.toml --json")
-            steps += each(f"calibrate refine calibration.toml points.csv {m} --sigma-um 8 -o refined.toml --json {DAY}")
+            steps += each(
+                f"calibrate doctor calibration.toml points.csv {m} --sigma-um 8 -o right.toml --json\ninspect machine.toml --json"
+            )
+            steps += each(
+                f"calibrate refine calibration.toml points.csv {m} --sigma-um 8 -o refined.toml --json {DAY}"
+            )
         if "p.ngc" in files:
             steps += each(f"correct p.ngc {m} -o out.ngc --json")
-        steps += [olp(f"calibrate import {f} --format siemens-cec --chain FXYZ -o {f}.toml --sense error") for f in sorted(files) if ".SPF" in f]
-        steps += each("calibrate read x.rtl --profile rtl.toml\ncalibrate read x.rtl") if "x.rtl" in files else []
+        steps += [
+            olp(f"calibrate import {f} --format siemens-cec --chain FXYZ -o {f}.toml --sense error")
+            for f in sorted(files)
+            if ".SPF" in f
+        ]
+        steps += (
+            each("calibrate read x.rtl --profile rtl.toml\ncalibrate read x.rtl") if "x.rtl" in files else []
+        )
         cases.append(Case(f"repro/calibration/{folder.name}", [(folder, "")], steps))
     return cases
+
 
 def of_corpus(shared: Path, made: Path) -> list[Case]:
     """Real programs, each with a big machine of its dialect; large ones are corrected only."""
@@ -751,8 +860,12 @@ def of_corpus(shared: Path, made: Path) -> list[Case]:
         p, size = shlex.quote(name), path.stat().st_size
         steps = each(f"correct {p} {setup} -o out --json {DAY}")
         if folder in control and size < 250_000:
-            steps += each(f"inspect {p} {setup} --json\nverify {p} out {setup} --json\ncheck {p} {setup} --format json {DAY}")
-            steps += each(f"correct {p} {setup} -o flat --flatten --expand-cycles --peck-clearance-mm 0.5 -q {DAY}")
+            steps += each(
+                f"inspect {p} {setup} --json\nverify {p} out {setup} --json\ncheck {p} {setup} --format json {DAY}"
+            )
+            steps += each(
+                f"correct {p} {setup} -o flat --flatten --expand-cycles --peck-clearance-mm 0.5 -q {DAY}"
+            )
         if folder in control and size < 6_000:
             steps += each(f"simulate {p} {setup} --step-mm 20\nretime {p} {setup} --json --lines l.csv")
             steps += each(f"view {p} {setup} -o v.html --no-time") if size < 2_000 else []
@@ -762,13 +875,16 @@ def of_corpus(shared: Path, made: Path) -> list[Case]:
         cases.append(Case(f"corpus/{folder}/{name}", [(machine, ""), (path, name)], steps))
     return cases
 
+
 def damaged(data: bytes, how: str, draw: random.Random) -> bytes:
     rows = data.splitlines(keepends=True)
     at = draw.randrange(max(len(data), 1))
     if how == "cut":
         return data[:at]
     if how == "flip":
-        return bytes(b ^ (1 << draw.randrange(8)) if k in {at, at // 2, at // 3} else b for k, b in enumerate(data))
+        return bytes(
+            b ^ (1 << draw.randrange(8)) if k in {at, at // 2, at // 3} else b for k, b in enumerate(data)
+        )
     if how == "drop":
         return b"".join(row for k, row in enumerate(rows) if k != at % len(rows))
     if how == "twice":
@@ -776,6 +892,7 @@ def damaged(data: bytes, how: str, draw: random.Random) -> bytes:
     digits = [k for k, b in enumerate(data) if 48 <= b < 58]
     where = draw.choice(digits) if digits else 0
     return data[:where] + (b"9" if how == "digit" else b"x") + data[where + 1 :]
+
 
 def of_damage(source: Path, made: Path) -> list[Case]:
     """Inputs cut off, flipped and changed, by seed; and every line of good files, one at a time."""
@@ -793,7 +910,9 @@ def of_damage(source: Path, made: Path) -> list[Case]:
         words = f"programs/{folder}/{program} -j programs/{folder}/job.toml"
         return each(f"correct {words} -o out --json {DAY}\ncheck {words}\ninspect {words} --json")
 
-    mill = dict.fromkeys(("bracket.nc", "machine.toml", "calibration.toml", "job.toml", "x.csv"), "bracket.nc")
+    mill = dict.fromkeys(
+        ("bracket.nc", "machine.toml", "calibration.toml", "job.toml", "x.csv"), "bracket.nc"
+    )
     for target in mill:
         case("haas-mill", target, job("haas-mill", "bracket.nc"))
     for name in ("modal.ngc", "cycles.ngc", "planes.ngc"):
@@ -812,11 +931,20 @@ def of_damage(source: Path, made: Path) -> list[Case]:
         case("gantry-checks", target, each(f"calibrate {words} {checks}/{target} --json"), "gantry-plate")
     harm = ("from pathlib import Path\np = Path({!r})\nd = p.read_bytes()\n"
             "p.with_name('bad' + p.suffix).write_bytes({})\n")  # fmt: skip
-    ways = ("d[:len(d) // 2]", "d[:100] + bytes([d[100] ^ 8]) + d[101:]", "b''", "d + d", "d.replace(b'1', b'x', 3)")
+    ways = (
+        "d[:len(d) // 2]",
+        "d[:100] + bytes([d[100] ^ 8]) + d[101:]",
+        "b''",
+        "d + d",
+        "d.replace(b'1', b'x', 3)",
+    )
     p, m = "programs/haas-mill/bracket.nc", "-m programs/haas-mill/machine.toml"
     steps = each(f"simulate {p} {m} -o raw.csv")
     for way in ways:
-        steps += [("python", harm.format("raw.csv", way), b""), *each(f"compare {p} bad.csv {m} --json\nview {p} {m} --measured bad.csv -o v.html --no-time")]
+        steps += [
+            ("python", harm.format("raw.csv", way), b""),
+            *each(f"compare {p} bad.csv {m} --json\nview {p} {m} --measured bad.csv -o v.html --no-time"),
+        ]
     cases.append(Case("damage/measured run", [(source / "programs/haas-mill", "programs/haas-mill")], steps))
     npz = f"{g}/calibration-covariance.npz"
     steps = each(f"calibrate fit {g} -m {g}/machine.toml -o {g}/calibration.toml -q")
@@ -829,16 +957,27 @@ def of_damage(source: Path, made: Path) -> list[Case]:
     good = source / "tests/broken/good"
     for file in sorted(good.glob("*.toml")):
         rows = file.read_text().splitlines()
-        check = "simulate -j job.toml --step-mm 50" if file.name == "job.toml" else "inspect machine.toml --json"
+        check = (
+            "simulate -j job.toml --step-mm 50" if file.name == "job.toml" else "inspect machine.toml --json"
+        )
         for k, row in enumerate(rows):
             key, equals, value = row.partition(" = ")
-            ways = {"drop": None, "name": f"{key[:-1]}{equals}{value}", "text": f'{key} = "?"', "minus": f"{key} = -7"}
+            ways = {
+                "drop": None,
+                "name": f"{key[:-1]}{equals}{value}",
+                "text": f'{key} = "?"',
+                "minus": f"{key} = -7",
+            }
             for how, new in ways.items():
                 if row and (equals or how in ("drop", "name")):
                     changed = "\n".join([*rows[:k], *([] if new is None else [new]), *rows[k + 1 :]]).encode()
-                    texts = {file.name: changed, "parts/part.nc": b"G21 G90 G54\nG0 X10 Y10 Z-10\nG1 X50 F600\nM2\n"}
+                    texts = {
+                        file.name: changed,
+                        "parts/part.nc": b"G21 G90 G54\nG0 X10 Y10 Z-10\nG1 X50 F600\nM2\n",
+                    }
                     cases.append(Case(f"broken/{file.name}:{k + 1} {how}", [(good, "")], each(check), texts))
     return cases
+
 
 def all_cases(place: Place, shared: Path) -> list[Case]:
     cases = of_readme(place.source) + of_programs(place.source) + of_words(place.source)
@@ -846,13 +985,17 @@ def all_cases(place: Place, shared: Path) -> list[Case]:
     cases += of_corpus(shared, place.made) if (shared / "corpus").is_dir() else []
     return cases + of_made(place.made) + of_golden(place.source, shared) + of_damage(place.source, place.made)
 
+
 # -- the run -------------------------------------------------------------------------------------------------
+
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--base", default="27681ad", help="commit to compare with")
     parser.add_argument("--tree", type=Path, default=ROOT, help="folder that holds olp/")
-    parser.add_argument("--work", type=Path, default=Path("/tmp/olp-compare"), help="what is kept from run to run")
+    parser.add_argument(
+        "--work", type=Path, default=Path("/tmp/olp-compare"), help="what is kept from run to run"
+    )
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="", help="cases whose name holds this text")
     parser.add_argument("--expect", type=Path, help="patterns of what may differ")
@@ -892,7 +1035,11 @@ def main() -> int:
             times.append((sum(done.seconds for done in found), case.name))
             for k, (step, a, b) in enumerate(zip(case.steps, base, found, strict=True)):
                 name = f"{case.name}: {title(step)}"
-                verb = step[0] if isinstance(step[1], str) else " ".join(step[1][: 1 + (step[1][:1] == ["calibrate"])])
+                verb = (
+                    step[0]
+                    if isinstance(step[1], str)
+                    else " ".join(step[1][: 1 + (step[1][:1] == ["calibrate"])])
+                )
                 count["steps"] += 1
                 count[f"of {verb}"] += 1
                 count["timeouts of the base"] += a.code == "timeout"
@@ -910,11 +1057,25 @@ def main() -> int:
     with ThreadPoolExecutor(options.jobs) as pool:
         for done in [pool.submit(run, case) for case in cases]:
             done.result()
-    say("\n" + ", ".join(f"{n} {k.removeprefix('of ')}" for k, n in sorted(count.items()) if k.startswith(("of ", "exit "))))
-    say(f"\nCPU of the tree's side {sum(t for t, _ in times):.0f} s; slowest: " + ", ".join(f"{name} {t:.0f} s" for t, name in sorted(times)[:-9:-1]) + "\n")
-    say(f"{len(cases)} cases, {count['steps']} steps, {count['equal']} equal, {count['expected differences']} differ as expected, ")
-    say(f"{count['differences']} differ; {count['timeouts of the base']} timeouts; {time.monotonic() - started:.0f} s\n")
+    say(
+        "\n"
+        + ", ".join(
+            f"{n} {k.removeprefix('of ')}" for k, n in sorted(count.items()) if k.startswith(("of ", "exit "))
+        )
+    )
+    say(
+        f"\nCPU of the tree's side {sum(t for t, _ in times):.0f} s; slowest: "
+        + ", ".join(f"{name} {t:.0f} s" for t, name in sorted(times)[:-9:-1])
+        + "\n"
+    )
+    say(
+        f"{len(cases)} cases, {count['steps']} steps, {count['equal']} equal, {count['expected differences']} differ as expected, "
+    )
+    say(
+        f"{count['differences']} differ; {count['timeouts of the base']} timeouts; {time.monotonic() - started:.0f} s\n"
+    )
     return int(count["differences"] > 0)
+
 
 if __name__ == "__main__":
     serve() if "--serve" in sys.argv else sys.exit(main())
