@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases.coal import Scene
 from cases.gate import TRUE_ZERO, Call, block, clamp, tool
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from judge.coal_judge import Scene
 
 import olp
 from olp.clearance.distance import Swept, nearest
