@@ -28,6 +28,7 @@ from olp.program.rs274.codes import (
     WORK_OFFSETS,
     WRITE_OFFSET,
 )
+from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, Capture, PathMode, State
 
@@ -59,13 +60,8 @@ class AxisState(State):
     """The state whose position counts in axis positions, mm; it knows offsets, lengths and frames."""
 
     setup: Setup
-    offset_name: str = "G54"
-    offsets: dict[str, list[float]] = field(default_factory=dict)
+    offsets: Offsets
     inherited: dict[str, Touch | None] = field(default_factory=dict)
-    shift: list[float] = field(default_factory=lambda: [0.0] * 3)
-    saved_shift: list[float] = field(default_factory=lambda: [0.0] * 3)
-    local: list[float] = field(default_factory=lambda: [0.0] * 3)
-    length: Vector = ZERO
     length_tool: int | None = None
     selected: int | None = None
     spindle: int | None = None
@@ -78,14 +74,13 @@ class AxisState(State):
     @staticmethod
     def at_start(setup: Setup, profile: Profile) -> AxisState:
         start = [NAN if p is None else p for p in setup.job.start_mm]
-        state = AxisState(profile, start, setup=setup)
+        state = AxisState(profile, start, setup=setup, offsets=Offsets(setup.machine.default_work_offset))
         state.motion = None if profile.motion is None else profile.motion * 10
-        state.offset_name = setup.machine.default_work_offset
         state.spindle = setup.machine.default_tool
         state.payload_kg = setup.job.payload_kg
         if state.spindle is not None and setup.machine.length_active:
             state.length_tool = state.spindle
-            state.length = state._tool(state.spindle, 1, "the tool in the spindle at the start")
+            state.offsets.length = state._tool(state.spindle, 1, "the tool in the spindle at the start")
         return state
 
     # -- frames ------------------------------------------------------------------------------------
@@ -93,32 +88,32 @@ class AxisState(State):
     def frame(self, line: int) -> int:
         """Index of the present frame; a tool or offset that is not defined is refused here, at its first
         use."""
-        work = self._work_offset(self.offset_name)
-        base = self.offsets.get(self.offset_name)
+        name = self.offsets.name
+        work = self._work_offset(name)
+        base = self.offsets.written.get(name)
         if base is None:
             if work is None:
                 raise ProgramError(
-                    f"work offset {self.offset_name} is used but not defined; give "
-                    f'[work_offsets."{self.offset_name}"] '
+                    f"work offset {name} is used but not defined; give "
+                    f'[work_offsets."{name}"] '
                     "in the machine or job file",
                     line=line,
                 )
             base = list(work.offset_mm)
         if work is not None and any(work.rotation_deg):
             raise ProgramError(
-                f"work offset {self.offset_name} is rotated, which is not read yet in this dialect; "
+                f"work offset {name} is rotated, which is not read yet in this dialect; "
                 "state it with A_deg = B_deg = C_deg = 0",
                 line=line,
             )
-        x, y, z = (base[i] + self.shift[i] + self.local[i] + self.length[i] for i in range(3))
         frame = Frame(
             unit_mm=self.unit_mm,
-            offset_mm=(x, y, z),
-            length_mm=self.length,
+            offset_mm=self.offsets.total(base),
+            length_mm=self.offsets.length,
             tool_mm=self._lever(line),
             tool=self.spindle,
-            work_offset=self.offset_name,
-            touched=self._touch(self.offset_name, base, line),
+            work_offset=name,
+            touched=self._touch(name, base, line),
             tool_touched=self._tool_touched(line),
             payload_kg=self.payload_kg,
         )
@@ -237,11 +232,12 @@ class AxisState(State):
         if code in UNITS:
             self.unit = code
         elif code == LENGTH_FROM_WORDS:
-            self.length = self._merged(self.length, [(i, self.length_mm(w)) for i, w in axis_words])
+            values = [(i, self.length_mm(w)) for i, w in axis_words]
+            self.offsets.length = self._merged(self.offsets.length, values)
             return replace(effect, consumed=True)
         elif code in LENGTHS:
             self._tool_length(code, line, by_letter)
-        elif code in WORK_OFFSETS | FURTHER_OFFSETS:
+        elif code in WORK_OFFSETS or code in FURTHER_OFFSETS:
             self._select_offset(code, line, by_letter)
         elif code in PATH_MODES:
             self._path_mode(code, line, by_letter)
@@ -273,7 +269,7 @@ class AxisState(State):
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code == 490:
-            self.length, self.length_tool = ZERO, None
+            self.offsets.length, self.length_tool = ZERO, None
             return
         name = f"G{code / 10:g}"
         if "H" in by_letter:
@@ -291,8 +287,8 @@ class AxisState(State):
         if code == 440:
             vector = (-vector[0], -vector[1], -vector[2])
         if code == 432:
-            vector = self._sum(self.length, vector)
-        self.length, self.length_tool = vector, number or None
+            vector = self._sum(self.offsets.length, vector)
+        self.offsets.length, self.length_tool = vector, number or None
 
     def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code in (541, 1540):
@@ -303,7 +299,7 @@ class AxisState(State):
             name = f"G{code / 10:g}P{self._integer(by_letter['P'], line)}"
         else:
             name = f"G{code / 10:g}"
-        self.offset_name = name
+        self.offsets.name = name
 
     def _path_mode(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         name = f"G{code / 10:g}"
@@ -334,9 +330,8 @@ class AxisState(State):
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
         if not 0 <= number <= self.profile.g10_offsets:
             raise ProgramError("G10 needs a P word with the number of a work offset, 1 for G54", line=line)
-        name = self.offset_name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
-        work = self._work_offset(name)
-        base = self.offsets.get(name) or (list(work.offset_mm) if work is not None else [NAN] * 3)
+        name = self.offsets.name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
+        base = self._work_mm(name)
         for i, word in axis_words:
             value = self.length_mm(word)
             if kind == 2:
@@ -344,34 +339,32 @@ class AxisState(State):
                 base[i] = base[i] + value if adds else value
             else:
                 self._capture(i, word, line, moves)
-                active = self._work_offset(self.offset_name)
-                now = self.offsets.get(self.offset_name) or (list(active.offset_mm) if active else [NAN] * 3)
-                self.inherited[name] = self._touch(self.offset_name, now, line)
-                base[i] = self.position[i] - self.length[i] - self.shift[i] - self.local[i] - value
-        self.offsets[name] = base
+                active = self.offsets.name
+                self.inherited[name] = self._touch(active, self._work_mm(active), line)
+                base[i] = self.offsets.work_at(i, self.position[i], value)
+        self.offsets.written[name] = base
 
     def _shift(self, code: int, line: int, axis_words: list[tuple[int, Word]], moves: int) -> None:
+        offsets = self.offsets
         if code in (921, 922):
-            if code == 922:
-                self.saved_shift = list(self.shift)
-            else:
-                self.saved_shift = [0.0] * 3
-            self.shift = [0.0] * 3
+            offsets.clear_shift(save=code == 922)
         elif code == 923:
-            self.shift = list(self.saved_shift)
+            offsets.restore_shift()
         elif code == LOCAL_OFFSET:
-            target = self.shift if self.profile.g52_is_g92 else self.local
+            target = offsets.shift if self.profile.g52_is_g92 else offsets.local
             for i, word in axis_words:
                 target[i] = self.length_mm(word)
         else:
-            work = self._work_offset(self.offset_name)
-            base = self.offsets.get(self.offset_name) or (list(work.offset_mm) if work else [NAN] * 3)
+            work = self._work_mm(offsets.name)
             for i, word in axis_words:
                 self._capture(i, word, line, moves)
-                self.shift[i] = (
-                    self.position[i] - base[i] - self.length[i] - self.local[i] - self.length_mm(word)
-                )
-            self.saved_shift = list(self.shift)
+                offsets.preset(i, self.position[i], work, self.length_mm(word))
+            offsets.saved = list(offsets.shift)
+
+    def _work_mm(self, name: str) -> list[float]:
+        """A work offset as the program has written it, else a copy of the setup's, else NaN."""
+        work = self._work_offset(name)
+        return self.offsets.written.get(name) or (list(work.offset_mm) if work is not None else [NAN] * 3)
 
     def _capture(self, axis: int, word: Word, line: int, moves: int) -> None:
         if math.isnan(self.position[axis]):
