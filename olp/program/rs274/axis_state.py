@@ -34,6 +34,13 @@ from olp.program.rs274.state import NAN, Capture, PathMode, State
 
 TOOL_CHANGE, SET_TOOL = 60, 610
 
+#: RS-274's order of execution within a block; other codes come last.
+_RANK = {
+    code: rank
+    for rank, codes in enumerate(((DWELL,), UNITS, LENGTHS, WORK_OFFSETS, PATH_MODES))
+    for code in codes
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Word:
@@ -208,7 +215,7 @@ class AxisState(State):
         if any(self.may_move(m) for m in m_codes):
             self.forget()
         effect = Effect()
-        for code in sorted(codes, key=_order):
+        for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
         return effect
 
@@ -391,11 +398,3 @@ class AxisState(State):
         for i, value in new:
             values[i] = value
         return (values[0], values[1], values[2])
-
-
-def _order(code: int) -> int:
-    """RS-274's order of execution within a block."""
-    for rank, codes in enumerate(((DWELL,), UNITS, LENGTHS, WORK_OFFSETS, PATH_MODES)):
-        if code in codes:
-            return rank
-    return 9
