@@ -12,8 +12,8 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Arcs, Toolpath
 from olp.program.program import ArcSlots, Hole, Program, Words
+from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.lexer import WordChunk
-from olp.program.rs274.state import State
 from olp.program.text.columns import Columns
 
 
@@ -74,7 +74,7 @@ class Collector:
         self.columns.put("arc_words", words, np.int32)
         self.columns.put("arc_absolute", absolute, np.bool_)
 
-    def program(self, state: State, end_line: int) -> Program:
+    def program(self, state: AxisState, end_line: int) -> Program:
         """All of it, with the frames and path modes of the final `state`. Takes the columns: once only."""
         return Program(
             data=self.data,
@@ -95,7 +95,7 @@ class Collector:
             calculator=not state.bare_increments,
         )
 
-    def _toolpath(self, state: State) -> Toolpath:
+    def _toolpath(self, state: AxisState) -> Toolpath:
         arcs = Arcs(
             self.columns.take("arc_move", np.int64),
             self.columns.take("arc_centre", np.float64, 3),

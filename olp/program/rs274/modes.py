@@ -15,10 +15,18 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
+from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.codes import (
+    CUTTER_COMPENSATION,
+    DWELL,
+    GROUPS,
+    LENGTH_FROM_WORDS,
+    SHIFTS,
+    WRITE_OFFSET,
+)
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
-from olp.program.rs274.profiles.base import CUTTER_COMPENSATION, Act
-from olp.program.rs274.state import State
+from olp.program.rs274.profiles.base import Act
 
 Modal = npt.NDArray[np.int16]
 
@@ -27,7 +35,7 @@ PLANE_OF = {170: 0, 180: 1, 190: 2}
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
 #: Events whose axis words are not motion: G10 G52 G92 G43.1
-_CLAIMS = (100, 520, 920, 921, 922, 923, 431)
+_CLAIMS = (WRITE_OFFSET, *SHIFTS, LENGTH_FROM_WORDS)
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True
 
@@ -57,7 +65,7 @@ class Context:
     plane: Modal
     distance: Modal
     arc_distance: Modal
-    feed: Modal
+    feed_mode: Modal
     retract: Modal
     event: Mask
     consumed: Mask
@@ -72,12 +80,12 @@ class Context:
 class Modes:
     """The codes in force, from chunk to chunk; those that end a chunk are kept in the `state`."""
 
-    def __init__(self, state: State, *, block_delete: bool, contour: bool) -> None:
+    def __init__(self, state: AxisState, *, block_delete: bool, contour: bool) -> None:
         self._state = state
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = (*_CLAIMS, 40) if profile.axis_dwell else _CLAIMS
+        self._claims = (*_CLAIMS, DWELL) if profile.axis_dwell else _CLAIMS
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act
@@ -126,7 +134,7 @@ class Modes:
             plane=_modal(chunk, codes, Act.PLANE, state.plane),
             distance=_modal(chunk, codes, Act.DISTANCE, state.distance),
             arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
-            feed=_modal(chunk, codes, Act.FEED, state.feed),
+            feed_mode=_modal(chunk, codes, Act.FEED, state.feed_mode),
             retract=_modal(chunk, codes, Act.RETRACT, state.retract),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
@@ -137,9 +145,7 @@ class Modes:
     def leave(self, context: Context, line: int) -> None:
         """Keep the codes in force on this line, the last one that is read, for the next chunk."""
         state = self._state
-        state.plane, state.distance = int(context.plane[line]), int(context.distance[line])
-        state.arc_distance, state.feed = int(context.arc_distance[line]), int(context.feed[line])
-        state.retract = int(context.retract[line])
+        state.take({int(getattr(context, group)[line]) for group in GROUPS})
         state.motion = None if context.motion[line] < 0 else int(context.motion[line])
 
     def _codes(self, chunk: WordChunk, value: Array, usable: Mask) -> Codes:
@@ -202,7 +208,7 @@ def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
         )
 
 
-def scaled(context: Context, state: State, remarks: dict[str, tuple[int, str]]) -> Array:
+def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str]]) -> Array:
     """The chunk's numbers as written, in program units: without a decimal point they count increments on
     some controls, which is remarked."""
     if not state.bare_increments:
@@ -237,18 +243,12 @@ def _in_force(chunk: WordChunk, at: Index, code: Index, now: int | None) -> Moda
     return modal(len(chunk.line_start), at, code, -1 if now is None else now)
 
 
-def _check_deleted(context: Context, active: Mask, state: State) -> None:
+def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
     """A `/` block must not change how later blocks are read, unless the next block restates it."""
     chunk = context.chunk
     deleted = np.flatnonzero(chunk.deleted & active)
-    pairs = (
-        (context.motion, -1 if state.motion is None else state.motion),
-        (context.plane, state.plane),
-        (context.distance, state.distance),
-        (context.arc_distance, state.arc_distance),
-        (context.feed, state.feed),
-        (context.retract, state.retract),
-    )
+    pairs = [(context.motion, -1 if state.motion is None else state.motion)]
+    pairs += [(getattr(context, group), getattr(state, group)) for group in GROUPS]
     for line in deleted.tolist():
         following = line + 1
         while following < len(chunk.deleted) and chunk.deleted[following]:

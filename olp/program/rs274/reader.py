@@ -1,9 +1,9 @@
 """Reads RS-274 and ISO 6983 text: bytes to a nominal toolpath and the words that can be edited.
 
 The way of a chunk of lines: lexer columns -> modal codes per line (`modes`) -> motion lines -> stretches
-between events, each resolved in bulk (`motion`), with the blocks that change frames (`state`) or need the
-present position (`singles`) carried out one by one. `collector` takes what comes of it. Nothing here knows an
-error model.
+between events, each resolved in bulk (`motion`), with the blocks that change frames (`axis_state`) or need
+the present position (`special_blocks`) carried out one by one. `collector` takes what comes of it. Nothing
+here knows an error model.
 """
 
 from __future__ import annotations
@@ -20,20 +20,30 @@ from olp.core.toolpath import Flag, Kind
 from olp.program.dialect import Options
 from olp.program.directives import Directives, with_payloads
 from olp.program.program import Program
+from olp.program.rs274.axis_state import AxisState, Effect
+from olp.program.rs274.codes import (
+    CYCLES,
+    HOMES,
+    INCREMENTAL,
+    INVERSE_TIME,
+    MACHINE,
+    PRESET,
+    PROBES,
+    WRITE_OFFSET,
+)
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import PLANE_OF, Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
-from olp.program.rs274.profiles.base import CYCLES, PROBES, Profile
+from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.special_blocks import Singles, event_block
-from olp.program.rs274.state import NAN, Effect, State
 
 #: motion code to kind of move; 255 where it is not plain motion, the last entry standing for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _ALONE = np.array(sorted(CYCLES | PROBES))
 #: Events that need the present position
-_POSITION = (100, 280, 300, 530, 920)
+_POSITION = HOMES | {WRITE_OFFSET, MACHINE, PRESET}
 
 
 def read(
@@ -64,7 +74,7 @@ class _Reader:
     def __init__(self, data: bytes, setup: Setup, profile: Profile, options: Options, words: bool) -> None:
         self.data = data = with_payloads(data, setup.job.payloads, profile.comment)
         self.options = options
-        self.state = State.at_start(setup, profile)
+        self.state = AxisState.at_start(setup, profile)
         x, y, z = self.state.position
         self.out = Collector(data, (x, y, z), keep_words=words)
         self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
@@ -134,8 +144,7 @@ class _Reader:
             if here and (alone[upto] or effect.home or effect.machine):
                 self._alone(context, rows, upto, effect)
             if effect.home:
-                for axis in effect.home:
-                    state.position[axis] = NAN
+                state.forget(effect.home)
                 self.singles.control_move(number, deleted=deleted)
         self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
@@ -153,7 +162,7 @@ class _Reader:
         if upto > rows.assigned:
             line = context.number(int(rows.blocks.line[rows.assigned]))
             rows.frame[rows.assigned : upto] = self.state.frame(line)
-            if not self.state.unit_stated:
+            if self.state.unit is None:
                 self.out.remarks.setdefault("unit", (line, "mm"))
             rows.assigned = upto
 
@@ -170,7 +179,7 @@ class _Reader:
         if (kind == 255).any():
             i = int(np.flatnonzero(kind == 255)[0])
             _refuse_motion(int(motion[i]), int(number[i]))
-        incremental = context.distance[line] == 910
+        incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
         offset, unit = self._offsets(frame)
         value = scaled(context, state, self.out.remarks)
@@ -179,7 +188,7 @@ class _Reader:
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
         flag[blocks.other[a:upto]] |= np.uint8(Flag.WHOLE)
         flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
-        inverse = context.feed[line] == 930
+        inverse = context.feed_mode[line] == INVERSE_TIME
         if inverse.any():
             flag[inverse] |= np.uint8(Flag.INVERSE_TIME)
         if self.switches:

@@ -1,7 +1,7 @@
 """Blocks that are carried out one by one: canned cycles, probes, G53 moves, the way to G28's intermediate
 point and the moves of the control's own; and the checks of a block with an event.
 
-What an event does to frames and tools is in `state`, the strokes of one hole are in `cycles`.
+What an event does to frames and tools is in `axis_state`, the strokes of one hole are in `cycles`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,22 @@ from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
 from olp.program.directives import Directives
 from olp.program.program import Hole
+from olp.program.rs274.axis_state import AxisState, Effect, Word
+from olp.program.rs274.codes import (
+    CUTTER_COMPENSATION,
+    CYCLES,
+    DWELL,
+    HOMES,
+    INCREMENTAL,
+    MACHINE,
+    RETRACT_TO_R,
+)
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycles import Stroke, hole_moves, levels
 from olp.program.rs274.modes import PLANE_OF, Context, scaled
 from olp.program.rs274.motion import fill
-from olp.program.rs274.profiles.base import CUTTER_COMPENSATION, CYCLES, Act, Profile
-from olp.program.rs274.state import NAN, Effect, State, Word
+from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.state import NAN
 
 _M_REFUSED = {
     700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
@@ -42,7 +52,9 @@ def event_block(context: Context, at: int, profile: Profile) -> tuple[list[Word]
     mine = slice(np.searchsorted(codes.line, at), np.searchsorted(codes.line, at, "right"))
     line = context.number(at)
     events = _checked(codes.code[mine], codes.act[mine], words, profile, line)
-    changes = set(events) - {40, 280, 300, 530} or any(w.letter == "M" and w.value in (6, 61) for w in words)
+    changes = set(events) - {DWELL, *HOMES, MACHINE} or any(
+        w.letter == "M" and w.value in (6, 61) for w in words
+    )
     if chunk.deleted[at] and changes:
         raise ProgramError(
             "a block under block delete changes offsets, units, path mode or the tool, so later blocks "
@@ -76,14 +88,10 @@ def _checked(
 class Singles:
     """Carries such blocks out: from the position in `state`, with their moves and holes put into `out`."""
 
-    def __init__(self, state: State, out: Collector, switches: Directives) -> None:
+    def __init__(self, state: AxisState, out: Collector, switches: Directives) -> None:
         self._state = state
         self._out = out
         self._switches = switches
-        # a series of cycles: its count, the level before it, and the words that its blocks inherit, in mm
-        self._series = 0
-        self._initial = 0.0
-        self._sticky: dict[str, float] = {}
 
     def run(self, context: Context, at: int, slot: Index, frame: int, effect: Effect) -> None:
         """Carry out the motion on line `at` of the chunk, whose axis words are `slot` (1, 3), in this
@@ -115,7 +123,7 @@ class Singles:
         """A probe, a G53 move or the way to G28's intermediate point."""
         state, line = self._state, context.number(at)
         frame = state.frames[frame_index]
-        incremental = bool(context.distance[at] == 910)
+        incremental = bool(context.distance[at] == INCREMENTAL)
         deleted = bool(context.chunk.deleted[at])
         flag = _deleted(deleted)
         kind = Kind.RAPID
@@ -153,7 +161,7 @@ class Singles:
     def _cycle(self, context: Context, at: int, frame_index: int, code: int) -> None:
         state, out, chunk, line = self._state, self._out, context.chunk, context.number(at)
         frame = state.frames[frame_index]
-        incremental = bool(context.distance[at] == 910)
+        incremental = bool(context.distance[at] == INCREMENTAL)
         plane = PLANE_OF[int(context.plane[at])]
         first, second, third = PLANES[plane]
         words = {
@@ -163,20 +171,24 @@ class Singles:
         given = {letter: float(value[i]) for letter, i in words.items()}
         if "P" in given:
             given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
-        self._inherit(context, at, given, code, third, frame.unit_mm)
+        held = self._inherit(context, at, given, code, third, frame.unit_mm)
+        series = state.series
+        initial = NAN if series.initial is None else series.initial
         times = self._repeats(context, words, line)
         offset = frame.offset_mm
-        z_word, r_word = self._sticky["XYZ"[third]], self._sticky["R"]
+        z_word, r_word = held["XYZ"[third]], held["R"]
         if incremental:
-            r, z = levels(r_word, z_word, absolute=False, initial_z=self._initial)
+            r, z = levels(r_word, z_word, absolute=False, initial_z=initial)
         else:
             r, z = r_word + offset[third], z_word + offset[third]
         place, step = [], []
         for axis in (first, second):
-            held, letter = state.position[axis], "XYZ"[axis]
+            before, letter = state.position[axis], "XYZ"[axis]
             number = given[letter] * frame.unit_mm if letter in given else None
             step.append(number if incremental and number is not None else 0.0)
-            place.append(held if number is None else held + number if incremental else number + offset[axis])
+            place.append(
+                before if number is None else before + number if incremental else number + offset[axis]
+            )
         if any(np.isnan((*place, *state.position))):
             raise ProgramError(
                 "a canned cycle starts where an axis has not been commanded yet; command X, Y and Z first, "
@@ -189,9 +201,9 @@ class Singles:
         for repeat in range(times):
             try:
                 strokes = hole_moves(
-                    code, start=start, xy=(place[0], place[1]), r=r, z=z, q=self._sticky.get("Q"),
-                    p=self._sticky.get("P"), retract_to_r=bool(context.retract[at] == 990),
-                    initial_z=self._initial, plane=17 + plane,
+                    code, start=start, xy=(place[0], place[1]), r=r, z=z, q=held.get("Q"),
+                    p=held.get("P"), retract_to_r=bool(context.retract[at] == RETRACT_TO_R),
+                    initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
                 )  # fmt: skip
             except ProgramError as error:
@@ -211,8 +223,8 @@ class Singles:
                 Hole(
                     line=line, first=begin, last=out.moves,
                     words={letter: context.base + i for letter, i in words.items()}, plane=plane,
-                    place_mm=(place[0], place[1]), r_mm=r, z_mm=z, initial_mm=self._initial,
-                    incremental=incremental, repeat=repeat, repeats=times, series=self._series, code=code,
+                    place_mm=(place[0], place[1]), r_mm=r, z_mm=z, initial_mm=initial,
+                    incremental=incremental, repeat=repeat, repeats=times, series=series.count, code=code,
                     rests=_rests(strokes),
                 )
             )  # fmt: skip
@@ -222,26 +234,23 @@ class Singles:
 
     def _inherit(
         self, context: Context, at: int, given: dict[str, float], code: int, third: int, unit_mm: float
-    ) -> None:
-        """Keep the words that later blocks of a series inherit; a new series starts after any other move."""
+    ) -> dict[str, float]:
+        """The words of a block and those inherited from its series, lengths in mm; a new series starts after
+        any other move."""
+        series, depth = self._state.series, "XYZ"[third]
         previous = int(context.motion[at - 1]) if at else (self._state.motion or -1)
         holes = self._out.holes
         if not (previous in CYCLES and holes and holes[-1].last == self._out.moves):
-            self._series += 1
-            self._initial = self._state.position[third]
-            self._sticky = {}
+            series.begin(self._state.position[third])
         elif previous != code:
-            self._sticky = {}
-        for letter in "RQ" + "XYZ"[third]:
-            if letter in given:
-                self._sticky[letter] = given[letter] * unit_mm
-        if "P" in given:
-            self._sticky["P"] = given["P"]
-        missing = [letter for letter in ("R", "XYZ"[third]) if letter not in self._sticky]
+            series.held = {}
+        series.hold({a: v if a == "P" else v * unit_mm for a, v in given.items()}, depth)
+        missing = [letter for letter in ("R", depth) if letter not in series.held]
         if missing:
             raise ProgramError(
                 f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=context.number(at)
             )
+        return {letter: value for letter, value in series.held.items() if value is not None}
 
     def _repeats(self, context: Context, words: dict[str, int], line: int) -> int:
         """How many holes the block makes: its L word, or K on ISO controls."""

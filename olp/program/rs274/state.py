@@ -1,34 +1,22 @@
-"""The running state of a control that reads RS-274: offsets, tools, units, and the blocks that change them.
+"""The state of a control that carries out RS-274: the one model that reader and unroller follow a program by.
 
-Positions are axis positions in mm; an axis whose position is not known is NaN. Only blocks with an
-*event* word (`Act.EVENT`, M6, T …) come here, one by one; plain motion is read in bulk (`motion`).
+`State` holds what is in force: modal codes, units, the position, the series of canned cycles. In which
+coordinates the position counts, its two kinds say: axis positions in mm with all offsets known
+(`axis_state`, the reader), or program coordinates in program units, whose offsets nobody has to know
+(`flatten.state`, the unroller).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
-from olp.core.errors import ProgramError
-from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import Frame, Touch, carried
 from olp.core.units import MM_PER_INCH
-from olp.program.frames import lever_of, touch_of
+from olp.program.rs274.codes import ABSOLUTE, GROUPS, INCH, INVERSE_TIME, RETRACT_TO_R
 from olp.program.rs274.profiles.base import Profile
 
 NAN = float("nan")
-TOOL_CHANGE, SET_TOOL = 60, 610
-
-
-@dataclass(frozen=True, slots=True)
-class Word:
-    """One word of a block: upper-case letter, number as written, index in the program's word table."""
-
-    letter: str
-    value: float
-    index: int
-    pointed: bool = True
+_GROUP_OF = tuple((code, group) for group, codes in GROUPS.items() for code in codes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,378 +41,75 @@ class PathMode:
     merges: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Effect:
-    """What a block's events leave to its axis words: `consumed`, or `machine` coordinates (G53), or `home`,
-    the axes that G28/G30 send home after the intermediate point."""
+@dataclass(slots=True)
+class Series:
+    """Canned cycles that follow one another: how many series there were, the level before this one (None:
+    not asked for yet), and the words that its blocks hand on, by upper-case letter."""
 
-    consumed: bool = False
-    machine: bool = False
-    home: tuple[int, ...] = ()
+    count: int = 0
+    initial: float | None = None
+    held: dict[str, float | None] = field(default_factory=dict)
+
+    def begin(self, initial: float | None) -> None:
+        self.count += 1
+        self.initial = initial
+        self.held = {}
+
+    def hold(self, words: Mapping[str, float | None], depth: str) -> None:
+        """Keep the words of a block that later blocks inherit; `depth` is the letter of the tool axis."""
+        self.held |= {letter: words[letter] for letter in (depth, "R", "Q", "P") if letter in words}
 
 
 @dataclass(slots=True)
 class State:
-    """Mutable while one program is read; one instance a reading."""
+    """Mutable while one program is followed; one instance a reading.
 
-    setup: Setup
+    `motion` to `feed_mode` are codes (`codes`), `motion` None where none is in force. `unit` is G20 or G21,
+    None before either. `position` (3,) is NaN where it is not known.
+    """
+
     profile: Profile
-    position: list[float]
+    position: list[float] = field(default_factory=lambda: [NAN] * 3)
     motion: int | None = None
     plane: int = 170
-    distance: int = 900
+    distance: int = ABSOLUTE
     arc_distance: int = 911
-    feed: int = 940
-    retract: int = 980
-    unit_mm: float = 1.0
-    unit_stated: bool = False
-    offset_name: str = "G54"
-    offsets: dict[str, list[float]] = field(default_factory=dict)
-    inherited: dict[str, Touch | None] = field(default_factory=dict)
-    shift: list[float] = field(default_factory=lambda: [0.0] * 3)
-    saved_shift: list[float] = field(default_factory=lambda: [0.0] * 3)
-    local: list[float] = field(default_factory=lambda: [0.0] * 3)
-    length: Vector = ZERO
-    length_tool: int | None = None
-    selected: int | None = None
-    spindle: int | None = None
-    payload_kg: float = 0.0
-    frames: list[Frame] = field(default_factory=list)
-    captures: list[Capture] = field(default_factory=list)
-    path_modes: list[PathMode] = field(default_factory=list)
-    _index: dict[Frame, int] = field(default_factory=dict)
+    feed_mode: int = 940
+    retract: int = field(init=False)
+    unit: int | None = None
+    series: Series = field(default_factory=Series)
 
-    @staticmethod
-    def at_start(setup: Setup, profile: Profile) -> State:
-        state = State(setup, profile, [NAN if p is None else p for p in setup.job.start_mm])
-        state.motion = None if profile.motion is None else profile.motion * 10
-        state.offset_name = setup.machine.default_work_offset
-        state.retract = profile.initial_retract
-        state.spindle = setup.machine.default_tool
-        state.payload_kg = setup.job.payload_kg
-        if state.spindle is not None and setup.machine.length_active:
-            state.length_tool = state.spindle
-            state.length = state._tool(state.spindle, 1, "the tool in the spindle at the start")
-        return state
-
-    # -- frames ------------------------------------------------------------------------------------
-
-    def frame(self, line: int) -> int:
-        """Index of the present frame; a tool or offset that is not defined is refused here, at its first
-        use."""
-        work = self._work_offset(self.offset_name)
-        base = self.offsets.get(self.offset_name)
-        if base is None:
-            if work is None:
-                raise ProgramError(
-                    f"work offset {self.offset_name} is used but not defined; give "
-                    f'[work_offsets."{self.offset_name}"] '
-                    "in the machine or job file",
-                    line=line,
-                )
-            base = list(work.offset_mm)
-        if work is not None and any(work.rotation_deg):
-            raise ProgramError(
-                f"work offset {self.offset_name} is rotated, which is not read yet in this dialect; "
-                "state it with A_deg = B_deg = C_deg = 0",
-                line=line,
-            )
-        x, y, z = (base[i] + self.shift[i] + self.local[i] + self.length[i] for i in range(3))
-        frame = Frame(
-            unit_mm=self.unit_mm,
-            offset_mm=(x, y, z),
-            length_mm=self.length,
-            tool_mm=self._lever(line),
-            tool=self.spindle,
-            work_offset=self.offset_name,
-            touched=self._touch(self.offset_name, base, line),
-            tool_touched=self._tool_touched(line),
-            payload_kg=self.payload_kg,
-        )
-        known = self._index.get(frame)
-        if known is None:
-            known = self._index[frame] = len(self.frames)
-            self.frames.append(frame)
-        return known
-
-    def _work_offset(self, name: str) -> WorkOffset | None:
-        return self.setup.work_offset(name) or self.setup.work_offset(name.replace("P", " P"))
-
-    def _lever(self, line: int) -> Vector:
-        number = self.spindle if self.spindle is not None else self.length_tool
-        if number is None or number == 0:
-            return ZERO
-        return lever_of(self.setup, number, line)
-
-    def _touch(self, name: str, base: Sequence[float], line: int) -> Touch | None:
-        """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's
-        part; one that G10 L2 changed keeps its own."""
-        if name in self.inherited:
-            return self.inherited[name]
-        work = self._work_offset(name) or WorkOffset(name, (base[0], base[1], base[2]))
-        return touch_of(self.setup, work, line)
-
-    def _tool_touched(self, line: int) -> Touch | None:
-        if self.length_tool is None:
-            return None
-        tool = self.setup.tool(self.length_tool)
-        if tool is None or tool.set_by != "touch" or tool.touched_at_mm is None:
-            return None
-        lever = tool.lever_mm or self._lever(line)
-        return tool.touched_at_mm, carried(lever, self.setup.job.payload_kg)
-
-    def _tool(self, number: int, line: int, what: str) -> Vector:
-        if number == 0:
-            return ZERO
-        tool = self.setup.tool(number)
-        if tool is None:
-            raise ProgramError(
-                f"{what} uses tool {number}, which is not defined; give [tools.{number}] in the machine or "
-                "job file",
-                line=line,
-            )
-        return tool.length_mm
-
-    # -- values ------------------------------------------------------------------------------------
-
-    def length_mm(self, word: Word) -> float:
-        """A length word in mm; without a decimal point it counts least increments where the control says
-        so."""
-        return word.value * self.word_scale(word.letter, word.pointed)
-
-    def word_scale(self, letter: str, pointed: bool) -> float:
-        """mm per unit of the number as written."""
-        if pointed or not self.bare_increments:
-            return self.unit_mm
-        return self.increment(letter) * self.unit_mm
+    def __post_init__(self) -> None:
+        self.retract = self.profile.initial_retract
 
     @property
-    def bare_increments(self) -> bool:
-        """Whether a length without a decimal point counts least increments."""
-        return self.profile.increments_without_point and self.setup.machine.decimal_point == "increment"
+    def absolute(self) -> bool:
+        return self.distance == ABSOLUTE
 
-    def increment(self, letter: str) -> float:
-        """Least increment in program units: 0.001 mm goes with 0.0001 inch (IS-B), 0.0001 mm with 0.00001
-        inch."""
-        axis = {"I": "X", "J": "Y", "K": "Z"}.get(letter, letter)
-        least = self.setup.machine.axes[axis if axis in "XYZ" else "X"].least_increment_mm
-        metric = 0.0001 if least < 0.0005 else 0.001
-        return metric if self.unit_mm == 1.0 else metric / 10
+    @property
+    def inverse_time(self) -> bool:
+        return self.feed_mode == INVERSE_TIME
 
-    # -- events ------------------------------------------------------------------------------------
+    @property
+    def retract_to_r(self) -> bool:
+        return self.retract == RETRACT_TO_R
 
-    def run(self, line: int, words: Sequence[Word], codes: Sequence[int], moves: int) -> Effect:
-        """Carry out the events of one block in the control's order and say what is left to its axis words."""
-        by_letter = {w.letter: w for w in words}
-        axis_words = [(i, by_letter[a]) for i, a in enumerate("XYZ") if a in by_letter]
-        m_codes = [round(w.value * 10) for w in words if w.letter == "M"]
-        if "T" in by_letter:
-            self.selected = self._integer(by_letter["T"], line)
-        if TOOL_CHANGE in m_codes:
-            if self.selected is None:
-                raise ProgramError("M6 changes to a tool, but no T word came before it", line=line)
-            self.spindle = self.selected
-            self._tool(self.spindle, line, "M6")
-        if SET_TOOL in m_codes and self.profile.m61_sets_tool:
-            if "Q" not in by_letter:
-                raise ProgramError("M61 needs a Q word with the tool number", line=line)
-            self.spindle = self._integer(by_letter["Q"], line)
-        if any(self.may_move(m) for m in m_codes):
-            self.position[:] = [NAN] * 3
-        effect = Effect()
-        for code in sorted(codes, key=_order):
-            effect = self._event(code, line, by_letter, axis_words, moves, effect)
-        return effect
+    @property
+    def unit_mm(self) -> float:
+        """mm per program unit; mm before any G20 or G21."""
+        return MM_PER_INCH if self.unit == INCH else 1.0
 
-    def may_move(self, m10: int) -> bool:
-        """M6, and M codes that are not known to leave the axes where they are."""
-        if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.m61_sets_tool):
-            return False
-        return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
+    def take(self, codes: Iterable[int]) -> None:
+        """Put the modal codes of a block into force, all but its motion and its unit."""
+        for code, group in _GROUP_OF:
+            if code in codes:
+                setattr(self, group, code)
 
-    def _event(
-        self,
-        code: int,
-        line: int,
-        by_letter: dict[str, Word],
-        axis_words: list[tuple[int, Word]],
-        moves: int,
-        effect: Effect,
-    ) -> Effect:
-        if code == 40:
-            return self._dwell(line, by_letter)
-        if code in (200, 210):
-            self.unit_mm = MM_PER_INCH if code == 200 else 1.0
-            self.unit_stated = True
-        elif code in (430, 440, 432, 490):
-            self._tool_length(code, line, by_letter)
-        elif code == 431:
-            self.length = self._merged(self.length, [(i, self.length_mm(w)) for i, w in axis_words])
-            return replace(effect, consumed=True)
-        elif 540 <= code <= 599 or code == 1540 or 1100 <= code <= 1290:
-            self._select_offset(code, line, by_letter)
-        elif code in (610, 611, 640):
-            self._path_mode(code, line, by_letter)
-        elif code in (280, 300):
-            if not axis_words:
-                return replace(effect, consumed=True, home=(0, 1, 2))
-            return replace(effect, home=tuple(i for i, _ in axis_words))
-        elif code == 530:
-            return replace(effect, machine=True)
-        elif code == 100:
-            self._write_offset(line, by_letter, axis_words, moves)
-            return replace(effect, consumed=True)
-        elif code in (520, 920, 921, 922, 923):
-            self._shift(code, line, axis_words, moves)
-            return replace(effect, consumed=True)
-        return effect
+    def in_force(self) -> set[int]:
+        """The modal codes in force, but for motion and unit; `take` brings them back."""
+        return {getattr(self, group) for group in GROUPS}
 
-    def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
-        """G4: ISO controls take its time from X, too; RS-274 from P alone, so that axis words still move."""
-        if not self.profile.axis_dwell:
-            return Effect()
-        if any(a in by_letter for a in "YZ") or any(
-            w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
-        ):
-            raise ProgramError(
-                "a dwell and a motion stand in one block; give the dwell a block of its own", line=line
-            )
-        return Effect(consumed=True)
-
-    def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
-        if code == 490:
-            self.length, self.length_tool = ZERO, None
-            return
-        name = f"G{code / 10:g}"
-        if "H" in by_letter:
-            number = self._integer(by_letter["H"], line)
-        elif self.profile.length_of_spindle_tool and code != 432:
-            number = self.spindle or 0
-        else:
-            raise ProgramError(f"{name} needs an H word with the number of the tool length", line=line)
-        if self.spindle is None and number:
-            # nothing tells which tool is in the spindle but the length that is called up for it
-            self.length_tool = number
-        vector = self._tool(number, line, name)
-        if self.profile.lengths_along_z:
-            vector = (0.0, 0.0, vector[2])
-        if code == 440:
-            vector = (-vector[0], -vector[1], -vector[2])
-        if code == 432:
-            vector = self._sum(self.length, vector)
-        self.length, self.length_tool = vector, number or None
-
-    def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
-        if code in (541, 1540):
-            if "P" not in by_letter:
-                raise ProgramError(
-                    f"G{code / 10:g} needs a P word with the number of the work offset", line=line
-                )
-            name = f"G{code / 10:g}P{self._integer(by_letter['P'], line)}"
-        else:
-            name = f"G{code / 10:g}"
-        self.offset_name = name
-
-    def _path_mode(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
-        name = f"G{code / 10:g}"
-        tolerance, merges = None, False
-        if code == 640 and self.profile.path_tolerance:
-            if "P" in by_letter:
-                tolerance = by_letter["P"].value * self.unit_mm
-                name += f" P{by_letter['P'].value:g}"
-                merges = "Q" not in by_letter or by_letter["Q"].value != 0
-            if "Q" in by_letter:
-                name += f" Q{by_letter['Q'].value:g}"
-        elif code != 640:
-            tolerance = 0.0
-        self.path_modes.append(PathMode(line, name, tolerance, merges))
-
-    def _write_offset(
-        self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
-    ) -> None:
-        kind = round(by_letter["L"].value) if "L" in by_letter else -1
-        if kind not in (2, 20):
-            what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
-            raise ProgramError(
-                f"{what} writes the control's tables in a way that is not read; only L2 and L20 are",
-                line=line,
-            )
-        if "R" in by_letter and by_letter["R"].value != 0:
-            raise ProgramError("G10 R rotates the work offset, which is not read yet; use R0", line=line)
-        number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
-        if not 0 <= number <= self.profile.g10_offsets:
-            raise ProgramError("G10 needs a P word with the number of a work offset, 1 for G54", line=line)
-        name = self.offset_name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
-        work = self._work_offset(name)
-        base = self.offsets.get(name) or (list(work.offset_mm) if work is not None else [NAN] * 3)
-        for i, word in axis_words:
-            value = self.length_mm(word)
-            if kind == 2:
-                adds = self.distance == 910 and self.profile.g10_adds
-                base[i] = base[i] + value if adds else value
-            else:
-                self._capture(i, word, line, moves)
-                active = self._work_offset(self.offset_name)
-                now = self.offsets.get(self.offset_name) or (list(active.offset_mm) if active else [NAN] * 3)
-                self.inherited[name] = self._touch(self.offset_name, now, line)
-                base[i] = self.position[i] - self.length[i] - self.shift[i] - self.local[i] - value
-        self.offsets[name] = base
-
-    def _shift(self, code: int, line: int, axis_words: list[tuple[int, Word]], moves: int) -> None:
-        if code in (921, 922):
-            if code == 922:
-                self.saved_shift = list(self.shift)
-            else:
-                self.saved_shift = [0.0] * 3
-            self.shift = [0.0] * 3
-        elif code == 923:
-            self.shift = list(self.saved_shift)
-        elif code == 520:
-            target = self.shift if self.profile.g52_is_g92 else self.local
-            for i, word in axis_words:
-                target[i] = self.length_mm(word)
-        else:
-            work = self._work_offset(self.offset_name)
-            base = self.offsets.get(self.offset_name) or (list(work.offset_mm) if work else [NAN] * 3)
-            for i, word in axis_words:
-                self._capture(i, word, line, moves)
-                self.shift[i] = (
-                    self.position[i] - base[i] - self.length[i] - self.local[i] - self.length_mm(word)
-                )
-            self.saved_shift = list(self.shift)
-
-    def _capture(self, axis: int, word: Word, line: int, moves: int) -> None:
-        if math.isnan(self.position[axis]):
-            raise ProgramError(
-                f"{word.letter} is stored as the present position, but the axis has not been commanded yet; "
-                "give start_mm in the job file or command the axis first",
-                line=line,
-            )
-        self.captures.append(Capture(word.index, axis, self.unit_mm, moves, line))
-
-    @staticmethod
-    def _integer(word: Word, line: int) -> int:
-        if word.value != round(word.value) or word.value < 0:
-            raise ProgramError(f"{word.letter}{word.value:g} is not a whole number", line=line)
-        return round(word.value)
-
-    @staticmethod
-    def _sum(a: Vector, b: Vector) -> Vector:
-        return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-    @staticmethod
-    def _merged(old: Vector, new: list[tuple[int, float]]) -> Vector:
-        values = list(old)
-        for i, value in new:
-            values[i] = value
-        return (values[0], values[1], values[2])
-
-
-def _order(code: int) -> int:
-    """RS-274's order of execution within a block."""
-    for rank, codes in enumerate(
-        ((40,), (200, 210), (430, 431, 432, 440, 490), range(540, 600), (610, 611, 640))
-    ):
-        if code in codes:
-            return rank
-    return 9
+    def forget(self, axes: Iterable[int] = (0, 1, 2)) -> None:
+        """The position of these axes is not known from here on."""
+        for axis in axes:
+            self.position[axis] = NAN

@@ -1,18 +1,40 @@
-"""What the flattener knows of the control while it unrolls: modes, and the position in program coordinates.
+"""The state as the unroller follows it, in program coordinates and program units.
 
-A value that cannot be known off line is None; asking for it refuses, not knowing it does not.
+It has no tables of offsets and tools: what changes them leaves the position unknown. Asking for what is not
+known refuses, not knowing it does not.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
 from olp.core.units import AXES, MM_PER_INCH
+from olp.program.rs274.codes import (
+    CUTTER_COMPENSATION,
+    CYCLES,
+    DWELL,
+    END_OF_CYCLES,
+    HOMES,
+    INCH,
+    LENGTHS,
+    LINEAR,
+    LOCAL_OFFSET,
+    MACHINE,
+    METRIC,
+    PATH_MODES,
+    PRESET,
+    PROBES,
+    SHIFTS,
+    SPLINES,
+    TABLE_LENGTHS,
+    UNITS,
+    WORK_OFFSETS,
+    WRITE_OFFSET,
+)
 from olp.program.rs274.cycles import (
-    CODES,
     LCNC_CLEARANCE_INCH,
     LCNC_CLEARANCE_MM,
     PLANES,
@@ -21,68 +43,53 @@ from olp.program.rs274.cycles import (
     levels,
 )
 from olp.program.rs274.flatten.expressions import whole
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.state import NAN, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
 Value = tuple[str, float | None]
 
-_LINEAR = frozenset({0, 10, 20, 30, 330})
-_SPLINES = frozenset({50, 51, 52, 53})
-_MOTION = _LINEAR | CODES | {331, 382, 383, 384, 385, 760, 800, 870, 880}
+_MOTION = LINEAR | CYCLES | PROBES | {331, 760, END_OF_CYCLES, 870, 880}
+#: Between axis and program positions; these hold already for the move of their own block.
+_FRAMES = LENGTHS | WORK_OFFSETS
+#: After these the position is not known in program coordinates; G92 says it itself.
 _UNSETTING = (
-    frozenset({100, 101, 280, 300, 281, 301, 310, 331, 430, 431, 432, 440, 490, 520, 541, 921, 922, 923, 540})
-    | frozenset(range(550, 594))
-    | frozenset({382, 383, 384, 385, 760, 870, 880, 650, 660})
+    _FRAMES
+    | (SHIFTS - {PRESET})
+    | HOMES
+    | PROBES
+    | {WRITE_OFFSET, 101, 281, 301, 310, 331, 760, 870, 880, 650, 660}
 )
-#: Of these, the ones that hold already for the move of their own block.
-_FRAMES = frozenset({430, 431, 432, 440, 490, 541, 540}) | frozenset(range(550, 594))
-_LENGTHS = frozenset({430, 440, 490})
 _ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
 _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
-_NO_AXES = frozenset({40, 100, 520, 920, 530, 280, 300, 650})
+#: Whose axis words are no motion, or not to where they say.
+_NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, 650}
 _STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
 #: Words that a cycle takes for itself.
 CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
 
 
 @dataclass(slots=True)
-class State:
-    """Modes and position of the control; `unit` None means that neither G20 nor G21 was met."""
+class ProgramState(State):
+    """The state whose position counts in program coordinates."""
 
-    profile: Profile
-    position: list[float | None] = field(default_factory=lambda: [None, None, None])
-    absolute: bool = True
-    unit: int | None = None
-    plane: int = 17
-    motion: int | None = None
-    retract_to_r: bool = False
-    inverse_time: bool = False
     compensated: bool = False
     odd_frame: bool = False
     spindle: int | None = None
     path: str = "G64"
     feed: float | None = None
     speed: float | None = None
-    initial: float | None = None
-    saved: tuple[bool, int | None, int, bool, bool, str] | None = None
+    saved: tuple[int | None, set[int], str] | None = None
     held_absolute: bool = True
-    held: dict[str, float | None] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.retract_to_r = self.profile.initial_retract == 990
 
     def at(self, axis: int) -> float:
         """Program position of an axis; ProgramError where it is not known."""
         value = self.position[axis]
-        if value is None or self.compensated:
+        if math.isnan(value) or self.compensated:
             raise ProgramError(
                 f"the position of {AXES[axis]} is asked for and not known off line; "
                 f"command {AXES[axis]} in the program before"
             )
         return value
-
-    def forget(self) -> None:
-        self.position = [None, None, None]
 
     def codes(self, words: Sequence[Value]) -> set[int]:
         return {round(value * 10) for letter, value in words if letter == "g" and value is not None}
@@ -92,54 +99,44 @@ class State:
         codes = self.codes(words)
         motion = codes & _MOTION
         if motion:
-            return bool(motion & CODES)
-        return self.motion in CODES and not codes & _NO_AXES and any(letter in "xyz" for letter, _ in words)
+            return bool(motion & CYCLES)
+        return self.motion in CYCLES and not codes & _NO_AXES and any(letter in "xyz" for letter, _ in words)
 
     def apply(self, words: Sequence[Value]) -> None:
         """Follow one block that is not a cycle."""
         codes = self._modes(words)
         motion = codes & _MOTION
         if self.profile.language.splines:
-            motion |= codes & _SPLINES
-        if motion or codes & {280, 300}:
-            self.initial = None
-            self.held = {}
+            motion |= codes & SPLINES
+        if motion or codes & HOMES:
+            self.series.begin(None)
         if motion:
             # G80 beside another motion ends the cycle, and the other moves
-            self.motion = next(iter(motion - {800} or motion))
+            self.motion = next(iter(motion - {END_OF_CYCLES} or motion))
         given = {AXES.lower().index(letter): value for letter, value in words if letter in ("x", "y", "z")}
-        if 920 in codes:
+        if PRESET in codes:
             for axis, value in given.items():
-                self.position[axis] = value
-        elif 530 in codes:
-            for axis in given:
-                self.position[axis] = None
+                self.position[axis] = NAN if value is None else value
+        elif MACHINE in codes:
+            self.forget(given)
         elif not codes & _NO_AXES and given:
             self._move(given)
         if any(letter in "@^" for letter, _ in words):
             self.forget()
-        reached = [self.position[a] if a in given else None for a in range(3)]
+        reached = [self.position[a] if a in given else NAN for a in range(3)]
         self._after(codes)
         if self.absolute and not codes & (_NO_AXES | _UNSETTING - _FRAMES) and not self.odd_frame:
-            self.position = [p if p is not None else r for p, r in zip(self.position, reached, strict=True)]
+            self.position = [r if math.isnan(p) else p for p, r in zip(self.position, reached, strict=True)]
 
     def _modes(self, words: Sequence[Value]) -> set[int]:
         codes = self.codes(words)
-        for unit in (20, 21):
-            if unit * 10 in codes:
+        for unit in UNITS:
+            if unit in codes:
                 self._change_unit(unit)
-        for plane in PLANES:
-            if plane * 10 in codes:
-                self.plane = plane
-        if codes & {900, 910}:
-            self.absolute = 900 in codes
-        if codes & {980, 990}:
-            self.retract_to_r = 990 in codes
-        if codes & {930, 940, 950}:
-            self.inverse_time = 930 in codes
-        if codes & {610, 611, 640}:
+        self.take(codes)
+        if codes & PATH_MODES:
             self._path_mode(codes, words)
-        if codes & {410, 411, 420, 421}:
+        if codes & CUTTER_COMPENSATION:
             self.compensated = True
         self.odd_frame = (self.odd_frame or bool(codes & _ODD_FRAME)) and not codes & _EVEN_FRAME
         for letter, value in words:
@@ -161,44 +158,42 @@ class State:
             self.compensated = False
             self.forget()
         unsetting = codes & _UNSETTING
-        along_z = self.profile.lengths_along_z and unsetting <= _LENGTHS
+        along_z = self.profile.lengths_along_z and unsetting <= TABLE_LENGTHS
         if unsetting and along_z and not self.odd_frame:
-            self.position[2] = None
+            self.forget((2,))
         elif unsetting or self.odd_frame:
             self.forget()
 
     def _move(self, given: dict[int, float | None]) -> None:
         for axis, value in given.items():
-            before = self.position[axis]
-            if self.motion not in _LINEAR | _SPLINES or value is None:
-                self.position[axis] = None
+            if self.motion not in LINEAR | SPLINES or value is None:
+                self.position[axis] = NAN
             elif self.absolute:
                 self.position[axis] = value
             else:
-                self.position[axis] = None if before is None else before + value
+                self.position[axis] += value
 
     def _change_unit(self, unit: int) -> None:
         if self.unit != unit:
-            factor = None if self.unit is None else MM_PER_INCH if unit == 21 else 1 / MM_PER_INCH
-            if self.unit is not None and self.initial is not None:
+            factor = NAN if self.unit is None else MM_PER_INCH if unit == METRIC else 1 / MM_PER_INCH
+            if self.unit is not None and self.series.initial is not None:
                 raise ProgramError("the unit changes within a series of canned cycles; end it with G80 first")
-            self.position = [None if p is None or factor is None else p * factor for p in self.position]
+            self.position = [p * factor for p in self.position]
             self.unit = unit
 
     def _keep_modes(self, code: int) -> None:
         """M70 saves the modes, M71 drops them, M72 brings them back."""
         if code == 70:
-            modes = (self.absolute, self.unit, self.plane)
-            self.saved = (*modes, self.retract_to_r, self.inverse_time, self.path)
+            self.saved = (self.unit, self.in_force(), self.path)
         elif code == 71:
             self.saved = None
         elif self.saved is None:
             raise ProgramError("M72 without saved modes; M70 must come before")
         else:
-            unit = self.saved[1]
+            unit, modes, self.path = self.saved
             if unit is None and self.unit is not None:
                 self.forget()
-            self.absolute, _, self.plane, self.retract_to_r, self.inverse_time, self.path = self.saved
+            self.take(modes)
             if unit is not None:
                 self._change_unit(unit)
 
@@ -219,46 +214,48 @@ class State:
         codes = self._modes(words)
         if self.inverse_time or self.compensated or self.odd_frame:
             raise ProgramError("a canned cycle in inverse time, cutter compensation or a turned frame")
-        chosen = codes & CODES
+        chosen = codes & CYCLES
         code = next(iter(chosen)) if chosen else self.motion
         if code is None:
             raise ProgramError("a canned cycle without a code")
-        if self.motion not in CODES:
-            self.initial = None
-            self.held = {}
+        series = self.series
+        if self.motion not in CYCLES:
+            series.begin(None)
         elif code != self.motion and self.profile.cycles.new_code_forgets:
-            self.held = {}
+            series.held = {}
         self.motion = code
-        given = {letter: value for letter, value in words if letter in CYCLE_WORDS}
-        first, second, tool = PLANES[self.plane]
-        if self.initial is None:
-            self.initial = self.at(tool)
-        depth = AXES[tool].lower()
+        given = {letter.upper(): value for letter, value in words if letter in CYCLE_WORDS}
+        first, second, tool = PLANES[self.plane // 10]
+        if series.initial is None:
+            series.initial = self.at(tool)
+        depth = AXES[tool]
         follows = self.profile.cycles.levels_follow_distance
-        turned = follows and self.held and self.held_absolute is not self.absolute
-        if turned and not {depth, "r"} <= given.keys():
+        turned = follows and series.held and self.held_absolute is not self.absolute
+        if turned and not {depth, "R"} <= given.keys():
             raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth anew")
         self.held_absolute = self.absolute
-        self.held |= {letter: given[letter] for letter in (depth, "r", "q", "p") if letter in given}
+        series.hold(given, depth)
         repeats = self._repeats(given)
         if repeats == 0:
             return ()
         xy, step = self._place(given, first, second)
-        r, z = levels(self._needed("r"), self._needed(depth), absolute=self.absolute, initial_z=self.initial)
+        r, z = levels(
+            self._needed("R"), self._needed(depth), absolute=self.absolute, initial_z=series.initial
+        )
         self.at(tool)
         strokes = cycle_moves(
             code,
-            start=(self._or_nan(0), self._or_nan(1), self._or_nan(2)),
+            start=(self.position[0], self.position[1], self.position[2]),
             xy=xy,
             step=step,
             repeats=repeats,
             r=r,
             z=z,
-            q=self._optional("q"),
-            p=self._optional("p"),
+            q=self._optional("Q"),
+            p=self._optional("P"),
             retract_to_r=self.retract_to_r,
-            initial_z=self.initial,
-            plane=self.plane,
+            initial_z=series.initial,
+            plane=self.plane // 10,
             clearance=self._clearance(code, clearance),
             rules=self.profile.cycles,
         )
@@ -268,9 +265,9 @@ class State:
 
     def _repeats(self, given: dict[str, float | None]) -> int:
         # where a block has both, the unrolled one keeps them, and the reader takes the first
-        for letter in reversed(self.profile.cycles.repeat_words.lower()):
+        for letter in reversed(self.profile.cycles.repeat_words):
             if letter in given:
-                count = whole(self._known(letter, given[letter]), f"the repeat count {letter.upper()}")
+                count = whole(self._known(letter, given[letter]), f"the repeat count {letter}")
                 return count or self._none()
         return 1
 
@@ -284,7 +281,7 @@ class State:
     ) -> tuple[tuple[float, float], tuple[float, float]]:
         xy, step = [0.0, 0.0], [0.0, 0.0]
         for i, axis in enumerate((first, second)):
-            letter = AXES[axis].lower()
+            letter = AXES[axis]
             if letter not in given:
                 xy[i] = self.at(axis)
                 continue
@@ -298,22 +295,19 @@ class State:
     def _known(self, letter: str, value: float | None) -> float:
         if value is None:
             raise ProgramError(
-                f"{letter.upper()} has no decimal point: it counts in least increments or in whole units, "
+                f"{letter} has no decimal point: it counts in least increments or in whole units, "
                 "as a parameter of the control says; write the point"
             )
         return value
 
     def _needed(self, letter: str) -> float:
-        if letter not in self.held:
-            raise ProgramError(f"the canned cycle has no {letter.upper()} word")
-        return self._known(letter, self.held[letter])
+        if letter not in self.series.held:
+            raise ProgramError(f"the canned cycle has no {letter} word")
+        return self._known(letter, self.series.held[letter])
 
     def _optional(self, letter: str) -> float | None:
-        return None if letter not in self.held else self._known(letter, self.held[letter])
-
-    def _or_nan(self, axis: int) -> float:
-        value = self.position[axis]
-        return math.nan if value is None else value
+        held = self.series.held
+        return None if letter not in held else self._known(letter, held[letter])
 
     def _clearance(self, code: int, clearance: float | None) -> float:
         if clearance is not None or code not in (730, 830):
@@ -325,4 +319,4 @@ class State:
             )
         if self.unit is None:
             raise ProgramError(f"G{code // 10} before any G20 or G21, on which its peck clearance depends")
-        return LCNC_CLEARANCE_INCH if self.unit == 20 else LCNC_CLEARANCE_MM
+        return LCNC_CLEARANCE_INCH if self.unit == INCH else LCNC_CLEARANCE_MM

@@ -25,7 +25,7 @@ from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Line, Word
 from olp.program.rs274.flatten.run import Walk
-from olp.program.rs274.flatten.state import CYCLE_WORDS, State, Value
+from olp.program.rs274.flatten.state import CYCLE_WORDS, ProgramState, Value
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables
 from olp.program.rs274.profiles.base import Profile
@@ -94,7 +94,7 @@ class _Flattener:
 
     def __init__(self, profile: Profile, *, expand_cycles: bool, peck_clearance: float | None) -> None:
         self.language, self.cycles = profile.language, profile.cycles
-        self.state = State(profile)
+        self.state = ProgramState(profile)
         self.variables = Variables(self.state)
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
@@ -203,7 +203,7 @@ class _Flattener:
             self._out.append((raw.rstrip() if line.raw.rstrip() == line.raw else raw, line.eol))
 
     def _write_strokes(
-        self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float | None, ...]]
+        self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float, ...]]
     ) -> None:
         """Blocks of a cycle."""
         exact = self.cycles.exact_corners and self.state.path != "G61"

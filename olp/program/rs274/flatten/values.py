@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from olp.core.errors import ProgramError
+from olp.program.rs274.codes import METRIC
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
-from olp.program.rs274.flatten.state import State
+from olp.program.rs274.flatten.state import ProgramState
 
 _NGC_LOCAL = 30
 _NGC_FREE = 5060
@@ -25,7 +26,7 @@ _COUNT_ARGUMENTS = frozenset("dhmst")
 class Variables:
     """Parameters of the run. What only the control knows raises ProgramError."""
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: ProgramState) -> None:
         self.state = state
         self.common: dict[int, float | None] = {}
         self.globals: dict[str, float] = {"_value": 0.0, "_value_returned": 0.0}
@@ -82,11 +83,11 @@ class Variables:
         if name in ("_x", "_y", "_z"):
             return lambda: state.at("xyz".index(name[1]))
         if name in ("_metric", "_imperial"):
-            return lambda: float((self._set(state.unit, name) == 21) is (name == "_metric"))
+            return lambda: float((self._set(state.unit, name) == METRIC) is (name == "_metric"))
         if name in ("_absolute", "_incremental"):
             return lambda: float(state.absolute is (name == "_absolute"))
         if name == "_plane":
-            return lambda: state.plane * 10.0
+            return lambda: float(state.plane)
         if name in ("_feed", "_rpm"):
             return lambda: float(self._set(state.feed if name == "_feed" else state.speed, name))
         return None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from olp.program.dialect import Dialect, Row, Support
+from olp.program.rs274.codes import CYCLES, PROBES
 from olp.program.rs274.cycles import CycleRules
 from olp.program.rs274.flatten.language import Language
 
@@ -129,10 +130,6 @@ REFUSALS: Mapping[int, str] = {
     420: "G42 (cutter compensation) makes the path inside the control",
     421: "G42.1 (cutter compensation) makes the path inside the control",
 }
-
-CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
-CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
-PROBES = frozenset({382, 383, 384, 385})
 
 
 def g_codes(*, carry: set[int], extra: dict[int, Act], without: Set[int] = frozenset()) -> dict[int, Act]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.program.rs274.codes import CYCLES
 from olp.program.rs274.cycles import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
-from olp.program.rs274.profiles.base import CYCLES, ISO_M, REFUSALS, Act, Profile, g_codes
+from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
 
 _EXTRA = {431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE}
 _LACKING = {

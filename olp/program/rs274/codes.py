@@ -1,0 +1,46 @@
+"""Which G codes change what: modal groups, frames, positions; ten times their number (G5.1 is 51).
+
+Reader and unroller take these sets alike. What a control has of them, and refuses, its profile says.
+"""
+
+from __future__ import annotations
+
+CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
+PROBES = frozenset({382, 383, 384, 385})
+SPLINES = frozenset({50, 51, 52, 53})
+#: Motion that ends where its axis words say.
+LINEAR = frozenset({0, 10, 20, 30, 330})
+CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
+
+INCH, METRIC = 200, 210
+ABSOLUTE, INCREMENTAL = 900, 910
+INVERSE_TIME = 930
+#: The level that a cycle returns to: G98 the one before the series, G99 its R.
+RETRACT_TO_INITIAL, RETRACT_TO_R = 980, 990
+END_OF_CYCLES = 800
+
+#: Modal groups besides motion, by the field of `State` that holds their code. A control takes one code of a
+#: group in a block; of more, which the reader refuses, the unroller takes the last one here.
+GROUPS: dict[str, tuple[int, ...]] = {
+    "plane": (170, 180, 190),
+    "distance": (INCREMENTAL, ABSOLUTE),
+    "arc_distance": (901, 911),
+    "retract": (RETRACT_TO_INITIAL, RETRACT_TO_R),
+    "feed_mode": (940, 950, INVERSE_TIME),
+}
+UNITS = (INCH, METRIC)
+PATH_MODES = frozenset({610, 611, 640})
+
+DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE = 40, 100, 520, 920, 530
+#: To the reference positions, over the point that the axis words say.
+HOMES = frozenset({280, 300})
+#: G10 L2 and L20, G52, and the family of G92: what they write counts between axis and program positions.
+SHIFTS = frozenset({LOCAL_OFFSET, PRESET, 921, 922, 923})
+#: Tool lengths from the table of tools, and G43.1 and G43.2.
+TABLE_LENGTHS = frozenset({430, 440, 490})
+LENGTH_FROM_WORDS = 431
+LENGTHS = TABLE_LENGTHS | {LENGTH_FROM_WORDS, 432}
+#: G54 to G59.3, and G54.1 P.
+WORK_OFFSETS = frozenset({540, 541, *range(550, 594)})
+#: G154 P and G110 to G129.
+FURTHER_OFFSETS = frozenset({1540, *range(1100, 1300, 10)})

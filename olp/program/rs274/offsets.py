@@ -1,0 +1,50 @@
+"""What counts between program and axis positions, and what G52, G92 and G10 make of it.
+
+axis position = program position + work offset + shift (G92) + local (G52) + tool length, in mm, axis by axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from olp.core.machine import ZERO, Vector
+
+
+def _zeros() -> list[float]:
+    return [0.0] * 3
+
+
+@dataclass(slots=True)
+class Offsets:
+    """The offsets in force, in mm: `name` of the work offset, those that the program has `written` by name,
+    the `shift` of G92 and the one `saved` for G92.3, the `local` one of G52, and the tool `length`."""
+
+    name: str
+    written: dict[str, list[float]] = field(default_factory=dict)
+    shift: list[float] = field(default_factory=_zeros)
+    saved: list[float] = field(default_factory=_zeros)
+    local: list[float] = field(default_factory=_zeros)
+    length: Vector = ZERO
+
+    def total(self, work: Sequence[float]) -> Vector:
+        """Axis position less program position, with this work offset (3,)."""
+        x, y, z = (work[i] + self.shift[i] + self.local[i] + self.length[i] for i in range(3))
+        return (x, y, z)
+
+    def work_at(self, axis: int, position: float, value: float) -> float:
+        """The work offset that makes an axis position the program position `value` (G10 L20)."""
+        return position - self.length[axis] - self.shift[axis] - self.local[axis] - value
+
+    def preset(self, axis: int, position: float, work: Sequence[float], value: float) -> None:
+        """Shift so that an axis position becomes the program position `value` (G92)."""
+        self.shift[axis] = position - work[axis] - self.length[axis] - self.local[axis] - value
+
+    def clear_shift(self, *, save: bool) -> None:
+        """End the shift; `save` keeps it for G92.3 (G92.2), else that is zero too (G92.1)."""
+        self.saved = list(self.shift) if save else _zeros()
+        self.shift = _zeros()
+
+    def restore_shift(self) -> None:
+        """The saved shift again (G92.3)."""
+        self.shift = list(self.saved)
