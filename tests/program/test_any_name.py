@@ -22,12 +22,13 @@ from olp.core.errors import OlpError
 from olp.core.machine import Setup
 from olp.files.config import load_setup
 from olp.files.described import described
+from olp.files.sources import Sources
 from olp.program import registry
 from olp.program.dialect import Dialect, Options
 from olp.program.feeds.timing import timing
 from olp.program.rs274.positions import positions_program
 from olp.program.rs274.profiles.base import Profile
-from olp.workflows.session import unrolled
+from olp.workflows.flatten import unrolled
 
 ROOT = Path(__file__).resolve().parents[2]
 OTHER = "another-name"
@@ -141,12 +142,18 @@ def test_programs_are_read_and_timed_alike(pairs: Mapping[str, Pair], name: str,
     assert sum(said.startswith("[") for said in found) > 3
 
 
+def _unrolled(text: bytes, setup: Setup, dialect: Dialect, expand: bool, clearance: float | None) -> bytes:
+    sources = Sources()
+    given = sources.source(text)
+    return unrolled(sources, given, setup, dialect, expand_cycles=expand, peck_clearance_mm=clearance)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_programs_are_unrolled_alike(pairs: Mapping[str, Pair], name: str) -> None:
     texts = [text.encode() for text in PARAMETRIC] + [(START + text).encode() for text in BLOCKS]
     for text in texts:
         for expand, clearance in ((False, None), (True, None), (True, 0.5)):
-            alike(lambda s, d: unrolled(text, "", s, d, expand, clearance), pairs[name])  # noqa: B023
+            alike(lambda s, d: _unrolled(text, s, d, expand, clearance), pairs[name])  # noqa: B023
 
 
 @pytest.mark.parametrize("name", NAMES)

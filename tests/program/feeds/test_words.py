@@ -91,7 +91,8 @@ def test_a_written_feed_is_the_planned_one_and_never_more(number: str, share: fl
     written = halved(text, share=share)
     before, after = (float(values(t)[0]) for t in (text.encode(), written.data))
     assert after <= before
-    assert after == pytest.approx(min(share, 1.0) * before, rel=0.0102, abs=1e-6)  # 1 % of the number that stands
+    # a word is kept within 1 % of itself, which is a little more of the planned feed
+    assert after == pytest.approx(min(share, 1.0) * before, rel=0.0102, abs=1e-6)
     assert blanked(written.data) == blanked(text.encode())
     assert (written.changed == 0) == (written.data == text.encode())
 
