@@ -13,7 +13,6 @@ from olp.core.errors import UsageError
 from olp.core.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
 from olp.core.units import AXES, MM_PER_UM
 from olp.files.calibration.reader import load_calibration
-from olp.files.described import described
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
@@ -139,7 +138,11 @@ def _read_job(path: PathLike, read: Reader) -> tuple[Job, Mapping[Path, int]]:
     if missing:
         raise config_error(missing, str(path))
     stated = file.dialect
-    own = described(stated, beside(path, stated), read) if stated is not None else None
+    own = None
+    if stated is not None:
+        from olp.files.described import described
+
+        own = described(stated, beside(path, stated), read)
     job = Job(
         program=beside(path, file.program),
         machine=beside(path, file.machine),

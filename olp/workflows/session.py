@@ -18,7 +18,6 @@ from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import files_beside, load_calibration
 from olp.files.calibration.structure import read_drift_log, sensors_of
 from olp.files.config import read_setup
-from olp.files.described import described
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
 from olp.program.registry import DIALECTS, dialect_of, find
@@ -82,6 +81,8 @@ class Session:
             return Session(machine, sources)
         setup = read_setup(machine, job, sources.read)
         if dialect is not None:
+            from olp.files.described import described
+
             own = described(dialect, read=sources.read)
             setup = replace(setup, job=replace(setup.job, dialect=dialect, described=own))
         return Session(setup, sources)
@@ -98,7 +99,11 @@ class Session:
     def control(self) -> Dialect:
         """What the control of the machine reads and writes."""
         name = self.setup.machine.controller
-        dialect = find(name) or described(name, read=self.sources.read)
+        dialect = find(name)
+        if dialect is None:
+            from olp.files.described import described
+
+            dialect = described(name, read=self.sources.read)
         if dialect is None:
             raise ConfigError(f"controller {name!r} has no dialect; expected one of {', '.join(DIALECTS)}")
         return dialect
