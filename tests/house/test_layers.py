@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from house.write_page import PAGE, page, purpose
+from house.write_page import PAGE, WHERE, page, purpose
 
 import olp
 
@@ -69,6 +69,7 @@ def test_every_room_is_in_the_list_and_nothing_lies_loose() -> None:
 def test_the_page_of_the_house_is_the_house() -> None:
     """Stale: run python tests/house/write_page.py."""
     assert PAGE.read_text("utf-8") == page(ROOMS)
+    assert [path for path in WHERE.values() if not (PACKAGE / path).is_file()] == []
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())

@@ -26,6 +26,23 @@ No circle of files is allowed anywhere. The way of the data is the order of the 
 files become a machine and an error model, both become commands, edits and a proof, and a verb reports them.
 """
 
+#: What a newcomer looks for, and where it is.
+WHERE = {
+    "which G code does what, where `G68` would be read": "program/rs274/codes.py",
+    "what a control does in its own way": "program/rs274/profiles/base.py",
+    "where a dialect is registered": "program/registry.py",
+    "where an error source is registered": "errormodel/sources/registry.py",
+    "how the play of an axis is computed": "errormodel/reversal.py",
+    "how a move is commanded so that the tip follows": "compensation/planning.py",
+    "how a correction is proved": "proof/proof.py",
+    "where an instrument is registered": "files/measurements/instruments/registry.py",
+    "where a table of a control is registered": "files/control_tables/registry.py",
+    "the codes of findings": "findings/codes/correction.py",
+    "how inputs are opened, each once": "workflows/session.py",
+    "where a verb is registered": "cli/__init__.py",
+    "where the exit code of findings is decided": "cli/common.py",
+}
+
 
 def purpose(path: Path) -> str:
     """The first sentence of a module's docstring, on one line."""
@@ -48,7 +65,8 @@ def _rows(folder: Path, level: int) -> Iterator[str]:
 def page(rooms: tuple[str, ...]) -> str:
     """The page as Markdown."""
     body = (row for room in rooms for row in _rows(PACKAGE / room, 2))
-    return _HEAD + "\n".join(body) + "\n"
+    where = "".join(f"| {what} | `{path}` |\n" for what, path in WHERE.items())
+    return f"{_HEAD}\n| looked for | is in `olp/` |\n|---|---|\n{where}" + "\n".join(body) + "\n"
 
 
 if __name__ == "__main__":
