@@ -25,6 +25,7 @@ from olp.calibration.observations.measurements import Measurements
 from olp.core.errors import ConfigError
 from olp.core.progress import silent
 from olp.core.toolpath import Frame, Toolpath
+from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Thermal
 from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import Expansion, Sensitivity
@@ -491,7 +492,7 @@ def test_two_sigma_cover_the_errors_of_fresh_machines() -> None:
         calibration = calibration_of(found)
         known = Sensitivity.of(calibration, "FXYZ", covariance_of(found, calibration))
         at = np.random.default_rng(seed).uniform(*calibration.box_mm.T, (40, 3))
-        off = machine.error(at, TOOL) - olp.errormodel.build(calibration, "FXYZ").error(at, TOOL)
+        off = machine.error(at, TOOL) - build(calibration, "FXYZ").error(at, TOOL)
         sigma = np.sqrt((known.rows(at, TOOL).astype(float) ** 2).sum(axis=2)).T
         inside += (np.abs(off) <= 2.0 * sigma).sum()
         count += off.size
