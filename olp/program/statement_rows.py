@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
+from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect
+from olp.program.path_columns import PathColumns
 from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
-from olp.program.text.columns import Columns
 from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
 _POW10 = 10.0 ** np.arange(19)
@@ -52,14 +52,14 @@ class Points:
         return len(self.line)
 
 
-class StatementCollector:
+class StatementCollector(PathColumns):
     """Columns of one program on their way. Without `keep_words` those that only writing needs are left
     out."""
 
     def __init__(self, data: bytes, dialect: Dialect, *, keep_words: bool) -> None:
-        self.data, self.dialect, self.keep_words = data, dialect, keep_words
-        self.columns = Columns(len(data) // 12)
-        self.moves = self.words = self._base = 0
+        super().__init__(len(data) // 12, keep_words=keep_words)
+        self.data, self.dialect = data, dialect
+        self.words = self._base = 0
         self._lone: list[tuple[int, int, bool, int, int]] = []
         self.arcs: dict[int, ArcText] = {}
         self.broken: dict[int, bytes] = {}
@@ -148,7 +148,7 @@ class StatementCollector:
 
     # -- moves ---------------------------------------------------------------------------------------
 
-    def put_moves(
+    def put_stated_moves(
         self,
         kind: npt.NDArray[np.uint8],
         flag: npt.NDArray[np.uint8],
@@ -159,16 +159,10 @@ class StatementCollector:
         begin: npt.ArrayLike,
         end: npt.ArrayLike,
     ) -> None:
-        self.columns.put("kind", kind, np.uint8)
-        self.columns.put("flag", flag, np.uint8)
-        self.columns.put("line", line, np.int32)
-        self.columns.put("frame", frame, np.int32)
-        self.columns.put("end", end_mm, np.float64)
+        self.put_moves(kind, flag, line, frame, end_mm, slot)
         if self.keep_words:
-            self.columns.put("slot", slot, np.int32)
             self.columns.put("begin_byte", begin, np.int32)
             self.columns.put("end_byte", end, np.int32)
-        self.moves += len(kind)
 
     def put_lone(
         self,
@@ -180,7 +174,7 @@ class StatementCollector:
         slot: Sequence[int] = _NONE,
     ) -> None:
         """One move without a statement that could be edited."""
-        self.put_moves(
+        self.put_stated_moves(
             np.array([kind], np.uint8), np.array([flag], np.uint8), [line], [frame],
             np.array([list(end_mm)], float), [slot], [-1], [-1],
         )  # fmt: skip
@@ -189,12 +183,6 @@ class StatementCollector:
         """A feed from a move on, and the word that says it."""
         self._feeds.append((move, mm_s, line, word))
 
-    def put_arcs(self, move: Index, centre: Array, plane: Index, sweep: Array) -> None:
-        self.columns.put("arc_move", move, np.int64)
-        self.columns.put("arc_centre", centre, np.float64)
-        self.columns.put("arc_plane", plane, np.int8)
-        self.columns.put("arc_sweep", sweep, np.float64)
-
     # -- the end -------------------------------------------------------------------------------------
 
     def program(
@@ -202,19 +190,10 @@ class StatementCollector:
     ) -> Program:
         """All of it. Takes the columns: once only."""
         take = self.columns.take
-        kind = take("kind", np.uint8)
-        arcs = Arcs(
-            take("arc_move", np.int64), take("arc_centre", np.float64, 3), take("arc_plane", np.int8),
-            take("arc_sweep", np.float64),
-        )  # fmt: skip
-        path = Toolpath(
-            kind=kind, flag=take("flag", np.uint8), line=take("line", np.int32),
-            frame=take("frame", np.int32), end_mm=take("end", np.float64, 3), frames=tuple(frames), arcs=arcs,
-            start_mm=start_mm,
-        )  # fmt: skip
+        path = self.toolpath(frames, start_mm)
         line_start, line_end = take("line_start", np.int32), take("line_end", np.int32)
         longest = int((line_end - line_start).max(initial=0))
-        rest, dwell = np.zeros(len(kind) + 1, bool), np.zeros(len(kind) + 1)
+        rest, dwell = np.zeros(len(path) + 1, bool), np.zeros(len(path) + 1)
         for move, seconds in self.pauses:
             rest[move] = True
             dwell[move] += seconds
@@ -223,13 +202,13 @@ class StatementCollector:
         feeds = StatedFeeds(move, line, word)
         statements = Statements(
             begin=take("begin_byte", np.int32), end=take("end_byte", np.int32),
-            feed_mm_s=self._feed(kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
+            feed_mm_s=self._feed(path.kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
             broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
             feeds=feeds, rapid=rapid,
             cards=cards,
             width=72 if cards else next((w for w in _WIDTHS if longest <= w), 0),
         )  # fmt: skip
-        count = len(arcs)
+        count = len(path.arcs)
         return Program(
             data=self.data,
             dialect=self.dialect,

@@ -207,7 +207,7 @@ class _Reader(Events):
                 self.out.put_arcs(rows + self.out.moves, found.centre, found.plane, found.sweep)
                 for row, form in arcs:
                     self.out.arcs[row + self.out.moves] = form.text
-            self.out.put_moves(kind, flag, line, frame, end, slot, begin, stop)
+            self.out.put_stated_moves(kind, flag, line, frame, end, slot, begin, stop)
         self.position = end[-1].tolist()
 
     def _check_turns(
@@ -305,7 +305,7 @@ class _Reader(Events):
             at = end[i] + up * (cycle.clear_mm or 0.0)
             stroke = cycle.depth_mm is not None and cycle.clear_mm is not None
             flag = np.array([Flag.CYCLE if stroke else 0], np.uint8)
-            out.put_moves(
+            out.put_stated_moves(
                 np.array([Kind.RAPID], np.uint8), flag, [where], [own], at[None],
                 slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip

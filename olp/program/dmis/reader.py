@@ -176,7 +176,7 @@ class _Reader(Events):
             flag |= np.uint8(Flag.PASS)
         if not self.unit_stated:
             self.out.remarks.setdefault("unit", (int(line[0]), "the program states no UNITS"))
-        self.out.put_moves(
+        self.out.put_stated_moves(
             kind, flag, line, np.full(len(line), number), end, self.points.slot[part],
             self.points.begin[part], self.points.end[part],
         )  # fmt: skip

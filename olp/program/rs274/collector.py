@@ -7,17 +7,15 @@ Nothing here interprets; indices of words count over the whole text (`Context.ba
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.toolpath import Arcs, Toolpath
+from olp.program.path_columns import PathColumns
 from olp.program.program import ArcSlots, Hole, Program, Words
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.lexer import WordChunk
-from olp.program.text.columns import Columns
 
 
-class Collector:
+class Collector(PathColumns):
     """The columns of one program on their way. Without `keep_words` those that only writing needs are left
     out.
 
@@ -26,11 +24,10 @@ class Collector:
     """
 
     def __init__(self, data: bytes, start: tuple[float, float, float], *, keep_words: bool) -> None:
+        super().__init__(len(data) // 3, keep_words=keep_words)
         self.data = data
         self.start = start
-        self.keep_words = keep_words
-        self.columns = Columns(len(data) // 3)
-        self.moves = self.word_count = 0
+        self.word_count = 0
         self.holes: list[Hole] = []
         self.remarks: dict[str, tuple[int, str]] = {}
 
@@ -46,31 +43,10 @@ class Collector:
             self.columns.put("first_word", chunk.first_word[:-1] + self.word_count, np.int32)
         self.word_count += len(chunk.letter)
 
-    def put_moves(
-        self,
-        kind: npt.NDArray[np.uint8],
-        flag: npt.NDArray[np.uint8],
-        line: npt.ArrayLike,
-        frame: npt.ArrayLike,
-        end: Array,
-        slot: npt.ArrayLike,
-    ) -> None:
-        self.columns.put("kind", kind, np.uint8)
-        self.columns.put("flag", flag, np.uint8)
-        self.columns.put("line", line, np.int32)
-        self.columns.put("frame", frame, np.int32)
-        self.columns.put("end", end, np.float64)
-        if self.keep_words:
-            self.columns.put("slot", slot, np.int32)
-        self.moves += len(kind)
-
-    def put_arcs(
+    def put_worded_arcs(
         self, move: Index, centre: Array, plane: Index, sweep: Array, words: Index, absolute: Mask
     ) -> None:
-        self.columns.put("arc_move", move, np.int64)
-        self.columns.put("arc_centre", centre, np.float64)
-        self.columns.put("arc_plane", plane, np.int8)
-        self.columns.put("arc_sweep", sweep, np.float64)
+        self.put_arcs(move, centre, plane, sweep)
         self.columns.put("arc_words", words, np.int32)
         self.columns.put("arc_absolute", absolute, np.bool_)
 
@@ -79,7 +55,7 @@ class Collector:
         return Program(
             data=self.data,
             dialect=state.profile,
-            toolpath=self._toolpath(state),
+            toolpath=self.toolpath(state.frames, self.start),
             words=self._words() if self.keep_words else None,
             slot=self.columns.take("slot", np.int32, 3),
             arc_slots=ArcSlots(
@@ -93,24 +69,6 @@ class Collector:
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             calculator=not state.bare_increments,
-        )
-
-    def _toolpath(self, state: AxisState) -> Toolpath:
-        arcs = Arcs(
-            self.columns.take("arc_move", np.int64),
-            self.columns.take("arc_centre", np.float64, 3),
-            self.columns.take("arc_plane", np.int8),
-            self.columns.take("arc_sweep", np.float64),
-        )
-        return Toolpath(
-            kind=self.columns.take("kind", np.uint8),
-            flag=self.columns.take("flag", np.uint8),
-            line=self.columns.take("line", np.int32),
-            frame=self.columns.take("frame", np.int32),
-            end_mm=self.columns.take("end", np.float64, 3),
-            frames=tuple(state.frames),
-            arcs=arcs,
-            start_mm=self.start,
         )
 
     def _words(self) -> Words:

@@ -231,7 +231,7 @@ class _Reader:
             line=line + (context.chunk.first_line + 1),
         )
         slot = np.where(words >= 0, words + context.base, -1)
-        self.out.put_arcs(row + self.out.moves, centre, plane, sweep, slot, absolute)
+        self.out.put_worded_arcs(row + self.out.moves, centre, plane, sweep, slot, absolute)
 
     def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
         frames = self.state.frames
