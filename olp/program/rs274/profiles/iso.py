@@ -2,11 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from olp.program.rs274.profiles.base import Act
+from olp.program.rs274.cycles import ISO_CYCLES
+from olp.program.rs274.entry import read_blocks, unroll_blocks
+from olp.program.rs274.flatten.language import MACRO_B
+from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
 
 #: G codes that mean nothing to the path on these controls.
 ISO_CARRY = frozenset({80, 90, 150, 500, 501, 620, 630, 670, 690, 691, 131, 231, 250})
 #: G44 and G54.1; G92.1 needs offsets that are not known off line.
-ISO_EXTRA: Mapping[int, Act] = {440: Act.EVENT, 541: Act.EVENT, 921: Act.REFUSE}
+ISO_EXTRA = {440: Act.EVENT, 541: Act.EVENT, 921: Act.REFUSE}
+
+#: The control that none of them is: each states its name, its codes, and where it differs.
+ISO = Profile(
+    name="iso",
+    title="ISO controls of mills",
+    reader=read_blocks,
+    unroller=unroll_blocks,
+    codes=g_codes(carry={*ISO_CARRY}, extra=ISO_EXTRA),
+    refusals=REFUSALS,
+    harmless_m=ISO_M,
+    initial_retract=980,
+    increments_without_point=True,
+    g10_adds=True,
+    cycles_apart=True,
+    axis_dwell=True,
+    exact_stop=True,
+    lengths_along_z=True,
+    cycles=ISO_CYCLES,
+    language=MACRO_B,
+    path_mode="not stated",
+    inch_decimals=4,
+    free_digits=0,
+)
