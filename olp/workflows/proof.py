@@ -142,7 +142,6 @@ def report_of(
 ) -> dict[str, Any]:
     """The report ("olp-report-1") as far as a proof alone can fill it."""
     data, name = source
-    machine, calibration = loaded.setup.machine, loaded.calibration
     size = proof.size_mm()
     bend = float(
         np.where(proof.after.judged & proof.cutting & ~proof.lean, proof.after.bend, 0.0).max(initial=0.0)
@@ -156,14 +155,7 @@ def report_of(
             "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),
         },
-        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
-        "calibration": {
-            "measured": calibration.measured,
-            "valid_until": calibration.valid_until,
-            "model": calibration.model,
-            "temperature_degC": calibration.temperature_degC,
-            "sha256": loaded.digest,
-        },
+        **loaded.heads(),
         "tolerance_um": tolerance_um,
         "deviation": {
             "before": proof.before.summary(proof.cutting),

@@ -40,7 +40,6 @@ def report_of(
     findings: Sequence[Finding],
 ) -> dict[str, Any]:
     """The report ("olp-results-1")."""
-    machine, calibration = loaded.setup.machine, loaded.calibration
     added = found.added_mm * UM_PER_MM
     size = np.sqrt((added * added).sum(axis=1))
     sources = [
@@ -56,14 +55,7 @@ def report_of(
             "points": len(reported),
             "frames": [frame for frame in reported.frames if frame is not None],
         },
-        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
-        "calibration": {
-            "measured": calibration.measured,
-            "valid_until": calibration.valid_until,
-            "model": calibration.model,
-            "temperature_degC": calibration.temperature_degC,
-            "sha256": loaded.digest,
-        },
+        **loaded.heads(),
         "correction": {
             **_size(added),
             "max_by_axis_um": np.abs(added).max(axis=0, initial=0.0).tolist(),

@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
@@ -48,6 +48,20 @@ class Loaded:
         if not self.left_out:
             return self.model
         return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
+
+    def heads(self) -> dict[str, dict[str, Any]]:
+        """What a report says of the machine and its calibration."""
+        machine, calibration = self.setup.machine, self.calibration
+        return {
+            "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
+            "calibration": {
+                "measured": calibration.measured,
+                "valid_until": calibration.valid_until,
+                "model": calibration.model,
+                "temperature_degC": calibration.temperature_degC,
+                "sha256": self.digest,
+            },
+        }
 
     def reading(self, program: Source) -> Loaded:
         """The same for a program: its dialect is settled here, also for what is made of it later. Raises
