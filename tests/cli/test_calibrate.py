@@ -44,6 +44,7 @@ def test_evaluate_says_what_a_metrologist_asks() -> None:
     assert "OLP859" in text and "ezx.csv" in text
 
 
+@pytest.mark.slow
 def test_report_and_plots_of_an_evaluation(tmp_path: Path) -> None:
     files = sorted(CHECKS.glob("go-return-*.csv"))
     good("evaluate", *files, "--report", tmp_path / "r.html", "--plot", tmp_path / "line.svg")

@@ -83,6 +83,7 @@ def test_part_not_measured(nominal: Path) -> None:
     assert codes(compared(nominal, np.concatenate((points[:800], points[805:])))[1]) == set()
 
 
+@pytest.mark.slow
 def test_fit_takes_the_error(nominal: Path) -> None:
     turned = Rigid(rotation_of(np.array((0, 0, 1e-4))), np.array((0.01, 0, 0)))(bent(2000))
     assert codes(compared(nominal, turned, "--align", "fit")[1]) == {"OLP604", "OLP611"}
@@ -101,6 +102,7 @@ def test_frame_not_determined(tmp_path: Path) -> None:
     assert "shift in X" in report["frame"]["not_determined"]
 
 
+@pytest.mark.slow
 def test_order_of_points(nominal: Path) -> None:
     _, report = compared(nominal, bent(2000)[::-1])
     assert codes(report) == {"OLP606"}
@@ -120,6 +122,7 @@ def test_crossings_without_order_are_in_doubt(tmp_path: Path) -> None:
     assert codes(compared(path, eight[::2] + np.array((0, 0, 0.02)))[1]) == set()
 
 
+@pytest.mark.slow
 def test_cycles_and_tolerance(nominal: Path, tmp_path: Path) -> None:
     files = []
     for i in range(10):
@@ -148,6 +151,7 @@ def test_frames_that_files_state_never_mix(tmp_path: Path) -> None:
     assert "G55" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_program_before_and_after(tmp_path: Path) -> None:
     for name, words in (("raw.csv", [PROGRAM]), ("good.csv", [tmp_path / "c.ngc"])):
         if name == "good.csv":
@@ -282,6 +286,7 @@ def test_a_profile_is_saved_and_used(nominal: Path, tmp_path: Path) -> None:
 FORMS = {".html": b"<!DOCTYPE html>", ".md": b"# ", ".json": b"{"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", FORMS)
 @pytest.mark.parametrize("verb", ["correct", "compare"])
 def test_reports_in_three_forms(verb: str, ending: str, tmp_path: Path) -> None:
@@ -328,6 +333,7 @@ def test_reports_in_three_forms(verb: str, ending: str, tmp_path: Path) -> None:
         assert len(ids) == len(set(ids)), "ids of two plots would mix"
 
 
+@pytest.mark.slow
 def test_text_of_a_program_is_no_markup(tmp_path: Path) -> None:
     program = tmp_path / "a.ngc"
     program.write_text(

@@ -54,6 +54,7 @@ def recovered(path: Path, points: np.ndarray, order: str = "forward") -> tuple[n
     return np.column_stack((parts.normal, parts.binormal)), found.segment
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nominal", "measured"), [(20_000, 20_000), (2_000, 30_000), (30_000, 1_500)])
 @pytest.mark.parametrize("order", ["forward", "backward"])
 def test_a_known_field_comes_back_within_the_noise(nominal: int, measured: int, order: str) -> None:
@@ -137,6 +138,7 @@ def test_what_was_not_measured_leaves_the_rest_alone() -> None:
     assert run.covered(path) == pytest.approx((share[0] + share[2]) / path.length_mm, abs=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["forward", "backward", "free"])
 def test_a_frame_anywhere_in_space_is_found(order: str) -> None:
     rng = np.random.default_rng(9)
@@ -155,6 +157,7 @@ def test_a_frame_anywhere_in_space_is_found(order: str) -> None:
     assert np.abs(found.rigid(away(points)) - points).max() < 10 * NOISE_MM / np.sqrt(4000 / 6)
 
 
+@pytest.mark.slow
 def test_a_field_comes_back_from_another_frame_up_to_what_a_best_fit_takes() -> None:
     """Noise, turned and shifted, other density, a path that crosses itself, three laps: all at once."""
     rng = np.random.default_rng(11)
@@ -182,6 +185,7 @@ def test_a_field_comes_back_from_another_frame_up_to_what_a_best_fit_takes() -> 
         assert np.sqrt((parts.across**2).mean()) > least
 
 
+@pytest.mark.slow
 def test_a_wrong_pairing_is_a_finding_and_not_a_number() -> None:
     rng = np.random.default_rng(10)
     path = Path.through(eight(np.linspace(0, 2 * np.pi, 3000)))
@@ -209,6 +213,7 @@ def test_what_a_path_does_not_determine_is_said(points: np.ndarray, word: str) -
     assert word in placed.loose
 
 
+@pytest.mark.slow
 def test_a_fit_that_takes_the_error_is_told() -> None:
     """A field that is a mere turn: the best fit leaves nothing of it."""
     path = Path.through(eight(np.linspace(0, 2 * np.pi, 3000)))

@@ -94,14 +94,8 @@ def test_there_is_something_to_try() -> None:
     assert all(b.kind in ("sh", "python", "toml", "csv", "text") for b in BLOCKS)
 
 
-#: Fits and plans of a whole machine take seconds each: they run with the slow tests.
-LONG = ("calibrate fit", "calibrate plan")
-
-
-@pytest.mark.parametrize(
-    "block",
-    [pytest.param(b, marks=[pytest.mark.slow] * any(w in b.body for w in LONG), id=b.name) for b in SHELL],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("block", SHELL, ids=lambda b: b.name)
 def test_commands_run(block: Block, copy: Path) -> None:
     found = masked(run(block.body, copy))
     for part in block.output.split("...\n"):

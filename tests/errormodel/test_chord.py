@@ -63,6 +63,7 @@ def random_moves(seed: int, n: int, axes: str) -> tuple[np.ndarray, np.ndarray]:
     return start, (end - start) * scale * moving
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(
     seed=st.integers(0, 10**6),

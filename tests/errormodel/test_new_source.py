@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import olp
 
 HERE = Path(__file__).parent
@@ -24,6 +26,7 @@ def run(folder: Path, laws: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_new_source_is_one_file_and_one_line(tmp_path: Path) -> None:
     shutil.copytree(PACKAGE, tmp_path / "olp", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(HERE / "test_sources.py", tmp_path)

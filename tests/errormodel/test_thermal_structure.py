@@ -171,6 +171,7 @@ def test_the_stated_uncertainty_is_that_of_repeated_fits() -> None:
     assert 0.6 < np.sqrt(np.mean(z * z)) < 1.6
 
 
+@pytest.mark.slow
 def test_a_log_of_every_second_is_thinned_and_tells_the_same() -> None:
     log = exact_log(STRUCTURE, 1)
     log = DriftLog(log.time_s, log.sensors_degC, {k: v for k, v in log.readings.items() if k[0] == "EXX"})
@@ -186,6 +187,7 @@ def test_a_log_of_every_second_is_thinned_and_tells_the_same() -> None:
         assert (b.offset, b.growth, b.bow) == pytest.approx((a.offset, a.growth, a.bow), rel=0.03, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_what_the_logs_do_not_tell_is_refused_or_said() -> None:
     log = exact_log(STRUCTURE, 1)
     twins = {"beam": log.sensors_degC["beam"], "column": log.sensors_degC["beam"] + 0.3}
@@ -299,6 +301,7 @@ def reference() -> list[str]:
     return [f"--reference-degC={n}={20.0 + o:.2f}" for n, o in zip(drift.BODIES, offset, strict=True)]
 
 
+@pytest.mark.slow
 def test_the_drift_of_days_that_were_not_seen_is_removed(tmp_path: Path) -> None:
     """Two days of logs, from the command line to corrected programs on six other days, at the tip of a
     tool."""

@@ -126,6 +126,7 @@ def test_differences_of_positions_see_a_joint_that_jumps() -> None:
     assert judge(replace(MOTION, time=time), WALK, LIMITS).differences > 1.0
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(st.integers(1, 3), st.lists(st.tuples(*[number] * 9), min_size=1, max_size=4))
 def test_bounds_are_those_of_brute_force(order: int, rows: list[tuple[float, ...]]) -> None:

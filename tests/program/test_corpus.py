@@ -60,6 +60,7 @@ def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Pa
     return out
 
 
+@pytest.mark.slow
 def test_nine_in_ten_legal_programs_are_corrected(corpus: Path, setups: dict[str, tuple[Path, Path]]) -> None:
     done, refused = [], {}
     for folder, (machine, job) in setups.items():
@@ -101,6 +102,7 @@ def everything(corpus: Path) -> Iterator[Path]:
     yield from sorted(path for path in corpus.glob("*/*") if path.is_file() and path.stat().st_size < 300_000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", ["linuxcnc", "grbl", "fanuc", "haas"])
 def test_no_text_of_any_dialect_crashes(corpus: Path, tmp_path: Path, controller: str) -> None:
     """Robot languages and part descriptions under a G-code profile are refused, or carried."""

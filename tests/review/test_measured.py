@@ -99,6 +99,7 @@ def test_points_against_the_order_are_shown_in_its_order(tmp_path: Path) -> None
     assert "OLP606" in [f.code for f in found.findings]
 
 
+@pytest.mark.slow
 def test_the_page_pairs_as_compare_does_and_says_what_that_found(tmp_path: Path) -> None:
     machine = random_machine(tmp_path / "m", 3, Recipe())
     program = written(tmp_path, TEXT, "part.ngc")

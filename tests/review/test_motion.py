@@ -29,6 +29,7 @@ def viewed(name: str) -> tuple[Review, olp.Retiming]:
     return olp.view(NASTY / f"{name}.ngc", NASTY / "machine.toml", correction=result), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_at_its_time_the_motion_is_at_the_sample(name: str) -> None:
     """The re-timed motion, asked for its position at the time of a sample, is where the corrected program has

@@ -185,6 +185,7 @@ OWN: dict[str, Callable[[], Case]] = {
 LONG = ("gentle jerk", "one axis slow", "jerk of 10", "acceleration of 1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in [*CASES, *OWN]],
@@ -365,6 +366,7 @@ ROUTES: dict[str, Callable[[], Case]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", BROKEN)
 @pytest.mark.parametrize("name", ROUTES)
 def test_a_broken_ruckig_makes_nothing_wrong_or_much_slower(

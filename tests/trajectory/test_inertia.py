@@ -51,6 +51,7 @@ def test_one_straight_move_in_closed_form() -> None:
     assert Inertial.of(found.motion, sideways).across_mm == pytest.approx(2e-6 * a, rel=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 10_000), matrices)
 def test_it_is_what_samples_say(seed: int, compliance: np.ndarray) -> None:

@@ -147,6 +147,7 @@ def laws_hold(given_route: Route, limits: AxisLimits) -> None:
         assert pace.min() >= -1e-9 * limits.velocity.max()
 
 
+@pytest.mark.slow
 @_SLOW_CHECK
 @given(st.integers(0, 2**32 - 1))
 @example(16)
@@ -163,6 +164,7 @@ def test_random_routes_keep_the_laws(seed: int) -> None:
 _LONG = {"gentle jerk", "feed changes in a curve", "collinear", "one axis slow", "slow feed", "circle"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow if name in _LONG else ()) for name in sorted(CASES)]
 )

@@ -119,6 +119,7 @@ def limits_of(draw):
     return AxisLimits(draw(powers(10.0, 2e3)) * axis, draw(powers(100.0, 2e4)) * axis, jerk * axis)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(routes(), limits_of())
 def test_any_route(route, limits):

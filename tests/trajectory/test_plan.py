@@ -60,6 +60,7 @@ def assert_within(found: Trajectory, limits: AxisLimits, feed: float = np.inf) -
         assert (np.abs(position) <= limit * (1 + 1e-6) * 1e-3**order + noise).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 10**6),

@@ -109,6 +109,7 @@ def test_what_the_offsets_of_a_reflector_hide(tools: tuple, hidden: set[str]) ->
     assert set(predict(planned, "FXYZ", BOX, [tools[0]]).hidden) == hidden
 
 
+@pytest.mark.slow
 def test_a_prediction_is_what_comes_out() -> None:
     """Machines that had no part in it: the median over seeds is within a third of the prediction."""
     tools = (simulated.OFFSETS[0],)
@@ -216,6 +217,7 @@ def test_plans_of_other_instruments_load(tmp_path: Path, instrument: str) -> Non
     assert count == {"pods": 40, "multilateration": 240}[instrument]
 
 
+@pytest.mark.slow
 def test_the_quickest_good_method_is_chosen() -> None:
     plan = plan_measurements(MACHINE, uncertainty_um=6.0)
     good = [m for m in plan.methods if m.prediction.rms_mm <= 6e-3]

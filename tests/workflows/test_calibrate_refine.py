@@ -26,6 +26,7 @@ from olp.workflows.calibrate_refine import refine_calibration
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "family"), [(0, "smooth"), (0, "rough")])
 def test_three_turns(seed: int, family: str) -> None:
     found = turns(seed, family, quick=True)

@@ -151,6 +151,7 @@ def test_figures_of_an_example_and_their_order() -> None:
     assert framed == sorted(framed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reference", ["functional-point", "table"])
 @pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "ZXFY", "YXFZ", "XYZF"])
 @pytest.mark.parametrize("key", ["isg", "etalon"])

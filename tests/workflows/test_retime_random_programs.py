@@ -25,6 +25,7 @@ def faults(seeds: Iterable[int], base: olp.Setup) -> dict[int, tuple[str, ...]]:
     return {seed: wrong for seed, wrong in found.items() if wrong}
 
 
+@pytest.mark.slow
 def test_random_programs_keep_every_limit(base: olp.Setup) -> None:
     # three whose optimum once ran out of digits
     assert faults([*range(8), 13, 323, 331], base) == {}

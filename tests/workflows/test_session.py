@@ -92,6 +92,7 @@ CALLS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", CALLS, ids=" ".join)
 def test_each_input_is_opened_once(folder: Path, words: tuple[str, ...]) -> None:
     found = opened(folder, words[0], *words[1:], "-j", "job.toml")
@@ -105,6 +106,7 @@ def test_each_input_is_opened_once(folder: Path, words: tuple[str, ...]) -> None
     assert {name: count for name, count in found.items() if count > 1} == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [
     ("verify", "plate.ngc", "corrected.ngc"), ("check", "corrected.ngc", "--nominal", "plate.ngc"),
     ("view", "plate.ngc", "--corrected", "corrected.ngc", "-o", "e.html", "--no-time"),

@@ -49,6 +49,7 @@ def without(measurements: Measurements, *names: str) -> Measurements:
 # -- simulated machines ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "seeds"), [("smooth", SMOOTH), ("rough", ROUGH)])
 def test_what_is_left_of_simulated_machines(family: str, seeds: range) -> None:
     """All chains of the benchmark, tables too; the uncertainty is neither too small nor too large."""
@@ -74,6 +75,7 @@ def test_the_files_say_what_the_fit_says(one: tuple[simulated.Machine, Measureme
         assert np.abs(model.error(at, np.array(tool)) - found.error(at, tool)).max() < 0.15 * UM
 
 
+@pytest.mark.slow
 def test_curves_of_a_rough_machine_are_written_true() -> None:
     """Steps and kinks are straight pieces in the file; cyclic terms stand beside the curves."""
     machine, measurements = case(2, "rough", "YFXZ")
@@ -131,6 +133,7 @@ def test_zeros_and_slopes_of_instruments_mean_nothing(
 # -- points of a tracker ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_points_leave_alone_and_with_lines() -> None:
     """The frame of the instrument is far away and turned; fresh tools."""
     alone, both = [], []
@@ -147,6 +150,7 @@ def test_what_points_leave_alone_and_with_lines() -> None:
     assert 0.5 < np.sqrt(np.mean([one.z**2 for one in alone])) < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("chain", "hidden"), [("FXYZ", "ECY"), ("YFXZ", "ECX"), ("ZXFY", "EBX")])
 def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None:
     """All turns of the last axis, and of the one before about the last one's direction: they move no point
@@ -198,6 +202,7 @@ def test_a_forgotten_scale_is_caught_by_chi_square() -> None:
 # -- lengths from stations -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_lengths_leave() -> None:
     """Six stations of 250 lengths, places and dead lengths unknown; the stations are found too."""
     left_same, left_other = [], []
@@ -435,6 +440,7 @@ def test_noise_and_drift_of_a_line() -> None:
     assert noise.sigma == pytest.approx(0.5 * UM, rel=0.2)
 
 
+@pytest.mark.slow
 def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
     lines = []
@@ -446,6 +452,7 @@ def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
     assert not any(curve.forward for curve in calibration.curves)
 
 
+@pytest.mark.slow
 def test_recordings_of_many_samples_are_read_in_reasonable_memory() -> None:
     """Sweeps of 2000 places there and back: no table of samples by places."""
     machine = simulated.machine(0, "smooth", "FXYZ")

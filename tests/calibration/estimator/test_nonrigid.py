@@ -81,6 +81,7 @@ def test_what_was_held_out_is_foretold_better(bent: tuple[simulated.Machine, Fit
     assert figures.held_out_after > figures.residual_after
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["smooth", "rough"])
 @pytest.mark.parametrize("seed", [200, 201])
 def test_nothing_is_invented_on_rigid_machines(family: str, seed: int) -> None:
@@ -91,6 +92,7 @@ def test_nothing_is_invented_on_rigid_machines(family: str, seed: int) -> None:
     assert not found.value(places()).any()
 
 
+@pytest.mark.slow
 def test_noise_that_was_stated_too_small_is_no_field() -> None:
     points = cloud(simulated.machine(203, "smooth"), 203, 120, 5.0)
     lying = dataclasses.replace(points, sigma=0.5 * points.sigma)
@@ -99,6 +101,7 @@ def test_noise_that_was_stated_too_small_is_no_field() -> None:
     assert found.noise > 1.2
 
 
+@pytest.mark.slow
 def test_directions_of_pods_show_a_sag_too() -> None:
     machine = simulated.bent(simulated.machine(2, "smooth"), sag_mm=0.15)
     found = nonrigid(before := fit(Measurements("simulated", (two_pods(machine, 2, 250),)), "FXYZ"))
@@ -193,6 +196,7 @@ def test_without_a_field_the_adjustment_is_that_of_the_fit() -> None:
 # -- maps and files --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_map_loses_no_more_than_stated(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
     _, before, found = bent
     wanted = Measurements("simulated", before.measurements.observations, map=MapWish(within_mm=2e-4))
@@ -238,6 +242,7 @@ def written(
     return folder
 
 
+@pytest.mark.slow
 def test_from_points_to_a_calibration_with_a_map(tmp_path: Path) -> None:
     machine = simulated.bent(simulated.machine(1, "smooth", "YFXZ"))
     plan = written(tmp_path, machine, "[map]\nwithin_um = 0.5\n")

@@ -39,6 +39,7 @@ def angles(names: set[str]) -> set[str]:
     return {name for name in names if name[1] in "ABC" and name[0] == "E"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", EACH)
 @pytest.mark.parametrize("offsets", TOOLS_OF)
 def test_angles_that_offsets_of_the_reflector_hide(chain: str, offsets: str) -> None:
@@ -97,6 +98,7 @@ def of_poses(at: np.ndarray) -> np.ndarray:
     return np.stack(out, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", EACH)
 def test_angles_alone_leave_the_scale_open(chain: str) -> None:
     """Beside what one offset hides there is one open change more without a distance, and it stretches all
@@ -117,6 +119,7 @@ def test_angles_alone_leave_the_scale_open(chain: str) -> None:
     assert len(told(free, "OLP809")) == 1 and not told(known, "OLP809")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", EACH)
 def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None:
     """Of three scales and three values of squareness four diagonals see four: the squareness, and one
@@ -149,6 +152,7 @@ def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None
     assert "one combination is known alone" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", EACH)
 def test_a_ball_bar_in_one_direction_cannot_tell_squareness(chain: str) -> None:
     machine, measurements = case(2, "smooth", chain)
@@ -218,6 +222,7 @@ def forgotten(kind: str, seed: int) -> tuple[Measurements, Measurements]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", ["a tracker that was moved", "the error of a square", "the scale of a ball-bar"]
 )

@@ -126,6 +126,7 @@ def polar_readings(
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_polar_station_weighs_distance_and_angles_as_they_are() -> None:
     """0.5 um along the ray and 10 urad across it: far better than as points of the mean uncertainty, with
     the stated band."""
@@ -197,6 +198,7 @@ def no_square(measurements: Measurements) -> Measurements:
     return dataclasses.replace(measurements.with_lines(lines), squares=())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "XYZF"])
 def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
     """Lines whose straightness was read without a square; zero, centre, radius, servo mismatch and lost

@@ -99,6 +99,7 @@ def parts(calibration: Calibration) -> object:
     return found, calibration.box_mm.tolist(), dict(calibration.squareness), rest
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(calibration=calibrations())
 def test_a_written_calibration_reads_back_exactly(

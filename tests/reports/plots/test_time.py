@@ -24,6 +24,7 @@ def job(tmp_path: Path) -> Path:
     return machine(tmp_path / "m", tables=TRUE_ZERO + TOOLS, job=START).with_name("job.toml")
 
 
+@pytest.mark.slow
 def test_the_picture_names_what_it_shows_and_is_the_same_each_time() -> None:
     way, limits = random_route(3)
     found = plan(way, limits)
