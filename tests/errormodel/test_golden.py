@@ -119,3 +119,17 @@ def test_scale_and_workpiece_expansion() -> None:
     model = build(Calibration("m", BOX, curves=(scale,), thermal=thermal, temperature_degC=22.0), "FXYZ")
     error = model.error(np.array([[1000.0, 0.0, 0.0]]), ZERO_TOOL)
     np.testing.assert_allclose(error * 1e3, [[4.5, 0.0, 0.0]], atol=1e-9)
+
+
+def test_scales_grow_from_where_they_are_fixed_and_parts_from_where_they_are_clamped() -> None:
+    """Scales 10 um/(m K) and 2 K warmer, fixed at 400; a part of 12 um/(m K) and 5 K, clamped at -100."""
+    thermal = Thermal(
+        scale_per_K=(10e-6, 0.0, 0.0), fixed_at_mm=(400.0, 0.0, 0.0), scale_degC=(22.0, 20.0, 20.0),
+        workpiece_per_K=12e-6, clamped_at_mm=(-100.0, 0.0, 50.0), workpiece_degC=25.0,
+    )  # fmt: skip
+    error = build(Calibration("m", BOX, thermal=thermal), "FXYZ").error(
+        np.array([[400.0, 0.0, 50.0], [-100.0, 0.0, -50.0], [900.0, 100.0, 50.0]]), ZERO_TOOL
+    )
+    np.testing.assert_allclose(
+        error * 1e3, [[-30.0, 0.0, 0.0], [-10.0, 0.0, 6.0], [10.0 - 60.0, -6.0, 0.0]], atol=1e-9
+    )

@@ -1,0 +1,207 @@
+"""What each control makes of the same words, by hand: where a program ends, or why it is refused."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import pytest
+from cases.acceptance import TRUE_ZERO, machine
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.files.config import load_setup
+from olp.files.sources import Source, Sources
+from olp.program.registry import DIALECTS, read
+from olp.program.rs274.cycles import CycleRules
+from olp.program.rs274.profiles.base import Profile
+from olp.workflows.flatten import unrolled
+
+LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
+#: Each tool has a length along X, too.
+TOOLS = "".join(
+    f"[tools.{n}]\nX_mm = {n}.0\nZ_mm = {n}0.0\ngauge_to_tip_mm = [0.0, 0.0, -{n}0.0]\n" for n in (1, 2, 3)
+)
+Outcome = tuple[float, float, float] | str
+
+#: Field of the profile: the program, what the controls make of it, and another value of the field.
+READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
+    "motion": (
+        "X1. Y0. Z0.",
+        {GRBL: (1, 0, 0)} | dict.fromkeys((LINUXCNC, FANUC, HAAS), "no motion code is in force"),
+        {GRBL: None, LINUXCNC: 0, FANUC: 0, HAAS: 0},
+    ),
+    "initial_retract": (
+        "G0 X0. Y0. Z9.\nG81 X1. Y1. Z-2. R3. F60.",
+        {LINUXCNC: (1, 1, 3), FANUC: (1, 1, 9), HAAS: (1, 1, 9)},
+        {LINUXCNC: 980, FANUC: 990, HAAS: 990},
+    ),
+    "increments_without_point": (
+        "G0 X1000 Y0 Z0",
+        {LINUXCNC: (1000, 0, 0), GRBL: (1000, 0, 0), FANUC: (1, 0, 0), HAAS: (1, 0, 0)},
+        "not",
+    ),
+    "g52_is_g92": (
+        "G0 X0. Y0. Z0.\nG92 X1.\nG52 X5.\nG0 X1. Y0. Z0.",
+        {LINUXCNC: (6, 0, 0), FANUC: (5, 0, 0), HAAS: (5, 0, 0)},
+        "not",
+    ),
+    "g10_offsets": (
+        "G10 L2 P7 X5.\nG0 X1. Y0. Z0.",
+        {LINUXCNC: (1, 0, 0)} | dict.fromkeys((FANUC, HAAS, GRBL), "the number of a work offset"),
+        {LINUXCNC: 6, FANUC: 9, HAAS: 9, GRBL: 9},
+    ),
+    "g10_adds": (
+        "G10 L2 P1 X5.\nG91\nG10 L2 P1 X2.\nG90 G0 X1. Y0. Z0.",
+        {LINUXCNC: (3, 0, 0), GRBL: (3, 0, 0), FANUC: (8, 0, 0), HAAS: (8, 0, 0)},
+        "not",
+    ),
+    "cycles_apart": (
+        "G1 X0. Y0. Z9. F60.\nG80\nX2.",
+        {FANUC: (2, 0, 9), HAAS: (2, 0, 9), LINUXCNC: "no motion code is in force"},
+        "not",
+    ),
+    "axis_dwell": (
+        "G0 X0. Y0. Z0.\nG4 X1.",
+        {FANUC: (0, 0, 0), HAAS: (0, 0, 0), LINUXCNC: (1, 0, 0), GRBL: (1, 0, 0)},
+        "not",
+    ),
+    "m61_sets_tool": (
+        "M61 Q2\nG43\nG0 X0. Y0. Z10.",
+        {LINUXCNC: (2, 0, 30)},
+        "not",
+    ),
+    "length_of_spindle_tool": (
+        "T1 M6\nG43\nG0 X0. Y0. Z10.",
+        {LINUXCNC: (1, 0, 20)} | dict.fromkeys((FANUC, HAAS), "G43 needs an H word"),
+        "not",
+    ),
+    "lengths_along_z": (
+        "G43 H3\nG0 X0. Y0. Z10.",
+        {LINUXCNC: (3, 0, 40), FANUC: (0, 0, 40), HAAS: (0, 0, 40)},
+        "not",
+    ),
+}
+
+_ISO = (FANUC, HAAS)
+_SERIES = "G0 X0. Y0. Z9.\nG81 X1. Y1. Z-2. R3. F60."
+_SYNCHRONISED = dict.fromkeys(_ISO, "synchronised by the control")
+#: Rule of the cycles: the program, and what it holds or why it is refused when its cycles are written out.
+CYCLES: dict[str, tuple[str, dict[str, str]]] = {
+    "rises_first": (
+        "G0 X0. Y0. Z1.\nG98 G81 X1. Y1. Z-2. R3. F60.\nG80",
+        {LINUXCNC: "G0 Z3|G0 X1 Y1|G1 Z-2"} | dict.fromkeys(_ISO, "G0 X1. Y1.|G0 Z3.|G1 Z-2."),
+    ),
+    "feeds_home": (
+        "G0 X0. Y0. Z9.\nG98 G89 X1. Y1. Z-2. R3. P1. F60.\nG80",
+        {LINUXCNC: "G4 P1|G1 Z9|"} | dict.fromkeys(_ISO, "G4 P1|G1 Z3.|G0 Z9."),
+    ),
+    "taps_in_any_plane": (
+        "G18 M3 S100\nG0 X0. Y9. Z0.\nG84 X1. Z1. Y-2. R3. F60.",
+        {LINUXCNC: "taps along the wrong axes"},
+    ),
+    "taps_by_control": (
+        "M3 S100\nG0 X0. Y0. Z9.\nG84 X1. Y1. Z-2. R3. F60.",
+        {LINUXCNC: "G1 Z-2|M5|M4|"} | _SYNCHRONISED,
+    ),
+    "peck_by_parameter": (
+        "G0 X0. Y0. Z9.\nG83 X1. Y1. Z-2. R3. Q2. F60.",
+        {LINUXCNC: "before any G20 or G21"} | dict.fromkeys(_ISO, "give peck_clearance_mm"),
+    ),
+    "stores": (
+        "G0 X0. Y0. Z9.\nG81 X1. Y1. Z-2. R3. F60. L0\nX2.",
+        {LINUXCNC: "repeated L0 times"} | dict.fromkeys(_ISO, "F60.|G0 X2.|G0 Z3.|G1 Z-2."),
+    ),
+    "new_code_forgets": (
+        f"{_SERIES}\nG82 X2. P1.",
+        {LINUXCNC: "has no R word"} | dict.fromkeys(_ISO, "G0 X2.|G0 Z3.|G1 Z-2.|G4 P1"),
+    ),
+    "levels_follow_distance": (
+        f"{_SERIES}\nG91\nX2.",
+        {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|"} | dict.fromkeys(_ISO, "give R and the depth anew"),
+    ),
+    "exact_corners": (
+        f"G64\n{_SERIES}",
+        {LINUXCNC: "G61|G0 X1 Y1"} | dict.fromkeys(_ISO, "F60.|G0 X1. Y1."),
+    ),
+}  # fmt: skip
+#: What these decide is a matter of time: feeds and rests by hand stand in `tests/program/feeds`.
+OF_TIME = {
+    "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "m_with_motion",
+}  # fmt: skip
+#: Tables and texts, which have tests of their own.
+TABLES = {"codes", "refusals", "harmless_m", "cycles", "language", "written_ending"}
+
+
+@pytest.fixture(scope="module")
+def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Setup]:
+    found = {}
+    for control in CONTROLS:
+        place = tmp_path_factory.mktemp(control)
+        found[control] = load_setup(machine(place, controller=control, tables=TRUE_ZERO + TOOLS))
+    return found
+
+
+def outcome(text: str, setup: Setup, control: Profile) -> Outcome:
+    """The last position, or what the refusal says."""
+    try:
+        x, y, z = read(text.encode(), setup, control).toolpath.end_mm[-1].tolist()
+    except ProgramError as error:
+        return str(error)
+    return x, y, z
+
+
+def written_out(text: str, setup: Setup, control: Profile) -> str:
+    """The program with its cycles written out, its blocks between bars, or what the refusal says."""
+    source = Source("", text.encode)
+    try:
+        return unrolled(Sources(), source, setup, control, expand_cycles=True).decode().replace("\n", "|")
+    except ProgramError as error:
+        return str(error)
+
+
+def is_it(got: Outcome, want: Outcome) -> bool:
+    return want in got if isinstance(want, str) and isinstance(got, str) else got == want
+
+
+def test_every_field_is_read_by_hand() -> None:
+    own = {f.name for f in fields(Profile)} - {f.name for f in fields(Profile.__base__)}  # type: ignore[arg-type]
+    assert own == set(READINGS) | OF_TIME | TABLES
+    # `repeat_words` are letters: K on Fanuc and Haas
+    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words"}
+
+
+@pytest.mark.parametrize(
+    ("field", "control"),
+    [(field, control) for field, (_, wanted, _) in READINGS.items() for control in wanted],
+)
+def test_a_control_reads_as_its_manual_says(field: str, control: str, setups: dict[str, Setup]) -> None:
+    text, wanted, other = READINGS[field]
+    profile = DIALECTS[control]
+    assert isinstance(profile, Profile)
+    got = outcome(text, setups[control], profile)
+    assert is_it(got, wanted[control]), got
+    # and it is this field that decides
+    value = not getattr(profile, field) if other == "not" else other[control]
+    changed = replace(profile, **{field: value})
+    assert not is_it(outcome(text, setups[control], changed), wanted[control])
+
+
+@pytest.mark.parametrize(
+    ("rule", "control"), [(rule, control) for rule, (_, wanted) in CYCLES.items() for control in wanted]
+)
+def test_a_control_makes_cycles_as_its_manual_says(rule: str, control: str, setups: dict[str, Setup]) -> None:
+    text, wanted = CYCLES[rule]
+    profile = DIALECTS[control]
+    assert isinstance(profile, Profile)
+    assert wanted[control] in written_out(text, setups[control], profile)
+    rules = replace(profile.cycles, **{rule: not getattr(profile.cycles, rule)})
+    assert wanted[control] not in written_out(text, setups[control], replace(profile, cycles=rules))
+
+
+@pytest.mark.parametrize("control", _ISO)
+def test_k_counts_holes(control: str, setups: dict[str, Setup]) -> None:
+    profile = DIALECTS[control]
+    assert isinstance(profile, Profile)
+    text = "G0 X0. Y0. Z9.\nG91 G81 X1. Z-2. R-3. F60. K3"
+    assert written_out(text, setups[control], profile).count("G1") == 3
