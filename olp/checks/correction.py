@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
-from olp.checks.listed import told_findings
+from olp.checks.listed import remark_findings
 from olp.compensation.hole_plan import HolePlan
 from olp.core.arrays import Index
 from olp.core.machine import Setup
@@ -43,7 +43,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
                     [line],
                 )
             )
-    out += told_findings(program)
+    out += remark_findings(program)
     whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
     if whole.any() and not (program.statements and program.statements.decimal):
         lines = lines_of(path, whole)
@@ -135,13 +135,13 @@ def proof_findings(proof: Proof, passed: Index) -> list[Finding]:
     if untouched.any():
         lines = lines_of(path, untouched)
         out.append(finding("OLP102", f"{int(untouched.sum())} moves were written as they were", lines))
-    unknown = proof.after.flank > proof.tolerance_mm
+    unknown = proof.after.side > proof.tolerance_mm
     if unknown.any():
         out.append(
             finding(
                 "OLP103",
                 f"at {int(unknown.sum())} way-points the flank of an axis is not known yet; the tip may be "
-                f"off by up to {proof.after.flank.max() * 1e3:.1f} um there",
+                f"off by up to {proof.after.side.max() * 1e3:.1f} um there",
                 lines_of(path, unknown),
             )
         )
@@ -175,8 +175,8 @@ def stroke_findings(program: Program, model: ErrorModel, tolerance_mm: float) ->
     path = program.toolpath
     top, bottom = said.strokes[:, 0], said.strokes[:, 1]
     tool = path.tool_mm()
-    levers = tool if tool.ndim == 1 else tool[top]
-    change = model.error(path.end_mm[bottom], levers) - model.error(path.end_mm[top], levers)
+    tool_vectors = tool if tool.ndim == 1 else tool[top]
+    change = model.error(path.end_mm[bottom], tool_vectors) - model.error(path.end_mm[top], tool_vectors)
     lean = np.nan_to_num(np.sqrt((change * change).sum(axis=1))) / 2
     wide = lean > tolerance_mm
     if not wide.any():

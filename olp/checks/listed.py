@@ -17,7 +17,7 @@ _SHARES = np.linspace(0.0, 1.0, 18)[1:-1]
 _CODES = {"told": "OLP331", "turning": "OLP332", "unmarked": "OLP626"}
 
 
-def told_findings(program: Program) -> list[Finding]:
+def remark_findings(program: Program) -> list[Finding]:
     """What was told from the text rather than stated."""
     return [finding(_CODES[name], said, [line]) for name, line, said in program.remarks if name in _CODES]
 
@@ -33,10 +33,10 @@ def between_findings(program: Program, proof: Proof, model: ErrorModel) -> list[
     # the ends are right but for rounding: only what the error may bend has to be looked at
     bound = model.chord_bound(step, tool if tool.ndim == 1 else tool[1:])
     some = np.flatnonzero(bound > proof.tolerance_mm)
-    lever = tool if tool.ndim == 1 else tool[some + 1]
+    tool_vector = tool if tool.ndim == 1 else tool[some + 1]
     for share in _SHARES if some.size else ():
         at = command[some] + share * step[some]
-        actual = at + model.error(at, lever)
+        actual = at + model.error(at, tool_vector)
         away[some + 1] = np.fmax(away[some + 1], segment_distance(actual, target[some], target[some + 1]))
     far = away > proof.allowed_mm
     if not far.any():

@@ -51,7 +51,7 @@ def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list
             number: float(np.linalg.norm(np.subtract(path.frames[number].tool_mm, described.tool_mm)))
             for number in numbers
         }
-        far = {number: lever for number, lever in away.items() if lever > within}
+        far = {number: tool_vector for number, tool_vector in away.items() if tool_vector > within}
         if not far:
             continue
         worst = max(far, key=far.__getitem__)

@@ -209,7 +209,7 @@ def changed_findings(proof: Proof, nominal_mm_s: Array, written_mm_s: Array) -> 
 
 def reversal_findings(path: Toolpath, model: ErrorModel) -> list[Finding]:
     """Passages in which an axis with lost motion turns round after every short way."""
-    lost = model.lost_motion_mm(path.end_mm) if len(path) else None
+    lost = model.backlash_at(path.end_mm) if len(path) else None
     out: list[Finding] = []
     for axis in range(3 if lost is not None else 0):
         assert lost is not None
@@ -254,7 +254,7 @@ def low_findings(proof: Proof, model: ErrorModel) -> list[Finding]:
     low = np.fmin(np.fmin(meant[:, 2], goal[:, 2]), _lowest(path, model))
     reached = np.full(len(path), np.inf)
     np.fmin.at(reached, proof.owner()[theirs], _lowest(written, model)[theirs])
-    play = model.lost_motion_mm(path.end_mm)
+    play = model.backlash_at(path.end_mm)
     loose = 0.0 if play is None else float(np.nanmax(np.nan_to_num(play[:, 2]), initial=0.0)) / 2
     with np.errstate(invalid="ignore"):
         below = low - reached - loose > proof.allowed_mm

@@ -28,10 +28,10 @@ class Part:
 def parts_of(tool: Tool) -> tuple[Part, ...]:
     """The tool from its tip to the gauge point: what cuts, the shank of the same radius, the holder. Nothing
     where the table gives no length."""
-    lever = tool.lever_mm
-    if lever is None or lever[2] >= 0.0:
+    tool_vector = tool.tool_vector_mm
+    if tool_vector is None or tool_vector[2] >= 0.0:
         return ()
-    length = -lever[2]
+    length = -tool_vector[2]
     free = length - sum(part.length_mm for part in tool.holder)
     cuts = min(tool.cutting_length_mm or free, free)
     out = [Part("tool", (0.0, cuts), (tool.radius_mm, tool.radius_mm), True)]

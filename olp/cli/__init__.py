@@ -9,7 +9,7 @@ import os
 
 import click
 
-from olp.cli.common import silence_stdout, talk
+from olp.cli.common import diagnostic, silence_stdout
 from olp.cli.late import LateGroup
 from olp.core.errors import OlpError
 from olp.core.version import __version__
@@ -46,10 +46,10 @@ class _Verbs(LateGroup):
             return super().invoke(ctx)
         except OlpError as error:
             for line in str(error).split("\n"):
-                talk(f"olp: error: {line}")
+                diagnostic(f"olp: error: {line}")
             ctx.exit(error.exit_code)
         except KeyboardInterrupt:
-            talk("olp: interrupted")
+            diagnostic("olp: interrupted")
             ctx.exit(INTERRUPTED)
         except BrokenPipeError:
             # The reader of stdout has gone, which is its right; what it asked for is lost only to itself.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import STREAM, exit_for, files_of, put_report, refuse_early, talk
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_report, refuse_early
 from olp.cli.options import (
     Length,
     fail_on_option,
@@ -65,7 +65,7 @@ def command(
     if output is not None:
         files = found.files(output)
         write_files(files, force=force, inputs=inputs)
-        talk(f"wrote {output} and {len(files) - 1} files beside it")
+        diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
     report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
     put_report(report, as_json=as_json, quiet=quiet)
     exit_for(found.findings, fail_on)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.calibrate_import import table_options
-from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, machine_given, put, refuse_early
 from olp.cli.options import fail_on_option, json_option, output_option, setup_options
 from olp.core.errors import UsageError
 
@@ -72,11 +72,11 @@ def command(
     write_files(found.files, force=force, inputs=inputs)
     _put(found.report, as_json)
     for finding in found.findings:
-        talk(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
+        diagnostic(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
     for note in found.notes:
-        talk(f"note: {note}")
+        diagnostic(f"note: {note}")
     for path in found.files:
-        talk(f"wrote {path}")
+        diagnostic(f"wrote {path}")
     exit_for(found.findings, fail_on)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, exit_for, files_of, put, refuse_early, report_ending, talk
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put, refuse_early, report_ending
 from olp.cli.options import (
     day_option,
     fail_on_option,
@@ -92,9 +92,9 @@ def command(
     write_files(files, force=force, inputs=inputs)
     if output is not None:
         kinds = "curves, map and covariance" if fitted.calibration.maps else "curves and covariance"
-        talk(f"wrote {output} and {curves} files of {kinds} beside it")
+        diagnostic(f"wrote {output} and {curves} files of {kinds} beside it")
     if report_file is not None:
-        talk(f"wrote {report_file}")
+        diagnostic(f"wrote {report_file}")
     report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
     if as_json:
         put(to_json(report))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import files_of, refuse_early, talk
+from olp.cli.common import diagnostic, files_of, refuse_early
 from olp.cli.options import day_option, force_option, machine_option, output_option
 from olp.core.errors import UsageError
 
@@ -87,8 +87,8 @@ def command(
     )  # fmt: skip
     write_files(found.files, force=force, inputs=inputs)
     for finding in found.findings:
-        talk(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
+        diagnostic(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
     for note in found.notes:
-        talk(f"note: {note}")
+        diagnostic(f"note: {note}")
     for path in found.files:
-        talk(f"wrote {path}")
+        diagnostic(f"wrote {path}")

@@ -6,7 +6,7 @@ import datetime
 
 import click
 
-from olp.cli.common import exit_for, files_of, put_report, refuse_early, talk
+from olp.cli.common import diagnostic, exit_for, files_of, put_report, refuse_early
 from olp.cli.options import (
     Length,
     day_option,
@@ -101,7 +101,7 @@ def command(
         files = plan.files(output, date)
         refuse_early([str(name) for name in files], files_of(machine), force=force)
         write_files(files, force=force, inputs=files_of(machine))
-        talk(f"wrote {len(files)} files to {output}")
+        diagnostic(f"wrote {len(files)} files to {output}")
     report = {**plan.report, "findings": [finding.as_dict() for finding in plan.findings]}
     put_report(report, as_json=as_json, quiet=quiet)
     exit_for(plan.findings, fail_on)

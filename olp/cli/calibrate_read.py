@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import put, talk
+from olp.cli.common import diagnostic, put
 from olp.cli.options import json_option
 
 
@@ -43,7 +43,7 @@ def command(file: str, profile: str | None, as_json: bool) -> None:
     runs = len(set(zip(found.run.tolist(), found.direction.tolist(), strict=True)))
     span = f"{found.target_mm.min():g} to {found.target_mm.max():g} mm"
     stated = "actual minus commanded" if found.sense_known else "as in the file, the plan must state it"
-    talk(f"{len(rows)} readings in {runs} one-way runs, {span}; component {found.component or 'not stated'}; "
-         f"sense: {stated}")  # fmt: skip
+    component = found.component or "not stated"
+    diagnostic(f"{len(rows)} readings in {runs} one-way runs, {span}; component {component}; sign: {stated}")
     for note in found.notes:
-        talk(f"note: {note}")
+        diagnostic(f"note: {note}")

@@ -6,7 +6,7 @@ import datetime
 
 import click
 
-from olp.cli.common import STREAM, exit_for, files_of, put_report, refuse_early, talk
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_report, refuse_early
 from olp.cli.options import (
     Length,
     day_option,
@@ -82,7 +82,7 @@ def command(
     )  # fmt: skip
     files = found.files(output)
     write_files(files, force=force, inputs=inputs)
-    talk(f"wrote {output} and {len(files) - 1} files beside it")
+    diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
     report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
     put_report(report, as_json=as_json, quiet=quiet)
     exit_for(found.findings, fail_on)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, exit_for, files_of, machine_given, put, refuse_early, talk
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, machine_given, put, refuse_early
 from olp.cli.options import fail_on_option, force_option, json_option, machine_option, output_option
 from olp.core.errors import UsageError
 
@@ -57,11 +57,11 @@ def command(
 
         put(to_json(result.report))
     for line in _shown(result.report):
-        talk(line)
+        diagnostic(line)
     for found in result.findings:
-        talk(f"{found.severity.name.lower()} {found.code}: {found.message}")
+        diagnostic(f"{found.severity.name.lower()} {found.code}: {found.message}")
     if target is not None:
-        talk(f"wrote {Path(target)}")
+        diagnostic(f"wrote {Path(target)}")
     exit_for(result.findings, fail_on)
 
 

@@ -9,6 +9,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    diagnostic,
     exit_for,
     files_of,
     given,
@@ -17,7 +18,6 @@ from olp.cli.common import (
     refuse_early,
     refuse_twice,
     source,
-    talk,
 )
 from olp.cli.options import (
     confidence_options,
@@ -107,5 +107,5 @@ def command(
     if STREAM in parts:
         put(parts[STREAM])
     for name in files_of(*parts):
-        talk(f"wrote {name}")
+        diagnostic(f"wrote {name}")
     exit_for(result.findings, fail_on)

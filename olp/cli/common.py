@@ -136,7 +136,7 @@ def report_ending(name: str) -> str:
     return ending
 
 
-def talk(message: str) -> None:
+def diagnostic(message: str) -> None:
     """Say something to the person, on stderr."""
     click.echo(_encodable(message, sys.stderr.encoding), err=True)
 

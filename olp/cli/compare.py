@@ -12,6 +12,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    diagnostic,
     exit_for,
     files_of,
     machine_given,
@@ -22,7 +23,6 @@ from olp.cli.common import (
     refuse_twice,
     report_ending,
     source,
-    talk,
 )
 from olp.cli.options import (
     Length,
@@ -127,7 +127,7 @@ def command(
         put(report_compare.to_text(result.report))
     if not out.quiet:
         for path in written:
-            talk(f"wrote {path}")
+            diagnostic(f"wrote {path}")
     exit_for(result.findings, out.fail_on)
 
 

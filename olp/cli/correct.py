@@ -13,6 +13,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Given,
+    diagnostic,
     exit_for,
     files_of,
     given,
@@ -21,7 +22,6 @@ from olp.cli.common import (
     refuse_early,
     refuse_twice,
     report_ending,
-    talk,
 )
 from olp.cli.layouts import with_layout_of
 from olp.cli.options import (
@@ -203,7 +203,7 @@ def _say(call: Given, result: Correction, out: _Outputs, written: Iterable[Path]
         put(report.to_text(result.report), err=on_stderr)
     if not out.quiet:
         for path in written:
-            talk(f"wrote {path}")
+            diagnostic(f"wrote {path}")
 
 
 def _diff(nominal: bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from olp.cli.common import talk
+from olp.cli.common import diagnostic
 from olp.cli.options import force_option
 from olp.core.errors import OlpError, UsageError
 
@@ -66,9 +66,9 @@ def command(
     files = {Path(folder) / file: text.encode() for file, text in texts.items()}
     write_files(files, force=force)
     for path in files:
-        talk(f"wrote {path}")
+        diagnostic(f"wrote {path}")
     for note in notes:
-        talk(f"note: {note}")
+        diagnostic(f"note: {note}")
 
 
 def _make_folder(folder: Path) -> None:

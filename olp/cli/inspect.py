@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import files_of, machine_given, plot_ending, put, refuse_early, source, talk
+from olp.cli.common import diagnostic, files_of, machine_given, plot_ending, put, refuse_early, source
 from olp.cli.options import force_option, json_option, plot_option, setup_options
 from olp.core.errors import UsageError
 
@@ -85,7 +85,7 @@ def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> No
 
     data = calibration_curves(_calibration(session), "png" if Path(name).suffix.lower() == ".png" else "svg")
     write_bytes(name, data, force=force, inputs=inputs)
-    talk(f"wrote {name}")
+    diagnostic(f"wrote {name}")
 
 
 def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from olp.cli.common import exit_for, files_of, put, refuse_early, refuse_twice, talk
+from olp.cli.common import diagnostic, exit_for, files_of, put, refuse_early, refuse_twice
 from olp.cli.options import fail_on_option, force_option, json_option
 from olp.core.errors import UsageError
 from olp.findings.catalogue import Finding
@@ -56,5 +56,5 @@ def end(
     write_files({Path(name): files[name] for name in files_of(*files)}, force=force, inputs=sources)
     put(to_json(result) if as_json else text)
     for name in files_of(*files):
-        talk(f"wrote {name}")
+        diagnostic(f"wrote {name}")
     exit_for(findings, fail_on)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from olp.cli.common import STREAM, exit_for, files_of, given, put, refuse_early, refuse_twice, talk
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, given, put, refuse_early, refuse_twice
 from olp.cli.layouts import layout_of
 from olp.core.errors import UsageError
 
@@ -75,7 +75,7 @@ def run(results: str | None, machine: str | None, job: str | None, asked: Asked)
         put(report_results.to_text(result.report), err=on_stderr)
     if not asked.quiet:
         for path in written:
-            talk(f"wrote {path}")
+            diagnostic(f"wrote {path}")
     exit_for(result.findings, asked.fail_on)
 
 

@@ -11,6 +11,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    diagnostic,
     exit_for,
     files_of,
     given,
@@ -22,7 +23,6 @@ from olp.cli.common import (
     refuse_twice,
     silence_stdout,
     source,
-    talk,
 )
 from olp.cli.options import (
     Length,
@@ -202,7 +202,7 @@ def _say(result: Retiming, out: _Outputs, written: Iterable[Path]) -> None:
 
     if not out.quiet:
         for path in written:
-            talk(f"wrote {path}")
+            diagnostic(f"wrote {path}")
     if out.as_json:
         put(report.to_json(result.report))
     elif not out.quiet:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import STREAM, files_of, given, put, refuse_early, talk
+from olp.cli.common import STREAM, diagnostic, files_of, given, put, refuse_early
 from olp.cli.options import Length, contour_option, force_option, output_option, setup_options
 
 
@@ -43,4 +43,4 @@ def command(
         put(data)
         return
     write_bytes(output, data, force=force, inputs=call.inputs)
-    talk(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")
+    diagnostic(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import STREAM, files_of, given, options_of, put, refuse_early, source, talk
+from olp.cli.common import STREAM, diagnostic, files_of, given, options_of, put, refuse_early, source
 from olp.cli.options import (
     Length,
     confidence_options,
@@ -117,7 +117,9 @@ def command(
 
     write_bytes(output, page.parts(), force=force, inputs=inputs)
     if not quiet:
-        talk(f"wrote {output}: {len(page.scene.samples)} points, {Path(output).stat().st_size / 1e6:.1f} MB")
+        diagnostic(
+            f"wrote {output}: {len(page.scene.samples)} points, {Path(output).stat().st_size / 1e6:.1f} MB"
+        )
 
 
 def _default_output(program: str) -> str:
@@ -127,10 +129,10 @@ def _default_output(program: str) -> str:
 def _serve(make: Callable[[], Review], inputs: tuple[str, ...], port: int, quiet: bool) -> None:
     from olp.review.live import Server
 
-    server = Server(make, inputs, (lambda message: None) if quiet else talk, port)
+    server = Server(make, inputs, (lambda message: None) if quiet else diagnostic, port)
     try:
-        talk(f"serving {server.address} until Ctrl-C")
+        diagnostic(f"serving {server.address} until Ctrl-C")
         server.run()
     except KeyboardInterrupt:
         # the way to end it
-        talk("ended")
+        diagnostic("ended")

@@ -31,7 +31,7 @@ class Alignment:
     rigid: Rigid
     order: Order
     loose: tuple[str, ...]
-    rival: bool = False
+    candidate: bool = False
 
 
 def paired(path: Path, points_mm: Array, order: Order | None, reach_mm: float) -> tuple[Order, Pairing]:
@@ -81,7 +81,7 @@ def align(path: Path, points_mm: Array, reach_mm: float, order: Order | None = N
     good = [f for f in found if f[0] <= _AS_GOOD * least]
     _, order, rigid = good[0]
     some = points_mm[:: max(len(points_mm) // _FIRST, 1)]
-    rival = any(
+    candidate = any(
         np.abs(other(some) - rigid(some)).max() > 10.0 * max(residual, least) + reach_mm
         for residual, _, other in good[1:]
     )
@@ -92,7 +92,7 @@ def align(path: Path, points_mm: Array, reach_mm: float, order: Order | None = N
         if _moves(step, rigid(points_mm[:: max(len(points_mm) // _FEW, 1)])) <= _STILL * residual + 1e-9:
             break
     step, loose, _ = _step(path, rigid(points_mm), order, reach_mm)
-    return Alignment(step.after(rigid), order, loose, rival)
+    return Alignment(step.after(rigid), order, loose, candidate)
 
 
 def refit(path: Path, runs: Sequence[Array], pairings: Sequence[Pairing], reach_mm: float) -> Alignment:

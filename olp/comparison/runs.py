@@ -27,7 +27,7 @@ MOST_OFF = 0.02
 #: places looked at for nearer passes; how much nearer, and above what everyday distance, counts
 _LOOKED, _NEARER, _USUAL = 4096, 10.0, 5.0
 #: a fit that takes more than this share of what there is, hides it
-_EATEN = 0.5
+_ABSORBED = 0.5
 #: covered less than this, a path counts as not measured in part
 _COVERED = 0.98
 
@@ -42,7 +42,7 @@ class Placed:
     rigid: tuple[Rigid, ...]
     fitted: bool
     loose: tuple[str, ...]
-    rival: bool
+    candidate: bool
     right: tuple[bool, ...]
 
 
@@ -67,7 +67,7 @@ def place(
         found = None
     rigid = [Rigid.identity() for _ in points]
     loose: tuple[str, ...] = ()
-    rival = False
+    candidate = False
     fitted = found is None
     if found is None:
         for name, some in list(zip(names, points, strict=True))[: None if how == "each" else 1]:
@@ -81,7 +81,7 @@ def place(
             fits = [_together(path, points, fits[0], order, reach_mm)] * len(points)
         rigid = [f.rigid for f in fits]
         loose = fits[0].loose
-        rival = any(f.rival for f in fits)
+        candidate = any(f.candidate for f in fits)
         found = [paired(path, move(p), order, reach_mm) for move, p in zip(rigid, points, strict=True)]
     runs = [
         Run.of(name, path, move(p), pairing, reach_mm, one)
@@ -89,7 +89,7 @@ def place(
     ]
     orders = [one for one, _ in found]
     right = [_right(path, run, one) for run, one in zip(runs, orders, strict=True)]
-    return Placed(tuple(runs), tuple(orders), tuple(rigid), fitted, loose, rival, tuple(right))
+    return Placed(tuple(runs), tuple(orders), tuple(rigid), fitted, loose, candidate, tuple(right))
 
 
 def _together(
@@ -100,7 +100,7 @@ def _together(
         return first
     moved = [first.rigid(p) for p in points]
     step = refit(path, moved, [paired(path, p, order, reach_mm)[1] for p in moved], reach_mm)
-    return Alignment(step.rigid.after(first.rigid), first.order, step.loose, first.rival)
+    return Alignment(step.rigid.after(first.rigid), first.order, step.loose, first.candidate)
 
 
 def _right(path: Path, run: Run, order: Order) -> bool:
@@ -166,7 +166,7 @@ def _frame_findings(placed: Placed) -> list[Finding]:
     out = [Finding("OLP611", f"shift {x:.4f}, {y:.4f}, {z:.4f} mm, turn {turn:.6f} deg{left}")]
     if placed.loose:
         out.append(Finding("OLP605", f"the path does not determine: {', '.join(placed.loose)}"))
-    if placed.rival:
+    if placed.candidate:
         out.append(Finding("OLP605", "the points fit the path in another place as well"))
     return out
 
@@ -177,7 +177,7 @@ def rms_um(run: Run) -> float:
     return float(np.sqrt(np.mean(size * size))) * UM_PER_MM if len(size) else float("nan")
 
 
-def eaten(path: Path, run: Run, rigid: Rigid) -> tuple[float, float]:
+def absorbed(path: Path, run: Run, rigid: Rigid) -> tuple[float, float]:
     """What the fit took: rms across the path in um of the deviations as stated and after the fit.
 
     It says something where points were stated in the nominal frame, or nearly so.
@@ -190,7 +190,7 @@ def eaten(path: Path, run: Run, rigid: Rigid) -> tuple[float, float]:
     return float(before) * UM_PER_MM, rms_um(run)
 
 
-def eaten_of_field(path: Path, run: Run, error_mm: Array) -> tuple[float, float]:
+def absorbed_of_field(path: Path, run: Run, error_mm: Array) -> tuple[float, float]:
     """What a fit would take of a known field of errors (m, 3) at the feet of a run: rms across the path in um
     of the field, and of what the best fit leaves of it."""
     feet, along = run.pairing.foot_mm[run.counted], path.axes(run.pairing.segment[run.counted])[0]
@@ -204,9 +204,9 @@ def eaten_of_field(path: Path, run: Run, error_mm: Array) -> tuple[float, float]
     return sizes[0], sizes[1]
 
 
-def eaten_finding(before_um: float, after_um: float, whose: str) -> list[Finding]:
+def absorbed_finding(before_um: float, after_um: float, whose: str) -> list[Finding]:
     """OLP604 where the fit took more than half of the mean square."""
-    if not before_um > 0.0 or after_um**2 >= (1.0 - _EATEN) * before_um**2:
+    if not before_um > 0.0 or after_um**2 >= (1.0 - _ABSORBED) * before_um**2:
         return []
     return [Finding(
         "OLP604", f"of {before_um:.3g} um rms {whose}, a best fit leaves {after_um:.3g} um"

@@ -180,7 +180,7 @@ def sampled(
     which = np.repeat(np.arange(len(pieces)), len(share))
     point = _points(start[which], end[which], arcs, pieces.arc[which], spread)
     play = None
-    if model.lost_motion_mm(point[:1]) is not None:
+    if model.backlash_at(point[:1]) is not None:
         play = arc_directions(
             start[which], end[which], arcs.centre_mm[pieces.arc[which]], arcs.plane[pieces.arc[which]],
             arcs.sweep_rad[pieces.arc[which]], spread,

@@ -87,7 +87,7 @@ def _cut_batch(
     share = (np.arange(len(owner)) - first[owner]) / count[owner]
     point = start[owner] + share[:, None] * delta[owner]
     tools = tool if tool.ndim == 1 else tool[owner]
-    play = np.sign(delta)[owner] if model.lost_motion_mm(point[:1]) is not None else None
+    play = np.sign(delta)[owner] if model.backlash_at(point[:1]) is not None else None
     error = point - bent(model, point, tools, play)
     length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
     along = (error * delta[owner]).sum(axis=1) / length2[owner]

@@ -35,7 +35,7 @@ class Reversal:
     @staticmethod
     def of(model: ErrorModel, band_mm: float) -> Reversal | None:
         probe = np.column_stack([np.linspace(low, high, 257) for low, high in model.box_mm])
-        if model.lost_motion_mm(probe) is None:
+        if model.backlash_at(probe) is None:
             return None
         axes = np.zeros(3, bool)
         for axis in range(3):
@@ -61,7 +61,7 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     command, held = rows.command_mm, np.zeros((len(rows), 3))
     still = _still(path, rows)
     for _ in range(_PASSES):
-        lost = model.lost_motion_mm(command)
+        lost = model.backlash_at(command)
         assert lost is not None
         lost = np.maximum(np.nan_to_num(lost), 0.0)
         # where the load is: the command without its lead, and without the hold of the pass before

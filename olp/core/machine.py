@@ -101,7 +101,7 @@ class Tool:
     holder: tuple[HolderPart, ...] = ()
 
     @property
-    def lever_mm(self) -> Vector | None:
+    def tool_vector_mm(self) -> Vector | None:
         """Gauge point to tip; None where only a touch-off value is known."""
         if self.gauge_to_tip_mm is not None:
             return self.gauge_to_tip_mm

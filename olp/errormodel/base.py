@@ -55,7 +55,7 @@ class ErrorModel(Protocol):
         """(3, 3): [i, j] is True where error component i changes with the position of axis j."""
         ...
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+    def backlash_at(self, axis_mm: Array) -> Array | None:
         """(n, 3) lost motion b of each axis at its position, None where no axis has any."""
         ...
 

@@ -12,7 +12,7 @@ from olp.core.machine import CHAINS, Vector
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.components import AxisComponents
-from olp.errormodel.levers import Levers, levers_of
+from olp.errormodel.lever_arms import LeverArms, lever_arms_of
 from olp.errormodel.sources.squareness import shears
 
 #: Short forms of sine and cosine may miss this much, over the box and with this much tool.
@@ -31,7 +31,7 @@ class Body:
     components: AxisComponents
     shear: Vector
     datum_mm: float
-    levers: Levers
+    lever_arms: LeverArms
     sine_terms: int
 
 
@@ -49,18 +49,18 @@ def build_bodies(
         carries = chain.index(axis) < chain.index("F")
         j = AXES.index(axis)
         components = AxisComponents.of(calibration, axis, skip)
-        levers = levers_of(
+        lever_arms = lever_arms_of(
             calibration.curves_of(axis), calibration.datum_mm, axis, after, carries, tool_terms
         )
-        terms = _sine_terms(components, levers, calibration.box_mm)
-        bodies.append(Body(j, carries, components, tilts[axis], calibration.datum_mm[j], levers, terms))
+        terms = _sine_terms(components, lever_arms, calibration.box_mm)
+        bodies.append(Body(j, carries, components, tilts[axis], calibration.datum_mm[j], lever_arms, terms))
     return tuple(bodies)
 
 
-def _sine_terms(components: AxisComponents, levers: Levers, box_mm: Array) -> int:
+def _sine_terms(components: AxisComponents, lever_arms: LeverArms, box_mm: Array) -> int:
     peak = max((v.peak for v in components.variation[3:] if v is not None), default=0.0)
     tool = np.array([[TOOL_REACH_MM] * 3, [-TOOL_REACH_MM] * 3])
-    reach = max(float(lever.reach_mm(box_mm, tool).max()) for _, lever in levers)
+    reach = max(float(lever_arm.reach_mm(box_mm, tool).max()) for _, lever_arm in lever_arms)
     if peak**4 / 8.0 * reach > TRIGONOMETRY_MM:
         return 0
     return 2 if peak**3 / 6.0 * reach > TRIGONOMETRY_MM else 1

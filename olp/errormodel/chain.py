@@ -18,7 +18,7 @@ from olp.errormodel.bodies import Body
 from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
-from olp.errormodel.levers import CROSS
+from olp.errormodel.lever_arms import CROSS
 
 #: A block's columns stay near the second-level cache (1 MB); measured best of 2k to 32k.
 BLOCK = 16384
@@ -83,10 +83,10 @@ class RigidBody(Boxed):
         hidden = None if unknown is None else unknown @ self.depends_on.T
         tool = self._arms(as_tool(tool_mm, len(points)), slice(None))
         for body in sorted(self.bodies, key=lambda b: b.axis):
-            levers = [(rows, lever.at(position, tool)) for rows, lever in body.levers]
+            lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
             moved = None if states is None else states[:, body.axis]
             for name, six in body.components.sources(position[body.axis], moved):
-                value = _columns(_first_order(six, levers), len(points))
+                value = _columns(_first_order(six, lever_arms), len(points))
                 if np.any(value != 0.0):
                     yield name, _hide(value, hidden)
             for i, name in ((0, "C0Y" if body.axis == 1 else "B0Z"), (1, "A0Z")):
@@ -103,10 +103,10 @@ class RigidBody(Boxed):
             depends = self._depends_after(body, depends)
         return depends
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+    def backlash_at(self, axis_mm: Array) -> Array | None:
         points = as_points(axis_mm)
         position, unknown = self._positions(points)
-        found = {b.axis: b.components.lost_motion_mm(position[b.axis]) for b in self.bodies}
+        found = {b.axis: b.components.backlash_at(position[b.axis]) for b in self.bodies}
         if all(lost is None for lost in found.values()):
             return None
         result = np.zeros(points.shape)
@@ -163,8 +163,8 @@ class RigidBody(Boxed):
                     )
                     turned = self._turn(body, six, position, tool, carried)
                 else:
-                    levers = [(rows, lever.at(position, tool)) for rows, lever in body.levers]
-                    turned = _first_order((None, None, None, *six[3:]), levers)
+                    lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
+                    turned = _first_order((None, None, None, *six[3:]), lever_arms)
             error = [_sum(_sum(error[i], six[i]), _sum(shift[i], turned[i])) for i in range(3)]
         return error
 
@@ -174,8 +174,8 @@ class RigidBody(Boxed):
         if body.carries_workpiece:
             angles.reverse()
         turned: Three = [None, None, None]
-        for rows, lever in body.levers:
-            arm = lever.at(position, tool)
+        for rows, lever_arm in body.lever_arms:
+            arm = lever_arm.at(position, tool)
             moved = _rotate(angles, [_plus(arm[k], carried[k]) for k in range(3)])
             for i in rows:
                 turned[i] = moved[i]
@@ -190,9 +190,9 @@ class RigidBody(Boxed):
         for i in range(3):
             if varies[i] or body.shear[i] != 0.0:
                 result[i] |= own
-        for rows, lever in body.levers:
-            arm = np.diag(lever.moves)
-            present = np.array(lever.moves) | self.tool_terms
+        for rows, lever_arm in body.lever_arms:
+            arm = np.diag(lever_arm.moves)
+            present = np.array(lever_arm.moves) | self.tool_terms
             turned = np.zeros((3, 3), dtype=np.bool_)
             if self.exact:
                 carried = arm | depends
@@ -214,14 +214,14 @@ class RigidBody(Boxed):
         return result
 
 
-def _first_order(six: Six, levers: list[tuple[tuple[int, ...], list[Column]]]) -> Three:
+def _first_order(six: Six, lever_arms: list[tuple[tuple[int, ...], list[Column]]]) -> Three:
     """E + eps x lever, each row with its own lever."""
     value: Three = list(six[:3])
-    for rows, lever in levers:
+    for rows, lever_arm in lever_arms:
         for i, a, k, sign in CROSS:
             angle = six[3 + a]
             if i in rows and angle is not None:
-                value[i] = _sum(value[i], sign * (angle * lever[k]))
+                value[i] = _sum(value[i], sign * (angle * lever_arm[k]))
     return value
 
 

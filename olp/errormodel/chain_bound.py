@@ -98,7 +98,7 @@ def _axis_bound(body: Body, reach: Array, extra: float, widened: float, lipschit
     for i, part in enumerate(parts[:3]):
         if part is not None:
             rows[i].add(part, 1.0 + extra)
-    moves = {i: lever.moves for members, lever in body.levers for i in members}
+    moves = {i: lever_arm.moves for members, lever_arm in body.lever_arms for i in members}
     for a, part in enumerate(parts[3:]):
         if part is None or not part.varies:
             continue
@@ -145,6 +145,6 @@ def _joined(rows: list[Array]) -> Array:
 def _reach(body: Body, box_mm: Array, tool: Array) -> Array:
     """(3, 3) largest |coordinate k| of the lever of row i."""
     reach = np.zeros((3, 3))
-    for members, lever in body.levers:
-        reach[list(members)] = lever.reach_mm(box_mm, tool)
+    for members, lever_arm in body.lever_arms:
+        reach[list(members)] = lever_arm.reach_mm(box_mm, tool)
     return reach

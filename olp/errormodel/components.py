@@ -11,7 +11,7 @@ from olp.core.interpolation import ON_GRID_MM, Column, DenseTable, Interpolant, 
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.chord import Variation
-from olp.errormodel.levers import DIRECTIONS
+from olp.errormodel.lever_arms import DIRECTIONS
 from olp.errormodel.sources.cyclic import Cyclic, cyclic_value
 
 #: Resampling stays this close to the interpolated curve: a ten-thousandth of a micrometre, at 1 m too.
@@ -88,7 +88,7 @@ class AxisComponents:
                 found.append((f"lost motion {axis}", _six(lost)))
         return found
 
-    def lost_motion_mm(self, q: Array) -> Column | None:
+    def backlash_at(self, q: Array) -> Column | None:
         """Lost motion at q (n,): backward minus forward; None where the axis has none."""
         if self.backlash_mm != 0.0:
             return self.backlash_mm

@@ -50,7 +50,7 @@ class Place:
     q: Array
     play: Array | None
     datum_mm: float
-    levers: list[tuple[tuple[int, ...], list[Column]]]
+    lever_arms: list[tuple[tuple[int, ...], list[Column]]]
 
 
 class Numbers:
@@ -98,7 +98,7 @@ def component_acts(name: str, side: Column, place: Place) -> Iterator[tuple[int,
     # eps x lever: an angle about a moves row a - 1 by its arm along a + 1, and row a + 1 by minus that along
     # a - 1
     after, before = (d - 2) % 3, (d - 1) % 3
-    for rows, arm in place.levers:
+    for rows, arm in place.lever_arms:
         if before in rows:
             yield before, side * arm[after]
         if after in rows:

@@ -19,7 +19,7 @@ from olp.core.units import AXES
 from olp.errormodel.boxed import Boxed, as_points, as_tool, payload_of
 from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import ComponentTable
-from olp.errormodel.levers import CROSS, DIRECTIONS, Levers, levers_of
+from olp.errormodel.lever_arms import CROSS, DIRECTIONS, LeverArms, lever_arms_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class GridBody:
     grid: Grid
     bound: GridBound
     column: tuple[int | None, ...]
-    levers: Levers
+    lever_arms: LeverArms
     mass_kg: float | None
     tool_terms: bool
 
@@ -58,14 +58,14 @@ class GridBody:
             table.knots_mm, np.stack([table.columns[n] for n in names], axis=-1), table.interpolation
         )
         column = tuple(names.index(n) if (n := f"E{d}{table.axis}") in names else None for d in DIRECTIONS)
-        levers = levers_of(tuple(beside), datum_mm, table.axis, after, carries, tool_terms)
+        lever_arms = lever_arms_of(tuple(beside), datum_mm, table.axis, after, carries, tool_terms)
         return cls(
             axis=AXES.index(table.axis),
             axes=tuple(AXES.index(a) for a in table.arguments),
             grid=grid,
             bound=GridBound.of(grid, table.arguments),
             column=column,
-            levers=levers,
+            lever_arms=lever_arms,
             mass_kg=mass_kg,
             tool_terms=tool_terms,
         )
@@ -89,8 +89,8 @@ class GridBody:
             if d < 3:
                 out[:, d] = value[:, column]
             else:
-                for rows, lever in self.levers:
-                    arm = lever.at(at, list(arms))
+                for rows, lever_arm in self.lever_arms:
+                    arm = lever_arm.at(at, list(arms))
                     for i, a, k, sign in CROSS:
                         if i in rows and a == d - 3:
                             out[:, i] += sign * value[:, column] * arm[k]
@@ -121,12 +121,12 @@ class GridBody:
         for i, column in enumerate(self.column[:3]):
             if column is not None:
                 out[i, list(self.axes)] |= varies[column]
-        for rows, lever in self.levers:
+        for rows, lever_arm in self.lever_arms:
             for i, a, k, _ in CROSS:
                 column = self.column[3 + a]
                 if i in rows and column is not None and np.any(self.grid.values[..., column]):
                     out[i] |= turns[a]
-                    out[i, k] |= lever.moves[k]
+                    out[i, k] |= lever_arm.moves[k]
         return out
 
     def chord_bound(self, delta: Array, tool: Array, payload_kg: Array | float, box_mm: Array) -> Array:
@@ -136,14 +136,14 @@ class GridBody:
         for i, column in enumerate(self.column[:3]):
             if column is not None:
                 out[:, i] += departure[:, column]
-        for rows, lever in self.levers:
-            reach = lever.reach_mm(box_mm, tool)
+        for rows, lever_arm in self.lever_arms:
+            reach = lever_arm.reach_mm(box_mm, tool)
             for i, a, k, _ in CROSS:
                 column = self.column[3 + a]
                 if i not in rows or column is None:
                     continue
                 out[:, i] += departure[:, column] * reach[k]
-                if lever.moves[k]:
+                if lever_arm.moves[k]:
                     out[:, i] += 0.25 * change[:, column] * np.abs(delta[:, k])
         return np.asarray(out * np.reshape(np.abs(self.weight(payload_kg)), (-1, 1)))
 
@@ -211,7 +211,7 @@ class GridErrors(Boxed):
     def depends_on(self) -> Mask:
         return np.asarray(np.any([body.depends_on() for body in self.bodies], axis=0))
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+    def backlash_at(self, axis_mm: Array) -> Array | None:
         return None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:

@@ -22,30 +22,30 @@ from olp.errormodel.boxed import as_points
 
 def plays(model: ErrorModel, axis_mm: Array) -> Array | None:
     """(n, 3) play at successive commands (n, 3) from an unknown start; None where no axis has lost motion."""
-    width = model.lost_motion_mm(axis_mm)
+    width = model.backlash_at(axis_mm)
     return None if width is None else play_states(axis_mm, width)
 
 
-def play_states(axis_mm: Array, lost_motion_mm: Array, start: Array | None = None) -> Array:
+def play_states(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> Array:
     """(n, 3) play in [-1, 1] at each of successive commands axis_mm (n, 3) with lost motion (n, 3) or (3,).
 
     `start` (3,) is the play at the first command; None or NaN there: unknown. The middle of what is possible
     is returned: 0 until a motion narrows it. Raises UsageError for a wrong shape.
     """
-    low, high = play_interval(axis_mm, lost_motion_mm, start)
+    low, high = play_interval(axis_mm, backlash_mm, start)
     low += high
     low *= 0.5
     return low
 
 
-def play_interval(axis_mm: Array, lost_motion_mm: Array, start: Array | None = None) -> tuple[Array, Array]:
+def play_interval(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> tuple[Array, Array]:
     """Least and greatest possible play, both (n, 3); equal once the lost motion has been taken up.
 
     A NaN command (an axis whose position is not known) makes the state unknown there and at the next one; a
     NaN lost motion counts as none.
     """
     commands = as_points(axis_mm)
-    width = np.asarray(lost_motion_mm, dtype=np.float64)
+    width = np.asarray(backlash_mm, dtype=np.float64)
     if width.shape not in ((3,), commands.shape):
         raise UsageError(f"lost_motion_mm has shape {width.shape}; expected (3,) or {commands.shape}")
     state = np.full(3, np.nan) if start is None else np.asarray(start, dtype=np.float64)

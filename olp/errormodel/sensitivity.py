@@ -135,10 +135,10 @@ class Sensitivity:
         if self.tool_terms:
             tool = [tool_mm[..., k] for k in range(3)]
         for body in self.bodies:
-            levers = [(rows, lever.at(position, tool)) for rows, lever in body.levers]
+            lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
             q = position[body.axis]
             state = None if play is None else play[:, body.axis]
-            place = Place(body.axis, q, state, body.datum_mm, levers)
+            place = Place(body.axis, q, state, body.datum_mm, lever_arms)
             for entry, first, spare in zip(self.entries, self.first, self.spare, strict=True):
                 if AXES.index(entry.name[-1]) != body.axis:
                     continue

@@ -35,8 +35,8 @@ class Total:
     def depends_on(self) -> Mask:
         return np.asarray(np.any([model.depends_on for model in self.models], axis=0))
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
-        found = [lost for model in self.models if (lost := model.lost_motion_mm(axis_mm)) is not None]
+    def backlash_at(self, axis_mm: Array) -> Array | None:
+        found = [lost for model in self.models if (lost := model.backlash_at(axis_mm)) is not None]
         return sum(found[1:], found[0]) if found else None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:

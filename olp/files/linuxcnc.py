@@ -239,7 +239,7 @@ def _tools(reading: Reading, ini: Path) -> dict[int, Tool]:
         if number in tools:
             reading.notes.append(f"Tool {number} stands twice in {name}; the last row is taken.")
         tools[number] = Tool(number, length_mm=(x, y, z), radius_mm=abs(words.get("D", 0.0)) * reading.mm / 2)
-    negative = [str(number) for number, tool in tools.items() if tool.lever_mm is None]
+    negative = [str(number) for number, tool in tools.items() if tool.tool_vector_mm is None]
     if negative:
         reading.notes.append(
             f"Tools {', '.join(negative)} have a negative Z, a touch-off value and no length: "

@@ -127,8 +127,8 @@ class ToolTable(Table):
     @field_validator("holder")
     @classmethod
     def _shorter_than_tool(cls, value: list[HolderTable], info: ValidationInfo) -> list[HolderTable]:
-        lever = info.data.get("gauge_to_tip_mm")
-        reach = abs(lever[2]) if lever is not None else abs(info.data.get("Z_mm", 0.0))
+        tool_vector = info.data.get("gauge_to_tip_mm")
+        reach = abs(tool_vector[2]) if tool_vector is not None else abs(info.data.get("Z_mm", 0.0))
         total = sum(part.length_mm for part in value)
         if value and total >= reach:
             raise refusal(

@@ -30,7 +30,7 @@ class Support(Enum):
 
     CORRECTED = "corrected"  #: its coordinates are edited
     READ = "read"  #: changes how later statements are understood; its bytes are carried
-    CARRIED = "carried"  #: means nothing to the path
+    UNCHANGED = "carried"  #: means nothing to the path
     REFUSED = "refused"  #: may move the machine in a way that is not read
 
 

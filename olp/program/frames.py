@@ -39,7 +39,7 @@ def turned(turn: Turn | None, vector: Vector) -> Vector:
     return (x, y, z)
 
 
-def lever_of(setup: Setup, number: int, line: int) -> Vector:
+def tool_vector_of(setup: Setup, number: int, line: int) -> Vector:
     """Gauge point to tip of a tool. Raises ProgramError where it is not defined."""
     tool = setup.tool(number)
     if tool is None:
@@ -48,14 +48,14 @@ def lever_of(setup: Setup, number: int, line: int) -> Vector:
             "job file",
             line=line,
         )
-    lever = tool.lever_mm
-    if lever is None:
+    tool_vector = tool.tool_vector_mm
+    if tool_vector is None:
         raise ProgramError(
             f"tool {number} has Z_mm = {tool.length_mm[2]:g}, a touch-off value and no length; "
             f"give tools.{number}.gauge_to_tip_mm",
             line=line,
         )
-    return lever
+    return tool_vector
 
 
 def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
@@ -63,22 +63,22 @@ def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
     was located by other means."""
     if work.set_by == "true":
         return None
-    length = lever = ZERO
+    length = tool_vector = ZERO
     if work.touch_tool is not None:
         tool = setup.tool(work.touch_tool)
-        if tool is None or tool.lever_mm is None:
+        if tool is None or tool.tool_vector_mm is None:
             raise ProgramError(
                 f"work offset {work.name} was touched off with tool {work.touch_tool}, "
                 "whose lever is not defined; give its Z_mm or gauge_to_tip_mm",
                 line=line,
             )
-        length, lever = tool.length_mm, tool.lever_mm
+        length, tool_vector = tool.length_mm, tool.tool_vector_mm
     at = [
         work.offset_mm[i] + length[i] if stated is None else stated
         for i, stated in enumerate(work.touched_at_mm)
     ]
     payload = setup.job.payload_kg if work.touched_payload_kg is None else work.touched_payload_kg
-    return (at[0], at[1], at[2]), carried(lever, payload)
+    return (at[0], at[1], at[2]), carried(tool_vector, payload)
 
 
 class FrameTable:
@@ -108,17 +108,17 @@ class FrameTable:
         unit_mm: float,
         tool: int | None = None,
         length: Vector = ZERO,
-        lever: Vector = ZERO,
+        tool_vector: Vector = ZERO,
         axis: Vector = UP,
         tool_touched: Touch | None = None,
     ) -> int:
         """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
         machine from tip to gauge point. Raises ProgramError for a tilted tool with a lever to the side."""
         if axis != UP:
-            length, lever = (_tilted(v, axis, tool, line) for v in (length, lever))
+            length, tool_vector = (_tilted(v, axis, tool, line) for v in (length, tool_vector))
         x, y, z = (o + n for o, n in zip(work.offset_mm, length, strict=True))
         frame = Frame(
-            unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=lever, tool=tool,
+            unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=tool_vector, tool=tool,
             work_offset=work.name, touched=touch_of(self.setup, work, line), tool_touched=tool_touched,
             turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg,
         )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from olp.core.machine import ZERO, Setup
-from olp.program.frames import FrameTable, lever_of
+from olp.program.frames import FrameTable, tool_vector_of
 
 
 def frame_index(
@@ -12,10 +12,12 @@ def frame_index(
     """The number of the frame; `tool` None is the one in the spindle at the start. Raises ProgramError."""
     work = table.work_offset(name, line, "this position")
     number = setup.machine.default_tool if tool is None else tool
-    length = lever = ZERO
+    length = tool_vector = ZERO
     if number:
-        lever = lever_of(setup, number, line)
+        tool_vector = tool_vector_of(setup, number, line)
         found = setup.tool(number)
         if found is not None and setup.machine.length_active:
             length = found.length_mm
-    return table.index(work, line, unit_mm=unit_mm, tool=number or None, length=length, lever=lever)
+    return table.index(
+        work, line, unit_mm=unit_mm, tool=number or None, length=length, tool_vector=tool_vector
+    )

@@ -40,7 +40,7 @@ class Deviation:
     path: Single
     bend: Single
     judged: Mask
-    flank: Array
+    side: Array
 
     def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
         """Largest and rms in um, at waypoints of all judged moves and along those that are `cutting`."""
@@ -86,19 +86,19 @@ def measure(
     judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
     if exempt is not None:
         judged &= ~exempt
-    flank = _unknown_flank(path, groups, model)
-    judged &= ~(flank > bend_mm)
+    side = _unknown_side(path, groups, model)
+    judged &= ~(side > bend_mm)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     for a in range(0, count, _BLOCK):
         b = min(a + _BLOCK, count)
         tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
-    return Deviation(waypoint, worst, bend, judged, flank)
+    return Deviation(waypoint, worst, bend, judged, side)
 
 
-def _unknown_flank(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
+def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is
     more. It shrinks as an axis moves in both directions, and is gone once that range is the backlash."""
-    width = model.lost_motion_mm(path.end_mm) if len(groups) else None
+    width = model.backlash_at(path.end_mm) if len(groups) else None
     if width is None:
         return np.zeros(len(groups))
     out = np.zeros(len(path))
@@ -125,7 +125,7 @@ class Tracer:
         self.play: Array | None = None
         self.last: Array | None = None
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
-        self.has_play = model.lost_motion_mm(np.array(model.box_mm).mean(axis=1)[None]) is not None
+        self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.nominal_arc = _arc_index(nominal)
         self.path_arc = _arc_index(path)
 
@@ -233,7 +233,7 @@ class Tracer:
         play = None
         if self.has_play and len(point):
             chain = point if self.last is None else np.concatenate((self.last, point))
-            width = self.model.lost_motion_mm(chain)
+            width = self.model.backlash_at(chain)
             assert width is not None
             play = play_states(chain, width, self.play)[len(chain) - len(point) :]
             self.last, self.play = point[-1:], play[-1]

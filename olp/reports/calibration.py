@@ -360,7 +360,7 @@ def _measurement(found: Evaluated) -> list[tuple[str, str]]:
     m = found.measurements
     lengths = [line for line in m.lines if line.quantity != "angle"]
     places = sorted({_place(line) for line in lengths})
-    levers = sorted({_vector(line.tool_mm) for line in lengths})
+    tool_vectors = sorted({_vector(line.tool_mm) for line in lengths})
     periods = ", ".join(
         f"{axis} {', '.join(f'{p:g}' for p in own)} mm"
         for axis, own in zip(AXES, m.periods_mm, strict=True)
@@ -372,7 +372,7 @@ def _measurement(found: Evaluated) -> list[tuple[str, str]]:
         ("Temperature of the scales", f"{m.temperature_degC:g} degC"),
         ("Lines", f"{len(m.lines)}, {sum(len(line.value) for line in m.lines)} readings"),
         ("Lines stood at", "; ".join(places[:6]) + ("; ..." if len(places) > 6 else "")),
-        ("Tool vectors", "; ".join(levers[:6]) + ("; ..." if len(levers) > 6 else "")),
+        ("Tool vectors", "; ".join(tool_vectors[:6]) + ("; ..." if len(tool_vectors) > 6 else "")),
         ("Periods looked for", periods),
         ("Corrected by the control then", ", ".join(sorted(m.active_during_measurement))),
         ("Instruments", ", ".join(sorted({line.instrument for line in m.lines if line.instrument}))),

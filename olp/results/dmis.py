@@ -17,7 +17,7 @@ from olp.program.dmis.dialect import DIALECT as DMIS
 from olp.program.dmis.events import MACHINE_FRAME
 from olp.program.text.numbers import Number, number
 from olp.program.text.statements import Comment, Statement, chunks
-from olp.results.reported import Carried, Reported, Stated
+from olp.results.reported import Reported, Stated, Unchanged
 from olp.results.table import stated_in
 
 _UNITS = {b"MM": 1.0, b"CM": 10.0, b"M": 1000.0, b"INCH": 25.4, b"FEET": 304.8}
@@ -70,7 +70,7 @@ class _Reader:
         self.units: list[float] = []
         self.approaches: list[float] = []
         self.names: list[str] = []
-        self.carried: list[Carried] = []
+        self.carried: list[Unchanged] = []
         self.stated: list[Stated] = []
 
     def statement(self, found: Statement) -> None:
@@ -87,7 +87,7 @@ class _Reader:
             self._point(found, major.decode(), rest, at)
         elif kind == b"TA":
             name = f"TA({(label or b'').decode('latin-1')})"
-            self.carried.append(Carried(found.line, name, _EVALUATED))
+            self.carried.append(Unchanged(found.line, name, _EVALUATED))
         elif kind in (b"D", b"DA"):
             self.frame = (label or b"").decode("latin-1")
         elif kind is None:
@@ -134,7 +134,7 @@ class _Reader:
         kind, _, tail = rest.partition(b",")
         if kind.strip().upper() != b"POINT":
             what = kind.strip().upper().decode("latin-1")
-            self.carried.append(Carried(found.line, f"{name}, a {what},", _COMPOSED))
+            self.carried.append(Unchanged(found.line, f"{name}, a {what},", _COMPOSED))
             return
         self._point(found, name, tail, at + len(kind) + 1)
 

@@ -42,7 +42,7 @@ class Stylus:
     """Length that enters axis positions, lever from gauge point to tip, radius of the tip, all in mm."""
 
     length_mm: Vector
-    lever_mm: Vector
+    tool_vector_mm: Vector
     radius_mm: float
 
 
@@ -56,7 +56,7 @@ class Forward:
     """
 
     axis_mm: Array
-    lever_mm: Array
+    tool_vector_mm: Array
     added_mm: Array
     play: Array | None
     doubt_mm: Array
@@ -82,13 +82,13 @@ def forward(
     rotation = np.array([p.rotation for p in places])[reported.frame]
     offset = np.array([p.offset_mm for p in places])[reported.frame]
     length = np.array([s.length_mm for s in styli])[reported.tool]
-    lever = np.array([s.lever_mm for s in styli], float)[reported.tool]
+    tool_vector = np.array([s.tool_vector_mm for s in styli], float)[reported.tool]
     radius = np.array([s.radius_mm for s in styli])[reported.tool]
     own = np.isfinite(reported.stylus_mm).all(axis=1)
     # a row's own stylus vector stands for the tool's, whose length is minus its vector
-    length[own], lever[own] = -reported.stylus_mm[own], reported.stylus_mm[own]
+    length[own], tool_vector[own] = -reported.stylus_mm[own], reported.stylus_mm[own]
     if axes == "ram":
-        length = -lever
+        length = -tool_vector
     elif axes == "tip":
         length[:] = 0.0
     if reported.tip_radius_mm is not None:
@@ -102,7 +102,9 @@ def forward(
         _inside(reported, axis, model)
     toward = np.einsum("nij,nj->ni", rotation, normal)
     play, play_doubt = _play(model, axis, toward, reported.approach_mm)
-    arms = np.column_stack([lever, np.full(len(lever), payload_kg)]) if payload_kg else lever
+    arms = (
+        np.column_stack([tool_vector, np.full(len(tool_vector), payload_kg)]) if payload_kg else tool_vector
+    )
     error = model.error(axis, arms, play)
     doubt = np.zeros(len(reported))
     # centre or surface, and from which side: the error at the other places of the tip bounds the doubt
@@ -117,7 +119,7 @@ def forward(
             at, arm = place.touched
             shift[k] = model.error(np.array([at]), np.array(arm, float))[0]
     added = np.einsum("nji,nj->ni", rotation, error - shift[reported.frame])
-    return Forward(axis, lever, added, play, doubt, play_doubt)
+    return Forward(axis, tool_vector, added, play, doubt, play_doubt)
 
 
 def _unit(normal: Array) -> Array:
@@ -148,7 +150,7 @@ def _play(model: ErrorModel, axis: Array, toward: Array, approach: Array) -> tup
     A touch is made while the machine moves against the surface, so axes that took up their lost motion on the
     way of the approach rest on that flank.
     """
-    lost = model.lost_motion_mm(axis)
+    lost = model.backlash_at(axis)
     if lost is None:
         return None, np.zeros(len(axis))
     away = np.nan_to_num(toward)

@@ -43,10 +43,10 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
     spindle at the start. With `by_row` the rows state their vectors, and a tool only gives the radius. Raises
     ConfigError."""
     usual = setup.tool(setup.machine.default_tool) if setup.machine.default_tool else None
-    lever = setup.stylus(str(label)) if label is not None else None
-    if lever is not None:
-        x, y, z = lever
-        return Stylus((0.0 - x, 0.0 - y, 0.0 - z), lever, usual.radius_mm if usual else 0.0)
+    tool_vector = setup.stylus(str(label)) if label is not None else None
+    if tool_vector is not None:
+        x, y, z = tool_vector
+        return Stylus((0.0 - x, 0.0 - y, 0.0 - z), tool_vector, usual.radius_mm if usual else 0.0)
     number = setup.machine.default_tool if label is None else label
     if number is None and by_row:
         return Stylus(ZERO, ZERO, 0.0)
@@ -65,6 +65,6 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
             f'stylus {number} is not defined; give [styli."{number}"] offset_mm = [x, y, z] in the machine '
             "or job file, end of the ram to centre of the tip, or the number of a tool with --tool"
         )
-    if tool.lever_mm is None and not by_row:
+    if tool.tool_vector_mm is None and not by_row:
         raise ConfigError(f"stylus {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm")
-    return Stylus(tool.length_mm, tool.lever_mm or ZERO, tool.radius_mm)
+    return Stylus(tool.length_mm, tool.tool_vector_mm or ZERO, tool.radius_mm)

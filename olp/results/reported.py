@@ -10,7 +10,7 @@ from olp.program.text.numbers import Number
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class Unchanged:
     """A statement whose values stay as they are, and why."""
 
     line: int
@@ -60,7 +60,7 @@ class Reported:
     point: str | None = None
     axes_at_ram: bool = False
     tip_radius_mm: float | None = None
-    carried: tuple[Carried, ...] = ()
+    carried: tuple[Unchanged, ...] = ()
     stated: tuple[Stated, ...] = ()
     assumed: tuple[str, ...] = field(default=())
 

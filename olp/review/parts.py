@@ -203,6 +203,6 @@ def error_mm(model: ErrorModel, points: Array, tool: Array, move: Index, play: A
     out = np.empty_like(points)
     for a in range(0, len(points), BLOCK):
         rows = slice(a, a + BLOCK)
-        lever = tool if tool.ndim == 1 else tool[move[rows]]
-        out[rows] = model.error(points[rows], lever, None if play is None else play[rows])
+        tool_vector = tool if tool.ndim == 1 else tool[move[rows]]
+        out[rows] = model.error(points[rows], tool_vector, None if play is None else play[rows])
     return out

@@ -124,9 +124,9 @@ def by_source(
     found: dict[str, npt.NDArray[np.float32]] = {}
     for a in range(0, len(samples), BLOCK):
         rows = slice(a, a + BLOCK)
-        lever = tool if tool.ndim == 1 else tool[samples.move[rows]]
+        tool_vector = tool if tool.ndim == 1 else tool[samples.move[rows]]
         play = None if samples.play is None else samples.play[rows]
-        for name, value in model.contributions(samples.axis_mm[rows], lever, play):
+        for name, value in model.contributions(samples.axis_mm[rows], tool_vector, play):
             size = found.setdefault(name, np.zeros(len(samples), np.float32))
             size[rows] = np.sqrt(np.einsum("ij,ij->i", value, value))
     yield from sorted(found.items(), key=lambda item: -float(item[1].max(initial=0.0)))
@@ -147,8 +147,8 @@ def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:
     which = which[known[which] & (path.kind[which] != Kind.RAPID)]
     if which.size:
         tool = path.tool_mm()
-        lever = tool if tool.ndim == 1 else tool[which]
-        finer = steps_needed(model, delta[which], lever, BEND_MM, at_most=_MOST_STEPS)
+        tool_vector = tool if tool.ndim == 1 else tool[which]
+        finer = steps_needed(model, delta[which], tool_vector, BEND_MM, at_most=_MOST_STEPS)
         steps[which] = np.maximum(steps[which], finer)
     arcs = path.arcs
     if len(arcs):

@@ -19,7 +19,7 @@ from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
-from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, Rival, Run, Solver
+from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, Candidate, Run, Solver
 from olp.trajectory.speedgrid import bound_s
 
 #: a limit may be touched; so much above it is rounding
@@ -48,40 +48,40 @@ class Found:
         return self.motion if self.factor == 1.0 else self.motion.slowed(self.factor)
 
 
-def fastest(run: Run, rivals: tuple[Rival, ...], optimise: bool) -> Found | None:
+def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Found | None:
     """The fastest of what the solvers find; those that were given no chance are asked when all else fails,
     and the last one then: stops everywhere are never the fastest."""
     best: Found | None = None
-    for rival in rivals:
-        if best is None or rival.least_s < best.duration_s:
-            best = _better(run, rival.solver, best)
-    if optimise and best is not None and any(rival.solver.bends for rival in rivals):
+    for candidate in candidates:
+        if best is None or candidate.least_s < best.duration_s:
+            best = _better(run, candidate.solver, best)
+    if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
         best = _optimised(run, best)
-    asked = [rival.solver for rival in rivals]
+    asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
             best = _better(run, solver, best)
     return best
 
 
-def contest(run: Run, rivals: tuple[Rival, ...]) -> list[tuple[int, int, Found]]:
+def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Found]]:
     """First and last way-point of runs that one solver drives best, one after the other; none where a solver
     fails, or has to be slowed down because of one run."""
-    all_found = [_better(run, rival.solver, None) for rival in rivals]
-    candidates = [found for found in all_found if found is not None and found.factor == 1.0]
-    if len(candidates) < len(rivals):
+    all_found = [_better(run, candidate.solver, None) for candidate in candidates]
+    whole = [found for found in all_found if found is not None and found.factor == 1.0]
+    if len(whole) < len(candidates):
         return []
     stops = stops_of(run.route)
-    of_run = [np.searchsorted(stops, found.motion.line, side="right") - 1 for found in candidates]
+    of_run = [np.searchsorted(stops, found.motion.line, side="right") - 1 for found in whole]
     seconds = np.stack([
         np.bincount(of, np.diff(found.motion.start_s), minlength=len(stops) - 1)
-        for of, found in zip(of_run, candidates, strict=True)
+        for of, found in zip(of_run, whole, strict=True)
     ])  # fmt: skip
     winner = np.argmin(seconds, axis=0)
     edges = np.concatenate(([0], 1 + np.flatnonzero(np.diff(winner)), [len(winner)]))
     out = []
     for a, b in pairwise(edges.tolist()):
-        found, of = candidates[winner[a]], of_run[winner[a]]
+        found, of = whole[winner[a]], of_run[winner[a]]
         pieces = slice(int(np.searchsorted(of, a)), int(np.searchsorted(of, b)))
         out.append((int(stops[a]), int(stops[b]), replace(found, motion=found.motion.part(pieces))))
     return out

@@ -136,11 +136,11 @@ def _legs(
         ),
         limits,
     )  # fmt: skip
-    if stretch.runs == 1 or len(stretch.rivals) == 1:
-        found = fastest(run, stretch.rivals, stretch.segments >= least and stretch.runs == 1)
+    if stretch.runs == 1 or len(stretch.candidates) == 1:
+        found = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
         chosen = [] if found is None else [(0, last - first, found)]
     else:
-        chosen = contest(run, stretch.rivals)
+        chosen = contest(run, stretch.candidates)
     if chosen:
         motion = Motion.joined(found.driven() for _, _, found in chosen)
         legs = [
@@ -156,7 +156,7 @@ def _legs(
     if len(stops) <= 2:
         raise CannotCompute(f"no solver found a motion along line {int(route.line[first])}")
     for begin, end in pairwise(stops.tolist()):
-        yield from _legs(route, limits, Stretch(begin, end, stretch.rivals), least)
+        yield from _legs(route, limits, Stretch(begin, end, stretch.candidates), least)
 
 
 def _with_dwells(route: Route, first: int, last: int, motion: Motion) -> Motion:

@@ -57,7 +57,7 @@ class Solver:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rival:
+class Candidate:
     """A solver, and the seconds that it is expected to take at least."""
 
     solver: Solver

@@ -10,7 +10,7 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.trajectory.contest import stops_of
 from olp.trajectory.route import AxisLimits, Route
-from olp.trajectory.solvers import SOLVERS, Rival
+from olp.trajectory.solvers import SOLVERS, Candidate
 from olp.trajectory.speedgrid import CELL_S
 
 #: runs with no more segments than this between stops are straight moves to the overlapping solver
@@ -32,7 +32,7 @@ class Stretch:
 
     first: int
     last: int
-    rivals: tuple[Rival, ...]
+    candidates: tuple[Candidate, ...]
     runs: int = 1
 
     @property
@@ -41,13 +41,13 @@ class Stretch:
 
     @property
     def bends(self) -> bool:
-        return any(rival.solver.bends for rival in self.rivals)
+        return any(candidate.solver.bends for candidate in self.candidates)
 
     def cost(self) -> float:
         """About how many pieces there are to optimise."""
         if not self.bends:
             return 0.0
-        seconds = max(rival.least_s for rival in self.rivals if rival.solver.bends)
+        seconds = max(candidate.least_s for candidate in self.candidates if candidate.solver.bends)
         return _CALL + _PIECES * self.segments + seconds / CELL_S
 
 
@@ -63,17 +63,17 @@ def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:
     bends = np.array([solver.bends for solver in SOLVERS])[order[0]]
     keep = least_s <= np.where(bends, np.inf, first / _SURE)
     # there are as many runs as way-points in a program of exact stops
-    alone = [(Rival(solver, 0.0),) for solver in SOLVERS]
+    alone = [(Candidate(solver, 0.0),) for solver in SOLVERS]
     runs = []
     for begin, end, ranks, fits, some in zip(
         stops[:-1].tolist(), stops[1:].tolist(), order.T.tolist(), keep.T.tolist(), least_s.T.tolist(),
         strict=True,
     ):  # fmt: skip
         if sum(fits) == 1:
-            rivals = alone[ranks[0]]
+            candidates = alone[ranks[0]]
         else:
-            rivals = tuple(Rival(SOLVERS[i], some[i]) for i in ranks if fits[i])
-        runs.append(Stretch(begin, end, rivals))
+            candidates = tuple(Candidate(SOLVERS[i], some[i]) for i in ranks if fits[i])
+        runs.append(Stretch(begin, end, candidates))
     return runs
 
 
@@ -94,8 +94,8 @@ def together(runs: list[Stretch], least: int) -> Iterator[Stretch]:
     for run in [*runs, None]:
         small = run is not None and (run.segments < short or not run.bends)
         if group and (run is None or not small or run.last - begin > _TOGETHER):
-            rivals = max((some.rivals for some in group), key=len)
-            yield Stretch(begin, group[-1].last, rivals, len(group))
+            candidates = max((some.candidates for some in group), key=len)
+            yield Stretch(begin, group[-1].last, candidates, len(group))
             group = []
         if run is not None and not small:
             yield run

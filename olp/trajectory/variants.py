@@ -28,7 +28,7 @@ from olp.trajectory.usage import LineUse, SlowPlaces, usage
 #: plans that a bound on the inertial deviation may take before it is made sure of
 _TRIALS = 3
 #: share by which a peak of acceleration may pass between the places that are looked at
-_UNSEEN = 1e-4
+_UNOBSERVABLE = 1e-4
 #: lines that a report names
 _LINES = 8
 
@@ -151,14 +151,14 @@ def within_inertial(
             "the machine file states no compliance, so inertial deviation cannot be bounded; give "
             "compliance_um_per_m_s2 in [axes.X], [axes.Y] or [axes.Z]"
         )
-    certain = sure(limits, compliance, most_mm) * (1.0 - 2.0 * _UNSEEN)
+    certain = sure(limits, compliance, most_mm) * (1.0 - 2.0 * _UNOBSERVABLE)
     size = np.sqrt((compliance * compliance).sum(axis=0))
     cap = float((size * limits.acceleration).max())
     for trial in range(_TRIALS + 1):
         cap = certain if trial == _TRIALS else max(cap, certain)
         found = planned(case, capped(limits, compliance, cap), tell, "plan" if trial == 0 else "bound")
         largest = max((Inertial.of(t.motion, compliance).most_mm for t in found.trajectories), default=0.0)
-        if largest * (1.0 + _UNSEEN) <= most_mm:
+        if largest * (1.0 + _UNOBSERVABLE) <= most_mm:
             return found
         # a cap above what was reached bound nothing
         cap = min(cap, largest) * (most_mm / largest) * (1.0 - 1e-3)

@@ -73,8 +73,8 @@ class Unknowns:
         for k, frame in enumerate(frames):
             for touch in (frame.touched, frame.tool_touched):
                 if touch is not None:
-                    at, lever = touch
-                    out[k] += self.sensitivity.rows(np.array([at]), np.array(lever, float))[:, 0]
+                    at, tool_vector = touch
+                    out[k] += self.sensitivity.rows(np.array([at]), np.array(tool_vector, float))[:, 0]
                     count[k] += 1
         return out, count
 
@@ -113,7 +113,7 @@ class Confidence:
         return len(self.points)
 
 
-def way_points(
+def waypoints(
     nominal: Program, corrected: Program, groups: Index, passed: Index, model: ErrorModel
 ) -> Points:
     """The way-points of a program and of its correction, whose moves up to groups (n,) belong to each nominal
@@ -247,9 +247,9 @@ def _blocks(
     for a in range(0, len(which), _BLOCK):
         part = which[a : a + _BLOCK]
         move = points.move[part]
-        lever = tool if tool.ndim == 1 else tool[move]
+        tool_vector = tool if tool.ndim == 1 else tool[move]
         play = None if points.play is None else points.play[part]
-        weights = sensitivity.weights(points.axis_mm[part], lever, play)
+        weights = sensitivity.weights(points.axis_mm[part], tool_vector, play)
         rows = np.stack([one @ sensitivity.table for one in weights])
         if touch.any():
             rows -= touch[path.frame[move]].transpose(1, 0, 2)

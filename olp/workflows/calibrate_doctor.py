@@ -88,8 +88,8 @@ def diagnose_calibration(
         known = known or frame_known
     skip = frozenset(described.compensated_by_controller - stated.active_during_measurement)
     found = diagnose(stated, described.chain, taken, frame_known=known, skip=skip)
-    levers = [tool.lever_mm for tool in described.tools.values()]
-    tools = list(dict.fromkeys(lever for lever in levers if lever is not None))
+    tool_vectors = [tool.tool_vector_mm for tool in described.tools.values()]
+    tools = list(dict.fromkeys(tool_vector for tool_vector in tool_vectors if tool_vector is not None))
     advice = advise(found, tools) if found.undecided else None
     left, words = None, "none is stated"
     if not isinstance(calibration, Calibration):

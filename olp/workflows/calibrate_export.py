@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.control_tables.controls import Control
-from olp.calibration.control_tables.residuals import CORRECT, Left, along, in_box, left_by
+from olp.calibration.control_tables.residuals import CORRECT, Residual, along, in_box, residuals_by
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.machine import Machine, Setup
 from olp.core.progress import silent
@@ -149,10 +149,12 @@ def _source(
     if skip:
         message = f"{', '.join(sorted(skip))} stand in compensated_by_controller and are not in the new table"
         findings.append(Finding("OLP876", message, count=len(skip)))
-    levers = {tool.lever_mm for tool in described.tools.values() if tool.lever_mm is not None}
+    tool_vectors = {
+        tool.tool_vector_mm for tool in described.tools.values() if tool.tool_vector_mm is not None
+    }
     return _Source(
         sources, described, loaded, described.chain, _without(loaded.calibration, skip), loaded.model,
-        np.array(sorted(levers) or [(0.0, 0.0, 0.0)]), np.array(described.least_increment_mm),
+        np.array(sorted(tool_vectors) or [(0.0, 0.0, 0.0)]), np.array(described.least_increment_mm),
         described.compensated_by_controller, tuple(findings),
     )  # fmt: skip
 
@@ -194,7 +196,7 @@ def _report(
         "machine": source.rest.machine,
         "box": {
             "points": POINTS, "seed": SEED, "box_mm": box.tolist(), "tools_mm": source.tools_mm.tolist(),
-            "left": _figures(left_by(source.model, controls, places, source.increment_mm)),
+            "left": _figures(residuals_by(source.model, controls, places, source.increment_mm)),
         },
     }  # fmt: skip
     if program is not None:
@@ -220,7 +222,7 @@ def _along(
     out: dict[str, Any] = {
         "name": text.short,
         "points": int(places.counted.sum()),
-        "left": _figures(left_by(source.model, controls, places)),
+        "left": _figures(residuals_by(source.model, controls, places)),
         "refused": None,
     }
     try:
@@ -234,7 +236,7 @@ def _along(
     return out
 
 
-def _figures(found: Mapping[str, Left]) -> dict[str, Any]:
+def _figures(found: Mapping[str, Residual]) -> dict[str, Any]:
     return {name: left.as_dict() for name, left in found.items()}
 
 

@@ -108,9 +108,9 @@ def fit_calibration(
     )
     if mapped is not None:
         calibration = dataclasses.replace(calibration, maps=(mapped,))
-    tools = [] if described is None else [tool.lever_mm for tool in described.tools.values()]
-    levers = [lever for lever in tools if lever is not None]
-    report, findings = summary(found, calibration, levers), findings_of(found, levers, travel)
+    tools = [] if described is None else [tool.tool_vector_mm for tool in described.tools.values()]
+    tool_vectors = [tool_vector for tool_vector in tools if tool_vector is not None]
+    report, findings = summary(found, calibration, tool_vectors), findings_of(found, tool_vectors, travel)
     if beyond is not None:
         report["map"] = map_summary(beyond, mapped)
         findings = (*findings, *map_findings(beyond, mapped))

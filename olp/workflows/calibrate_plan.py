@@ -111,8 +111,12 @@ def plan_measurements(
     described = setup.machine
     box = _box(described, box_mm)
     reflectors = list(tools) or _reflectors(described)
-    levers = [tool.lever_mm for tool in described.tools.values()]
-    judged = list(dict.fromkeys([reflectors[0], *(lever for lever in levers if lever is not None)]))
+    tool_vectors = [tool.tool_vector_mm for tool in described.tools.values()]
+    judged = list(
+        dict.fromkeys(
+            [reflectors[0], *(tool_vector for tool_vector in tool_vectors if tool_vector is not None)]
+        )
+    )
     sigma = TRACKER if sigma_um is None else sigma_um * MM_PER_UM
     names = INSTRUMENTS if instrument is None else (instrument,)
     methods: list[Method] = []
@@ -150,8 +154,8 @@ def _box(machine: Machine, box_mm: Sequence[tuple[float, float]] | None) -> Arra
 
 def _reflectors(machine: Machine) -> list[Vector]:
     tool = machine.tools.get(machine.default_tool) if machine.default_tool is not None else None
-    lever = tool.lever_mm if tool is not None else None
-    first = lever if lever is not None else (0.0, 0.0, -100.0)
+    tool_vector = tool.tool_vector_mm if tool is not None else None
+    first = tool_vector if tool_vector is not None else (0.0, 0.0, -100.0)
     rest = [(float(x), float(y), float(z)) for x, y, z in offsets([first]).tolist()]
     return [first, *(vector for vector in rest if vector != first)][:3]
 

@@ -30,5 +30,5 @@ def fit_postures(
                 f"posture {row + 1} is outside the calibrated box; leave it out, or call without the machine",
                 file=str(source),
             )
-        error = model.error(found.axis_mm, found.lever_mm)
+        error = model.error(found.axis_mm, found.tool_vector_mm)
     return postures.fit(found, error, reference)

@@ -190,7 +190,7 @@ def _paths(
     judged = placed.fitted and all(placed.right) and bool(placed.runs[0].counted.any())
     taken = _taken(side, path, move, placed, axes) if judged else None
     if taken is not None:
-        found += runs.eaten_finding(*taken)
+        found += runs.absorbed_finding(*taken)
     report = _head(side, sets, options) | _placed_report(path, placed, taken, axes, options)
     count = len(sets[0])
     groups = {"after": placed.runs[:count], "before": placed.runs[count:]}
@@ -307,7 +307,7 @@ def _taken(
     run, rigid = placed.runs[0], placed.rigid[0]
     moved = float(np.abs(rigid.inverse()(run.points_mm) - run.points_mm).max())
     if moved < 1.0:  # stated in the nominal frame already, as far as anybody can tell
-        return *runs.eaten(path, run, rigid), "as measured"
+        return *runs.absorbed(path, run, rigid), "as measured"
     if side.program is None or side.loaded is None or move is None:
         return None
     toolpath = side.program.toolpath
@@ -323,7 +323,7 @@ def _taken(
         at = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
     error = side.loaded.model.error(at, tool if tool.ndim == 1 else tool[which])
     whose = "that the calibration predicts for the uncorrected machine"
-    return *runs.eaten_of_field(path, run, error), whose
+    return *runs.absorbed_of_field(path, run, error), whose
 
 
 def _head(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from olp.comparison import iso9283
-from olp.comparison.runs import Align, eaten_finding
+from olp.comparison.runs import Align, absorbed_finding
 from olp.core.arrays import Array, Mask
 from olp.core.errors import InputError
 from olp.core.rigid_fit import Rigid, fit_frame
@@ -88,7 +88,7 @@ def poses_report(
             f"{rest:.3g} um",
         ))  # fmt: skip
         if float(stated["after"].max()) < reach_mm:
-            found += eaten_finding(_rms(stated["after"]), rest, "as measured")
+            found += absorbed_finding(_rms(stated["after"]), rest, "as measured")
     report: dict[str, Any] = {
         "frame": {
             "fitted": fitted, "shift_mm": rigid.shift_mm.tolist(), "angles_deg": list(rigid.angles_deg),

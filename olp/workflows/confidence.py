@@ -13,7 +13,7 @@ from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.uncertainty.components import components
-from olp.uncertainty.spread import Confidence, Unknowns, confidence, way_points
+from olp.uncertainty.spread import Confidence, Unknowns, confidence, waypoints
 from olp.uncertainty.summary import findings, summary
 from olp.workflows.session import Loaded
 
@@ -38,7 +38,7 @@ def assess(
     if uncertainty is None:
         return None
     unknowns, growth, expansion = unknowns_of(loaded, uncertainty, date)
-    points = way_points(nominal, corrected, groups, passed, loaded.full)
+    points = waypoints(nominal, corrected, groups, passed, loaded.full)
     found = confidence(unknowns, nominal.toolpath, points, within_um * MM_PER_UM, tell=tell)
     parts = [
         c for c in components(loaded.calibration, uncertainty.scaled(growth)) if c.name not in loaded.skip

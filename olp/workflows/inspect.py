@@ -86,17 +86,17 @@ def error_of(
         raise ConfigError(
             f"{axis} = {at[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose a place in it"
         )
-    vector = session.lever(tool)
+    vector = session.tool_vector(tool)
     payload = loaded.setup.job.payload_kg
-    lever = np.array(carried(vector, payload))
+    tool_vector = np.array(carried(vector, payload))
     return {
         "position_mm": [float(v) for v in position_mm],
         "tool_mm": [float(v) for v in vector],
         "payload_kg": payload,
-        "error_um": (loaded.model.error(at, lever)[0] * 1e3).tolist(),
+        "error_um": (loaded.model.error(at, tool_vector)[0] * 1e3).tolist(),
         "rotation_urad": (loaded.model.rotation(at, None, payload)[0] * 1e6).tolist(),
         "sources": [
             {"name": source, "error_um": (part[0] * 1e3).tolist()}
-            for source, part in loaded.model.contributions(at, lever)
+            for source, part in loaded.model.contributions(at, tool_vector)
         ],
     }

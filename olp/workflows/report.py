@@ -94,7 +94,7 @@ def correction(
 def _tests(session: Session) -> dict[str, Any]:
     loaded, setup = session.loaded("hold"), session.setup
     digit = max(setup.machine.least_increment_mm)
-    tool = carried(session.lever(None), setup.job.payload_kg)
+    tool = carried(session.tool_vector(None), setup.job.payload_kg)
     return predicted(loaded.model, np.array(tool, float), digit)
 
 

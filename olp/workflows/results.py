@@ -132,7 +132,7 @@ def _corrected(
         reported, places, styli, loaded.model, axes=axes, hold=options.outside_box == "hold",
         payload_kg=setup.job.payload_kg,
     )  # fmt: skip
-    if radius is None and any(s.radius_mm == 0.0 and any(s.lever_mm) for s in styli):
+    if radius is None and any(s.radius_mm == 0.0 and any(s.tool_vector_mm) for s in styli):
         findings.append(
             Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
         )

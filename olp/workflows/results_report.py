@@ -44,7 +44,7 @@ def report_of(
     size = np.sqrt((added * added).sum(axis=1))
     sources = [
         {"name": source, **_size(part * UM_PER_MM)}
-        for source, part in loaded.model.contributions(found.axis_mm, found.lever_mm, found.play)
+        for source, part in loaded.model.contributions(found.axis_mm, found.tool_vector_mm, found.play)
     ]
     return {
         "schema": "olp-results-1",

@@ -207,7 +207,7 @@ class Session:
             digest.update(repr(sorted(left_out)).encode())
         return digest.hexdigest()
 
-    def lever(self, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:
+    def tool_vector(self, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:
         """Gauge point to tip in mm of a tool number, of a vector, or of the tool in the spindle at the start.
         Raises ConfigError for a tool without one."""
         if isinstance(tool, tuple):
@@ -216,11 +216,11 @@ class Session:
         if not number:
             return (0.0, 0.0, 0.0)
         found = self.setup.tool(number)
-        if found is None or found.lever_mm is None:
+        if found is None or found.tool_vector_mm is None:
             raise ConfigError(
                 f"tool {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm in the machine file"
             )
-        return found.lever_mm
+        return found.tool_vector_mm
 
 
 def opened(

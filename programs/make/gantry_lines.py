@@ -33,7 +33,7 @@ LOST = (6.0, 0.0, 0.0)
 AT, REFLECTOR, RUNS = (740.0, 620.0, -310.0), (0.0, 0.0, -85.0), 5
 SPAN = ((20.0, 1580.0), (20.0, 980.0), (-440.0, -5.0))
 TARGETS = (17, 13, 11)
-CARRIED = ((1, 2), (2,), ())
+UNCHANGED = ((1, 2), (2,), ())
 
 
 def error_um(at: Sequence[float], tool: Sequence[float], play: Sequence[float]) -> list[float]:
@@ -41,7 +41,7 @@ def error_um(at: Sequence[float], tool: Sequence[float], play: Sequence[float]) 
     total = [0.0, 0.0, 0.0]
     for axis in range(3):
         values = ERRORS[axis](at[axis])
-        lever = [tool[k] - TOOL[k] + (at[k] - PLACE[k] if k in CARRIED[axis] else 0.0) for k in range(3)]
+        lever = [tool[k] - TOOL[k] + (at[k] - PLACE[k] if k in UNCHANGED[axis] else 0.0) for k in range(3)]
         a, b, c = (angle * 1e-3 for angle in values[3:])
         turned = (b * lever[2] - c * lever[1], c * lever[0] - a * lever[2], a * lever[1] - b * lever[0])
         for k in range(3):

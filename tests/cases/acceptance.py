@@ -146,7 +146,7 @@ def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
     sure = real.sure.copy()
     for axis in np.flatnonzero(model.has_play).tolist():
         place = np.where(settled[:, axis], dense.points[:, axis], np.nan)
-        lost = model.lost_motion_mm(axis, np.clip(dense.points[:, axis], *model.box[axis]))
+        lost = model.backlash_at(axis, np.clip(dense.points[:, axis], *model.box[axis]))
         for a, b in itertools.pairwise(edges):
             moved = np.fmax.accumulate(place[a:b]) - np.fmin.accumulate(place[a:b])
             sure[a:b] &= np.nan_to_num(moved) >= lost[a:b]

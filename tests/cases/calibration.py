@@ -84,7 +84,7 @@ def two_pods(
 
 
 @dataclass(frozen=True)
-class Left:
+class Residual:
     """rms lengths in um over fresh places in the box: before and after, in the machine's own frame and in the
     rigid frame that fits best; and the standard deviation of error over stated uncertainty."""
 
@@ -95,7 +95,7 @@ class Left:
     z: float
 
 
-def left(machine: simulated.Machine, fit: Fit, tool: Sequence[float], n: int = 1500) -> Left:
+def left(machine: simulated.Machine, fit: Fit, tool: Sequence[float], n: int = 1500) -> Residual:
     """What a fit leaves of a machine's errors with a tool."""
     rng = np.random.default_rng(4711)
     at = rng.uniform(machine.box[:, 0], machine.box[:, 1], (n, 3))
@@ -104,6 +104,6 @@ def left(machine: simulated.Machine, fit: Fit, tool: Sequence[float], n: int = 1
     after = before - fit.error(at, vector)
     z = after[:200] / fit.sigma(at[:200], vector)
     rms, off = simulated.rms_um, simulated.off_frame
-    return Left(
+    return Residual(
         rms(before), rms(off(at, before)), rms(after), rms(off(at, after)), float(np.sqrt(np.mean(z**2)))
     )

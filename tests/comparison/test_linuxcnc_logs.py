@@ -9,7 +9,7 @@ import pytest
 from judge import controller, linuxcnc, machines, programs
 from judge.machines import Recipe
 from judge.model import JudgeModel
-from judge.path import densify, levers
+from judge.path import densify, tool_vectors
 from workflows.test_correct_in_linuxcnc import RANGE, distances_mm
 
 import olp
@@ -47,10 +47,10 @@ def test_a_log_of_the_control_is_a_measurement(tmp_path: Path) -> None:
     model = JudgeModel(machine.parent)
     moves = linuxcnc.interpret(nominal, machine.parent)
     dense = densify(moves, 0.02).points
-    lever = levers(moves, model)[np.isin(moves.kind, (linuxcnc.FEED, linuxcnc.ARC))]
+    tool_vector = tool_vectors(moves, model)[np.isin(moves.kind, (linuxcnc.FEED, linuxcnc.ARC))]
     for group, run in (("before", runs[0]), ("after", runs[1])):
         at = run.axis[run.cutting]
-        real = at + model.error_mm(at, np.tile(lever[0], (len(at), 1)))
+        real = at + model.error_mm(at, np.tile(tool_vector[0], (len(at), 1)))
         judged = distances_mm(real, dense).max() * 1e3
         assert both.report[group]["across_um"]["max"] == pytest.approx(judged, abs=SLACK_UM)
     assert both.report["before"]["across_um"]["max"] > 20

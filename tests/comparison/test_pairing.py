@@ -152,7 +152,7 @@ def test_a_frame_anywhere_in_space_is_found(order: str) -> None:
     found = align(path, away(points), 1.0)
     assert found.order == order
     assert not found.loose
-    assert not found.rival
+    assert not found.candidate
     # uncertainty of a best fit of 4000 points, with levers
     assert np.abs(found.rigid(away(points)) - points).max() < 10 * NOISE_MM / np.sqrt(4000 / 6)
 
@@ -220,13 +220,13 @@ def test_a_fit_that_takes_the_error_is_told() -> None:
     nominal = eight(np.linspace(0, 2 * np.pi, 1000))
     turned = Rigid(rotation_of(np.array((0.0, 0.0, 2e-4))), np.array((0.01, 0.0, 0.0)))(nominal)
     placed = runs.place(path, ["a"], [turned], "fit", None, 1.0)
-    before, after = runs.eaten(path, placed.runs[0], placed.rigid[0])
+    before, after = runs.absorbed(path, placed.runs[0], placed.rigid[0])
     assert before > 15
     assert after < 0.5
-    assert [f.code for f in runs.eaten_finding(before, after, "x")] == ["OLP604"]
-    assert runs.eaten_finding(10.0, 8.0, "x") == []
+    assert [f.code for f in runs.absorbed_finding(before, after, "x")] == ["OLP604"]
+    assert runs.absorbed_finding(10.0, 8.0, "x") == []
     error = turned - nominal
-    field_before, field_after = runs.eaten_of_field(path, placed.runs[0], error)
+    field_before, field_after = runs.absorbed_of_field(path, placed.runs[0], error)
     assert field_before == pytest.approx(before, rel=0.02)
     assert field_after < 0.5
 

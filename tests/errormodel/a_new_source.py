@@ -57,7 +57,7 @@ class SagErrors(Boxed):
         out[2, 1] = self.sag.per_mm2 != 0.0
         return out
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+    def backlash_at(self, axis_mm: Array) -> Array | None:
         return None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:

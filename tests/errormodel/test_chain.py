@@ -270,7 +270,7 @@ def test_a_model_without_errors_is_exactly_zero(chain: str) -> None:
     model = build(Calibration("m", BOX, curves=(constant("X", {"EXX": 0.0, "ECX": 0.0}),)), chain)
     assert not model.error(P, TOOL).any()
     assert not model.depends_on.any()
-    assert model.lost_motion_mm(P) is None
+    assert model.backlash_at(P) is None
     assert not model.chord_bound(P, TOOL).any()
     assert not list(model.contributions(P, TOOL))
 
@@ -387,7 +387,7 @@ def test_a_sum_of_models_is_a_model() -> None:
         both.error(points, TOOL, play), one.error(points, TOOL, play) + two.error(points, TOOL, play)
     )
     np.testing.assert_array_equal(both.rotation(points), one.rotation(points) + two.rotation(points))
-    np.testing.assert_array_equal(both.lost_motion_mm(points), two.lost_motion_mm(points))
+    np.testing.assert_array_equal(both.backlash_at(points), two.backlash_at(points))
     np.testing.assert_array_equal(
         both.chord_bound(points, TOOL), one.chord_bound(points, TOOL) + two.chord_bound(points, TOOL)
     )

@@ -100,7 +100,7 @@ def test_lost_motion_follows_the_play() -> None:
     commands = np.zeros((7, 3))
     commands[:, 0] = [0.0, 10.0, 10.002, 9.999, 9.9, 9.9005, 12.0]
     model = build(Calibration("m", BOX, backlash_mm=(6e-3, 0.0, 0.0)), "FXYZ")
-    lost = model.lost_motion_mm(commands)
+    lost = model.backlash_at(commands)
     play = play_states(commands, lost)
     error_um = model.error(commands, ZERO_TOOL, play)[:, 0] * 1e3
     np.testing.assert_allclose(error_um, [0.0, -3.0, -3.0, 0.0, 3.0, 2.5, -3.0], atol=1e-9)

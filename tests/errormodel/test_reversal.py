@@ -130,7 +130,7 @@ def test_direction_columns_give_both_directions_and_the_mean(chain: str) -> None
     mean = 0.5 * (curve.forward["EXX"] + curve.backward["EXX"])
     np.testing.assert_allclose(model.error(points, TOOL)[:, 0], mean, atol=1e-15)
     np.testing.assert_allclose(
-        model.lost_motion_mm(points), [[4e-3, 0, 0], [3e-3, 0, 0], [6e-3, 0, 0]], atol=1e-15
+        model.backlash_at(points), [[4e-3, 0, 0], [3e-3, 0, 0], [6e-3, 0, 0]], atol=1e-15
     )
     parts = dict(model.contributions(points, np.array([0.0, 0.0, -100.0]), np.ones((3, 3))))
     # The lever of the difference in pitch belongs to the lost motion too.
@@ -140,5 +140,5 @@ def test_direction_columns_give_both_directions_and_the_mean(chain: str) -> None
 
 def test_lost_motion_is_unknown_where_the_position_is() -> None:
     model = build(bidirectional(), "FXYZ")
-    lost = model.lost_motion_mm(np.array([[np.nan, 1.0, 1.0], [1.0, np.nan, np.nan]]))
+    lost = model.backlash_at(np.array([[np.nan, 1.0, 1.0], [1.0, np.nan, np.nan]]))
     np.testing.assert_array_equal(np.isnan(lost), [[True, False, False], [False] * 3])

@@ -68,10 +68,10 @@ class Moves:
     centre: list[np.ndarray] = field(default_factory=list)
     turns: list[int] = field(default_factory=list)
     plane: list[int] = field(default_factory=list)
-    lever: list[np.ndarray] = field(default_factory=list)
+    tool_vector: list[np.ndarray] = field(default_factory=list)
 
     def add(
-        self, line: int, kind: int, axis: np.ndarray, length: np.ndarray, tool: int, lever: np.ndarray,
+        self, line: int, kind: int, axis: np.ndarray, length: np.ndarray, tool: int, tool_vector: np.ndarray,
         centre: np.ndarray | None = None, turns: int = 0, plane: int = 0,
     ) -> None:  # fmt: skip
         self.line.append(line)
@@ -79,7 +79,7 @@ class Moves:
         self.axis.append(axis)
         self.length.append(length)
         self.tool.append(tool)
-        self.lever.append(lever)
+        self.tool_vector.append(tool_vector)
         self.centre.append(np.zeros(3) if centre is None else centre)
         self.turns.append(turns)
         self.plane.append(plane)
@@ -120,7 +120,7 @@ def read_apt(
         elif major in ("GOTO", "GODLTA"):
             if len(value) == 6:
                 aim = rotation @ np.array(value[3:])
-            lever = -tall * aim
+            tool_vector = -tall * aim
             length = tall * aim if size else np.zeros(3)
             if major == "GOTO":
                 here = at(frame, value[:3], unit, length)
@@ -131,9 +131,19 @@ def read_apt(
                 centre, normal, turns = arc
                 k = int(np.abs(normal).argmax())
                 sign = 1 if normal[k] > 0 else -1
-                out.add(line, ARC, here, length, tool, lever, centre + length, sign * turns, AXIS_OF_PLANE[k])
+                out.add(
+                    line,
+                    ARC,
+                    here,
+                    length,
+                    tool,
+                    tool_vector,
+                    centre + length,
+                    sign * turns,
+                    AXIS_OF_PLANE[k],
+                )
             else:
-                out.add(line, RAPID if rapid else FEED, here, length, tool, lever)
+                out.add(line, RAPID if rapid else FEED, here, length, tool, tool_vector)
             rapid, arc = False, None
         elif major in ("CIRCLE", "MOVARC"):
             times = re.search(r"TIMES\s*,\s*(\d+)", text)

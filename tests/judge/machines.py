@@ -177,7 +177,7 @@ def random_machine(folder: Path, seed: int, recipe: Recipe | None = None) -> Pat
     path = _write(folder, recipe, datum, curves, {"squareness": square, **extra})
     points = rng.uniform(low, high, (2000, 3))
     model = JudgeModel(path)
-    tools = [model.lever_mm(int(number)) for number in recipe.tools] or [np.zeros(3)]
+    tools = [model.tool_vector_mm(int(number)) for number in recipe.tools] or [np.zeros(3)]
     peak = max(float(np.linalg.norm(model.error_mm(points, tool), axis=1).max()) for tool in tools)
     scale = rng.uniform(*recipe.peak_um) / (1e3 * peak)
     scaled = [

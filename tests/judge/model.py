@@ -281,7 +281,7 @@ class JudgeModel:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Translation (n, 3), angles (n, 3) of one axis, and the translation due to its measuring lines."""
         q = points[:, axis]
-        shift, angle, lever = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 3))
+        shift, angle, tool_vector = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 3))
         for curve in self.curves:
             if curve.axis != axis:
                 continue
@@ -296,9 +296,9 @@ class JudgeModel:
             angle += own
             line = self._line_lever(curve, q)
             if self.first_order:
-                lever -= np.cross(own, line)
+                tool_vector -= np.cross(own, line)
             else:
-                lever -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), line)
+                tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), line)
         for load in self.loads:
             if load.axis != axis:
                 continue
@@ -308,13 +308,13 @@ class JudgeModel:
                 target, column = (shift, "XYZ") if name[1] in "XYZ" else (own, "ABC")
                 target[:, column.index(name[1])] += value
             angle += own
-            lever -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_lever(load, q))
+            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_lever(load, q))
         for name, period, amplitude, phase in self.cyclic:
             if name[2] == AXES[axis]:
                 value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
                 (shift if name[1] in "XYZ" else angle)[:, "XYZABC".index(name[1]) % 3] += value
         shift[:, axis] -= 0.5 * self.backlash_mm[axis] * play
-        return shift, angle, lever
+        return shift, angle, tool_vector
 
     def _line_lever(self, curve: _CurveFile | _LoadFile, q: np.ndarray) -> np.ndarray:
         """(n, 3) lever at which the curve was measured: tool vector + axes toward the tool (+ own axis)."""
@@ -346,11 +346,11 @@ class JudgeModel:
             if letter == "F":
                 continue
             axis = AXES.index(letter)
-            shift, angle, lever = self._components(axis, points, play[:, axis])
+            shift, angle, tool_vector = self._components(axis, points, play[:, axis])
             own = points[:, axis] - self.datum[axis]
             travel = np.zeros(points.shape)
             travel[:, axis] = own
-            shift = shift + lever + self._tilt(axis, own)
+            shift = shift + tool_vector + self._tilt(axis, own)
             rotation = _rotation(angle)
             if place > base:
                 product = product @ _homogeneous(rotation, travel + shift)
@@ -364,10 +364,10 @@ class JudgeModel:
         """Equation (1) with ISO names: first order, no tool terms."""
         total = np.zeros(points.shape)
         for axis in range(3):
-            shift, angle, lever = self._components(axis, points, play[:, axis])
+            shift, angle, tool_vector = self._components(axis, points, play[:, axis])
             own = points[:, axis] - self.datum[axis]
             reach = (points - self.datum) * self._reach(axis)
-            total += shift + lever + np.cross(angle, reach) + self._tilt(axis, own)
+            total += shift + tool_vector + np.cross(angle, reach) + self._tilt(axis, own)
         return total
 
     # -- lost motion -------------------------------------------------------------------------------
@@ -389,7 +389,7 @@ class JudgeModel:
             states[:, axis], known[:, axis] = self._axis_play(int(axis), np.asarray(axis_mm[:, axis], float))
         return states, known
 
-    def lost_motion_mm(self, axis: int, q: np.ndarray) -> np.ndarray:
+    def backlash_at(self, axis: int, q: np.ndarray) -> np.ndarray:
         """(n,) lost motion b of one axis: error moving in - less error moving in +."""
         total = np.full(len(q), self.backlash_mm[axis])
         for curve in self.curves:
@@ -400,7 +400,7 @@ class JudgeModel:
         return total
 
     def _axis_play(self, axis: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        half = 0.5 * self.lost_motion_mm(axis, np.clip(q, *self.box[axis]))
+        half = 0.5 * self.backlash_at(axis, np.clip(q, *self.box[axis]))
         state, known = np.zeros(len(q)), np.zeros(len(q), bool)
         low, high, sign = -max(half[0], 0.0), max(half[0], 0.0), 0.0
         moves = np.diff(q, prepend=q[:1])
@@ -417,7 +417,7 @@ class JudgeModel:
 
     # -- zero setting ------------------------------------------------------------------------------
 
-    def lever_mm(self, tool: int | None) -> np.ndarray:
+    def tool_vector_mm(self, tool: int | None) -> np.ndarray:
         """(3,) gauge point to tip of a tool; zero without a tool."""
         entry = self.machine.get("tools", {}).get(str(tool))
         if entry is None:
@@ -441,7 +441,7 @@ class JudgeModel:
         tool = entry.get("touch_tool")
         default = np.array([entry.get(f"{a}_mm", 0.0) for a in AXES]) + self.length_mm(tool)
         at = _position(entry.get("touched_at_mm", {}), default)
-        return np.asarray(self.error_mm(at[None], self.lever_mm(tool))[0])
+        return np.asarray(self.error_mm(at[None], self.tool_vector_mm(tool))[0])
 
     def tool_shift(self, tool: int | None) -> np.ndarray:
         """(3,) the same for an active tool length that was set on the raw machine."""
@@ -449,4 +449,4 @@ class JudgeModel:
         if entry.get("set_by", "true") == "true":
             return np.zeros(3)
         at = _position(entry["touched_at_mm"], np.zeros(3))
-        return np.asarray(self.error_mm(at[None], self.lever_mm(tool))[0])
+        return np.asarray(self.error_mm(at[None], self.tool_vector_mm(tool))[0])

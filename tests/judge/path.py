@@ -159,16 +159,16 @@ def actual(moves: CanonMoves, model: JudgeModel, spacing_mm: float = 1.0, *, lea
         if len(rows):
             states, sure = model.play(column)
             play[rows, axis], taken_up[rows, axis] = states[:, axis], sure[:, axis]
-    points = dense.points + model.error_mm(dense.points, levers(dense.moves, model)[dense.move], play)
+    points = dense.points + model.error_mm(dense.points, tool_vectors(dense.moves, model)[dense.move], play)
     sure = settled.all(axis=1) & taken_up.all(axis=1)
     return ActualPath(dense, points, sure, model.inside(dense.points))
 
 
-def levers(moves: CanonMoves, model: JudgeModel) -> np.ndarray:
+def tool_vectors(moves: CanonMoves, model: JudgeModel) -> np.ndarray:
     """(n, 3) tool vector of each move."""
     out = np.zeros((len(moves), 3))
     for tool in np.unique(moves.tool):
-        out[moves.tool == tool] = model.lever_mm(int(tool)) if tool > 0 else 0.0
+        out[moves.tool == tool] = model.tool_vector_mm(int(tool)) if tool > 0 else 0.0
     return out
 
 

@@ -43,11 +43,11 @@ class Machine:
         out = np.zeros(at.shape)
         for axis in range(3):
             q = at[:, axis]
-            lever = np.array(np.broadcast_to(np.asarray(tool, float), at.shape))
+            tool_vector = np.array(np.broadcast_to(np.asarray(tool, float), at.shape))
             for k in self.after(axis):
-                lever[:, k] += at[:, k] - self.datum[k]
+                tool_vector[:, k] += at[:, k] - self.datum[k]
             out += np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in AXES], axis=-1)
-            out += np.cross(self.angles(axis, q), lever)
+            out += np.cross(self.angles(axis, q), tool_vector)
             if play is not None:
                 for d, letter in enumerate(AXES):
                     out[:, d] += play[:, axis] * self.half.get(f"E{letter}{AXES[axis]}", 0.0)

@@ -184,10 +184,10 @@ def test_exact_product_agrees_with_the_linear_law(tmp_path: Path, chain: str) ->
         value = {name: table.both(points[:, curve.axis])[0] for name, table in curve.tables.items()}
         line = np.tile(curve.line_mm, (40, 1))
         line[:, curve.axis] = q[:, curve.axis]
-        lever = np.tile(tool - curve.tool_mm, (40, 1))
-        lever[:, after] += (q - line)[:, after]
+        tool_vector = np.tile(tool - curve.tool_mm, (40, 1))
+        tool_vector[:, after] += (q - line)[:, after]
         angles = np.stack([value[f"E{c}{letter}"] for c in "ABC"], 1)
-        total += np.stack([value[f"E{c}{letter}"] for c in "XYZ"], 1) + np.cross(angles, lever)
+        total += np.stack([value[f"E{c}{letter}"] for c in "XYZ"], 1) + np.cross(angles, tool_vector)
     assert np.abs(model.error_mm(points, tool) - total).max() < 0.1 * UM
 
 
@@ -209,7 +209,9 @@ def walk(seed: int, count: int = 300, step: float = 3.0) -> np.ndarray:
 def corrected_points(model: JudgeModel, points: np.ndarray, pieces: int) -> np.ndarray:
     part = np.tile(np.arange(1, pieces + 1) / pieces, len(points) - 1)[:, None]
     begin, end = np.repeat(points[:-1], pieces, axis=0), np.repeat(points[1:], pieces, axis=0)
-    return model.command_for(np.vstack([points[:1], (1 - part) * begin + part * end]), model.lever_mm(1))
+    return model.command_for(
+        np.vstack([points[:1], (1 - part) * begin + part * end]), model.tool_vector_mm(1)
+    )
 
 
 @pytest.mark.parametrize("pieces", [1, 3])
@@ -226,7 +228,7 @@ def test_inverted_path_has_no_deviation(model: JudgeModel, pieces: int) -> None:
 
 def test_correction_with_the_wrong_sign_doubles_the_error(model: JudgeModel) -> None:
     points = walk(2)
-    error = model.error_mm(points, model.lever_mm(1))
+    error = model.error_mm(points, model.tool_vector_mm(1))
     nominal = CanonMoves.polyline(points, tool=1)
     result = deviation(CanonMoves.polyline(points + error, tool=1), nominal, model)
     assert result.vertex_max_um == pytest.approx(2 * result.before.vertex_max_um, rel=1e-2)
@@ -246,7 +248,7 @@ def test_a_single_wrong_sign_is_seen(model: JudgeModel, name: str) -> None:
         mistaken.curves = list(model.curves)
         mistaken.curves[axis] = replace(curve, tables={**curve.tables, name: wrong})
     points = np.random.default_rng(6).uniform((0, 0, -400), (800, 600, 0), (50, 3))
-    tool = model.lever_mm(2)
+    tool = model.tool_vector_mm(2)
     command = mistaken.command_for(points, tool)
     nominal = CanonMoves.polyline(points, tool=2)
     result = deviation(CanonMoves.polyline(command, tool=2), nominal, model, spacing_mm=10.0)
@@ -303,8 +305,8 @@ def test_a_tool_change_forgets_the_position(model: JudgeModel) -> None:
     moves = replace(CanonMoves.polyline(points), tool=np.repeat([1, 2], [10, 9]))
     command = np.vstack(
         [
-            model.command_for(points[:11], model.lever_mm(1)),
-            model.command_for(points[11:], model.lever_mm(2)),
+            model.command_for(points[:11], model.tool_vector_mm(1)),
+            model.command_for(points[11:], model.tool_vector_mm(2)),
         ]
     )
     corrected = replace(CanonMoves.polyline(command), tool=moves.tool)
@@ -527,7 +529,7 @@ def test_a_corrected_program_passes_and_an_uncorrected_one_fails(tmp_path: Path)
     model = JudgeModel(folder)
     offset = np.array([250.0, 200.0, -300.0])
     points = walk(8, 120, 5.0) - [400, 300, -200] + [20, 10, 30]
-    part = model.command_for(points + offset, model.lever_mm(1)) - offset
+    part = model.command_for(points + offset, model.tool_vector_mm(1)) - offset
     nominal, corrected = programs.polyline_program(points), programs.polyline_program(part)
     result = judge_programs(nominal, corrected, folder)
     assert result.vertex_max_um < 2e-3 and result.max_um < 0.1
@@ -545,7 +547,7 @@ def test_arcs_written_as_inverted_chords_pass(plane: str, tmp_path: Path) -> Non
     moves = linuxcnc.interpret(nominal, folder)
     dense = densify(moves, 0.05)
     first = int(np.flatnonzero(dense.last)[0])
-    command = model.command_for(dense.points[first:], model.lever_mm(1)) - offset
+    command = model.command_for(dense.points[first:], model.tool_vector_mm(1)) - offset
     result = judge_programs(nominal, programs.polyline_program(command), folder)
     assert result.max_um < 0.3 and result.vertex_max_um < 2e-3
     assert result.before.max_um > 10.0 and result.after.judged > 1000

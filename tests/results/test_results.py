@@ -74,8 +74,8 @@ def test_true_points_are_recovered(
     model = JudgeModel(machine)
     true, normal = truth()
     reported = cmm.report(
-        model, true, normal, offset_mm=OFFSET, angles_deg=angles, stylus_mm=model.lever_mm(2), radius_mm=1.5,
-        noise_mm=noise_mm,
+        model, true, normal, offset_mm=OFFSET, angles_deg=angles, stylus_mm=model.tool_vector_mm(2),
+        radius_mm=1.5, noise_mm=noise_mm,
     )  # fmt: skip
     before = np.linalg.norm(reported - true, axis=1).max()
     result = olp.correct_results(csv(reported, normal), machine, frame=frame, tool=2)
@@ -89,18 +89,20 @@ def test_true_points_are_recovered(
 def test_the_model_runs_forward_and_not_backward(machine: Path) -> None:
     model = JudgeModel(machine)
     true, normal = truth()
-    reported = cmm.report(model, true, normal, offset_mm=OFFSET, stylus_mm=model.lever_mm(1), radius_mm=2.5)
+    reported = cmm.report(
+        model, true, normal, offset_mm=OFFSET, stylus_mm=model.tool_vector_mm(1), radius_mm=2.5
+    )
     data = olp.correct_results(csv(reported, normal), machine, frame="G54").data
     centre = reported + 2.5 * normal + OFFSET
     added = values(data) - reported
-    assert np.abs(added - model.error_mm(centre, model.lever_mm(1))).max() < 2e-6
+    assert np.abs(added - model.error_mm(centre, model.tool_vector_mm(1))).max() < 2e-6
 
 
 def test_a_zero_set_on_the_raw_machine_keeps_the_touched_point(machine: Path) -> None:
     model = JudgeModel(machine)
     true, normal = truth()
     reported = cmm.report(
-        model, true, normal, offset_mm=OFFSET, stylus_mm=model.lever_mm(1), radius_mm=2.5,
+        model, true, normal, offset_mm=OFFSET, stylus_mm=model.tool_vector_mm(1), radius_mm=2.5,
         zero_shift_mm=model.zero_shift("TOUCHED"),
     )  # fmt: skip
     good = values(olp.correct_results(csv(reported, normal), machine, frame="TOUCHED").data)
@@ -113,15 +115,15 @@ def test_each_row_may_have_its_stylus(machine: Path) -> None:
     model = JudgeModel(machine)
     true, normal = truth(30)
     number_ = np.tile([1, 2], 15)
-    lever = np.array([model.lever_mm(int(n)) for n in number_])
-    reported = cmm.report(model, true, normal, offset_mm=OFFSET, stylus_mm=lever, radius_mm=0.0)
+    tool_vector = np.array([model.tool_vector_mm(int(n)) for n in number_])
+    reported = cmm.report(model, true, normal, offset_mm=OFFSET, stylus_mm=tool_vector, radius_mm=0.0)
     head = "X_mm,Y_mm,Z_mm,{}\n"
     by_number = head.format("tool") + "".join(
         f"{p[0]:.6f},{p[1]:.6f},{p[2]:.6f},{n}\n" for p, n in zip(reported, number_, strict=True)
     )
     by_vector = head.format("SX,SY,SZ") + "".join(
         f"{p[0]:.6f},{p[1]:.6f},{p[2]:.6f},{v[0]},{v[1]},{v[2]}\n"
-        for p, v in zip(reported, lever, strict=True)
+        for p, v in zip(reported, tool_vector, strict=True)
     )
     for text in (by_number, by_vector):
         layout = told(text.splitlines()[:5])
@@ -137,7 +139,7 @@ def test_lost_motion_is_known_where_the_approach_is(tmp_path: Path) -> None:
     model = JudgeModel(machine)
     true, normal = truth()
     reported = cmm.report(
-        model, true, normal, offset_mm=OFFSET, stylus_mm=model.lever_mm(1), radius_mm=2.5, play=True
+        model, true, normal, offset_mm=OFFSET, stylus_mm=model.tool_vector_mm(1), radius_mm=2.5, play=True
     )
     profile = tmp_path / "p.toml"
     profile.write_text(
@@ -180,7 +182,7 @@ def test_dmis_output_is_corrected_point_by_point(machine: Path) -> None:
         true,
         normal,
         offset_mm=OFFSET - [0, 0, 120],
-        stylus_mm=model.lever_mm(1),
+        stylus_mm=model.tool_vector_mm(1),
         radius_mm=2.5,
         ram=True,
     )
@@ -232,10 +234,10 @@ def test_a_stylus_of_a_file_is_looked_up_by_its_label(machine: Path, tmp_path: P
     here = tmp_path / "machine.toml"
     here.write_text(machine.read_text() + "[styli.STAR_X]\noffset_mm = [40.0, -60.0, -120.0]\n")
     model = JudgeModel(machine)
-    lever = np.array([40.0, -60.0, -120.0])
+    tool_vector = np.array([40.0, -60.0, -120.0])
     result = olp.correct_results(source, here, tip_radius_mm=1.0)
-    axis = true + 1.0 * normal + OFFSET - [0, 0, 120] - lever
-    assert np.abs(read_dmis(result.data).value_mm - true - model.error_mm(axis, lever)).max() < 2e-6
+    axis = true + 1.0 * normal + OFFSET - [0, 0, 120] - tool_vector
+    assert np.abs(read_dmis(result.data).value_mm - true - model.error_mm(axis, tool_vector)).max() < 2e-6
     found = np.array([p["axis_mm"] for p in result.report["points"]])
     assert found == pytest.approx(axis, abs=2e-6)
 

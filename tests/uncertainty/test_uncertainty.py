@@ -140,8 +140,8 @@ def test_sigma_columns_hold_anywhere_between_their_positions(q: float, name: str
     assert known is not None
     at = np.array([[q, 0.0, -400.0]])
     rows = Sensitivity.of(flat(), "FXYZ", known).rows(at, np.zeros(3))[0, 0]
-    lever = 1.0 if name == "EXX" else 400.0
-    assert np.sqrt(rows @ rows) == pytest.approx(lever * np.interp(q, KNOTS["X"], sigma), rel=1e-5)
+    tool_vector = 1.0 if name == "EXX" else 400.0
+    assert np.sqrt(rows @ rows) == pytest.approx(tool_vector * np.interp(q, KNOTS["X"], sigma), rel=1e-5)
 
 
 def test_variances_of_independent_numbers_add() -> None:

@@ -147,8 +147,8 @@ def test_few_blocks_more_than_the_longest_chords(tmp_path: Path, seed: int) -> N
     at = rng.uniform(low + 30, high - 30, (7, 3)).round(3)
     text = programs.polyline_program(at - (250.0, 200.0, -300.0), 3)
     count = len(points(olp.correct(text, path).data)) - 1
-    model, lever = JudgeModel(path), np.array([0.0, 0.0, -120.0])
-    best = sum(chord_count(a, b, model, lever, 1e-3) for a, b in itertools.pairwise(at))
+    model, tool_vector = JudgeModel(path), np.array([0.0, 0.0, -120.0])
+    best = sum(chord_count(a, b, model, tool_vector, 1e-3) for a, b in itertools.pairwise(at))
     assert best >= 10
     assert count <= 1.15 * best
 

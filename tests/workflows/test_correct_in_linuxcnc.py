@@ -10,7 +10,7 @@ from cases.acceptance import ROUNDING, TOLERANCE_UM
 from judge import controller, linuxcnc, machines, programs
 from judge.machines import Recipe
 from judge.model import JudgeModel
-from judge.path import densify, levers, shifts
+from judge.path import densify, shifts, tool_vectors
 from scipy.spatial import cKDTree
 
 import olp
@@ -49,8 +49,8 @@ def test_the_control_drives_the_corrected_path(seed: int, tmp_path: Path) -> Non
     dense = densify(moves, 0.02)
     tip = dense.points + shifts(dense.moves, model)[dense.move]
     cutting = np.isin(moves.kind, (linuxcnc.FEED, linuxcnc.ARC)) & moves.known.all(axis=1)
-    lever = levers(moves, model)[cutting]
-    assert (lever == lever[0]).all()
+    tool_vector = tool_vectors(moves, model)[cutting]
+    assert (tool_vector == tool_vector[0]).all()
     kept = np.isin(dense.move, np.flatnonzero(cutting))
     vertices = tip[dense.last & kept]
 
@@ -60,7 +60,7 @@ def test_the_control_drives_the_corrected_path(seed: int, tmp_path: Path) -> Non
         run = controller.run(text, machine, tmp_path / f"control{len(worst)}")
         commanded = run.axis[run.cutting]
         assert len(commanded) > 1000
-        real = commanded + model.error_mm(commanded, np.tile(lever[0], (len(commanded), 1)))
+        real = commanded + model.error_mm(commanded, np.tile(tool_vector[0], (len(commanded), 1)))
         worst.append((distances_mm(real, tip).max(), distances_mm(vertices, real).max()))
     assert worst[0][0] > 0.02
     assert max(worst[1]) <= allowed_mm

@@ -30,7 +30,7 @@ _MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class Residual:
     """Distances from where the tip should be, in um: root mean square and maximum, and the root mean square
     once a best-fit rigid frame has been taken out, as a work offset does in practice."""
 
@@ -77,9 +77,9 @@ def along(path: Toolpath, box_mm: Array, chain: str, step_mm: float = 1.0) -> Pl
     return Places(points, tool if tool.ndim == 1 else tool[move], direction, True, counted)
 
 
-def left_by(
+def residuals_by(
     model: ErrorModel, controls: Mapping[str, Control], places: Places, increment_mm: Array | None = None
-) -> dict[str, Left]:
+) -> dict[str, Residual]:
     """What is left by name: the machine as it is, with each control's tables and, where `increment_mm` (3,)
     is given, by corrected commands that are rounded to it."""
     out = {}
@@ -97,16 +97,16 @@ def _play(model: ErrorModel, command: Array, places: Places) -> Array | None:
     return plays(model, command) if places.path else places.direction
 
 
-def _left(model: ErrorModel, command: Array, places: Places) -> Left:
+def _left(model: ErrorModel, command: Array, places: Places) -> Residual:
     actual = command + model.error(command, places.tool_mm, _play(model, command, places))
     wanted = places.points_mm
     if places.counted is not None:
         actual, wanted = actual[places.counted], wanted[places.counted]
     if not len(wanted):
-        return Left(0.0, 0.0, 0.0)
+        return Residual(0.0, 0.0, 0.0)
     distance = np.sqrt(((actual - wanted) ** 2).sum(axis=1)) * UM_PER_MM
     framed = fit_points(actual, wanted)(actual) - wanted
-    return Left(_rms(distance), float(distance.max()), _rms(np.sqrt((framed**2).sum(axis=1)) * UM_PER_MM))
+    return Residual(_rms(distance), float(distance.max()), _rms(np.sqrt((framed**2).sum(axis=1)) * UM_PER_MM))
 
 
 def _rms(values: Array) -> float:

@@ -16,7 +16,7 @@ from olp.core.machine import COMPONENTS, ZERO
 from olp.core.units import AXES
 from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Reference
-from olp.errormodel.levers import Lever
+from olp.errormodel.lever_arms import LeverArm
 from olp.errormodel.sources.cyclic import cyclic_value
 
 #: Between rows a table may miss the curve by this much, in mm or rad times a metre, where its size allows.
@@ -192,14 +192,15 @@ def zeroed(calibration: Calibration, chain: str, reference: Reference = "functio
         shift = {name: value for name, value in shifts[axis].items() if value}
         own = calibration.curves_of(axis)
         on_table = body.carries_workpiece and reference == "table"
-        levers = {row: lever for rows, lever in body.levers for row in rows}
+        lever_arms = {row: lever_arm for rows, lever_arm in body.lever_arms for row in rows}
         turns = any(name[1] in "ABC" for curve in own for name in curve.names)
         moved = turns and any(
-            any(lever.offset_mm) or lever.moves[body.axis] != on_table for lever in levers.values()
+            any(lever_arm.offset_mm) or lever_arm.moves[body.axis] != on_table
+            for lever_arm in lever_arms.values()
         )
         kind: Reference = "table" if on_table else "functional-point"
         if moved or shift:
-            curves.append(_joined(calibration, axis, levers, shift, kind))
+            curves.append(_joined(calibration, axis, lever_arms, shift, kind))
         else:
             curves += [replace(c, line_mm=ZERO, tool_mm=ZERO, reference=kind) for c in own]
     curves.sort(key=lambda curve: curve.axis)
@@ -207,7 +208,11 @@ def zeroed(calibration: Calibration, chain: str, reference: Reference = "functio
 
 
 def _joined(
-    calibration: Calibration, axis: str, levers: dict[int, Lever], shift: dict[str, float], kind: Reference
+    calibration: Calibration,
+    axis: str,
+    lever_arms: dict[int, LeverArm],
+    shift: dict[str, float],
+    kind: Reference,
 ) -> Curve:
     """One curve of an axis with all its components, moved to the line through 0 with no tool."""
     j, own = AXES.index(axis), calibration.curves_of(axis)
@@ -224,11 +229,11 @@ def _joined(
         for i, name in enumerate(f"E{d}{axis}" for d in AXES):
             where = [np.zeros(1)] * 3
             where[j] = position
-            arms = levers[i].at(where, [0.0, 0.0, 0.0])
+            arms = lever_arms[i].at(where, [0.0, 0.0, 0.0])
             if kind == "table":
                 arms[j] = arms[j] - position
-            lever = np.column_stack([none + arm for arm in arms])
-            added = np.cross(angles, lever)[:, i] + shift.get(name, 0.0)
+            lever_arm = np.column_stack([none + arm for arm in arms])
+            added = np.cross(angles, lever_arm)[:, i] + shift.get(name, 0.0)
             if name in values or np.any(added):
                 values[name] = _rounded(values.get(name, 0.0) + added, name)
         sides.append(values)

@@ -15,7 +15,7 @@ from olp.calibration.estimator.model import mean_slopes
 from olp.calibration.estimator.normal import Normal, solve
 from olp.calibration.estimator.parameters import Parameters, Place, frame_columns
 from olp.calibration.estimator.prior import POSE, Prior
-from olp.calibration.estimator.summary import squareness_unseen, unseen
+from olp.calibration.estimator.summary import squareness_unobservable, unobservable
 from olp.calibration.observations.base import State
 from olp.calibration.observations.lines import Square, square_names
 from olp.calibration.observations.measurements import Measurements
@@ -75,7 +75,7 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
         mean_slopes(parameters), 0.0, 1.0, {},
     )  # fmt: skip
     after, worst = _spread(parameters, solved.covariance, box_mm, tools)
-    return Prediction(after, worst, (*unseen(found), *squareness_unseen(found)))
+    return Prediction(after, worst, (*unobservable(found), *squareness_unobservable(found)))
 
 
 def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:

@@ -140,22 +140,22 @@ def diagnose(
     model = build(calibration, chain, outside="hold", skip_components=skip)
     seen = Checkpoints.of(points, model, frame_known=frame_known, scale=scale)
     search = _Search(calibration, chain, seen, skip)
-    chosen, rivals = search.arranged()
+    chosen, candidates = search.arranged()
     arranged = search.applied(chosen)
     base, found = search.columns(chosen), search.factors(chosen)
-    others = [(rival, search.factors([*chosen, rival]).marginals) for rival in rivals]
+    others = [(candidate, search.factors([*chosen, candidate]).marginals) for candidate in candidates]
     verdicts = []
     for name in (*COMPONENTS, *SQUARENESS):
         if name in found.marginals:
-            same = [o.get(name) for rival, o in others if name not in rival.renames]
-            doubted = any(name in rival.renames for rival in rivals)
+            same = [o.get(name) for candidate, o in others if name not in candidate.renames]
+            doubted = any(name in candidate.renames for candidate in candidates)
             verdicts.append(_verdict(found.marginals[name], base[name], same, doubted=doubted))
     corrected = scaled(arranged, {v.name: v.applied for v in verdicts})
     stated = contributions_of(
         build(corrected, chain, outside="hold", skip_components=skip), points.axis_mm, points.tool_mm
     )
     return Diagnosis(
-        calibration, seen, tuple(verdicts), tuple(chosen), tuple(r.words for r in rivals),
+        calibration, seen, tuple(verdicts), tuple(chosen), tuple(r.words for r in candidates),
         _senses(verdicts, chain), found, corrected, chain, skip,
         _left(seen, search.columns([])), _left(seen, stated),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk, Normal, evidence, solve
-from olp.calibration.estimator.parameters import LEVER_MM, frame_columns
+from olp.calibration.estimator.parameters import LEVER_ARM_MM, frame_columns
 from olp.calibration.observations.points import Points, deviations
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
@@ -133,7 +133,7 @@ class Checkpoints:
         deviation = (
             points.measured_mm - points.axis_mm - points.tool_mm if frame_known else deviations(points)
         )
-        lost = model.lost_motion_mm(points.axis_mm)
+        lost = model.backlash_at(points.axis_mm)
         sigma = np.full(deviation.shape, points.sigma)
         if lost is not None:
             sigma = np.hypot(sigma, 0.5 * np.abs(lost))
@@ -229,7 +229,7 @@ def design_of(
     curves = np.stack([columns.get(name, zero) for name in names], axis=2)
     scales = np.zeros((len(tip), 3, 3))
     for k in range(3):
-        scales[:, k, k] = (tip[:, k] - centre_mm[k]) / LEVER_MM
+        scales[:, k, k] = (tip[:, k] - centre_mm[k]) / LEVER_ARM_MM
     return np.concatenate([curves, frame_columns(tip - centre_mm), scales], axis=2)
 
 
@@ -256,7 +256,7 @@ def _precision(seen: Checkpoints, spread: Array) -> Array:
     """Prior precisions of factors, frame and scales."""
     # a frame that is known may still be off by a nanometre; one that is not, by metres
     frame = np.full(6, 1e12 if seen.frame_known else 1e-6)
-    scales = np.full(3, 1.0 / max(seen.scale * LEVER_MM, 1e-9) ** 2)
+    scales = np.full(3, 1.0 / max(seen.scale * LEVER_ARM_MM, 1e-9) ** 2)
     return np.concatenate([1.0 / np.square(spread), frame, scales])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from olp.calibration.estimator.covariance import principal
 from olp.calibration.estimator.curves import DIGITS
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of, solve
-from olp.calibration.estimator.parameters import LEVER_MM, frame_columns
+from olp.calibration.estimator.parameters import LEVER_ARM_MM, frame_columns
 from olp.calibration.observations.base import OUTLIER, SHARE
 from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
@@ -72,7 +72,7 @@ def refine(
     meant = points.axis_mm + points.tool_mm + model.error(points.axis_mm, points.tool_mm, play)
     seen = points.measured_mm if frame_known else fit_frame(points.measured_mm, meant)(points.measured_mm)
     sigma = np.full(meant.shape, points.sigma)
-    lost = model.lost_motion_mm(points.axis_mm) if play is None else None
+    lost = model.backlash_at(points.axis_mm) if play is None else None
     if lost is not None:
         sigma = np.hypot(sigma, 0.5 * np.abs(lost))
     parts = Sensitivity.of(calibration, chain, uncertainty, skip=skip)
@@ -124,7 +124,7 @@ def _block(
     local = _across(frame, blind).reshape(3 * len(arm), -1)
     precision = np.zeros(local.shape[1])
     if scaled:
-        precision[6] = 1.0 / (points.sigma_scale * LEVER_MM) ** 2
+        precision[6] = 1.0 / (points.sigma_scale * LEVER_ARM_MM) ** 2
     if frame_known:
         local, precision = local[:, 6:], precision[6:]
     rows, misses = _across(rows, blind), _across(misses[:, :, None], blind)

@@ -150,7 +150,7 @@ def _finish(start: _Start, end: _Settled) -> Fit:
     parameters = end.prior.parameters
     return Fit(
         start.measurements, parameters, theta, covariance, end.prior, tuple(results), tuple(end.outliers),
-        model.box_mm, mean_slopes(parameters), chi_square, freedom, model.unseen,
+        model.box_mm, mean_slopes(parameters), chi_square, freedom, model.unobservable,
     )  # fmt: skip
 
 

@@ -12,7 +12,13 @@ from olp.calibration.estimator.adjustment import MISFIT
 from olp.calibration.estimator.curves import joints_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.prior import class_of
-from olp.calibration.estimator.summary import cost_um, scale_unseen, scales_open, squareness_unseen, unseen
+from olp.calibration.estimator.summary import (
+    cost_um,
+    scale_unobservable,
+    scales_open,
+    squareness_unobservable,
+    unobservable,
+)
 from olp.calibration.observations.base import unit_of
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, Vector
@@ -33,7 +39,7 @@ def findings_of(
 ) -> tuple[Finding, ...]:
     """What a person should know about an adjustment."""
     return (
-        *_unseen_findings(fit, tools),
+        *_unobservable_findings(fit, tools),
         *_scale_findings(fit),
         *_outlier_findings(fit),
         *_scatter_findings(fit),
@@ -43,13 +49,13 @@ def findings_of(
         *_misfit_findings(fit),
         *(
             Finding("OLP853", f"{name}, period {period:g} mm: {reason}")
-            for (name, period), reason in fit.cyclic_unseen.items()
+            for (name, period), reason in fit.cyclic_unobservable.items()
         ),
     )
 
 
-def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
-    for name, sigma in unseen(fit).items():
+def _unobservable_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
+    for name, sigma in unobservable(fit).items():
         unit, scale = unit_of(name)
         arm = f", and {sigma * 1e5:.2g} um more for 100 mm of tool" if name[1] in "ABC" else ""
         like = {"angle": "angles", "straightness": "straightness", "positioning": "positioning"}[
@@ -61,7 +67,7 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
             f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}"
             + _why(fit, name),
         )
-    for name in squareness_unseen(fit):
+    for name in squareness_unobservable(fit):
         yield Finding(
             "OLP806",
             f"{name} stands as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
@@ -69,7 +75,7 @@ def _unseen_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
 
 
 def _scale_findings(fit: Fit) -> Iterator[Finding]:
-    scale = scale_unseen(fit)
+    scale = scale_unobservable(fit)
     if scale is not None:
         yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
         return
@@ -134,7 +140,7 @@ def _step_findings(fit: Fit) -> Iterator[Finding]:
 def _correlation_findings(fit: Fit) -> Iterator[Finding]:
     """Of squareness, and of what each curve does from one end of the box to the other."""
     functionals = {name: fit.squareness(name) for name in SQUARENESS}
-    hidden = {**unseen(fit), **squareness_unseen(fit)}
+    hidden = {**unobservable(fit), **squareness_unobservable(fit)}
     for name in COMPONENTS:
         if name not in hidden:
             ends = fit.curve(name, fit.box_mm[AXES.index(name[2])])

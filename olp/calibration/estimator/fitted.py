@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.estimator.basis import Step
-from olp.calibration.estimator.parameters import CROSS, LEVER_MM, Parameters, frame_columns
+from olp.calibration.estimator.parameters import CROSS, LEVER_ARM_MM, Parameters, frame_columns
 from olp.calibration.estimator.prior import Prior
 from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
 from olp.calibration.observations.measurements import Measurements
@@ -38,7 +38,7 @@ class Fit:
     slopes: Mapping[str, Array]
     chi_square: float
     freedom: float
-    cyclic_unseen: Mapping[tuple[str, float], str]
+    cyclic_unobservable: Mapping[tuple[str, float], str]
 
     def of(self, kind: type[S]) -> tuple[Result[S], ...]:
         """The results of a kind of state, such as LineState."""
@@ -96,7 +96,7 @@ class Fit:
                 continue
             for i, a, k, _ in CROSS:
                 if "ABC"[a] == name[1]:
-                    variance[:, i] += between * self.parameters.lever(i, axis, k, position, tool) ** 2
+                    variance[:, i] += between * self.parameters.lever_arm(i, axis, k, position, tool) ** 2
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def between_targets(self, name: str, q: Array) -> Array:
@@ -130,7 +130,7 @@ class Fit:
         start, axis = self.parameters.slices["frame"].start, AXES.index(name[2])
         if name[1] not in AXES:
             if not self.parameters.after(axis):
-                out[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_MM
+                out[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_ARM_MM
             return out
         row = AXES.index(name[1])
         if not self.parameters.after(axis):
@@ -144,7 +144,7 @@ class Fit:
             k = 3 - row - axis
             sign = 1.0 if (axis - k) % 3 == 1 else -1.0
             turn = -self.turn[k]
-            turn[start + 3 + k] += 1.0 / LEVER_MM
+            turn[start + 3 + k] += 1.0 / LEVER_ARM_MM
             out += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
         return out
 

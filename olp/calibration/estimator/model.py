@@ -41,7 +41,7 @@ class Model:
     splines: Sequence[Spline]
     shapes: Mapping[str, Shape]
     waves: Mapping[str, tuple[Wave, ...]]
-    unseen: Mapping[tuple[str, float], str]
+    unobservable: Mapping[tuple[str, float], str]
     framed: bool
 
     @classmethod
@@ -56,10 +56,10 @@ class Model:
         ranges, box = _ranges(own, observations, travel_mm)
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
         splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
-        waves, unseen = _waves(measurements, own, observations)
+        waves, unobservable = _waves(measurements, own, observations)
         shapes = _shapes(lines, splines, waves, tell)
         framed = any(taken.framed for taken in observations)
-        return cls(chain, (x, y, z), box, lines, splines, shapes, waves, unseen, framed)
+        return cls(chain, (x, y, z), box, lines, splines, shapes, waves, unobservable, framed)
 
     def parameters(self, waves: Mapping[str, tuple[Wave, ...]]) -> Parameters:
         """The layout of theta with some cyclic terms."""
@@ -177,7 +177,7 @@ def _waves(
 ) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
     """Cyclic terms that the targets can see, and why others cannot be seen."""
     waves: dict[str, tuple[Wave, ...]] = {}
-    unseen: dict[tuple[str, float], str] = {}
+    unobservable: dict[tuple[str, float], str] = {}
     for name in COMPONENTS:
         own = [targets_of(line) for line in lines if line.component == name]
         if name[1] == name[2]:
@@ -188,8 +188,8 @@ def _waves(
             if None in reasons:
                 waves[name] = (*waves.get(name, ()), Wave(period))
             else:
-                unseen[name, period] = str(reasons[0])
-    return waves, unseen
+                unobservable[name, period] = str(reasons[0])
+    return waves, unobservable
 
 
 def _own_lines(name: str, lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Line, Noise]]:

@@ -23,7 +23,7 @@ CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0
 #: Row, axis and sign of what a squareness adds, times the distance of that axis from the datum.
 SHEAR = {"C0Y": (0, 1, -1.0), "B0Z": (0, 2, 1.0), "A0Z": (1, 2, -1.0)}
 #: Turns of the frame count per metre of lever, so that all unknowns are of one size.
-LEVER_MM = 1000.0
+LEVER_ARM_MM = 1000.0
 
 Part = tuple[slice, Array]
 
@@ -110,18 +110,18 @@ class Parameters:
         for i, a, k, sign in CROSS:
             if i != row:
                 continue
-            lever = self.lever(row, axis, k, position, tool)
+            lever_arm = self.lever_arm(row, axis, k, position, tool)
             if on_table and k == axis:
-                lever = lever - (q - self.datum_mm[axis])
-            if np.any(lever != 0.0):
+                lever_arm = lever_arm - (q - self.datum_mm[axis])
+            if np.any(lever_arm != 0.0):
                 for part, values in self.curve(f"E{'ABC'[a]}{AXES[axis]}", q, direction):
-                    yield part, sign * lever[:, None] * values
+                    yield part, sign * lever_arm[:, None] * values
 
-    def lever(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
+    def lever_arm(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
         """(n,) coordinate `k` of the lever by which angles of `axis` act on displacement `row`."""
         place = self.places[f"E{AXES[row]}{AXES[axis]}"]
-        lever = np.broadcast_to(tool[..., k] - place.tool_mm[k], (len(position),))
-        return lever + (position[:, k] - place.line_mm[k]) if k in self.after(axis) else lever
+        lever_arm = np.broadcast_to(tool[..., k] - place.tool_mm[k], (len(position),))
+        return lever_arm + (position[:, k] - place.line_mm[k]) if k in self.after(axis) else lever_arm
 
     def shear(self, row: int, position: Array) -> Iterator[Part]:
         """The parts of what squareness adds to displacement `row` at axis positions (n, 3)."""
@@ -155,10 +155,10 @@ def frame_columns(arm: Array, *, scale: bool = False) -> Array:
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         out[:, k, k] = 1.0
-        out[:, i, 3 + k] = -arm[:, j] / LEVER_MM
-        out[:, j, 3 + k] = arm[:, i] / LEVER_MM
+        out[:, i, 3 + k] = -arm[:, j] / LEVER_ARM_MM
+        out[:, j, 3 + k] = arm[:, i] / LEVER_ARM_MM
     if scale:
-        out[:, :, 6] = arm / LEVER_MM
+        out[:, :, 6] = arm / LEVER_ARM_MM
     return out
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from olp.calibration.estimator.curves import half_of, joints_of, sigma_of
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.parameters import LEVER_MM, SHEAR
+from olp.calibration.estimator.parameters import LEVER_ARM_MM, SHEAR
 from olp.calibration.observations.base import rms, unit_of
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, Vector
@@ -19,7 +19,7 @@ from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration
 
 #: A curve whose uncertainty the readings lowered by less than this factor was not seen.
-UNSEEN = 0.7
+UNOBSERVABLE = 0.7
 _POINTS = 41
 #: Sums and tables of a report that are there whatever was measured, in their order; the frame only where some
 #: points were taken in it.
@@ -36,7 +36,7 @@ def grid_of(fit: Fit, name: str) -> Array:
     return np.linspace(low, high, _POINTS)
 
 
-def unseen(fit: Fit) -> dict[str, float]:
+def unobservable(fit: Fit) -> dict[str, float]:
     """Components that no reading tells of, with the standard deviation that they may have (mm or rad)."""
     found: dict[str, float] = {}
     matrix, _ = fit.prior.precision()
@@ -48,12 +48,12 @@ def unseen(fit: Fit) -> dict[str, float]:
         rows = fit.parameters.spaces[name].values(q)
         before = np.einsum("nk,kl,nl->n", rows, np.linalg.inv(matrix[at, at]), rows, optimize=True)
         after = np.einsum("nk,kl,nl->n", rows, fit.covariance[at, at], rows, optimize=True)
-        if after.mean() > UNSEEN**2 * before.mean():
+        if after.mean() > UNOBSERVABLE**2 * before.mean():
             found[name] = math.sqrt(float(after.mean()))
     return found
 
 
-def scale_unseen(fit: Fit) -> float | None:
+def scale_unobservable(fit: Fit) -> float | None:
     """Standard deviation of the common scale of all axes, where no reading tells of it."""
     prior = np.linalg.inv(fit.prior.precision()[0])
     row = np.zeros(fit.parameters.size)
@@ -61,7 +61,7 @@ def scale_unseen(fit: Fit) -> float | None:
         ends = fit.curve(f"E{letter}{letter}", fit.box_mm[axis])
         row += (ends[1] - ends[0]) / float(np.ptp(fit.box_mm, axis=1).sum())
     before, after = float(row @ prior @ row), float(row @ fit.covariance @ row)
-    return math.sqrt(after) if after > UNSEEN**2 * before else None
+    return math.sqrt(after) if after > UNOBSERVABLE**2 * before else None
 
 
 def scales_open(fit: Fit) -> tuple[Array, Array]:
@@ -76,7 +76,7 @@ def scales_open(fit: Fit) -> tuple[Array, Array]:
     root = (vectors * np.sqrt(values)) @ vectors.T
     back = np.linalg.inv(root)
     share, parts = np.linalg.eigh(back @ rows @ fit.covariance @ rows.T @ back)
-    unknown = share > UNSEEN**2
+    unknown = share > UNOBSERVABLE**2
     changes, known = (root @ parts[:, unknown]).T, (back @ parts[:, ~unknown]).T
     return _largest_one(changes), _largest_one(known)
 
@@ -86,13 +86,13 @@ def _largest_one(rows: Array) -> Array:
     return np.asarray(rows / rows[np.arange(len(rows)), at][:, None])
 
 
-def squareness_unseen(fit: Fit) -> dict[str, float]:
+def squareness_unobservable(fit: Fit) -> dict[str, float]:
     """Values of squareness that no reading tells of, with their standard deviation in rad."""
     matrix, _ = fit.prior.precision()
     found = {}
     for name in SQUARENESS:
         at = fit.parameters.slices[name].start
-        if fit.covariance[at, at] * matrix[at, at] > UNSEEN**2:
+        if fit.covariance[at, at] * matrix[at, at] > UNOBSERVABLE**2:
             found[name] = math.sqrt(float(fit.covariance[at, at]))
     return found
 
@@ -105,7 +105,7 @@ def cost_um(fit: Fit, name: str, sigma: float, tools: Sequence[Vector]) -> float
     if name[1] in AXES:
         return sigma * UM_PER_MM
     axis, turn = AXES.index(name[2]), "ABC".index(name[1])
-    lever = []
+    lever_arm = []
     for k in range(3):
         if k == turn:
             continue
@@ -113,13 +113,13 @@ def cost_um(fit: Fit, name: str, sigma: float, tools: Sequence[Vector]) -> float
             (abs(t[k] - fit.parameters.places[f"E{AXES[axis]}{AXES[axis]}"].tool_mm[k]) for t in tools),
             default=0.0,
         )
-        lever.append(tool + (float(np.ptp(fit.box_mm[k])) if k in fit.parameters.after(axis) else 0.0))
-    return sigma * math.hypot(*lever) * UM_PER_MM
+        lever_arm.append(tool + (float(np.ptp(fit.box_mm[k])) if k in fit.parameters.after(axis) else 0.0))
+    return sigma * math.hypot(*lever_arm) * UM_PER_MM
 
 
 def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict[str, Any]:
     """Everything that was found, with units in the keys."""
-    hidden = unseen(fit)
+    hidden = unobservable(fit)
     return {
         "schema": "olp-fit-1",
         "machine": fit.measurements.machine,
@@ -149,7 +149,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         **_sections(fit),
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
-            for name, sigma in {**hidden, **squareness_unseen(fit)}.items()
+            for name, sigma in {**hidden, **squareness_unobservable(fit)}.items()
         ],
     }  # fmt: skip
 
@@ -214,7 +214,7 @@ def _frame_row(fit: Fit) -> dict[str, Any]:
     """The axes as a whole in the machine's frame, at the datum."""
     part = fit.parameters.slices["frame"]
     value, sigma = fit.theta[part], np.sqrt(np.diag(fit.covariance)[part])
-    per_urad = 1.0 / LEVER_MM / RAD_PER_URAD
+    per_urad = 1.0 / LEVER_ARM_MM / RAD_PER_URAD
     return {
         "shift_um": (value[:3] * UM_PER_MM).tolist(),
         "sigma_shift_um": (sigma[:3] * UM_PER_MM).tolist(),

@@ -150,8 +150,8 @@ def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] 
             )
     if not diagonals:
         raise ConfigError("no diagonals; expected face or body diagonals")
-    levers = np.array([d.tool_mm for d in diagonals], float)
-    if np.ptp(levers, axis=0).max() > 1.0:
+    lever_arms = np.array([d.tool_mm for d in diagonals], float)
+    if np.ptp(lever_arms, axis=0).max() > 1.0:
         raise ConfigError(
             "diagonals with different tool vectors; angular errors would differ between them; expected one",
             file=diagonals[-1].source,

@@ -50,7 +50,7 @@ class Reversal:
     drift: float
 
     @property
-    def lost_motion(self) -> float:
+    def backlash(self) -> float:
         """The lost motion of the axis, for a positioning line; mm."""
         return 0.0 - self.mean
 
@@ -72,7 +72,7 @@ class Reversal:
             },
         }
         if self.line.quantity == "positioning":
-            out["lost_motion_um"] = self.lost_motion * UM_PER_MM
+            out["lost_motion_um"] = self.backlash * UM_PER_MM
         return out
 
 
@@ -220,7 +220,7 @@ def backlash_toml(reversals: Sequence[Reversal]) -> str:
     lines = ["[backlash]"]
     for reversal in reversals:
         axis = AXES[reversal.line.axis]
-        b, sigma = reversal.lost_motion * UM_PER_MM, reversal.sigma * UM_PER_MM
+        b, sigma = reversal.backlash * UM_PER_MM, reversal.sigma * UM_PER_MM
         if reversal.constant:
             lines.append(f"{axis}_um = {b:.3f}  # standard uncertainty {sigma:.3f} um")
         else:

@@ -55,7 +55,7 @@ class Postures:
         return tuple(dict.fromkeys(self.tool))
 
     @property
-    def lever_mm(self) -> Array:
+    def tool_vector_mm(self) -> Array:
         """(n, 3) nominal tool vectors in the machine's frame."""
         return np.asarray(np.einsum("nij,nj->ni", self.turn, self.vector_mm))
 
@@ -137,7 +137,7 @@ def fit(postures: Postures, error_mm: Array | None = None, reference: str | None
     turned = bool(np.ptp(postures.turn, axis=0).max() > 1e-9)
     if reference is None and not turned and len(names) > 1:
         reference = names[0]
-    tip = postures.axis_mm + postures.lever_mm + (0.0 if error_mm is None else error_mm)
+    tip = postures.axis_mm + postures.tool_vector_mm + (0.0 if error_mm is None else error_mm)
     before = tip - tip.mean(axis=0)
     fitted = [name for name in names if name != reference]
     design = np.zeros((n, 3, 3 + 3 * len(fitted)))

@@ -95,12 +95,12 @@ def from_straightness_pair(first: Line, second: Line, square: Square) -> Squaren
                 file=line.source,
             )
     apart = abs(a.line_mm[third] - b.line_mm[third])
-    levers = max(abs(p - q) for p, q in zip(a.tool_mm, b.tool_mm, strict=True))
-    if max(apart, levers) > SAME_PLACE_MM:
+    lever_arms = max(abs(p - q) for p, q in zip(a.tool_mm, b.tool_mm, strict=True))
+    if max(apart, lever_arms) > SAME_PLACE_MM:
         what = (
             f"stand {apart:g} mm apart in {AXES[third]}"
             if apart > SAME_PLACE_MM
-            else f"have tool vectors {levers:g} mm apart"
+            else f"have tool vectors {lever_arms:g} mm apart"
         )
         raise ConfigError(
             f"lines {a.component} and {b.component} {what}; angular errors between would be counted as "

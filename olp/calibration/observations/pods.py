@@ -32,7 +32,7 @@ CHUNK = 2000
 #: Gauss and Newton have arrived where no pod moves by more than this.
 STILL_MM = 1e-5
 #: Turns of a pod count per metre of lever, so that all unknowns are of one size.
-LEVER_MM = 1000.0
+LEVER_ARM_MM = 1000.0
 _STEPS, _AROUND = 30, (-0.7, 0.5, 1.7)
 #: A pose whose directions miss the nominal points by more than this (rad) is no pose.
 _FOUND_RAD = 2e-3
@@ -101,7 +101,7 @@ class Pose:
 
     def moved(self, step: Array) -> Pose:
         """After a shift in mm and a turn in rad times LEVER_MM, in the machine's frame."""
-        return Pose(self.place_mm + step[:3], self.rotation @ rotation_of(-step[3:] / LEVER_MM))
+        return Pose(self.place_mm + step[:3], self.rotation @ rotation_of(-step[3:] / LEVER_ARM_MM))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,7 +203,7 @@ def _linear(tip: Array, pods: Pods, k: int, part: slice, pose: Pose) -> tuple[Ar
     rows = own @ pose.rotation
     # a turn w of the pod moves what it sees by -w x ray
     turned = np.cross(rows, ray[:, None, :])
-    return misses, rows, np.concatenate([-rows, turned / LEVER_MM], axis=2)
+    return misses, rows, np.concatenate([-rows, turned / LEVER_ARM_MM], axis=2)
 
 
 def _resected(tip: Array, pods: Pods, k: int) -> Pose:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
-from olp.calibration.estimator.parameters import LEVER_MM, Unknowns, frame_columns
+from olp.calibration.estimator.parameters import LEVER_ARM_MM, Unknowns, frame_columns
 from olp.calibration.observations.base import (
     Advance,
     Noise,
@@ -153,7 +153,7 @@ def points_block(points: Points, parameters: Unknowns) -> Block:
     local = local[:, :, 6:] if points.known_frame else local
     precision = np.zeros(local.shape[2])
     if points.sigma_scale > 0.0:
-        precision[-1] = 1.0 / (points.sigma_scale * LEVER_MM) ** 2
+        precision[-1] = 1.0 / (points.sigma_scale * LEVER_ARM_MM) ** 2
     size = parameters.size
     sigma = np.full(nominal.shape, points.sigma)
     turn: Array | None = None

@@ -172,13 +172,13 @@ def _result(
                 )
             )
             sigma.append((s[0], s[1], s[2]))
-        drift, unseen = held.get(component, (float("nan"), float("nan")))
+        drift, unobservable = held.get(component, (float("nan"), float("nan")))
         places = sorted({c.position_mm for c in problem.channels if c.component == component})
         low, high = problem.span(component)
         fits.append(
             ComponentFit(
                 component, SHAPES[:count], len(places), len(values), rms(values), rms(left), drift,
-                unseen, (places[-1] - places[0]) / (high - low),
+                unobservable, (places[-1] - places[0]) / (high - low),
             )
         )  # fmt: skip
     return ThermalFit(Structure(sensors, tuple(distortions)), condition, tuple(fits), tuple(sigma), what)

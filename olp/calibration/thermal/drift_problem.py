@@ -248,9 +248,9 @@ class Problem:
         out = {}
         for component in self.components:
             columns, values = self.design(component, training, rises)
-            unseen, drift = self.design(component, held_out, rises)
+            unobservable, drift = self.design(component, held_out, rises)
             if len(values) > columns.shape[1] and len(drift):
-                left = drift - unseen @ self.solve(columns, values)
+                left = drift - unobservable @ self.solve(columns, values)
                 out[component] = (rms(drift), rms(left))
         return out
 

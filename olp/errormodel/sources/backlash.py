@@ -25,7 +25,7 @@ class BacklashTable(Table):
     sigma_Z_um: NotNegative = Field(default=0.0, description="the standard uncertainty of Z_um, in um")
 
 
-class LostMotion(Numbers):
+class BacklashNumbers(Numbers):
     """That of one axis."""
 
     kind = "backlash"
@@ -40,7 +40,7 @@ class Backlash(ErrorSource[BacklashTable, Vector]):
     """The table [backlash]; values are lost motions in mm."""
 
     key, field = "backlash", "backlash_mm"
-    numbers = (LostMotion(),)
+    numbers = (BacklashNumbers(),)
     schema: Schema = (BacklashTable, Field(default_factory=BacklashTable, description="the table [backlash]"))
 
     def example(self, by: float) -> Example:

@@ -91,7 +91,7 @@ class ThermalExpansion(Boxed):
     def depends_on(self) -> Mask:
         return np.diag((self.scale_slope != 0.0) | (self.workpiece_slope != 0.0))
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+    def backlash_at(self, axis_mm: Array) -> Array | None:
         return None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:

@@ -129,7 +129,7 @@ class MapErrors(Boxed):
     def depends_on(self) -> Mask:
         return self.grid.varies()
 
-    def lost_motion_mm(self, axis_mm: Array) -> Array | None:
+    def backlash_at(self, axis_mm: Array) -> Array | None:
         return None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:

@@ -274,7 +274,7 @@ def coarse(rows: Iterable[Rows], good_mm: float, good_rad: float) -> Iterator[Fi
         yield Finding("OLP873", f"straight lines between the rows miss the curves: {worst}", count=len(found))
 
 
-def lost_motion(calibration: Calibration, axes: Iterable[str]) -> Iterator[Finding]:
+def backlash_in_table(calibration: Calibration, axes: Iterable[str]) -> Iterator[Finding]:
     """A finding where a table takes up a constant lost motion."""
     found = [axis for axis in axes if calibration.backlash_mm[AXES.index(axis)]]
     if found:
@@ -287,7 +287,7 @@ def lost_motion(calibration: Calibration, axes: Iterable[str]) -> Iterator[Findi
         )
 
 
-def no_lost_motion(calibration: Calibration) -> Iterator[Finding]:
+def backlash_left_out(calibration: Calibration) -> Iterator[Finding]:
     """A finding where a format without directions leaves lost motion in the machine."""
     axes = {a for a in AXES if calibration.backlash_mm[AXES.index(a)]}
     axes |= {curve.axis for curve in calibration.curves if curve.forward}

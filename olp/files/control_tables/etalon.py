@@ -139,7 +139,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
             lines += [f"[{name}]", f"VALUE = {base.shown(table.squareness[name] * factor)}"]
     findings = [
         *base.not_held(calibration, (*COMPONENTS, *SQUARENESS), written),
-        *base.no_lost_motion(calibration),
+        *base.backlash_left_out(calibration),
         *base.coarse(written, MISS_MM, MISS_RAD),
     ]
     data = ("\n".join(lines) + "\n").encode("ascii", "replace")

@@ -168,7 +168,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     findings: list[Finding] = [
         *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS), written),
         *base.coarse(written, MISS_MM, MISS_RAD),
-        *base.lost_motion(calibration, AXES),
+        *base.backlash_in_table(calibration, AXES),
         Finding("OLP874", f"values have the sense stated, {sense}; run {verify.name} before any part"),
     ]
     if crossed:

@@ -203,7 +203,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
             lines += [" ".join(map(base.shown, row)) for row in np.array(columns).T.tolist()]
     findings = [
         *base.not_held(calibration, (*COMPONENTS, *SQUARENESS), written),
-        *base.no_lost_motion(calibration),
+        *base.backlash_left_out(calibration),
         *base.coarse(written, MISS_MM, MISS_RAD),
     ]
     data = ("\n".join(lines) + "\n").encode("ascii", "replace")

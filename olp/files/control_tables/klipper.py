@@ -74,7 +74,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
         f"[skew_correction {name}]",
     ]
     lines += [f"{key} = {base.shown(value)}" for key, value in zip(_KEYS, factors(calibration), strict=True)]
-    findings = [*base.not_held(calibration, SQUARENESS), *base.no_lost_motion(calibration)]
+    findings = [*base.not_held(calibration, SQUARENESS), *base.backlash_left_out(calibration)]
     corrects = frozenset(n for n, value in calibration.squareness.items() if value)
     return Exported({target: ("\n".join(lines) + "\n").encode()}, corrects, tuple(findings))
 

@@ -129,7 +129,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     findings: list[Finding] = [
         *base.not_held(calibration, corrects, written),
         *base.coarse(written, MISS_MM, MISS_RAD),
-        *base.lost_motion(calibration, AXES),
+        *base.backlash_in_table(calibration, AXES),
     ]
     return Exported({target: ("\n".join(lines) + "\n").encode(), **files}, corrects, tuple(findings))
 

@@ -53,10 +53,10 @@ def read_postures(path: PathLike, tools: Mapping[int, Tool] | None = None) -> Po
 
 def _vector(name: str, line: int, tools: Mapping[int, Tool], file: str) -> tuple[float, float, float]:
     tool = tools.get(int(name)) if name.isdigit() else None
-    if tool is None or tool.lever_mm is None:
+    if tool is None or tool.tool_vector_mm is None:
         sentence = (
             f"tool {name} has no vector; expected the columns TX_mm, TY_mm, TZ_mm, or a tool number of the "
             "machine file (-m) with gauge_to_tip_mm or a length"
         )
         raise config_error([(line, sentence)], file)
-    return tool.lever_mm
+    return tool.tool_vector_mm

@@ -15,7 +15,7 @@ from olp.core.toolpath import Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.program.apt.arcs import ArcForm, circle, directed, movarc
 from olp.program.dialect import Dialect, Options
-from olp.program.frames import UP, FrameTable, lever_of, turn_of, turned
+from olp.program.frames import UP, FrameTable, tool_vector_of, turn_of, turned
 from olp.program.statement_rows import Points, StatementCollector
 from olp.program.text.statements import Field, Statement, shown
 
@@ -25,7 +25,7 @@ _BLOCK = re.compile(rb"(?i)\s*(?:[A-Z]\s*[=+-]?\s*[\d.]+\s*|\([^)]*\)\s*)+\Z")
 _MOVING = re.compile(rb"(?i)[GXYZUVWABC]\s*[=+-]?\s*[\d.]|M\s*(?:98|6|06)\b|[PL]\s*\d")
 _OFF = frozenset((b"OFF", b"NOMORE"))
 #: words of CYCLE that state something and begin none
-_CYCLE_TALK = frozenset((b"INIT", b"CLEAR", b"PARAM", b"AVOID"))
+_CYCLE_MESSAGE = frozenset((b"INIT", b"CLEAR", b"PARAM", b"AVOID"))
 #: how far a direction may be from length 1
 UNIT = 1e-3
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
@@ -120,21 +120,21 @@ class Events:
         work = self.table.work_offset(
             name, line, "the program" if place == 1 else f"coordinate system {place} of the program"
         )
-        length = lever = ZERO
+        length = tool_vector = ZERO
         touched = None
         if self.tool:
-            lever = lever_of(self.setup, self.tool, line)
+            tool_vector = tool_vector_of(self.setup, self.tool, line)
             if self.length_active:
                 tool = self.setup.tool(self.tool)
                 assert tool is not None
                 length = tool.length_mm
                 if tool.set_by == "touch" and tool.touched_at_mm is not None:
-                    touched = (tool.touched_at_mm, lever)
+                    touched = (tool.touched_at_mm, tool_vector)
         # an axis that was never said is the machine's own
         self.up = UP if self.axis == UP else turned(turn_of(work.rotation_deg), self.axis)
         return self.table.index(
-            work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, lever=lever, axis=self.up,
-            tool_touched=touched,
+            work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=tool_vector,
+            axis=self.up, tool_touched=touched,
         )  # fmt: skip
 
     def _feed(self, statement: Statement, row: int) -> None:
@@ -183,7 +183,7 @@ class Events:
         self.tool = number[0] // 10 ** number[1]
         self.length_active = True
         if self.tool and self.setup.tool(self.tool) is None:
-            lever_of(self.setup, self.tool, statement.line)
+            tool_vector_of(self.setup, self.tool, statement.line)
 
     def _cycle(self, statement: Statement, row: int) -> None:
         self._resolve(row)
@@ -193,7 +193,7 @@ class Events:
             self.cycle = None
         elif word == b"ON":
             self.cycle = self.last_cycle
-        elif word not in _CYCLE_TALK or len(fields) > 1:
+        elif word not in _CYCLE_MESSAGE or len(fields) > 1:
             self.cycle = self.last_cycle = self._cycle_of(fields)
 
     def _cycle_of(self, fields: Sequence[Field]) -> Cycle:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from olp.program.dialect import Support
 
-_C, _R, _X = Support.CORRECTED, Support.READ, Support.CARRIED
+_C, _R, _X = Support.CORRECTED, Support.READ, Support.UNCHANGED
 _NO = Support.REFUSED
 
 _CONTOUR = "drives the tool along geometry that only an APT processor knows; send its output (CLDATA)"

@@ -24,7 +24,7 @@ DOES = {
     "unit": (Support.READ, "the unit from here on"),
     "speed": (Support.READ, "the speed from here on, where it is stated in a unit of speed"),
     "section": (Support.READ, "begins or ends a part of the text"),
-    "carry": (Support.CARRIED, ""),
+    "carry": (Support.UNCHANGED, ""),
     "refuse": (Support.REFUSED, ""),
 }
 

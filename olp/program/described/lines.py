@@ -102,7 +102,7 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Kin:
+class SameForm:
     """A line whose moves say all in numbers: which of its numbers (from 0) are X, Y and Z, the orientation,
     the speed (-1: none); `label` is how many of them its label has. The statement begins `gap` bytes behind
     the last of these, or that far into the line, and ends `rest` bytes behind its last number."""
@@ -119,7 +119,7 @@ class Kin:
     rest: int
 
 
-def kin_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match[str]) -> Kin | None:
+def same_form_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match[str]) -> SameForm | None:
     """What the lines that are like this one say; None where more than numbers of named fields could
     differ."""
     if len(line.at) > 1 or rule.does not in ("line", "rapid") or rule.incremental or rule.enters is not None:
@@ -148,7 +148,7 @@ def kin_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match[str])
     if len(names) != len(spans) or not {"x", "y", "z"} <= names.keys():
         return None
     before = int(text.last[tokens[label - 1]]) if label else line.begin
-    return Kin(
+    return SameForm(
         rule=rule, count=len(tokens), places=text.places[index],
         offset=tuple(text.offset[tokens.start : tokens.stop].tolist()),
         xyz=(names["x"], names["y"], names["z"]), turn=tuple(names[a] for a in "abc" if a in names),

@@ -17,7 +17,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup
 from olp.core.toolpath import Flag, Kind
 from olp.program.described.language import Rule, UserDialect
-from olp.program.described.lines import Kin, Line, Text, kin_of
+from olp.program.described.lines import Line, SameForm, Text, same_form_of
 from olp.program.dialect import Dialect, Options
 from olp.program.frames import FrameTable
 from olp.program.places import frame_index
@@ -58,7 +58,7 @@ class _Alike:
     """A stretch of lines (from 0) that are like others before them, and which."""
 
     line: list[int]
-    kin: list[Kin]
+    kin: list[SameForm]
 
 
 _Item = tuple[Line, Rule, "re.Match[str]"] | _Alike
@@ -120,7 +120,7 @@ class _Reader:
     def _matched(self, text: Text) -> list[_Item]:
         """Statements with their rules, and stretches of lines that are alike, in order."""
         found: list[_Item] = []
-        known: dict[str, dict[bytes, Kin | None]] = {}
+        known: dict[str, dict[bytes, SameForm | None]] = {}
         open_: _Alike | None = None
         plain, count, places, keys = text.plain, text.count, text.places, text.keys
         here = known.setdefault(self.section, {})
@@ -141,7 +141,7 @@ class _Reader:
                 bare, rule, match = self._rule(line)
                 found.append((bare, rule, match))
                 if keys[at] not in here and rule.enters is None and self._varies(match):
-                    here[keys[at]] = kin_of(text, line, bare, rule, match)
+                    here[keys[at]] = same_form_of(text, line, bare, rule, match)
                 here = known.setdefault(self.section, {})
             at = behind
         return found

@@ -10,7 +10,7 @@ from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.program.dialect import Dialect
-from olp.program.frames import FrameTable, lever_of
+from olp.program.frames import FrameTable, tool_vector_of
 from olp.program.statement_rows import Points, StatementCollector
 from olp.program.text.statements import Statement, shown
 
@@ -66,15 +66,17 @@ class Events:
             self.datum,
         )  # fmt: skip
         work = self.table.work_offset(name, line, what)
-        lever, tool = ZERO, None
+        tool_vector, tool = ZERO, None
         if self.sensor is not None:
-            lever = self._stylus(self.sensor, line)
+            tool_vector = self._stylus(self.sensor, line)
         elif self.setup.machine.default_tool:
             tool = self.setup.machine.default_tool
-            lever = lever_of(self.setup, tool, line)
+            tool_vector = tool_vector_of(self.setup, tool, line)
         # the control counts its axes at the end of the ram: the tip is there plus the offset of the stylus
-        x, y, z = (0.0 - v for v in lever)
-        return self.table.index(work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), lever=lever)
+        x, y, z = (0.0 - v for v in tool_vector)
+        return self.table.index(
+            work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), tool_vector=tool_vector
+        )
 
     def _stylus(self, name: str, line: int) -> Vector:
         stated = self.setup.stylus(name)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from olp.program.dialect import Support
 
-_C, _R, _X, _NO = Support.CORRECTED, Support.READ, Support.CARRIED, Support.REFUSED
+_C, _R, _X, _NO = Support.CORRECTED, Support.READ, Support.UNCHANGED, Support.REFUSED
 
 _FEATURE = "nominals, tolerances and actuals are never edited"
 _RUN_TIME = "goes where only the run of the program decides"

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.toolpath import Frame, Touch, carried
-from olp.program.frames import lever_of, touch_of
+from olp.program.frames import tool_vector_of, touch_of
 from olp.program.rs274.codes import (
     DWELL,
     FURTHER_OFFSETS,
@@ -117,7 +117,7 @@ class AxisState(State):
             unit_mm=self.unit_mm,
             offset_mm=self.offsets.total(base),
             length_mm=self.offsets.length,
-            tool_mm=self._lever(line),
+            tool_mm=self._tool_vector(line),
             tool=self.spindle,
             work_offset=name,
             touched=self._touch(name, base, line),
@@ -133,11 +133,11 @@ class AxisState(State):
     def _work_offset(self, name: str) -> WorkOffset | None:
         return self.setup.work_offset(name) or self.setup.work_offset(name.replace("P", " P"))
 
-    def _lever(self, line: int) -> Vector:
+    def _tool_vector(self, line: int) -> Vector:
         number = self.spindle if self.spindle is not None else self.length_tool
         if number is None or number == 0:
             return ZERO
-        return lever_of(self.setup, number, line)
+        return tool_vector_of(self.setup, number, line)
 
     def _touch(self, name: str, base: Sequence[float], line: int) -> Touch | None:
         """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's
@@ -153,8 +153,8 @@ class AxisState(State):
         tool = self.setup.tool(self.length_tool)
         if tool is None or tool.set_by != "touch" or tool.touched_at_mm is None:
             return None
-        lever = tool.lever_mm or self._lever(line)
-        return tool.touched_at_mm, carried(lever, self.setup.job.payload_kg)
+        tool_vector = tool.tool_vector_mm or self._tool_vector(line)
+        return tool.touched_at_mm, carried(tool_vector, self.setup.job.payload_kg)
 
     def _tool(self, number: int, line: int, what: str) -> Vector:
         if number == 0:

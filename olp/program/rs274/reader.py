@@ -36,7 +36,7 @@ from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import PLANE_OF, Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
 from olp.program.rs274.profiles.base import Profile
-from olp.program.rs274.special_blocks import Singles, event_block
+from olp.program.rs274.special_blocks import SpecialBlocks, event_block
 
 #: motion code to kind of move; 255 where it is not plain motion, the last entry standing for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
@@ -80,7 +80,7 @@ class _Reader:
         self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
         self.switches = Directives(data)
         self.payloads: dict[int, float] = {}
-        self.singles = Singles(self.state, self.out, self.switches)
+        self.singles = SpecialBlocks(self.state, self.out, self.switches)
         self.end_line = 0
 
     def run(self) -> Program:

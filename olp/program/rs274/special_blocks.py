@@ -85,7 +85,7 @@ def _checked(
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 
 
-class Singles:
+class SpecialBlocks:
     """Carries such blocks out: from the position in `state`, with their moves and holes put into `out`."""
 
     def __init__(self, state: AxisState, out: Collector, switches: Directives) -> None:

@@ -17,7 +17,7 @@ from olp.calibration.estimator.curves import calibration_of, sigmas_of
 from olp.calibration.estimator.findings import findings_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of, solve
-from olp.calibration.estimator.summary import unseen
+from olp.calibration.estimator.summary import unobservable
 from olp.calibration.observations.lengths import LengthsState
 from olp.calibration.observations.lines import Line, drift_ramps, group_of, noise_of
 from olp.calibration.observations.measurements import Measurements
@@ -158,14 +158,14 @@ def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None
     last = chain.replace("F", "")[2]
     machine = simulated.machine(1, "smooth", chain)
     one = fit(Measurements("m", (cloud(machine, 1, 250, 5.0, [(30.0, 0.0, 9.0)]),)), chain)
-    assert set(unseen(one)) == {hidden, *(f"E{d}{last}" for d in "ABC")}
+    assert set(unobservable(one)) == {hidden, *(f"E{d}{last}" for d in "ABC")}
     assert all("one offset" in finding.message for finding in told(one, "OLP801"))
     line = [(0.0, 0.0, -80.0), (0.0, 0.0, -400.0)]
     along_z = fit(Measurements("m", (cloud(machine, 1, 250, 5.0, line),)), chain)
-    assert set(unseen(along_z)) == {f"EC{last}", *([hidden] if hidden[1] == "C" else [])}
+    assert set(unobservable(along_z)) == {f"EC{last}", *([hidden] if hidden[1] == "C" else [])}
     assert "on one line" in told(along_z, "OLP801")[0].message
     three = fit(Measurements("m", (cloud(machine, 1, 250, 5.0),)), chain)
-    assert not unseen(three)
+    assert not unobservable(three)
 
 
 def test_where_the_instrument_stands_means_nothing() -> None:
@@ -284,7 +284,7 @@ def test_roll_of_z_without_its_lines_is_said_to_be_unknown() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     kept = [line for line in measurements.lines if abs(line.tool_mm[0]) < 1.0]
     found = fit(measurements.with_lines(tuple(kept)), "FXYZ")
-    assert list(unseen(found)) == ["ECZ"]
+    assert list(unobservable(found)) == ["ECZ"]
     (finding,) = told(found, "OLP801")
     assert "ECZ" in finding.message and "um" in finding.message
     assert "ECZ" not in {name for curve in calibration_of(found).curves for name in curve.names}

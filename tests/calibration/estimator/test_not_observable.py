@@ -13,7 +13,12 @@ from cases.calibration import case, cloud, two_pods
 from judge import nullspace, simulated
 
 from olp.calibration.estimator.adjustment import fit
-from olp.calibration.estimator.summary import scale_unseen, scales_open, squareness_unseen, unseen
+from olp.calibration.estimator.summary import (
+    scale_unobservable,
+    scales_open,
+    squareness_unobservable,
+    unobservable,
+)
 from olp.calibration.observations.measurements import Measurements
 
 ORDERS = ["".join(order) for order in permutations("XYZ")]
@@ -52,7 +57,7 @@ def test_angles_that_offsets_of_the_reflector_hide(chain: str, offsets: str) -> 
     assert len(changes) == 4 * len(angles(hidden))
     assert len(changes) in {"one offset": (16,), "collinear": (4, 8), "three": (0,)}[offsets]
     found = fit(Measurements("m", (points,)), chain)
-    said = set(unseen(found))
+    said = set(unobservable(found))
     assert said == angles(hidden)
     words = {"one offset": "one offset", "collinear": "on one line", "three": ""}[offsets]
     assert all(words in message for message in told(found, "OLP801"))
@@ -113,7 +118,7 @@ def test_angles_alone_leave_the_scale_open(chain: str) -> None:
     assert len(changes) == 17
     free = fit(Measurements("m", (dataclasses.replace(pods, baselines=()),)), chain)
     known = fit(Measurements("m", (pods,)), chain)
-    assert scale_unseen(free) is not None and scale_unseen(known) is None
+    assert scale_unobservable(free) is not None and scale_unobservable(known) is None
     (change,) = scales_open(free)[0]
     assert change == pytest.approx([1.0, 1.0, 1.0], abs=0.15)
     assert len(told(free, "OLP809")) == 1 and not told(known, "OLP809")
@@ -141,7 +146,7 @@ def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None
     assert len(changes) == 2
     assert np.abs(changes[:, 3:]).max() < 1e-6 * np.abs(changes).max()
     found = fit(Measurements("m", lines), chain)
-    assert not squareness_unseen(found)
+    assert not squareness_unobservable(found)
     changes_said, (seen,) = scales_open(found)
     assert len(changes_said) == 2
     # what no diagonal sees is at right angles to the combination that they see
@@ -173,7 +178,7 @@ def test_a_ball_bar_in_one_direction_cannot_tell_squareness(chain: str) -> None:
             seen += 1 - len(nullspace.open_changes(column[:, None], np.stack(own, axis=1)))
         assert seen == closed
         found = fit(bare.also(runs), chain)
-        assert len(squareness_unseen(found)) == 3 - closed
+        assert len(squareness_unobservable(found)) == 3 - closed
 
 
 # -- forgotten nuisances ---------------------------------------------------------------------------------

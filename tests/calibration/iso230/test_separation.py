@@ -90,7 +90,7 @@ def test_recovery(seed: int, amplitude: float, phase: float, lost: float, period
     assert found.noncyclic / UM == pytest.approx(smooth, abs=1e-6)
     assert found.reversal is not None
     assert found.reversal.constant
-    assert found.reversal.lost_motion / UM == pytest.approx(lost, abs=1e-6)
+    assert found.reversal.backlash / UM == pytest.approx(lost, abs=1e-6)
     assert first.cyclic.period_mm == period
 
 
@@ -167,7 +167,7 @@ def test_stated_uncertainty_covers() -> None:
         found = separate(add(one, random.normal(0, 1e-3, len(one.value))), [10.0])
         assert found.reversal is not None
         z.append((found.harmonics[0].amplitude - 3e-3) / found.harmonics[0].sigma_amplitude)
-        z.append((found.reversal.lost_motion - 4e-3) / found.reversal.sigma)
+        z.append((found.reversal.backlash - 4e-3) / found.reversal.sigma)
     assert 0.75 < np.std(z) < 1.3
 
 
@@ -179,7 +179,7 @@ def test_reversal_along_the_axis_is_told_from_a_constant_one() -> None:
     noise = random.normal(0, 0.3e-3, len(constant.value))
     one, other = reversal_of(add(constant, noise)), reversal_of(add(growing, noise))
     assert one.constant and list(findings_of(one)) == []
-    assert one.lost_motion / UM == pytest.approx(4.0, abs=0.2)
+    assert one.backlash / UM == pytest.approx(4.0, abs=0.2)
     assert not other.constant
     assert [f.code for f in findings_of(other)] == ["OLP854"]
     assert other.at / UM == pytest.approx(-x / 150.0, abs=1.0)
@@ -264,5 +264,5 @@ def test_a_recording_of_many_targets_needs_no_large_system() -> None:
     one = add(line(x, np.full(20_000, -2.0), np.full(20_000, 2.0), runs=2), random.normal(0, 1e-3, 80_000))
     found = separate(one, [10.0])
     assert found.reversal is not None
-    assert found.reversal.lost_motion / UM == pytest.approx(4.0, abs=0.1)
+    assert found.reversal.backlash / UM == pytest.approx(4.0, abs=0.1)
     assert found.refused == ()

@@ -93,14 +93,14 @@ def test_the_control_moves_as_the_table_predicts(kind: int, tmp_path: Path) -> N
     # the judge's machine under these drives stands where the predicted residual says
     judge = JudgeModel(machine.parent)
     at = np.flatnonzero(moved & still)[::40]
-    lever = np.array([0.0, 0.0, -120.0])
-    tools = np.tile(lever, (len(at), 1))
+    tool_vector = np.array([0.0, 0.0, -120.0])
+    tools = np.tile(tool_vector, (len(at), 1))
     drives = run.motor[at]
     really = drives - run.axis[at] + judge.error_mm(drives, tools, sign[at])
     command = run.axis[at] + predicted[at]
     calibration = load_calibration(machine.parent / "calibration.toml")
     model = build(calibration, setup.chain, outside="hold")
-    left = predicted[at] + model.error(command, lever, sign[at])
+    left = predicted[at] + model.error(command, tool_vector, sign[at])
     assert np.abs(really - left).max() <= 1e-5
     before = judge.error_mm(run.axis[at], tools, sign[at])
     assert np.abs(before).max() > 0.01

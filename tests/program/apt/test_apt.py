@@ -241,10 +241,10 @@ def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
     assert heights.tolist() == pytest.approx([30, 3, -40, 25, 3, -40, 25, 50])
     assert ((path.flag & Flag.CYCLE) != 0).tolist() == [False, True, True, True, True, True, True, False]
     result = olp.correct(data, bent)
-    model, lever = JudgeModel(bent), [0.0, 0.0, -120.0]
+    model, tool_vector = JudgeModel(bent), [0.0, 0.0, -120.0]
     places = np.array([[10, 20, 0], [60, -20, 0.0]]) + ORIGIN + [0, 0, 120]
     levels = [np.array([0.0, 0.0, z]) for z in (3.0, -40.0)]
-    ends = [model.command_for(places + level, lever) - level for level in levels]
+    ends = [model.command_for(places + level, tool_vector) - level for level in levels]
     want = (ends[0] + ends[1]) / 2
     own = np.array(read_apt(result.data, FRAMES, LENGTHS).axis)[1:3]
     assert np.abs(own - want).max() < 1e-4

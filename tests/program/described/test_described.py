@@ -133,8 +133,8 @@ def judged(text: bytes, corrected: bytes, machine: Path, setup: Setup, tools: li
         ]
         command = command[near]
     known = np.isfinite(nominal).all(axis=1)
-    lever = np.array([model.lever_mm(n) for n in tools])
-    actual = command[known] + model.error_mm(command[known], lever[known])
+    tool_vector = np.array([model.tool_vector_mm(n) for n in tools])
+    actual = command[known] + model.error_mm(command[known], tool_vector[known])
     return float(np.abs(actual - nominal[known]).max())
 
 
@@ -362,7 +362,7 @@ def test_files_that_come_with_olp_load_and_say_what_they_know(name: str) -> None
     assert dialect.name == name
     assert len(getattr(dialect, "about", "")) > 100
     kinds = {row.support for row in dialect.rows()}
-    assert {Support.CARRIED, Support.REFUSED} <= kinds
+    assert {Support.UNCHANGED, Support.REFUSED} <= kinds
     assert all(row.why for row in dialect.rows() if row.support is Support.REFUSED)
 
 

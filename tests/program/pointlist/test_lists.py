@@ -76,9 +76,9 @@ def test_a_corrected_list_brings_the_tip_to_its_places(machine: Path, text: byte
     result = olp.correct(text, setup_of(machine))
     model = JudgeModel(machine)
     nominal, corrected = positions(text, machine), positions(result.data, machine)
-    lever = model.lever_mm(1)
-    actual = corrected + model.error_mm(corrected, lever)
-    assert np.abs(model.error_mm(nominal, lever)).max() > 0.004
+    tool_vector = model.tool_vector_mm(1)
+    actual = corrected + model.error_mm(corrected, tool_vector)
+    assert np.abs(model.error_mm(nominal, tool_vector)).max() > 0.004
     # half of the coarsest digit that these files are written with: 0.0001 inch
     assert np.abs(actual - nominal).max() < 0.0014
     assert result.report["deviation"]["holds"]
@@ -121,7 +121,7 @@ def test_a_turned_frame_is_turned(machine: Path) -> None:
     result = olp.correct(text, setup_of(machine))
     model = JudgeModel(machine)
     nominal, corrected = positions(text, machine), positions(result.data, machine)
-    actual = corrected + model.error_mm(corrected, model.lever_mm(1))
+    actual = corrected + model.error_mm(corrected, model.tool_vector_mm(1))
     assert np.abs(actual - nominal).max() < 2e-4
     a, c = np.radians(-4.0), np.radians(30.0)
     turn = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]]) @ np.array(
@@ -245,7 +245,7 @@ def test_a_list_read_back_says_what_was_meant(
     text = "\n".join([mark.join(["X_mm", "Y_mm", "Z_mm"]), *body, ""]).encode()
     result = olp.correct(text, setup_of(machine))
     model = JudgeModel(machine)
-    wanted = model.command_for(np.array(rows) / 1000 + OFFSET, model.lever_mm(1))
+    wanted = model.command_for(np.array(rows) / 1000 + OFFSET, model.tool_vector_mm(1))
     assert np.abs(positions(result.data, machine) - wanted).max() <= 0.5 * 10.0**-places * 1.001 + 2e-6
 
 
@@ -346,7 +346,7 @@ def test_lists_of_another_package_are_carried(tmp_path: Path, corpus: Path) -> N
         dialect = layout(header=False, columns={"X": 1, "Y": 2, "Z": 3})
         result = olp.correct(data, setup_of(machine, dialect))
         nominal, corrected = (positions(t, machine, dialect) for t in (data, result.data))
-        actual = corrected + model.error_mm(corrected, model.lever_mm(1))
+        actual = corrected + model.error_mm(corrected, model.tool_vector_mm(1))
         assert np.abs(actual - nominal).max() < 0.0006
         tail = re.compile(rb"^[^,]*,[^,]*,[^,]*")
         after = [tail.sub(b"", line) for line in result.data.splitlines()[1:]]

@@ -30,7 +30,7 @@ class Act(IntEnum):
     REFUSE = 8
 
 
-_SUPPORT = {Act.CARRY: Support.CARRIED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
+_SUPPORT = {Act.CARRY: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

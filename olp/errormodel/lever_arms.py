@@ -42,7 +42,7 @@ class Measured(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Lever:
+class LeverArm:
     """Coordinate k is q_k + t_k - offset_k where `moves`, t_k - offset_k elsewhere; lengths in mm."""
 
     moves: tuple[bool, bool, bool]
@@ -61,17 +61,17 @@ class Lever:
         return np.asarray(np.abs(ends.T[:, None, :] + arms[None, :, :]).max(axis=(0, 1)))
 
 
-Levers = tuple[tuple[tuple[int, ...], Lever], ...]
+LeverArms = tuple[tuple[tuple[int, ...], LeverArm], ...]
 
 
-def levers_of(
+def lever_arms_of(
     curves: Sequence[Measured], datum_mm: Vector, axis: str, after: str, carries: bool, tool_terms: bool
-) -> Levers:
+) -> LeverArms:
     """The levers of what was measured of one axis, `after` it in the chain toward the tool."""
     holder = {name: curve for curve in curves for name in curve.names}
     default = curves[0] if len(curves) == 1 else None
 
-    def lever(sources: list[Measured | None]) -> Lever:
+    def lever_arm(sources: list[Measured | None]) -> LeverArm:
         """Of one row, coordinate by coordinate from the curve it was measured with."""
         moves, offset = [False] * 3, [0.0] * 3
         for k, source in enumerate(sources):
@@ -84,9 +84,9 @@ def levers_of(
             # from the datum.
             at = (datum_mm if line is None else line)[k] if moves[k] else 0.0
             offset[k] = at + tool
-        return Lever((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
+        return LeverArm((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
 
-    rows: dict[Lever, list[int]] = {}
+    rows: dict[LeverArm, list[int]] = {}
     for i in range(3):
         measured = holder.get(f"E{AXES[i]}{axis}", default)
         # A row without a curve is zero on the lines on which the angles were measured.
@@ -95,5 +95,5 @@ def levers_of(
             for a, name in enumerate("ABC"):
                 if a != i:
                     sources[_OTHER[i, a]] = holder.get(f"E{name}{axis}")
-        rows.setdefault(lever(sources), []).append(i)
-    return tuple((tuple(members), lever) for lever, members in rows.items())
+        rows.setdefault(lever_arm(sources), []).append(i)
+    return tuple((tuple(members), lever_arm) for lever_arm, members in rows.items())
