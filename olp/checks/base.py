@@ -1,4 +1,4 @@
-"""How checks write findings."""
+"""Findings with lists of lines."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Toolpath
 from olp.findings.catalogue import Finding
 
+#: lines that a finding lists
 _LISTED = 20
 
 
 def finding(code: str, message: str, lines: Sequence[int] = (), count: int | None = None) -> Finding:
-    """A finding at the lines given; `count` is how many there are, of which the first few are listed."""
+    """A finding at the given lines; `count` is their number, and the first 20 are listed."""
     unique = sorted(set(lines))
     return Finding(
         code,
@@ -26,5 +27,5 @@ def finding(code: str, message: str, lines: Sequence[int] = (), count: int | Non
 
 
 def lines_of(path: Toolpath, moves: Mask | Array | Index) -> list[int]:
-    """The lines of moves, each once."""
+    """The line numbers of moves, each once."""
     return [int(v) for v in np.unique(path.line[moves]).tolist()]

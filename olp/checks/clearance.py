@@ -1,12 +1,12 @@
 """Clearance of tool and holder along a path, against the meshes of a job.
 
-Everything is seen from the workpiece. A mesh of a work offset stands where the program sees it: the tip is
-there at the axis position less the active tool length. One of the frame "machine" counts in axis positions:
-the tip is at the axis position plus its tool vector; a mesh of role machine stands still while axes before
-F carry the workpiece.
+Positions are relative to the workpiece. A mesh of a work offset is in program coordinates: there the tip is
+at the axis position less the active tool length. A mesh of the frame "machine" is in axis positions: there
+the tip is at the axis position plus its tool vector. A mesh of role machine stands still while axes before F
+carry the workpiece.
 
-What cuts may touch the workpiece in feed moves. In a rapid that begins or ends at one, it leaves or reaches
-what it cuts: there it counts less `SLACK_MM` all around, and only contact counts."""
+The cutting part may touch the workpiece in feed moves. In a rapid beside a feed move it leaves or reaches the
+surface that it cuts. There it is taken smaller by `SLACK_MM`, and only contact counts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy as np
 from olp.checks.base import finding
 from olp.clearance.parts import Part, parts_of
 from olp.clearance.search import CONTACT_MM, Best, search
-from olp.clearance.sweep import CHORD_MM, Ways, ways_of
+from olp.clearance.sweep import CHORD_MM, Segments, segments_of
 from olp.clearance.tree import Tree
 from olp.compensation.plan import zero_shifts
 from olp.core.arrays import Array, Index, Mask
@@ -29,7 +29,7 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.findings.catalogue import Finding
 
-#: what a mesh of the workpiece and the path that cuts it may differ by (chords of both, allowances)
+#: mm; how far a mesh of the workpiece may be from the path that cuts it (chords of both, allowances)
 SLACK_MM = 0.1
 
 
@@ -47,9 +47,9 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearances:
-    """Of b blocks: (b,) `line`, `clearance_mm` (0: contact), (b, 3) the nearest `point_mm` of a mesh in its
-    own frame; (b,) `part` and `solid`, what is nearest, as indices of `parts` and `solids`. `unknown` are
-    lines that could not be looked at."""
+    """Of b blocks: (b,) `line`, `clearance_mm` (0: contact), (b, 3) the nearest `point_mm` of a mesh in the
+    mesh's frame; (b,) the nearest `part` and `solid`, as indices of `parts` and `solids`. `unknown` are lines
+    that could not be checked."""
 
     line: Index
     clearance_mm: Array
@@ -61,7 +61,7 @@ class Clearances:
     unknown: tuple[int, ...]
 
     def rows(self) -> Iterator[dict[str, object]]:
-        """One mapping a block."""
+        """One mapping per block."""
         for k in range(len(self.line)):
             solid = self.solids[self.solid[k]]
             yield {
@@ -75,7 +75,7 @@ class Clearances:
             }
 
     def nearest(self, most: int) -> Clearances:
-        """The blocks that come nearest, in order."""
+        """The `most` blocks of least clearance, in order."""
         order = np.argsort(self.clearance_mm, kind="stable")[:most]
         return Clearances(
             self.line[order], self.clearance_mm[order], self.point_mm[order], self.part[order],
@@ -83,8 +83,8 @@ class Clearances:
         )  # fmt: skip
 
     def findings(self, limit_mm: float) -> list[Finding]:
-        """Contacts, clearances below the limit, and what was not looked at."""
-        out = []
+        """Contacts, clearances below the limit, and blocks that were not checked."""
+        findings = []
         touching = self.clearance_mm <= 0.0
         for code, rows, what in (
             ("OLP701", touching, "touches"),
@@ -99,54 +99,63 @@ class Clearances:
                 f"the {self.parts[self.part[first]]} {what} {solid.name} at ({place}) in {solid.mesh.frame}"
             )
             if code == "OLP702":
-                text += f": {self.clearance_mm[first]:.4g} mm, {limit_mm:g} mm are asked for"
+                text += f": {self.clearance_mm[first]:.4g} mm, expected {limit_mm:g} mm"
             text += f", line {int(self.line[first])}"
-            out.append(finding(code, text, self.line[rows].tolist()))
+            findings.append(finding(code, text, self.line[rows].tolist()))
         if self.unknown:
-            text = f"{len(self.unknown)} blocks move from or to unknown places, or with a tool without length"
-            out.append(finding("OLP703", text, self.unknown))
-        return out
+            text = (
+                f"{len(self.unknown)} blocks move from or to unknown positions, or with a tool without length"
+            )
+            findings.append(finding("OLP703", text, self.unknown))
+        return findings
 
 
 def clearances(path: Toolpath, model: ErrorModel, setup: Setup, solids: Sequence[Solid]) -> Clearances:
-    """The least clearance of each block of a path, with its place.
+    """The least clearance of each block of a path, with its position.
 
-    Distances are exact to `CLOSE_MM` along the straight ways between way-points and along arcs
-    (`CHORD_MM`), for the tip that the error model gives at the way-points."""
+    Distances are exact to `CLOSE_MM` along straight segments between waypoints and along arcs (`CHORD_MM`),
+    for the tip positions that the error model gives at the waypoints."""
     names: list[str] = []
     best = Best.of(len(path))
-    seen = np.zeros(len(path), bool)
+    checked = np.zeros(len(path), bool)
     tips = _Tips.of(path, model, setup)
     tools = _tools(path, setup)
     for number, solid in enumerate(solids):
         tree = Tree.of(_placed(solid, setup))
         start, end = tips.of_solid(solid)
-        ways = ways_of(path, start, end)
+        segments = segments_of(path, start, end)
         known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
         for parts, moves in tools:
-            seen |= moves & known
+            checked |= moves & known
             for part in parts:
                 names.append(part.name)
                 tag = number + len(solids) * (len(names) - 1)
-                _measure(path, tree, ways, part, moves, solid.mesh.role == "workpiece", best, tag)
-    return _by_line(path, best, names, setup, solids, seen)
+                _measure(path, tree, segments, part, moves, solid.mesh.role == "workpiece", best, tag)
+    return _by_line(path, best, names, setup, solids, checked)
 
 
 def _measure(
-    path: Toolpath, tree: Tree, ways: Ways, part: Part, moves: Mask, workpiece: bool, best: Best, tag: int
+    path: Toolpath,
+    tree: Tree,
+    segments: Segments,
+    part: Part,
+    moves: Mask,
+    workpiece: bool,
+    best: Best,
+    tag: int,
 ) -> None:
     """One part of a tool against one mesh, on the moves with that tool."""
     if not (workpiece and part.cuts):
-        mine = ways.of_moves(moves)
+        mine = segments.of_moves(moves)
         search(tree, mine.swept(part), mine.move, best, tag)
         return
     rapid = path.kind == Kind.RAPID
     beside = np.zeros(len(path), bool)
     beside[1:] |= ~rapid[:-1]
     beside[:-1] |= ~rapid[1:]
-    mine = ways.of_moves(moves & rapid & ~beside)
+    mine = segments.of_moves(moves & rapid & ~beside)
     search(tree, mine.swept(part), mine.move, best, tag)
-    mine = ways.of_moves(moves & rapid & beside)
+    mine = segments.of_moves(moves & rapid & beside)
     touch = Best.of(len(path), 2 * CONTACT_MM)
     search(tree, mine.swept(part.shrunk(SLACK_MM)), mine.move, touch, tag)
     hit = np.flatnonzero((touch.tag == tag) & (best.distance_mm > 0.0))
@@ -158,24 +167,24 @@ def _measure(
 
 
 def _tools(path: Toolpath, setup: Setup) -> list[tuple[tuple[Part, ...], Mask]]:
-    """The tools of a path with the moves of each; tools that have no length are left out."""
+    """The tools of a path with the moves of each; tools without length are left out."""
     by_tool: dict[int, list[int]] = {}
     for number, frame in enumerate(path.frames):
         if frame.tool is not None:
             by_tool.setdefault(frame.tool, []).append(number)
-    out = []
+    result = []
     for tool, frames in by_tool.items():
         described = setup.tool(tool)
         parts = parts_of(described) if described is not None else ()
         if parts:
-            out.append((parts, np.isin(path.frame, frames)))
-    return out
+            result.append((parts, np.isin(path.frame, frames)))
+    return result
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tips:
     """Where the tip really is, relative to the workpiece: (n, 3) at the start and the end of each move, in
-    axis positions; and what is to be added to that, per move."""
+    axis positions; and the offsets of each move into the coordinates of meshes."""
 
     start: Array
     end: Array
@@ -197,12 +206,12 @@ class _Tips:
         return _Tips(start, end, (-shift - length)[path.frame], path.tools_mm()[path.frame, :3], carried)
 
     def of_solid(self, solid: Solid) -> tuple[Array, Array]:
-        """(n, 3) the tip at start and end of each move, in the coordinates that a mesh is placed in."""
+        """(n, 3) the tip at start and end of each move, in the coordinates of a mesh."""
         start, end = self.start, self.end
         if solid.mesh.frame != "machine":
             return start + self.in_program, end + self.in_program
         if solid.mesh.role == "machine":
-            # what is known of an axis that carries the workpiece does not matter here
+            # positions of axes that carry the workpiece do not matter here
             start, end = (np.where(self.carried, 0.0, p) for p in (start, end))
         return start + self.in_machine, end + self.in_machine
 
@@ -218,14 +227,14 @@ def _placed(solid: Solid, setup: Setup) -> Array:
 
 
 def _by_line(
-    path: Toolpath, best: Best, names: list[str], setup: Setup, solids: Sequence[Solid], seen: Mask
+    path: Toolpath, best: Best, names: list[str], setup: Setup, solids: Sequence[Solid], checked: Mask
 ) -> Clearances:
-    """The least of the moves of each line."""
+    """The least clearance of the moves of each line."""
     distance = best.distance_mm.copy()
     distance[path.arcs.move] -= CHORD_MM
     distance[distance <= CONTACT_MM] = 0.0
-    found = np.flatnonzero(best.tag >= 0)
-    order = found[np.lexsort((distance[found], path.line[found]))]
+    measured = np.flatnonzero(best.tag >= 0)
+    order = measured[np.lexsort((distance[measured], path.line[measured]))]
     first = order[np.flatnonzero(np.diff(path.line[order], prepend=-1))]
     solid, part = best.tag[first] % max(len(solids), 1), best.tag[first] // max(len(solids), 1)
     point = best.point_mm[first].copy()
@@ -237,7 +246,7 @@ def _by_line(
     labels = tuple(dict.fromkeys(names))
     index = np.array([labels.index(name) for name in names] or [0])
     moving = (path.flag & np.uint8(Flag.CONTROL)) == 0
-    unknown = np.unique(path.line[moving & ~seen]).tolist() if solids else []
+    unknown = np.unique(path.line[moving & ~checked]).tolist() if solids else []
     return Clearances(
         path.line[first].astype(np.int64), distance[first], point, index[part], solid, labels, tuple(solids),
         tuple(int(line) for line in unknown),

@@ -1,4 +1,4 @@
-"""Checks of what the error model knows of this job: the tool of a map, payloads, temperatures."""
+"""Checks of the error model against the job: tools of maps, payloads, temperatures."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
 
-#: A total map is all that is known, so its tool has to be the one in use but for this.
+#: mm; how far the tool in use may be from that of a total map.
 _SAME_TOOL_MM = 1.0
 
 
 def model_findings(
     path: Toolpath, calibration: Calibration, model: ErrorModel, sanity: Sanity, tolerance_mm: float
 ) -> list[Finding]:
-    """Tools that a map was not measured with, payloads that change before a cut or that nothing is known
-    of."""
+    """Tools other than those of a map, and payloads that change before a cut or that the calibration does not
+    know."""
     return [
         *_map_tools(path, calibration, sanity),
         *_payloads(path, calibration),
@@ -35,15 +35,19 @@ def _structure(calibration: Calibration) -> list[Finding]:
         return []
     names = ", ".join(sensor.name for sensor in structure.sensors)
     if structure.temperatures_degC is None:
-        return [finding("OLP423", f"the job states no temperatures of {names}; their distortion is left")]
+        return [
+            finding(
+                "OLP423", f"the job states no temperatures of {names}; their distortion is left uncorrected"
+            )
+        ]
     far = [f"{name} {value:.2f} degC" for name, value in structure.outside().items()]
     if not far:
         return []
-    return [finding("OLP424", f"{', '.join(far)}: taken at the end of the identified range")]
+    return [finding("OLP424", f"{', '.join(far)}: the end of the identified range was used")]
 
 
 def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list[Finding]:
-    out = []
+    findings = []
     numbers = np.unique(path.frame).tolist() if calibration.maps else []
     for described in calibration.maps:
         within = _SAME_TOOL_MM if described.kind == "total" else sanity.tool_within_mm
@@ -59,12 +63,11 @@ def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list
         name = "no tool" if tool is None else f"tool {tool}"
         what = (
             f"the tip of {name} is {far[worst]:.4g} mm from where it was when {described.name} was measured; "
-            f"each 10 urad that the axes turn are {far[worst] * 1e-5 * UM_PER_MM:.3g} um there, which the "
-            f"map "
-            "does not know"
+            f"10 urad of an axis' rotation are {far[worst] * 1e-5 * UM_PER_MM:.3g} um there, which the map "
+            "does not include"
         )
-        out.append(finding("OLP420", what, lines_of(path, np.isin(path.frame, list(far)))[:1]))
-    return out
+        findings.append(finding("OLP420", what, lines_of(path, np.isin(path.frame, list(far)))[:1]))
+    return findings
 
 
 def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
@@ -78,9 +81,8 @@ def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
     if not any(other.values()):
         return []
     what = (
-        f"a payload of {max(other.values()):g} kg is stated, the calibration is for "
-        f"{calibration.payload_kg:g} kg "
-        "and knows no compliance"
+        f"a payload of {max(other.values()):g} kg is stated; the calibration is for "
+        f"{calibration.payload_kg:g} kg and has no compliance"
     )
     return [finding("OLP422", what, lines_of(path, np.isin(path.frame, list(other)))[:1])]
 
@@ -89,21 +91,20 @@ def _jumps(path: Toolpath, model: ErrorModel, tolerance_mm: float) -> list[Findi
     payload = np.array([f.payload_kg for f in path.frames])
     if len(path) < 2 or not payload.any():
         return []
-    at = np.flatnonzero(np.diff(payload[path.frame]) != 0.0) + 1
-    at = at[(path.kind[at] != Kind.RAPID) & np.isfinite(path.end_mm[at - 1]).all(axis=1)]
-    if not at.size:
+    moves = np.flatnonzero(np.diff(payload[path.frame]) != 0.0) + 1
+    moves = moves[(path.kind[moves] != Kind.RAPID) & np.isfinite(path.end_mm[moves - 1]).all(axis=1)]
+    if not moves.size:
         return []
-    place = path.end_mm[at - 1]
-    after = path.tools_mm()[path.frame[at]]
+    place = path.end_mm[moves - 1]
+    after = path.tools_mm()[path.frame[moves]]
     before = after.copy()
-    before[:, 3] = payload[path.frame[at - 1]]
+    before[:, 3] = payload[path.frame[moves - 1]]
     jump = np.linalg.norm(model.error(place, after) - model.error(place, before), axis=1)
     wide = jump > tolerance_mm
     if not wide.any():
         return []
     what = (
-        f"the tip moves by up to {jump.max() * UM_PER_MM:.3g} um where the payload changes, and a feed "
-        f"move starts "
-        "there"
+        f"the tip moves by up to {jump.max() * UM_PER_MM:.3g} um where the payload changes, and a feed move "
+        "starts there"
     )
-    return [finding("OLP421", what, lines_of(path, at[wide]))]
+    return [finding("OLP421", what, lines_of(path, moves[wide]))]

@@ -1,9 +1,11 @@
-"""Distance between a cone frustum that is swept along a straight way and a triangle, for many pairs at once.
+"""Distance between a cone frustum swept along a straight segment and a triangle, for many pairs at once.
 
-Both are convex, and so is what all differences of their points make: its point nearest to the origin is
-searched with the algorithm of Gilbert, Johnson and Keerthi (IEEE Journal of Robotics and Automation 4,
-1988, 193-203), with support points of the true round shape. Each step gives an upper bound, the point
-found, and a lower one, the plane through its support point: the search ends where they meet."""
+Both are convex, and so is the set of all differences of their points. The algorithm of Gilbert, Johnson and
+Keerthi searches its point nearest to the origin, with support points of the true round shape. Each step gives
+an upper bound, the point so far, and a lower one, the plane through its support point. The search ends where
+they meet.
+Source: IEEE Journal of Robotics and Automation 4, 1988, 193-203.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +15,27 @@ import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 
-#: bounds have met where they are so close, in mm
+#: mm; bounds this close have met
 MET_MM = 1e-5
-#: distances below this count as contact: less than what the arithmetic resolves over a metre
+#: mm; smaller distances count as contact: less than the arithmetic resolves over a metre
 TOUCH_MM = 1e-7
+#: steps of the search at most
 _STEPS = 64
+#: pairs per batch
 _BATCH = 1 << 13
-#: a simplex is flat below this share of what its edges could span
+#: a simplex is flat below this share of the volume (or area) that its edges could span
 _FLAT = 1e-13
+#: pairs of edges of a simplex
 _PAIRS = ((0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Swept:
-    """n frusta about axes parallel to Z, swept along straight ways: tip at (n, 3) `start`, moved by (n, 3)
-    `way`; (n, 2) `level` of lower and upper end above the tip, (n, 2) `radius` there. All mm."""
+    """n frusta about axes parallel to Z, swept along straight segments: tip at `start`, moved by `travel`,
+    (n, 3) each; (n, 2) `level` of lower and upper end above the tip, (n, 2) `radius` there. All mm."""
 
     start: Array
-    way: Array
+    travel: Array
     level: Array
     radius: Array
 
@@ -38,12 +43,12 @@ class Swept:
         return len(self.start)
 
     def take(self, rows: Index) -> Swept:
-        return Swept(self.start[rows], self.way[rows], self.level[rows], self.radius[rows])
+        return Swept(self.start[rows], self.travel[rows], self.level[rows], self.radius[rows])
 
     def bounds(self) -> tuple[Array, Array]:
-        """(n, 3) lowest and highest corner of the box about the way of each axis, without the radius."""
-        low = np.minimum(self.start, self.start + self.way)
-        high = np.maximum(self.start, self.start + self.way)
+        """(n, 3) lowest and highest corner of the box that each axis sweeps, without the radius."""
+        low = np.minimum(self.start, self.start + self.travel)
+        high = np.maximum(self.start, self.start + self.travel)
         low[:, 2] += self.level[:, 0]
         high[:, 2] += self.level[:, 1]
         return low, high
@@ -55,12 +60,12 @@ class Swept:
         upper = reach[:, 1] > reach[:, 0]
         wide = np.where(upper, self.radius[:, 1], self.radius[:, 0])
         wide = wide / np.where(flat > 0, flat, np.inf)
-        ahead = np.einsum("ij,ij->i", self.way, direction) > 0
-        out = np.where(ahead[:, None], self.way, 0.0)
-        out[:, 0] += wide * direction[:, 0]
-        out[:, 1] += wide * direction[:, 1]
-        out[:, 2] += np.where(upper, self.level[:, 1], self.level[:, 0])
-        return out
+        ahead = np.einsum("ij,ij->i", self.travel, direction) > 0
+        point = np.where(ahead[:, None], self.travel, 0.0)
+        point[:, 0] += wide * direction[:, 0]
+        point[:, 1] += wide * direction[:, 1]
+        point[:, 2] += np.where(upper, self.level[:, 1], self.level[:, 0])
+        return point
 
     def gap(self, triangle: Array, direction: Array) -> Array:
         """(n,) by how much a plane across a direction (n, 3) of length 1 separates each from its triangle
@@ -72,8 +77,10 @@ class Swept:
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
     """(n,) `distance_mm`, 0 in contact; (n, 3) `point_mm` of the triangle; (n, 3) `away` of length 1 from the
-    swept part to the triangle, 0 in contact. Where the distance is beyond the bound that was given it is
-    only known to be at least that: inf, with `away` across a plane that separates them by about so much."""
+    swept part to the triangle, 0 in contact.
+
+    A distance of at least the given bound is inf; `away` is then normal to a plane that separates them by
+    about that bound."""
 
     distance_mm: Array
     point_mm: Array
@@ -81,28 +88,28 @@ class Nearest:
 
 
 def nearest(swept: Swept, triangle: Array, bound_mm: Array | None = None) -> Nearest:
-    """Distances of n swept parts, each from its triangle (n, 3, 3); those of `bound_mm` (n,) or more are not
-    worked out. Exact to `MET_MM`."""
+    """Distances of n swept parts, each from its triangle (n, 3, 3), exact to `MET_MM`; inf from `bound_mm`
+    (n,) on."""
     count = len(swept)
-    out = Nearest(np.full(count, np.inf), np.zeros((count, 3)), np.zeros((count, 3)))
+    result = Nearest(np.full(count, np.inf), np.zeros((count, 3)), np.zeros((count, 3)))
     bound = np.full(count, np.inf) if bound_mm is None else bound_mm
     for a in range(0, count, _BATCH):
         rows = np.arange(a, min(a + _BATCH, count))
-        _batch(swept.take(rows), triangle[rows], bound[rows], rows, out)
-    return out
+        _batch(swept.take(rows), triangle[rows], bound[rows], rows, result)
+    return result
 
 
-def _batch(swept: Swept, triangle: Array, bound: Array, rows: Index, out: Nearest) -> None:
-    """Search one batch; `rows` is where its pairs stand in the result. Pairs leave it as they are done."""
+def _batch(swept: Swept, triangle: Array, bound: Array, rows: Index, result: Nearest) -> None:
+    """Search one batch; `rows` are the indices of its pairs in the result. Pairs leave it when done."""
     local = triangle - swept.start[:, None]
-    point = local.mean(axis=1) - 0.5 * swept.way
+    point = local.mean(axis=1) - 0.5 * swept.travel
     point[:, 2] -= 0.5 * swept.level.sum(axis=1)
-    found = np.zeros((len(rows), 4, 3))
+    corners = np.zeros((len(rows), 4, 3))
     source = np.zeros((len(rows), 4, 3))
     weight = np.zeros((len(rows), 4))
     size = np.full(len(rows), np.inf)
     low = np.zeros(len(rows))
-    seen = local[:, 0]
+    witness = local[:, 0]
     for step in range(_STEPS):
         pick = np.einsum("ijk,ik->ij", local, point).argmin(axis=1)
         near = local[np.arange(len(local)), pick]
@@ -111,63 +118,63 @@ def _batch(swept: Swept, triangle: Array, bound: Array, rows: Index, out: Neares
             low = np.maximum(low, np.einsum("ij,ij->i", point, new) / size)
             met = (size - low <= MET_MM) | (low >= bound)
             if met.any():
-                _done(met, low, bound, size, point, seen, swept.start, rows, out)
+                _done(met, low, bound, size, point, witness, swept.start, rows, result)
                 go = ~met
                 if not go.any():
                     return
                 swept, local, bound, rows = swept.take(np.flatnonzero(go)), local[go], bound[go], rows[go]
-                found, source, weight, size, low = found[go], source[go], weight[go], size[go], low[go]
-                point, new, near, seen = point[go], new[go], near[go], seen[go]
+                corners, source, weight, size, low = corners[go], source[go], weight[go], size[go], low[go]
+                point, new, near, witness = point[go], new[go], near[go], witness[go]
         order = np.argsort(-weight, axis=1, kind="stable")[:, :3]
-        at = np.arange(len(rows))[:, None]
-        kept = weight[at, order] > 0
-        found = np.concatenate(
-            (new[:, None], np.where(kept[..., None], found[at, order], new[:, None])), axis=1
+        row = np.arange(len(rows))[:, None]
+        kept = weight[row, order] > 0
+        corners = np.concatenate(
+            (new[:, None], np.where(kept[..., None], corners[row, order], new[:, None])), axis=1
         )
         source = np.concatenate(
-            (near[:, None], np.where(kept[..., None], source[at, order], near[:, None])), axis=1
+            (near[:, None], np.where(kept[..., None], source[row, order], near[:, None])), axis=1
         )
-        weight = _weights(found)
-        last, point = point, np.einsum("ij,ijk->ik", weight, found)
+        weight = _weights(corners)
+        last, point = point, np.einsum("ij,ijk->ik", weight, corners)
         before, size = size, np.sqrt(np.einsum("ij,ij->i", point, point))
         low = np.where(size <= TOUCH_MM, size, low)
         size = np.maximum(size, TOUCH_MM)
         stuck = np.flatnonzero(size > before)
         if stuck.size:
-            # corners so close that the arithmetic loses them: go on from the best point as the only corner
+            # corners too close for the arithmetic: continue from the best point as the only corner
             point[stuck], size[stuck] = last[stuck], before[stuck]
-            found[stuck, 0], source[stuck, 0] = last[stuck], seen[stuck]
+            corners[stuck, 0], source[stuck, 0] = last[stuck], witness[stuck]
             weight[stuck] = (1.0, 0.0, 0.0, 0.0)
-        seen = np.einsum("ij,ijk->ik", weight, source)
-    _done(np.ones(len(rows), bool), low, bound, size, point, seen, swept.start, rows, out)
+        witness = np.einsum("ij,ijk->ik", weight, source)
+    _done(np.ones(len(rows), bool), low, bound, size, point, witness, swept.start, rows, result)
 
 
 def _done(
-    met: Mask, low: Array, bound: Array, size: Array, point: Array, seen: Array, start: Array, rows: Index,
-    out: Nearest,
+    met: Mask, low: Array, bound: Array, size: Array, point: Array, witness: Array, start: Array, rows: Index,
+    result: Nearest,
 ) -> None:  # fmt: skip
-    """Write the pairs that are done; those beyond their bound stay at infinity."""
+    """Write the pairs that are done; distances beyond their bound remain infinite."""
     ours = met & ((low < bound) | (size <= TOUCH_MM))
-    out.away[rows[met]] = point[met] / size[met, None]
+    result.away[rows[met]] = point[met] / size[met, None]
     to = rows[ours]
     touching = size[ours] <= TOUCH_MM
-    out.distance_mm[to] = np.where(touching, 0.0, size[ours])
-    out.point_mm[to] = seen[ours] + start[ours]
-    out.away[to[touching]] = 0.0
+    result.distance_mm[to] = np.where(touching, 0.0, size[ours])
+    result.point_mm[to] = witness[ours] + start[ours]
+    result.away[to[touching]] = 0.0
 
 
-def _weights(found: Array) -> Array:
+def _weights(corners: Array) -> Array:
     """(n, 4) weights of the point nearest to the origin in simplices (n, 4, 3) whose first corner is the
     newest.
 
-    That corner takes part, so its own faces are all that is looked at: 3 edges, 3 triangles, the whole.
+    That corner always has weight, so only its own faces are compared: 3 edges, 3 triangles, the whole.
     Corners may coincide."""
-    first = found[:, 0]
-    edge = found[:, 1:] - first[:, None]
+    first = corners[:, 0]
+    edge = corners[:, 1:] - first[:, None]
     gram = np.einsum("nik,njk->nij", edge, edge)
     goal = -np.einsum("nik,nk->ni", edge, first)
     base = np.einsum("ij,ij->i", first, first)
-    share = np.zeros((len(found), 3))
+    share = np.zeros((len(corners), 3))
     best = base.copy()
     with np.errstate(invalid="ignore", divide="ignore"):
         for i in range(3):

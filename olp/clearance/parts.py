@@ -17,7 +17,7 @@ class Part:
     cuts: bool
 
     def shrunk(self, by_mm: float) -> Part:
-        """The same, less so much at its side and at its lower end, as far as it goes."""
+        """The same, smaller by `by_mm` at its side and at its lower end, down to size 0."""
         low, high = self.level_mm
         a, b = self.radius_mm
         return Part(
@@ -26,20 +26,20 @@ class Part:
 
 
 def parts_of(tool: Tool) -> tuple[Part, ...]:
-    """The tool from its tip to the gauge point: what cuts, the shank of the same radius, the holder. Nothing
-    where the table gives no length."""
+    """The tool from its tip to the gauge point: the cutting part, the shank of the same radius, the holder.
+    Empty where the table gives no length."""
     tool_vector = tool.tool_vector_mm
     if tool_vector is None or tool_vector[2] >= 0.0:
         return ()
     length = -tool_vector[2]
     free = length - sum(part.length_mm for part in tool.holder)
     cuts = min(tool.cutting_length_mm or free, free)
-    out = [Part("tool", (0.0, cuts), (tool.radius_mm, tool.radius_mm), True)]
+    parts = [Part("tool", (0.0, cuts), (tool.radius_mm, tool.radius_mm), True)]
     if cuts < free:
-        out.append(Part("shank", (cuts, free), (tool.radius_mm, tool.radius_mm), False))
+        parts.append(Part("shank", (cuts, free), (tool.radius_mm, tool.radius_mm), False))
     level = free
     for holder in tool.holder:
         ends = (level, level + holder.length_mm)
-        out.append(Part("holder", ends, (holder.radius_mm, holder.top_radius_mm), False))
+        parts.append(Part("holder", ends, (holder.radius_mm, holder.top_radius_mm), False))
         level += holder.length_mm
-    return tuple(out)
+    return tuple(parts)

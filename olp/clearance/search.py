@@ -1,5 +1,4 @@
-"""The nearest triangle to each of many swept parts: boxes first, then planes known to separate, then
-distances."""
+"""The nearest triangle to each of many swept parts: by boxes, separating planes and distances."""
 
 from __future__ import annotations
 
@@ -11,27 +10,26 @@ from olp.clearance.distance import Swept, nearest
 from olp.clearance.tree import LEAF, Tree, box_distance
 from olp.core.arrays import Array, Index
 
-#: what is nearer than the nearest found so far by less than this is not looked for, in mm
+#: mm; triangles nearer than the nearest so far by less than this are not searched for
 CLOSE_MM = 1e-4
-#: bodies of metres that touch are found to be no farther apart than this
+#: mm; largest distance that is computed for bodies of metres in contact
 CONTACT_MM = 5e-4
 #: swept parts that go down the tree together
 _CHUNK = 1 << 12
-#: of so many swept parts one is searched first, for a guess at the others
+#: one in this many swept parts is searched first, as a guess for the others
 _STRIDE = 16
-#: planes that are tried before a distance is measured
+#: separating planes that are tried before a distance is measured
 _PLANES = 4
-#: leaves that are looked at together; memory goes with it
+#: leaves per block, which bounds the memory
 _MOST = 1 << 18
-#: more boxes than this for each swept part, and the guesses were bad
+#: boxes per swept part above which a better guess is made
 _WIDE = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Best:
-    """The nearest found so far of n blocks: (n,) `distance_mm`, inf where there is none yet; (n, 3)
-    `point_mm` of a `triangle` (n, 3, 3); (n, 3) `away` towards it; (n,) `tag`, a number that the caller
-    gives to what was nearest."""
+    """The nearest triangle so far of n blocks: (n,) `distance_mm`, inf without one; (n, 3) `point_mm` of the
+    `triangle` (n, 3, 3); (n, 3) `away` towards it; (n,) the caller's number `tag` for its source."""
 
     distance_mm: Array
     point_mm: Array
@@ -41,41 +39,41 @@ class Best:
 
     @staticmethod
     def of(count: int, within_mm: float = np.inf) -> Best:
-        """Nothing found yet; what is farther than `within_mm` is not looked for."""
+        """No triangle yet; those farther than `within_mm` are not searched for."""
         return Best(
             np.full(count, within_mm), np.full((count, 3), np.nan), np.zeros((count, 3)),
             np.full((count, 3, 3), np.nan), np.full(count, -1, np.int64),
         )  # fmt: skip
 
     def limit(self, block: Index) -> Array:
-        """What a pair has to be nearer than to matter."""
+        """The distance below which a pair is of interest."""
         return self.distance_mm[block] - CLOSE_MM
 
     def take(self, swept: Swept, block: Index, triangle: Array, tag: int) -> Array:
-        """Measure pairs and keep what is nearer; (n, 3) ways across planes that separate them."""
-        found = nearest(swept, triangle, self.limit(block))
-        order = np.argsort(-found.distance_mm, kind="stable")
-        order = order[found.distance_mm[order] < self.distance_mm[block[order]]]
+        """Measure pairs and keep the nearer ones; (n, 3) normals of planes that separate them."""
+        measured = nearest(swept, triangle, self.limit(block))
+        order = np.argsort(-measured.distance_mm, kind="stable")
+        order = order[measured.distance_mm[order] < self.distance_mm[block[order]]]
         # of several pairs of a block the nearest is written last
         to = block[order]
-        self.distance_mm[to] = found.distance_mm[order]
-        self.point_mm[to], self.away[to] = found.point_mm[order], found.away[order]
+        self.distance_mm[to] = measured.distance_mm[order]
+        self.point_mm[to], self.away[to] = measured.point_mm[order], measured.away[order]
         self.triangle[to], self.tag[to] = triangle[order], tag
-        return found.away
+        return measured.away
 
 
 def search(tree: Tree, swept: Swept, block: Index, best: Best, tag: int) -> None:
-    """Put into `best` what of a tree is nearest to n swept parts, each of the block (n,) it belongs to;
-    parts that follow one another in the arrays are best near one another.
+    """Put into `best` the triangles of a tree nearest to n swept parts, each of its `block` (n,).
 
-    The distances are those of the nearest triangle, or more than that by at most `CLOSE_MM`.
+    It is fastest where parts that follow one another in the arrays are near one another. Distances are those
+    of the nearest triangle, or larger by at most `CLOSE_MM`.
     """
     for a in range(0, len(swept), _CHUNK):
         rows = np.arange(a, min(a + _CHUNK, len(swept)))
         some = rows[::_STRIDE]
         _Group.of(tree, swept.take(some), block[some], best, tag).run()
         group = _Group.of(tree, swept.take(rows), block[rows], best, tag)
-        # what is nearest to one is nearly so to those around it
+        # the triangle nearest to one part is nearly so to its neighbours
         nearby = block[some][np.arange(len(rows)) // _STRIDE]
         for guess in (nearby, block[some][np.minimum(np.arange(len(rows)) // _STRIDE + 1, len(some) - 1)]):
             use = np.flatnonzero(best.tag[guess] == tag)
@@ -85,7 +83,7 @@ def search(tree: Tree, swept: Swept, block: Index, best: Best, tag: int) -> None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Swept parts that go down a tree together, with the boxes about them."""
+    """Swept parts that go down a tree together, with the boxes around them."""
 
     tree: Tree
     swept: Swept
@@ -102,7 +100,7 @@ class _Group:
         return _Group(tree, swept, block, low, high, swept.radius.max(axis=1), best, tag)
 
     def run(self) -> None:
-        """Measure all that may be nearer than what is known."""
+        """Measure all triangles that may be nearer than the best so far."""
         tree, best, block = self.tree, self.best, self.block
         far = box_distance(self.low, self.high, self.wide, tree.low[0][:1], tree.high[0][:1])
         part = np.flatnonzero(far < best.limit(block))
@@ -114,7 +112,7 @@ class _Group:
             node[1::2] += 1
             part, node, far = self._near(part, node, level, away, reach)
             if len(part) > _WIDE * len(block):
-                # too many for what is known: a guess from the likeliest box of each block, and once more
+                # too many boxes: a guess from the nearest box of each block, then filter again
                 order = np.lexsort((far, block[part]))
                 first = order[np.flatnonzero(np.diff(block[part[order]], prepend=-1))]
                 self._guess(part[first], node[first], level)
@@ -130,18 +128,19 @@ class _Group:
     def _near(
         self, part: Index, node: Index, level: int, away: Array, reach: Array
     ) -> tuple[Index, Index, Array]:
-        """Of pairs of parts and boxes of a level those that may hold something nearer, and how near."""
+        """The pairs of parts and boxes of a level that may contain something nearer, and their bounds."""
         low, high = self.tree.low[level][node], self.tree.high[level][node]
         far = box_distance(self.low[part], self.high[part], self.wide[part], low, high)
         # a plane that separates the nearest triangle may separate the box as well
-        way = away[part]
-        far = np.maximum(far, np.einsum("ij,ij->i", np.where(way > 0, low, high), way) - reach[part])
+        direction = away[part]
+        corner = np.where(direction > 0, low, high)
+        far = np.maximum(far, np.einsum("ij,ij->i", corner, direction) - reach[part])
         keep = np.flatnonzero(far < self.best.limit(self.block[part]))
         return part[keep], node[keep], far[keep]
 
     def _guess(self, part: Index, node: Index, level: int) -> None:
-        """Measure a triangle that is likely near: down from a box to the nearer child, the one nearer in its
-        middle where both are as near."""
+        """Measure a triangle that is probably near: from a box down to the nearer child, by the distance of
+        the centres where both are equally near."""
         low, high, wide = self.low[part], self.high[part], self.wide[part]
         middle = 0.5 * (low + high)
         for level_low, level_high in zip(
@@ -157,14 +156,14 @@ class _Group:
         self.best.take(self.swept.take(part), self.block[part], self.tree.triangle[LEAF * node], self.tag)
 
     def _planes(self) -> tuple[Array, Array]:
-        """Of each part (n, 3) the way towards the nearest known of its block, and (n,) how far it reaches
-        there."""
+        """Of each part (n, 3) the direction towards the nearest triangle so far of its block, and (n,) how
+        far it reaches in that direction."""
         away = self.best.away[self.block]
         point = self.swept.start + self.swept.support(away)
         return away, np.einsum("ij,ij->i", point, away)
 
     def _leaves(self, part: Index, face: Index) -> None:
-        """Measure triangles that may be nearer, the likeliest first."""
+        """Measure triangles that may be nearer, the nearest bounds first."""
         best = self.best
         corner = self.tree.triangle[face]
         far = box_distance(
@@ -191,7 +190,7 @@ class _Group:
             )
             first = (np.arange(len(owner)) - rank)[later]
             part, face, far = part[later], face[later], far[later]
-            # planes that separate others of the block, the last measured first: often one of the same face
+            # planes that separate other triangles of the block, the last first: often of the same face
             for back in range(min(take, _PLANES) if part.size else 0):
                 gap = self.swept.take(part).gap(self.tree.triangle[face], planes[first + take - 1 - back])
                 far = np.maximum(far, gap)

@@ -1,5 +1,5 @@
-"""Triangles as a complete binary tree of boxes, in flat arrays: each level halves the groups of the one
-before."""
+"""Triangles as a complete binary tree of boxes, in flat arrays: each level halves the groups of the level
+above."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Tree:
 
 
 def box_distance(low: Array, high: Array, wide: Array, other_low: Array, other_high: Array) -> Array:
-    """(n,) bounds of the distance between what is round about Z, within a box widened by `wide` (n,), and
-    other boxes: no more than the distance."""
+    """(n,) lower bounds of the distance between boxes widened by the radius `wide` (n,) about Z, and other
+    boxes."""
     gap = np.maximum(low - other_high, other_low - high)
     np.maximum(gap, 0.0, out=gap)
     x, y, z = gap[:, 0], gap[:, 1], gap[:, 2]

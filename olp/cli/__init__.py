@@ -1,4 +1,4 @@
-"""The command line: one module a verb, imported when that verb is called.
+"""The command line: one module per verb, imported when that verb is called.
 
 Every error of `olp` becomes one `olp: error: ...` on stderr and an exit code here, and nowhere else.
 """
@@ -17,19 +17,22 @@ from olp.core.version import __version__
 #: Verb to what it does. Kept here so that `olp --help` imports no verb.
 VERBS = {
     "init": "Write the first files of a new machine into a folder.",
-    "inspect": "Say what a program does, or what a machine's calibration holds.",
+    "inspect": "Show what a program does, or what a machine's calibration holds.",
     "correct": "Correct a program with the machine's calibrated errors, and prove it.",
-    "verify": "Prove a corrected program from the two texts alone.",
-    "simulate": "Write the path that the machine would really take, as CSV.",
+    "results": "Correct what a measuring machine reported.",
+    "verify": "Prove a corrected program from the nominal and the corrected text alone.",
+    "simulate": "Write the path that the machine would take with its errors, as CSV.",
     "retime": "Re-time a program within the limits of the axes, and say how long it takes.",
-    "check": "Say whether a program may run: a gate with findings, for people and pipelines.",
+    "check": "Check whether a program may run on the machine: findings, for people and pipelines.",
     "view": "Show a job in the browser: paths, enlarged errors, time, program text.",
-    "compare": "Hold measured runs against a nominal path: deviations, ISO 9283 figures.",
+    "compare": "Compare measured runs with a nominal path: deviations, ISO 9283 figures.",
     "calibrate": "Make a calibration from measurements; read and write the tables of controls.",
     "schema": "Print the JSON Schema of a file that people write.",
-    "explain": "Explain the code of a finding, or list all codes.",
+    "explain": "Explain the code of a finding or a term, or list all codes.",
+    "help": "Show the papers on a topic, or answer a question.",
 }
 
+#: Exit code of an interrupted run, as shells report it.
 INTERRUPTED = 130
 
 # Read when numpy and pydantic are imported, which a verb does. The matrices here are 3 x 3: threads for them
@@ -39,7 +42,7 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 class _Verbs(LateGroup):
-    """The verbs; an error of ours ends in one line and an exit code."""
+    """The verbs; an error of `olp` ends in one line and an exit code."""
 
     def invoke(self, ctx: click.Context) -> object:
         try:
@@ -52,18 +55,18 @@ class _Verbs(LateGroup):
             diagnostic("olp: interrupted")
             ctx.exit(INTERRUPTED)
         except BrokenPipeError:
-            # The reader of stdout has gone, which is its right; what it asked for is lost only to itself.
+            # The reader of stdout has closed it, such as `head`: no error.
             silence_stdout()
             ctx.exit(0)
 
 
 _HELP = """Corrects off-line programs of machines with three linear axes by the machine's calibrated errors.
 
-The result goes to stdout, all talk to stderr; - is stdin or stdout; no file is overwritten without --force.
+The result goes to stdout, messages to stderr; - is stdin or stdout. No file is overwritten without --force.
 
 \b
 Exit codes: 0 good; 1 findings at or above --fail-on; 2 wrong call; 3 input unreadable or refused;
-4 no answer; 130 interrupted."""
+4 cannot be computed; 130 interrupted."""
 
 main = _Verbs(
     VERBS,

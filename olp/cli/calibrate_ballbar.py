@@ -15,7 +15,7 @@ from olp.cli.options import output_option, plot_option
 @output_option("OUT.toml", "Write [[squareness]] for a plan of measurements.")
 @click.option(
     "--skip-deg", type=click.FloatRange(0.0, 30.0), default=2.5, show_default=True,
-    help="Leave out readings this near to where an axis turns round.",
+    help="Leave out readings this near to the reversal of an axis.",
 )  # fmt: skip
 @plot_option("Draw every circle, as FILE-<plane>.svg or .png.")
 @ending_options
@@ -28,7 +28,7 @@ def command(
     fail_on: str,
     force: bool,
 ) -> None:
-    """Squareness, scale and servo mismatch, and lost motion from circles of a ball-bar (ISO 230-4).
+    """Squareness, scale and servo mismatch, and backlash from circles of a ball-bar (ISO 230-4).
 
     FILES are CSV: angle_deg,run,direction,deviation_um, below comments # plane = XY, # radius_mm,
     # centre_mm, # tool_mm. Squareness needs both directions of rotation."""
@@ -40,10 +40,10 @@ def command(
 
     kind = plot_kind(plot)
     fits = fit_ballbar(files, skip_deg=skip_deg)
-    findings = [finding for found in fits for finding in found.findings]
+    findings = [finding for fit in fits for finding in fit.findings]
     result: dict[str, Any] = {
         "schema": "olp-ballbar-1",
-        "circles": [found.as_dict() for found in fits],
+        "circles": [fit.as_dict() for fit in fits],
         "findings": [f.as_dict() for f in findings],
     }
     written: dict[str, bytes] = {}
@@ -51,10 +51,10 @@ def command(
         written[output] = readings_toml(readings_of(fits)).encode()
     if plot is not None:
         plots: dict[str, bytes] = {}
-        for found in fits:
-            name = found.circles.plane
+        for fit in fits:
+            name = fit.circles.plane
             name = name if name not in plots else f"{name}-{len(plots) + 1}"
-            plots[name] = plots_calibration.circle(found, cast(Any, kind))
+            plots[name] = plots_calibration.circle(fit, cast(Any, kind))
         written |= numbered(plot, plots)
     text = "\n".join(outline(_shown(circle)) for circle in result["circles"])
     text += outline({"findings": result["findings"]}) if findings else ""

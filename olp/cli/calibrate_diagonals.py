@@ -16,7 +16,7 @@ from olp.core.units import RAD_PER_URAD
 @click.argument("files", nargs=-1, required=True)
 @click.option(
     "--known", multiple=True, metavar="NAME=VALUE,SIGMA",
-    help="What another instrument gave: SX, SY, SZ in um/m, C0Y, B0Z, A0Z in urad, with uncertainty.",
+    help="Result of another instrument: SX, SY, SZ in um/m, C0Y, B0Z, A0Z in urad, with uncertainty.",
 )  # fmt: skip
 @output_option("OUT.toml", "Write [[squareness]] for a plan of measurements.")
 @ending_options
@@ -28,7 +28,7 @@ def command(
     fail_on: str,
     force: bool,
 ) -> None:
-    """Deviations along face and body diagonals (ISO 230-6), and what of squareness and scales they tell.
+    """Deviations along face and body diagonals (ISO 230-6), and the squareness and scales they determine.
 
     FILES are CSV: target_mm,run,direction,value_um (the distance from the start), below comments
     # start_mm, # end_mm, # tool_mm, # sense."""
@@ -36,14 +36,14 @@ def command(
     from olp.cli.outline import outline
     from olp.workflows.calibrate_diagonals import fit_diagonals
 
-    found = fit_diagonals(files, dict(_known(item) for item in known))
-    findings = list(found.findings)
+    fitted = fit_diagonals(files, dict(_known(item) for item in known))
+    findings = list(fitted.findings)
     result: dict[str, Any] = {
         "schema": "olp-diagonals-1",
-        **found.as_dict(),
+        **fitted.as_dict(),
         "findings": [f.as_dict() for f in findings],
     }
-    written = {} if output is None else {output: readings_toml(found.readings()).encode()}
+    written = {} if output is None else {output: readings_toml(fitted.readings()).encode()}
     end(
         result,
         outline(_shown(result)),
@@ -57,12 +57,12 @@ def command(
 
 
 def _shown(result: dict[str, Any]) -> dict[str, Any]:
-    """The result as people read it: the figures that tell most, and one column of values."""
+    """The result as people read it: the main figures, and one column of values."""
     kept = ("name", "length_mm", "elongation_um_m", "sigma_um_m", "E_um", "R_um", "M_um", "B_mean_um")
-    found = []
+    values = []
     for row in result["found"]:
         unit = "urad" if "value_urad" in row else "um_m"
-        found.append({
+        values.append({
             "name": row["name"], "value": row[f"value_{unit}"], "sigma": row[f"sigma_{unit}"],
             "unit": unit.replace("_", "/"),
         })  # fmt: skip
@@ -70,7 +70,7 @@ def _shown(result: dict[str, Any]) -> dict[str, Any]:
     return {
         **fitted,
         "diagonals": [{k: row[k] for k in kept if k in row} for row in result["diagonals"]],
-        "found": found,
+        "found": values,
         "not_determined": result["not_determined"],
         "findings": result["findings"],
     }
@@ -81,7 +81,6 @@ def _known(item: str) -> tuple[str, tuple[float, float]]:
     try:
         value, sigma = (float(v) * RAD_PER_URAD for v in values.split(","))
     except ValueError:
-        raise UsageError(
-            f"--known {item!r}; expected a name, a value and its uncertainty: SX=12.5,0.5"
-        ) from None
+        expected = "expected a name, a value and its uncertainty, such as SX=12.5,0.5"
+        raise UsageError(f"--known {item!r} is not understood; {expected}") from None
     return name.strip(), (value, sigma)

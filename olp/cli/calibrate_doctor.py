@@ -21,7 +21,7 @@ from olp.core.errors import UsageError
 @click.argument("calibration", metavar="CALIBRATION")
 @click.argument("points", metavar="POINTS.csv")
 @machine_option(required=True)
-@output_option("NEW.toml", "Write the calibration with what is decided put right.")
+@output_option("NEW.toml", "Write the calibration with the decided mistakes corrected.")
 @click.option("--sigma-um", type=Length(), help="Standard uncertainty of a coordinate, if the file has none.")
 @click.option(
     "--tool", type=(float, float, float), metavar="X Y Z",
@@ -29,7 +29,7 @@ from olp.core.errors import UsageError
 )  # fmt: skip
 @json_option()
 @fail_on_option
-@quiet_option("No table; the exit code tells.")
+@quiet_option("No table; only the exit code.")
 @force_option("the new calibration and its curves")
 def command(
     calibration: str,
@@ -43,14 +43,14 @@ def command(
     quiet: bool,
     force: bool,
 ) -> None:
-    """Judge the curves of a calibration by independent points.
+    """Check the curves of a calibration with independent points.
 
-    POINTS.csv holds commanded axis positions and measured places (or deviations) of points that had no part
-    in the calibration, in a frame that nobody needs to know. For every curve and squareness: sense right,
-    flipped or undecided; unit; columns in each other's place; and which points would decide what is open.
+    POINTS.csv holds commanded axis positions and measured positions (or deviations) of points that were not
+    used for the calibration. The instrument frame may be unknown. For every curve and squareness, the report
+    says: sign right, flipped or undecided; unit; swapped columns. It names points that would decide the rest.
     """
     if STREAM in (output, calibration, points):
-        raise UsageError("a calibration is several files; name files, - is none")
+        raise UsageError("a calibration is several files and cannot be -; name files")
     from olp.files.calibration.reader import files_beside
     from olp.files.measurements.reader import files_of_measurements
 
@@ -61,11 +61,11 @@ def command(
     from olp.files.write import write_files
     from olp.workflows.calibrate_doctor import diagnose_calibration
 
-    found = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=tool)
+    diagnosis = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=tool)
     if output is not None:
-        files = found.files(output)
+        files = diagnosis.files(output)
         write_files(files, force=force, inputs=inputs)
         diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
-    report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
+    report = {**diagnosis.report, "findings": [finding.as_dict() for finding in diagnosis.findings]}
     put_report(report, as_json=as_json, quiet=quiet)
-    exit_for(found.findings, fail_on)
+    exit_for(diagnosis.findings, fail_on)

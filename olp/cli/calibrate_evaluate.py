@@ -14,7 +14,7 @@ from olp.cli.options import day_option, machine_option, plot_option, report_opti
 
 @click.command("evaluate")
 @click.argument("data", nargs=-1, required=True)
-@machine_option("Check what files say of tables with its chain.")
+@machine_option("Check what the files say of moving tables against its chain.")
 @click.option(
     "--zone", type=click.Choice(["least-squares", "minimum-zone"]), default="least-squares",
     show_default=True, help="Reference line of straightness.",
@@ -47,13 +47,13 @@ def command(
     for name in files_of(report_file):
         report_ending(name)
     refuse_early(files_of(report_file), inputs, force=force)
-    found = evaluate_lines(data, machine, zone=cast(Any, zone))
-    result = found.as_dict()
+    evaluated = evaluate_lines(data, machine, zone=cast(Any, zone))
+    result = evaluated.as_dict()
     files: dict[str, bytes] = {}
     if report_file is not None and report_file != STREAM:
-        files[report_file] = calibrate_report.evaluation(found, report_file, date)
+        files[report_file] = calibrate_report.evaluation(evaluated, report_file, date)
     if plot is not None:
-        files |= numbered(plot, report_calibration.plots_of(found, cast(Any, kind)))
-    text = report_calibration.to_text(found)
+        files |= numbered(plot, report_calibration.plots_of(evaluated, cast(Any, kind)))
+    text = report_calibration.to_text(evaluated)
     as_json = as_json or report_file == STREAM
-    end(result, text, files, inputs, found.findings, as_json=as_json, fail_on=fail_on, force=force)
+    end(result, text, files, inputs, evaluated.findings, as_json=as_json, fail_on=fail_on, force=force)

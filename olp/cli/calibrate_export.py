@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 @setup_options
 @click.option("-c", "--calibration", metavar="FILE", help="A calibration alone, without a machine.")
 @click.option("--format", "kind", metavar="FORMAT", help="One of: olp calibrate formats.")
-@output_option("FILE", "The table; further files stand beside it.")
-@click.option("--compare", is_flag=True, help="Write nothing: what every format would leave, side by side.")
-@click.option("--program", metavar="PROGRAM", help="Say what is left along this program as well.")
+@output_option("FILE", "The table; further files go beside it.")
+@click.option("--compare", is_flag=True, help="Write nothing; show the residual error of every format.")
+@click.option("--program", metavar="PROGRAM", help="Also show the residual error along this program.")
 @click.option("--most-rows", type=click.IntRange(min=2), help="Rows that the control takes in one table.")
 @json_option()
 @fail_on_option
@@ -45,9 +45,9 @@ def command(
     chain: str | None,
     force: bool,
 ) -> None:
-    """Write a calibration as the compensation table of a control, and say what the table would leave.
+    """Write a calibration as the compensation table of a control, and show the residual error.
 
-    The figures stand next to those of a corrected program, so that either can be chosen.
+    The figures stand next to those of a corrected program, so that you can choose either.
     """
     from olp.files.write import write_files
     from olp.workflows.calibrate_export import compare_tables, export_table
@@ -66,34 +66,34 @@ def command(
     if output is None or output == STREAM:
         raise UsageError("a table is written to files; name the first one with -o")
     refuse_early([output], inputs, force=force)
-    found = export_table(
+    exported = export_table(
         machine, kind, output, job, sense=sense, comp_type=comp_type, axis_names=names, **common
     )
-    write_files(found.files, force=force, inputs=inputs)
-    _put(found.report, as_json)
-    for finding in found.findings:
+    write_files(exported.files, force=force, inputs=inputs)
+    _put(exported.report, as_json)
+    for finding in exported.findings:
         diagnostic(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
-    for note in found.notes:
+    for note in exported.notes:
         diagnostic(f"note: {note}")
-    for path in found.files:
+    for path in exported.files:
         diagnostic(f"wrote {path}")
-    exit_for(found.findings, fail_on)
+    exit_for(exported.findings, fail_on)
 
 
 def _put(report: dict[str, Any], as_json: bool) -> None:
     from olp.reports.report import table, to_json
-    from olp.workflows.calibrate_export import left_lines
+    from olp.workflows.calibrate_export import residual_rows
 
     if as_json:
         put(to_json(report))
         return
-    header = ["left by", "rms um", "max um", "in frame"]
+    header = ["residual with", "rms um", "max um", "in frame"]
     if "program" in report:
         header += ["path rms", "path max", "in frame"]
     box = report["box"]
     over = f"{box['points']} points over the box, {len(box['tools_mm'])} tool(s)"
     lines = [f"{over}; in frame: rms after a best-fit frame"]
-    lines += table(header, left_lines(report))
+    lines += table(header, residual_rows(report))
     if report.get("program", {}).get("refused"):
         lines.append(f"olp correct refuses the program: {report['program']['refused']}")
     for key, form in report.get("formats", {}).items():

@@ -30,15 +30,15 @@ from olp.core.errors import UsageError
 @machine_option("The machine file: chain, travel, tools.")
 @click.option(
     "--datum", type=(float, float, float), metavar="X Y Z",
-    help="Axis position where the curves are zero. Default: the place in the box nearest to zero.",
+    help="Axis position where the curves are zero. Default: the position in the box nearest to zero.",
 )  # fmt: skip
 @day_option("The last day of the calibration's validity.", "--valid-until")
 @click.option(
     "--map/--no-map", "map_", default=None,
-    help="Also map what no rigid bodies make, where points show it. Default: as the plan says ([map]).",
+    help="Also map errors that rigid bodies cannot make, where points show them. Default: [map] of the plan.",
 )  # fmt: skip
 @report_option()
-@json_option("Print what was found as JSON.")
+@json_option("Print the result as JSON.")
 @fail_on_option
 @quiet_option("No table and no progress.")
 @force_option("the calibration and its curves")
@@ -58,11 +58,11 @@ def command(
     """Make a calibration from measurements.
 
     DATA are plans (olp-measurements-1), folders with measurements.toml, or folders and files of readings that
-    describe themselves. All readings go into one adjustment: curves, squareness, lost motion and cyclic
+    describe themselves. One adjustment takes all readings. It gives curves, squareness, backlash and cyclic
     errors with their uncertainties.
     """
     if STREAM in (output, report_file, *data):
-        raise UsageError("a calibration is several files; name files, - is none")
+        raise UsageError("a calibration is several files and cannot be -; name files")
     from olp.files.measurements.reader import files_of_measurements
 
     inputs = (*files_of_measurements(data), *files_of(machine))
@@ -74,14 +74,14 @@ def command(
     from olp.reports.report import to_json
     from olp.workflows.calibrate_fit import fit_calibration
 
-    with progress(quiet) as tell:
+    with progress(quiet) as show:
         fitted = fit_calibration(
             [Path(name) for name in data],
             machine,
             datum_mm=datum,
             valid_until=valid_until,
             map=map_,
-            progress=tell,
+            progress=show,
         )
     files: dict[Path, bytes] = {} if output is None else fitted.files(output)
     curves = len(files) - 1

@@ -11,7 +11,7 @@ from olp.cli.options import json_option
 @click.command("formats")
 @json_option("Print the list as JSON.")
 def command(as_json: bool) -> None:
-    """List the tables of controls that can be read and written: sense, what each holds, how far verified."""
+    """List the tables of controls: sign convention, what each holds, how far verified."""
     from olp.files.control_tables.registry import FORMATS
     from olp.reports.report import to_json
 

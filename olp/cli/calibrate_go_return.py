@@ -20,10 +20,10 @@ from olp.core.errors import UsageError
 @plot_option("Draw the reversal along each axis, as FILE-reversal.svg or .png.")
 @click.option("--program", metavar="OUT.ngc", help="Write the program of the test instead (-m, --axis).")
 @click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="The axis of the program.")
-@click.option("--count", type=click.IntRange(min=1), default=10, show_default=True, help="Targets of it.")
-@click.option("--over-mm", type=Length(), default=2.0, show_default=True, help="Way past each target.")
+@click.option("--count", type=click.IntRange(min=1), default=10, show_default=True, help="Number of targets.")
+@click.option("--over-mm", type=Length(), default=2.0, show_default=True, help="Overtravel past each target.")
 @click.option("--feed", type=Length(), default=1000.0, show_default=True, help="Feed in mm/min.")
-@click.option("--runs", type=click.IntRange(min=1), default=5, show_default=True, help="Runs there and back.")
+@click.option("--runs", type=click.IntRange(min=1), default=5, show_default=True, help="Runs, both ways.")
 @ending_options
 def command(
     data: tuple[str, ...],
@@ -40,9 +40,9 @@ def command(
     fail_on: str,
     force: bool,
 ) -> None:
-    """Test B: lost motion of each axis, from targets approached from both sides.
+    """Test B: backlash of each axis, from targets approached from both sides.
 
-    DATA are plans, folders and files as olp calibrate fit takes them; the lines of positioning count."""
+    DATA are plans, folders and files as olp calibrate fit takes them; only lines of positioning are used."""
     if program is not None:
         if data or machine is None or axis is None:
             raise UsageError("--program writes the test: give -m and --axis, and no DATA")
@@ -59,16 +59,16 @@ def command(
     from olp.workflows.calibrate_go_return import go_return
 
     kind = plot_kind(plot)
-    found = go_return(data, machine)
-    findings = [finding for reversal in found for finding in findings_of(reversal)]
+    reversals = go_return(data, machine)
+    findings = [finding for reversal in reversals for finding in findings_of(reversal)]
     result: dict[str, Any] = {
         "schema": "olp-go-return-1",
-        "axes": [reversal.as_dict() for reversal in found],
+        "axes": [reversal.as_dict() for reversal in reversals],
         "findings": [f.as_dict() for f in findings],
     }
-    written = {} if output is None else {output: backlash_toml(found).encode()}
+    written = {} if output is None else {output: backlash_toml(reversals).encode()}
     if plot is not None:
-        written |= numbered(plot, {"reversal": plots_calibration.reversals(found, cast(Any, kind))})
+        written |= numbered(plot, {"reversal": plots_calibration.reversals(reversals, cast(Any, kind))})
     rows = [
         {"name": a["component"]} | {k: v for k, v in a.items() if k not in ("component", "targets", "file")}
         for a in result["axes"]
@@ -84,7 +84,7 @@ def _program(machine: str, axis: str, count: int, over_mm: float, feed: float, r
 
     described = Session.start(machine).setup.machine
     low, high = described.axes[axis].travel_mm
-    # a whole increment inside the travel, and no equal steps: a screw's pitch would hide in them
+    # inside the travel, and in unequal steps: equal ones can hide the pitch of a screw
     targets = np.linspace(low + 2.0 * over_mm, high - 2.0 * over_mm, count)
     step = float(np.diff(targets).mean()) if count > 1 else 0.0
     shift = 0.1 * step * np.sin(2.399963 * np.arange(count)) if count > 2 else np.zeros(count)

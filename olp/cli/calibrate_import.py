@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 def axis_names(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
     """`X=AX1` as a mapping; an option's callback."""
-    out = {}
+    names = {}
     for value in values:
         axis, mark, name = value.partition("=")
         if not mark or axis not in ("X", "Y", "Z") or not name:
             raise UsageError(f"--axis-name {value} is not understood; expected such as --axis-name X=AX1")
-        out[axis] = name
-    return out
+        names[axis] = name
+    return names
 
 
 def table_options(function: Any) -> Any:
     """What reading and writing of tables have in common."""
     for option in (
         force_option(),
-        click.option("--chain", metavar="FXYZ", help="Axes from workpiece to tool; without -m."),
+        click.option("--chain", metavar="FXYZ", help="Axes from workpiece to tool, F the frame; without -m."),
         click.option(
             "--reference", type=click.Choice(["functional-point", "table"]),
-            help="Where errors of axes that carry the workpiece count: at the tool, or on the table.",
+            help="Where errors of axes that move the workpiece are stated: at the tool, or on the table.",
         ),
         click.option(
             "--axis-name", "names", multiple=True, metavar="X=NAME", callback=axis_names,
@@ -43,7 +43,7 @@ def table_options(function: Any) -> Any:
         click.option("--comp-type", type=click.IntRange(min=0), help="LinuxCNC's COMP_FILE_TYPE."),
         click.option(
             "--sense", type=click.Choice(["error", "correction"]),
-            help="error: the control takes values off (actual minus commanded); correction: adds them.",
+            help="error: the control subtracts the values (actual minus commanded); correction: adds them.",
         ),
     ):  # fmt: skip
         function = option(function)
@@ -81,14 +81,14 @@ def command(
 
     inputs = files_of(table, machine)
     refuse_early([output], inputs, force=force)
-    found = import_table(
+    imported = import_table(
         table, kind, output, machine, sense=sense, measured=measured, axis=axis,
         comp_type=comp_type, axis_names=names, reference=reference, chain=chain,
     )  # fmt: skip
-    write_files(found.files, force=force, inputs=inputs)
-    for finding in found.findings:
+    write_files(imported.files, force=force, inputs=inputs)
+    for finding in imported.findings:
         diagnostic(f"{finding.severity.name.lower()}: {finding.code} {finding.message}")
-    for note in found.notes:
+    for note in imported.notes:
         diagnostic(f"note: {note}")
-    for path in found.files:
+    for path in imported.files:
         diagnostic(f"wrote {path}")

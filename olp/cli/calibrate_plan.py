@@ -26,17 +26,17 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 @machine_option(required=True)
 @click.option(
     "--uncertainty-um", type=Length(), default=5.0, show_default=True,
-    help="What a correction may leave: rms length over the box, best-fit frame.",
+    help="Residual error that a correction may leave: rms length over the box, best-fit frame.",
 )  # fmt: skip
-@click.option("--instrument", type=click.Choice(METHODS), help="Default: whatever gets there quickest.")
-@click.option("--points", type=click.IntRange(min=8), help="Number of points, in place of the least enough.")
+@click.option("--instrument", type=click.Choice(METHODS), help="Default: the quickest that reaches it.")
+@click.option("--points", type=click.IntRange(min=8), help="Number of points. Default: the fewest.")
 @click.option(
     "--box", type=(float, float, float, float, float, float), metavar="X X Y Y Z Z",
     help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
 )  # fmt: skip
 @click.option(
     "--reflector", "reflectors", type=(float, float, float), multiple=True, metavar="X Y Z",
-    help="Vector from the gauge point to a reflector in mm; three that are not on one line see everything.",
+    help="Vector from the gauge point to a reflector in mm; three that are not on one line suffice.",
 )  # fmt: skip
 @click.option(
     "--sigma-um", type=Length(), help="Standard uncertainty of a tracker's coordinate.  [default: 8]"
@@ -72,11 +72,11 @@ def command(
     quiet: bool,
     force: bool,
 ) -> None:
-    """Propose what to measure, before anybody measures.
+    """Propose what to measure, before you measure.
 
-    Compares methods by time against what a correction made from them would leave, by the covariance of the
-    adjustment for their geometry. FOLDER gets measurements.toml, CSV files whose readings are still empty,
-    and a program for each run of the machine: machine coordinates, a dwell at each place.
+    Compares methods: the time they take, and the residual error of a correction made from them, by the
+    covariance of the adjustment. FOLDER gets measurements.toml, CSV files whose readings are still empty, and
+    a program for each run of the machine: machine coordinates, a dwell at each point.
     """
     from pathlib import Path
 
@@ -84,7 +84,7 @@ def command(
     from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
 
     if output is not None and not Path(output).is_dir():
-        raise UsageError("is no folder; create it first", file=output)
+        raise UsageError("is not a folder; create it first", file=output)
     plan = plan_measurements(
         machine,
         uncertainty_um=uncertainty_um,

@@ -14,14 +14,14 @@ from olp.core.errors import UsageError
 
 @click.command("postures")
 @click.argument("file", required=False)
-@machine_option("Its tools, and its calibration, taken out first.")
-@click.option("--reference", metavar="TOOL", help="The tool whose vector is right.")
+@machine_option("Machine file: its tools, and its calibration, whose errors are removed first.")
+@click.option("--reference", metavar="TOOL", help="The tool whose vector is known.")
 @click.option(
     "--program", metavar="OUT.ngc", help="Write the program of the test instead (--tools, --point)."
 )
 @click.option("--tools", metavar="1,2,3", help="Tool numbers of the program.")
 @click.option("--point", metavar="X,Y,Z", help="The point, in the active work offset, in mm.")
-@click.option("--clearance-mm", type=Length(), default=50.0, show_default=True, help="Way up between tools.")
+@click.option("--clearance-mm", type=Length(), default=50.0, show_default=True, help="Retract between tools.")
 @click.option("--feed", type=Length(), default=300.0, show_default=True, help="mm/min down to the point.")
 @ending_options
 def command(
@@ -40,7 +40,7 @@ def command(
     """Test A: errors of tool vectors, from one point that the tool holds in several postures.
 
     FILE is CSV: X_mm,Y_mm,Z_mm,tool[,TX_mm,TY_mm,TZ_mm][,A_deg,B_deg,C_deg], axis positions with the tool
-    point on the one point, a row a posture."""
+    point on the one point, one row per posture."""
     from olp.calibration.iso230 import postures
     from olp.cli.outline import outline
     from olp.workflows.calibrate_postures import fit_postures
@@ -56,11 +56,11 @@ def command(
         return
     if file is None:
         raise UsageError("no FILE is given; name the readings, or write the test with --program")
-    found = fit_postures(file, machine, reference=reference)
-    findings = list(found.findings)
+    fitted = fit_postures(file, machine, reference=reference)
+    findings = list(fitted.findings)
     result: dict[str, Any] = {
         "schema": "olp-postures-1",
-        **found.as_dict(),
+        **fitted.as_dict(),
         "findings": [f.as_dict() for f in findings],
     }
     inputs = files_of(file, machine)
@@ -71,11 +71,11 @@ def _numbers(text: str, name: str) -> list[float]:
     try:
         return [float(v) for v in text.split(",")]
     except ValueError:
-        raise UsageError(f"{name} {text!r}; expected numbers between commas") from None
+        raise UsageError(f"{name} {text!r} is not understood; expected numbers between commas") from None
 
 
 def _point(text: str) -> tuple[float, float, float]:
     values = _numbers(text, "--point")
     if len(values) != 3:
-        raise UsageError(f"--point {text!r}; expected X,Y,Z in mm")
+        raise UsageError(f"--point {text!r} is not understood; expected X,Y,Z in mm")
     return values[0], values[1], values[2]

@@ -13,37 +13,37 @@ from olp.cli.options import json_option
 @click.option("--profile", metavar="FILE.toml", help="How the file is laid out (olp-line-profile-1).")
 @json_option("Print the readings as JSON.")
 def command(file: str, profile: str | None, as_json: bool) -> None:
-    """Show what is understood of an instrument's FILE: one row a reading, and what was assumed.
+    """Show what the program reads in an instrument's FILE: one row per reading, and what it assumed.
 
     Without --profile the file is native CSV: target_mm,run,direction,value_um or value_urad.
     """
     from olp.files.measurements.line_profile import load_line_profile, read_line
 
-    found = read_line(file, None if profile is None else load_line_profile(profile))
-    unit, scale = ("urad", 1e6) if found.angular else ("um", 1e3)
+    readings = read_line(file, None if profile is None else load_line_profile(profile))
+    unit, scale = ("urad", 1e6) if readings.angular else ("um", 1e3)
     rows = list(
-        zip(found.line.tolist(), found.target_mm.tolist(), found.run.tolist(), found.direction.tolist(),
-            (found.value * scale).tolist(), strict=True)
+        zip(readings.line.tolist(), readings.target_mm.tolist(), readings.run.tolist(),
+            readings.direction.tolist(), (readings.value * scale).tolist(), strict=True)
     )  # fmt: skip
     if as_json:
         import json
 
         names = ("line", "target_mm", "run", "direction", f"value_{unit}")
-        out = {
-            "file": found.file,
-            "component": found.component,
-            "notes": list(found.notes),
+        listed = {
+            "file": readings.file,
+            "component": readings.component,
+            "notes": list(readings.notes),
             "readings": [dict(zip(names, row, strict=True)) for row in rows],
         }
-        put(json.dumps(out, indent=1) + "\n")
+        put(json.dumps(listed, indent=1) + "\n")
         return
     lines = [f"{'line':>6} {'target_mm':>12} {'run':>4} {'dir':>4} {'value_' + unit:>12}\n"]
     lines += [f"{n:6d} {q:12.4f} {run:4d} {sign:+4d} {value:12.3f}\n" for n, q, run, sign, value in rows]
     put("".join(lines))
-    runs = len(set(zip(found.run.tolist(), found.direction.tolist(), strict=True)))
-    span = f"{found.target_mm.min():g} to {found.target_mm.max():g} mm"
-    stated = "actual minus commanded" if found.sense_known else "as in the file, the plan must state it"
-    component = found.component or "not stated"
+    runs = len(set(zip(readings.run.tolist(), readings.direction.tolist(), strict=True)))
+    span = f"{readings.target_mm.min():g} to {readings.target_mm.max():g} mm"
+    stated = "actual minus commanded" if readings.sense_known else "as in the file, the plan must state it"
+    component = readings.component or "not stated"
     diagnostic(f"{len(rows)} readings in {runs} one-way runs, {span}; component {component}; sign: {stated}")
-    for note in found.notes:
+    for note in readings.notes:
         diagnostic(f"note: {note}")

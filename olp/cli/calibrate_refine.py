@@ -24,7 +24,7 @@ from olp.core.errors import UsageError
 @click.argument("calibration", metavar="CALIBRATION")
 @click.argument("measured", metavar="MEASURED.csv")
 @setup_options
-@output_option("NEW.toml", "Where to write; never in place.", required=True)
+@output_option("NEW.toml", "Where to write; never over CALIBRATION.", required=True)
 @click.option(
     "--program", metavar="NOMINAL", help="MEASURED are tip positions along a corrected run of this program."
 )
@@ -36,7 +36,7 @@ from olp.core.errors import UsageError
 @day_option("Day of the run: the new calibration's date of measuring. Default: the old one's.")
 @json_option()
 @fail_on_option
-@quiet_option("No table; the exit code tells.")
+@quiet_option("No table; only the exit code.")
 @force_option("the new calibration and its files")
 def command(
     calibration: str,
@@ -55,12 +55,12 @@ def command(
 ) -> None:
     """Update a calibration by a measured run, within its covariance.
 
-    MEASURED.csv holds commanded axis positions and where an instrument saw the reflector, in a frame of its
-    own. Every number of the calibration moves as far as its uncertainty lets it and the run asks for it; what
-    the run says nothing of stays.
+    MEASURED.csv holds commanded axis positions and measured positions of the reflector, in an unknown
+    instrument frame. Every number of the calibration changes as far as its uncertainty allows and the run
+    asks for. What the run does not determine stays unchanged.
     """
     if STREAM in (output, calibration, measured):
-        raise UsageError("a calibration is several files; name files, - is none")
+        raise UsageError("a calibration is several files and cannot be -; name files")
     if machine is None:
         raise UsageError("no machine file is given; name it with -m")
     from olp.files.calibration.reader import files_beside
@@ -76,13 +76,13 @@ def command(
     from olp.files.write import write_files
     from olp.workflows.calibrate_refine import refine_calibration
 
-    found = refine_calibration(
+    refined = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=tool,
         date=date,
     )  # fmt: skip
-    files = found.files(output)
+    files = refined.files(output)
     write_files(files, force=force, inputs=inputs)
     diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
-    report = {**found.report, "findings": [finding.as_dict() for finding in found.findings]}
+    report = {**refined.report, "findings": [finding.as_dict() for finding in refined.findings]}
     put_report(report, as_json=as_json, quiet=quiet)
-    exit_for(found.findings, fail_on)
+    exit_for(refined.findings, fail_on)

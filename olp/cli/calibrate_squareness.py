@@ -15,18 +15,19 @@ from olp.core.units import RAD_PER_URAD
 @click.command("squareness")
 @click.argument("values", nargs=-1)
 @click.option(
-    "--from", "convention", metavar="NAME", default="iso", show_default=True, help="Theirs, as listed."
-)
+    "--from", "convention", metavar="NAME", default="iso", show_default=True,
+    help="Convention of VALUES, as listed.",
+)  # fmt: skip
 @click.option(
     "--frame", "frames", multiple=True, metavar="NAME=PP,NP,SIDE",
     help="Diagonal that grows in both axes, the other one, and a side of a drawn frame, in mm.",
 )  # fmt: skip
 @json_option("Print the result as JSON.")
 def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], as_json: bool) -> None:
-    """Squareness in the senses of controls and instruments.
+    """Squareness in the sign conventions of controls and instruments.
 
-    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from; a frame that the machine drew or
-    printed gives its own. Without either, the conventions are listed."""
+    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from. With --frame, they come from a
+    frame that the machine drew or printed. Without either, the conventions are listed."""
     from olp.calibration.iso230.conventions import CONVENTIONS, angle_words, from_iso, to_iso
     from olp.calibration.iso230.squareness import from_frame
     from olp.cli.outline import outline
@@ -63,5 +64,5 @@ def _numbers(item: str, count: int, example: str) -> tuple[str, list[float]]:
     except ValueError:
         numbers = []
     if len(numbers) != count:
-        raise UsageError(f"{item!r}; expected such as {example}")
+        raise UsageError(f"{item!r} is not understood; expected such as {example}")
     return name.strip(), numbers

@@ -15,11 +15,10 @@ from olp.core.errors import UsageError
 @click.command("thermal")
 @click.argument("logs", metavar="LOG.csv ...", nargs=-1, required=True)
 @machine_option(required=True)
-@output_option("thermal.toml", "Where the structure goes. Default: stdout.")
+@output_option("thermal.toml", "Where to write the thermal structure. Default: stdout.")
 @click.option(
     "--reference-degC", "reference", multiple=True, metavar="[SENSOR=]degC",
-    help="What the sensors said when the machine was calibrated: one for all, or one each. Default: "
-    "temperature_degC of the calibration.",
+    help="Sensor reading at the calibration: one for all, or one each. Default: its temperature_degC.",
 )  # fmt: skip
 @click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Take only these sensors.")
 @fail_on_option
@@ -32,16 +31,12 @@ def command(
     """Identify how the structure of a machine distorts with the temperatures of its sensors.
 
     A LOG holds columns t_s, NAME_degC for each sensor, and EXX@500_um for each reading of drift (a component
-    at an axis position; empty where nothing was read). With several logs the last one is held out of a first
-    fit and tells what the model is worth; with one, its last quarter.
-
-    A LOG holds columns t_s, NAME_degC for each sensor, and EXX@500_um for each reading of drift (a component
-    at an axis position; empty where nothing was read). With several logs the last one is held out of a first
-    fit and
+    at an axis position; empty where nothing was read). To test the model, a first fit leaves out the last
+    log, or the last quarter of a single log.
     """
     target = None if output in (None, STREAM) else output
     if target is None and as_json:
-        raise UsageError("both the structure and --json would go to stdout; name a file for it with -o")
+        raise UsageError("the structure and --json cannot both go to stdout; name a file with -o")
     session, inputs = machine_given(machine, None)
     refuse_early(files_of(target), (*inputs, *logs), force=force)
     from olp.files.write import write_bytes
@@ -58,8 +53,8 @@ def command(
         put(to_json(result.report))
     for line in _shown(result.report):
         diagnostic(line)
-    for found in result.findings:
-        diagnostic(f"{found.severity.name.lower()} {found.code}: {found.message}")
+    for finding in result.findings:
+        diagnostic(f"{finding.severity.name.lower()} {finding.code}: {finding.message}")
     if target is not None:
         diagnostic(f"wrote {Path(target)}")
     exit_for(result.findings, fail_on)
@@ -74,27 +69,27 @@ def _reference(stated: tuple[str, ...]) -> float | dict[str, float] | None:
         return {name: float(value) for name, _, value in (item.partition("=") for item in stated)}
     except ValueError:
         raise UsageError(
-            "--reference-degC takes a temperature for all sensors, or SENSOR=degC each"
+            "--reference-degC is not understood; expected a temperature for all sensors, or SENSOR=degC each"
         ) from None
 
 
 def _shown(report: dict[str, Any]) -> list[str]:
     """The report for people."""
-    out = []
+    lines = []
     for s in report["sensors"]:
         low, high = s["range_degC"]
         lag = f"lags by {s['lag_s']:.0f} s" if s["lag_s"] >= 0 else f"leads by {-s['lag_s']:.0f} s"
-        out.append(f"{s['name']}: the structure {lag}, identified from {low:.2f} to {high:.2f} degC")
+        lines.append(f"{s['name']}: the structure {lag}, identified from {low:.2f} to {high:.2f} degC")
     for c in report["components"]:
         unit = "urad" if "drift_rms_urad" in c else "um"
-        drift, left = c[f"drift_rms_{unit}"], c[f"left_rms_{unit}"]
-        text = f"{c['component']}: drift {drift:.2f} {unit} rms, left {left:.2f}"
+        drift, residual = c[f"drift_rms_{unit}"], c[f"left_rms_{unit}"]
+        text = f"{c['component']}: drift {drift:.2f} {unit} rms, residual {residual:.2f}"
         if c[f"held_out_left_rms_{unit}"] is not None:
-            drift, left = c[f"held_out_drift_rms_{unit}"], c[f"held_out_left_rms_{unit}"]
-            text += f"; held out: {drift:.2f}, left {left:.2f}"
-        out.append(text)
-    out.append(f"condition of the sensors {report['condition']:.3g} (refused above 1000)")
+            drift, residual = c[f"held_out_drift_rms_{unit}"], c[f"held_out_left_rms_{unit}"]
+            text += f"; held out: {drift:.2f}, residual {residual:.2f}"
+        lines.append(text)
+    lines.append(f"condition of the sensors {report['condition']:.3g} (refused above 1000)")
     removed = report["held_out_removed_share"]
     if removed is not None:
-        out.append(f"removed where it was not fitted ({report['held_out']}): {removed:.1%}")
-    return out
+        lines.append(f"removed where it was not fitted ({report['held_out']}): {removed:.1%}")
+    return lines

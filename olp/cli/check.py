@@ -42,7 +42,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @click.argument("program", required=False)
 @setup_options
 @click.option(
-    "--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is the correction of it."
+    "--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is a corrected one."
 )
 @click.option(
     "--select", multiple=True, callback=_codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
@@ -79,14 +79,14 @@ def command(
 ) -> None:
     """May this program run on this machine? A gate before deployment.
 
-    A nominal PROGRAM is corrected, and what that gives is checked; a corrected one is checked as it is, and
-    against NOMINAL where that is given."""
+    A nominal PROGRAM is corrected first, and the result is checked. A corrected PROGRAM is checked unchanged,
+    and against NOMINAL where that is given."""
     call = given(program, machine, job)
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")
     inputs = (*call.inputs, *files_of(nominal))
     if clearances is not None and not call.setup.job.meshes:
-        raise UsageError("--clearances needs meshes; name them in the job file, a table [[meshes]] each")
+        raise UsageError("--clearances needs meshes; add a table [[meshes]] for each mesh to the job file")
     if clearances == output == STREAM:
         raise UsageError("findings and --clearances cannot both go to stdout; name a file for one of them")
     refuse_early(files_of(output, clearances), inputs, force=force)

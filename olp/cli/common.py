@@ -21,16 +21,17 @@ if TYPE_CHECKING:
     from olp.files.sources import Source, Sources
     from olp.workflows.session import Session
 
+#: Name of stdin and stdout on the command line.
 STREAM = "-"
+#: Exit code of a run with findings at or above --fail-on.
 FINDINGS_EXIT = 1
 REPORT_ENDINGS = (".html", ".json", ".md")
 PLOT_ENDINGS = (".svg", ".png")
 
-T = TypeVar("T")
-
-
-#: Where a call keeps what --dialect says.
+#: Key under which a call keeps the value of --dialect.
 DIALECT = "olp.dialect"
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class Given:
 
     @property
     def stream(self) -> str:
-        """What errors call the program where it comes from stdin, else ""."""
+        """Name of the program in errors where it comes from stdin, else ""."""
         return "<stdin>" if self.program == STREAM else ""
 
 
@@ -81,7 +82,7 @@ def source(sources: Sources, name: str) -> Source:
 
 
 def options_of(kind: type[T], words: Mapping[str, Any]) -> T:
-    """A value, such as the options of a workflow, of the words of a call that it has by their names."""
+    """A value, such as the options of a workflow, of those words of a call that are its parameters."""
     return kind(**{key: words[key] for key in inspect.signature(kind).parameters if key in words})
 
 
@@ -90,8 +91,14 @@ def files_of(*names: str | None) -> list[str]:
     return [name for name in names if name is not None and name != STREAM]
 
 
+def default_output(program: str) -> str:
+    """PROGRAM.corrected.SUFFIX beside PROGRAM."""
+    path = Path(program)
+    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
+
+
 def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) -> None:
-    """Raise before the work what the writer would raise after it."""
+    """Raise the writer's errors before the work is done."""
     sources = [Path(name) for name in inputs if Path(name).exists()]
     for name in targets:
         path = Path(name)
@@ -115,11 +122,11 @@ def refuse_twice(names: Iterable[str]) -> None:
 
 
 def refuse_stream(**outputs: str | None) -> None:
-    """Raise where an output that goes to a file only is named `-`; keys are options, as in `save_profile`."""
+    """Raise where an output that must be a file is named `-`; keys are options, as in `save_profile`."""
     for key, name in outputs.items():
         if name == STREAM:
             option = f"--{key.replace('_', '-')}"
-            raise UsageError(f"{option} writes a file, and - is stdout; name a file")
+            raise UsageError(f"{option} writes a file and cannot be -; name a file")
 
 
 def plot_ending(name: str) -> None:
@@ -132,12 +139,12 @@ def report_ending(name: str) -> str:
     """The form of a report by the ending of its file. Raises UsageError."""
     ending = Path(name).suffix.lower()
     if ending not in REPORT_ENDINGS:
-        raise UsageError(f"ends in no form of a report; expected {', '.join(REPORT_ENDINGS)}", file=name)
+        raise UsageError(f"is not a form of report; expected {', '.join(REPORT_ENDINGS)}", file=name)
     return ending
 
 
 def diagnostic(message: str) -> None:
-    """Say something to the person, on stderr."""
+    """Write a message to stderr."""
     click.echo(_encodable(message, sys.stderr.encoding), err=True)
 
 
@@ -157,14 +164,14 @@ def put(text: str | bytes, *, err: bool = False) -> None:
 
 
 def silence_stdout() -> None:
-    """Send what is still to be flushed nowhere, so that the interpreter does not complain at its end."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+    """Discard what is still to be flushed, so that the interpreter does not complain at its end."""
+    devnull = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(devnull, sys.stdout.fileno())
+    os.close(devnull)
 
 
 def put_report(report: Mapping[str, Any], *, as_json: bool, quiet: bool) -> None:
-    """A report on stdout: as JSON, or in words unless they are not wanted."""
+    """Write a report to stdout: as JSON, else as text unless `quiet`."""
     if as_json:
         from olp.reports.report import to_json
 
@@ -177,8 +184,8 @@ def put_report(report: Mapping[str, Any], *, as_json: bool, quiet: bool) -> None
 
 def exit_for(findings: Iterable[Finding], fail_on: str) -> None:
     """End with exit code 1 where a finding is at or above `fail_on`."""
-    found = worst(findings)
-    if found is not None and fail_on != "never" and found >= Severity[fail_on.upper()]:
+    most_severe = worst(findings)
+    if most_severe is not None and fail_on != "never" and most_severe >= Severity[fail_on.upper()]:
         click.get_current_context().exit(FINDINGS_EXIT)
 
 

@@ -33,6 +33,7 @@ from olp.cli.options import (
     json_option,
     output_option,
     quiet_option,
+    renamed_option,
     report_option,
     setup_options,
 )
@@ -55,80 +56,86 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @click.argument("measured", nargs=-1, required=True)
 @setup_options
 @click.option("--before", multiple=True, metavar="FILE", help="A run without correction; may be repeated.")
-@click.option("--poses", is_flag=True, help="Rows are poses, not places along a path.")
+@click.option("--poses", is_flag=True, help="Rows are poses, not points along a path.")
 @click.option("--profile", metavar="NAME|FILE", help="How the files are laid out; see --save-profile.")
 @click.option(
-    "--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, t, name or line."
-)
+    "--column", "columns", multiple=True, metavar="X=NAME",
+    help="Name or number of the column of X, Y, Z, t, name or line.",
+)  # fmt: skip
 @click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z.")
 @click.option(
-    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "space"]), help="What separates columns."
+    "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "space"]), help="Separator of columns."
 )
 @click.option(
-    "--positions", type=click.Choice(["tip", "axes"]), help="Places of the tip, or axis positions of a log."
+    "--positions", type=click.Choice(["tip", "axes"]), help="Tip positions, or axis positions of a log."
 )
-@click.option("--save-profile", metavar="FILE.toml", help="Write the layout as a profile for next time.")
+@click.option("--save-profile", metavar="FILE.toml", help="Write the layout as a profile.")
 @click.option(
     "--align", type=click.Choice(["auto", "none", "fit", "each"]), default="auto", show_default=True,
-    help="Best-fit frame: only where points lie far off, never, one for all runs, or one a run.",
+    help="Best-fit frame: only where points lie far off, never, one for all runs, or one per run.",
 )  # fmt: skip
 @click.option(
     "--order", type=click.Choice(["forward", "backward", "free"]),
-    help="Order of the points along the path; told from them if left out.",
+    help="Order of the points along the path. Default: detected from them.",
 )  # fmt: skip
 @click.option(
-    "--reach-mm", type=Length(), default=1.0, show_default=True, help="Farther points are in no figure."
+    "--reach-mm", type=Length(), default=1.0, show_default=True,
+    help="Leave points farther from the path out of all figures.",
+)  # fmt: skip
+@renamed_option("--tolerance-um", "--part-tolerance-um")
+@click.option(
+    "--part-tolerance-um", type=Length(), help="Exit with 1 where the measured path is farther off."
 )
-@click.option("--tolerance-um", type=Length(), help="Exit with 1 where the measured path is farther off.")
-@click.option("--add-errors", is_flag=True, help="Move axis positions of a log by the machine's errors.")
+@click.option("--add-errors", is_flag=True, help="Add the machine's errors to the axis positions of a log.")
 @output_option("OUT.csv", "Deviation of every point.")
 @click.option(
-    "--part-frame", metavar="FILE.toml", help="Work offset from three or more poses, for the job file."
-)
+    "--part-frame", metavar="FILE.toml",
+    help="Write the work offset from three or more poses, for the job file.",
+)  # fmt: skip
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
 @report_option()
 @contour_option
 @date_option("measurement")
 @json_option()
 @fail_on_option
-@quiet_option("No report and no progress; the exit code tells.")
+@quiet_option("No report and no progress; only the exit code.")
 @force_option()
 def command(
     nominal: str, measured: tuple[str, ...], machine: str | None, job: str | None, **words: Any
 ) -> None:
-    """Hold measured runs against a nominal path.
+    """Compare measured runs with a nominal path.
 
     NOMINAL is a program (with -m or -j) or a file of points; every MEASURED is one run. Files come from
     trackers, CMMs, logs of a control, or olp simulate.
     """
     from olp.files.sources import Sources
 
-    out = options_of(_Outputs, words)
+    outputs = options_of(_Outputs, words)
     session, described = machine_given(machine, job) if machine or job else (None, ())
     sources = Sources() if session is None else session.sources
     inputs = (*files_of(nominal, *measured, *words["before"]), *described)
-    _refuse(out, inputs, poses=words["poses"])
+    _refuse(outputs, inputs, poses=words["poses"])
 
     from olp.files.write import write_files
     from olp.reports import compare as report_compare
     from olp.reports.report import to_json
     from olp.workflows import compare
 
-    part_frame = words["frame_name"] if out.part_frame else None
+    part_frame = words["frame_name"] if outputs.part_frame else None
     layout = _layout(measured[0], sources, **{key: words[key] for key in _LAYOUT})
     options = options_of(compare.CompareOptions, words | {"profile": layout, "part_frame": part_frame})
-    with progress(out.quiet) as show:
+    with progress(outputs.quiet) as show:
         result = compare.run(sources, session, source(sources, nominal), measured, options, show)
-        written = _files(result, out, session, options.date)
-        write_files(written, force=out.force, inputs=inputs)
-    if out.as_json or out.report_file == STREAM:
+        written = _files(result, outputs, session, options.date)
+        write_files(written, force=outputs.force, inputs=inputs)
+    if outputs.as_json or outputs.report_file == STREAM:
         put(to_json(result.report))
-    elif not out.quiet:
+    elif not outputs.quiet:
         put(report_compare.to_text(result.report))
-    if not out.quiet:
+    if not outputs.quiet:
         for path in written:
             diagnostic(f"wrote {path}")
-    exit_for(result.findings, out.fail_on)
+    exit_for(result.findings, outputs.fail_on)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,32 +152,32 @@ class _Outputs:
     force: bool
 
 
-def _refuse(out: _Outputs, inputs: Iterable[str], *, poses: bool) -> None:
-    """Raise UsageError for outputs that cannot be, or do not go together."""
-    refuse_stream(output=out.output, part_frame=out.part_frame, save_profile=out.save_profile)
-    targets = files_of(out.output, out.part_frame, out.save_profile, out.report_file)
-    refuse_early(targets, inputs, force=out.force)
+def _refuse(outputs: _Outputs, inputs: Iterable[str], *, poses: bool) -> None:
+    """Raise UsageError for outputs that are impossible or exclude each other."""
+    refuse_stream(output=outputs.output, part_frame=outputs.part_frame, save_profile=outputs.save_profile)
+    targets = files_of(outputs.output, outputs.part_frame, outputs.save_profile, outputs.report_file)
+    refuse_early(targets, inputs, force=outputs.force)
     refuse_twice(targets)
-    if out.part_frame and not poses:
-        raise UsageError("--part-frame takes points of a part, a row each; add --poses")
-    for name in files_of(out.report_file):
+    if outputs.part_frame and not poses:
+        raise UsageError("--part-frame takes points of a part, one row per point; add --poses")
+    for name in files_of(outputs.report_file):
         report_ending(name)
-    if out.output and poses:
-        raise UsageError("-o writes deviations along a path; poses are in the report")
+    if outputs.output and poses:
+        raise UsageError("-o writes deviations along a path, and --poses has none; use --report")
 
 
 def _files(
-    result: Comparison, out: _Outputs, session: Session | None, date: datetime.date | None
+    result: Comparison, outputs: _Outputs, session: Session | None, date: datetime.date | None
 ) -> dict[Path, Content]:
     """What the call writes to files, by path."""
     from olp.workflows import report
 
-    written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(out.output)}
-    if out.part_frame and result.part_frame:
-        written[Path(out.part_frame)] = result.part_frame.encode()
-    if out.save_profile:
-        written[Path(out.save_profile)] = result.profile.to_toml().encode()
-    for name in files_of(out.report_file):
+    written: dict[Path, Content] = {Path(name): result.to_csv() for name in files_of(outputs.output)}
+    if outputs.part_frame and result.part_frame:
+        written[Path(outputs.part_frame)] = result.part_frame.encode()
+    if outputs.save_profile:
+        written[Path(outputs.save_profile)] = result.profile.to_toml().encode()
+    for name in files_of(outputs.report_file):
         written[Path(name)] = report.comparison(result, session, name, date)
     return written
 
@@ -178,7 +185,7 @@ def _files(
 def _layout(
     first: str, sources: Sources, profile: str | None, columns: tuple[str, ...], **values: str | None
 ) -> PointProfile | None:
-    """The profile that the call asks for, None where files tell their own."""
+    """The profile that the call asks for, None where it is detected from the files."""
     from olp.files.point_profile import BUILT_IN, load_profile, with_options
     from olp.files.points import layout_of
 

@@ -13,6 +13,7 @@ import click
 from olp.cli.common import (
     STREAM,
     Given,
+    default_output,
     diagnostic,
     exit_for,
     files_of,
@@ -31,13 +32,12 @@ from olp.cli.options import (
     outside_box_option,
     proof_options,
     quiet_option,
+    renamed_option,
     report_option,
     setup_options,
     unroll_options,
 )
 from olp.cli.progress import Report, progress
-from olp.cli.results import Asked, default_output
-from olp.cli.results import run as run_results
 from olp.core.errors import ProgramError, UsageError
 
 if TYPE_CHECKING:
@@ -45,9 +45,7 @@ if TYPE_CHECKING:
     from olp.files.write import Content
     from olp.workflows.correct import Correction, CorrectOptions
 
-#: What does not go with --results.
-_OF_PROGRAMS = ("flatten", "expand_cycles", "split_rapids", "contour", "show_diff", "review_file")
-#: What rounding adds to a correction, at most.
+#: Most that rounding adds to a correction, in um.
 LAST_DIGITS_UM = 10.0
 
 
@@ -62,73 +60,52 @@ LAST_DIGITS_UM = 10.0
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @report_option()
 @click.option(
-    "--review", "review_file", metavar="review.html", help="Also write a page to look at; see olp view."
+    "--review", "review_file", metavar="review.html", help="Also write the page of olp view."
 )
-@click.option("--results", is_flag=True, help="PROGRAM holds points that a measuring machine reported.")
-@click.option("--profile", metavar="NAME|FILE", help="How a table of points is laid out.")
+@click.option(
+    "--profile", metavar="NAME|FILE", help="Layout of the columns of a list of positions."
+)
 @click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
-@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a table.")
-@click.option(
-    "--frame", "frames", multiple=True, metavar="[NAME=]FRAME",
-    help="Work offset that results are stated in, or machine; may be repeated.",
-)  # fmt: skip
-@click.option(
-    "--tool", "tools", multiple=True, metavar="[NAME=]N", help="Stylus of results; may be repeated."
-)
-@click.option(
-    "--tip-radius-mm", type=click.FloatRange(min=0.0), help="Radius of the tip of results, 0 for centres."
-)
-@click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
+@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a list.")
+@renamed_option("--results", "the verb olp results", flag=True)
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
-@quiet_option("No report and no progress; the exit code tells.")
+@quiet_option("No report and no progress; only the exit code.")
 @force_option()
 def command(program: str | None, machine: str | None, job: str | None, **words: Any) -> None:
     """Correct a program with the machine's calibrated errors, and prove it.
 
-    PROGRAM and the machine file may come from the job file; what the command line says wins. OUT is written
-    also where the proof ends above the tolerance; the exit code is 1 then.
+    PROGRAM and the machine file may come from the job file; the command line has priority. OUT is also
+    written where the deviation exceeds the tolerance; the exit code is 1 then.
 
-    With --results, PROGRAM is a table of points or DMIS output of a measuring machine, and the error is added
-    to what it reported.
+    For points that a measuring machine reported, use olp results.
     """
-    if words["results"]:
-        for name in _OF_PROGRAMS:
-            if words[name]:
-                raise UsageError(
-                    f"--{name.removesuffix('_file').replace('show_', '').replace('_', '-')} is of "
-                    "programs and does not go with --results"
-                )
-        run_results(program, machine, job, options_of(Asked, words))
-        return
-    if words["frames"] or words["tools"] or words["decimals"] is not None:
-        raise UsageError("--frame, --tool and --decimals are of reported results; add --results")
     layout = (words["profile"], words["columns"], words["unit"])
     call = with_layout_of(given(program, machine, job), *layout)
-    out = options_of(_Outputs, words)
-    out = replace(
-        out,
-        output=out.output or default_output(call.program),
-        as_json=out.as_json or out.report_file == STREAM,
+    outputs = options_of(_Outputs, words)
+    outputs = replace(
+        outputs,
+        output=outputs.output or default_output(call.program),
+        as_json=outputs.as_json or outputs.report_file == STREAM,
     )
-    _refuse(out, call.inputs)
+    _refuse(outputs, call.inputs)
 
     from olp.files.write import write_files
     from olp.workflows import correct
 
     options = options_of(correct.CorrectOptions, words)
-    with progress(out.quiet) as show:
+    with progress(outputs.quiet) as show:
         try:
             result = correct.run(call.session, call.source, options, show)
-            written: dict[Path, Content] = {Path(name): result.data for name in files_of(out.output)}
-            if out.review_file is not None:
-                written[Path(out.review_file)] = _review(call, result, options, out, show)
+            written: dict[Path, Content] = {Path(name): result.data for name in files_of(outputs.output)}
+            if outputs.review_file is not None:
+                written[Path(outputs.review_file)] = _review(call, result, options, outputs, show)
         except ProgramError as error:
             raise error.in_file(call.stream or call.program) from None
-    for name in files_of(out.report_file):
+    for name in files_of(outputs.report_file):
         written[Path(name)] = _report(call, result, options, name)
-    write_files(written, force=out.force, inputs=call.inputs)
-    _say(call, result, out, written)
-    exit_for(result.findings, out.fail_on)
+    write_files(written, force=outputs.force, inputs=call.inputs)
+    _say(call, result, outputs, written)
+    exit_for(result.findings, outputs.fail_on)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,28 +122,28 @@ class _Outputs:
     force: bool
 
 
-def _refuse(out: _Outputs, inputs: Iterable[str]) -> None:
-    """Raise UsageError for outputs that cannot be, or do not go together."""
-    if out.review_file == STREAM:
-        raise UsageError("the page of --review goes to a file; olp view writes one to stdout")
-    if out.as_json and (out.output == STREAM or out.show_diff):
+def _refuse(outputs: _Outputs, inputs: Iterable[str]) -> None:
+    """Raise UsageError for outputs that are impossible or exclude each other."""
+    if outputs.review_file == STREAM:
+        raise UsageError("--review writes a file and cannot be -; name a file, or use olp view -o -")
+    if outputs.as_json and (outputs.output == STREAM or outputs.show_diff):
         raise UsageError(
-            "JSON on stdout goes with neither -o - nor --diff; write the report to a file with --report"
+            "JSON on stdout excludes -o - and --diff; write the report to a file with --report"
         )
-    for name in files_of(out.report_file):
+    for name in files_of(outputs.report_file):
         report_ending(name)
-    outputs = files_of(out.output, out.report_file, out.review_file)
-    refuse_early(outputs, inputs, force=out.force)
-    refuse_twice(outputs)
+    targets = files_of(outputs.output, outputs.report_file, outputs.review_file)
+    refuse_early(targets, inputs, force=outputs.force)
+    refuse_twice(targets)
 
 
 def _review(
-    call: Given, result: Correction, options: CorrectOptions, out: _Outputs, show: Report | None
+    call: Given, result: Correction, options: CorrectOptions, outputs: _Outputs, show: Report | None
 ) -> Iterator[bytes]:
     """The page of --review, in parts."""
     from olp.review import job as review
 
-    name = "" if out.output == STREAM else out.output
+    name = "" if outputs.output == STREAM else outputs.output
     viewed = options_of(review.ViewOptions, asdict(options))
     return review.run(
         call.session, call.source, viewed, correction=result, corrected_name=name, progress=show
@@ -174,7 +151,7 @@ def _review(
 
 
 def _report(call: Given, result: Correction, options: CorrectOptions, name: str) -> bytes:
-    """The report as a file, about the program as it was corrected, unrolled where that was asked for."""
+    """The report as a file, on the program that was corrected: unrolled where the call asks for it."""
     from olp.workflows import report
     from olp.workflows.flatten import unrolled
 
@@ -188,20 +165,20 @@ def _report(call: Given, result: Correction, options: CorrectOptions, name: str)
     return report.correction(result, program, call.session, options, name)
 
 
-def _say(call: Given, result: Correction, out: _Outputs, written: Iterable[Path]) -> None:
-    """What goes to stdout and stderr."""
+def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[Path]) -> None:
+    """Write to stdout and stderr."""
     from olp.reports import report
 
-    on_stderr = out.output == STREAM
+    on_stderr = outputs.output == STREAM
     if on_stderr:
         put(result.data)
-    if out.show_diff:
+    if outputs.show_diff:
         put(_diff(call.source.data, result, call.setup.machine, on_stderr), err=on_stderr)
-    if out.as_json:
+    if outputs.as_json:
         put(report.to_json(result.report))
-    elif not out.quiet:
+    elif not outputs.quiet:
         put(report.to_text(result.report), err=on_stderr)
-    if not out.quiet:
+    if not outputs.quiet:
         for path in written:
             diagnostic(f"wrote {path}")
 

@@ -1,8 +1,8 @@
 """What a correction changed, line by line, from the two texts: nominal, corrected, and the change in um.
 
-A line of one text is the partner of a line of the other where both leave the axes at the same place, as far
-as words tell, and the corrected one says nothing else that the nominal one does not say. A line without
-partner was inserted (`+`) or left out (`-`); of a split block the last part is the partner.
+Two lines are partners where both leave the axes at the same position, as far as their words state it, and
+the corrected line has no other words than the nominal one. A line without partner was inserted (`+`) or left
+out (`-`); of a split block the last part is the partner.
 """
 
 from __future__ import annotations
@@ -15,49 +15,57 @@ from dataclasses import dataclass
 from olp.core.units import AXES
 from olp.reports.report import printable, shortened
 
-#: Insertions looked through for the partner of a line, and how far apart both texts may drift otherwise.
+#: Insertions, in lines, that are searched for the partner of a line.
 AHEAD = 1000
+#: Lines by which both texts may be out of step where lines were not only inserted.
 ASTRAY = 40
-#: Comparisons a line before texts that have little in common are set side by side as they come.
+#: Mean comparisons per line; beyond that the texts have little in common and are listed side by side.
 EFFORT = 50
 
+#: Characters of a column of program text.
 MAX_COLUMN = 42
-_RED, _GREEN, _DIM, _PLAIN = "\x1b[31m", "\x1b[32m", "\x1b[2m", "\x1b[0m"
+_RED = "\x1b[31m"
+_GREEN = "\x1b[32m"
+_DIM = "\x1b[2m"
+_PLAIN = "\x1b[0m"
 
 _END = re.compile(r"\r\n|\n|\r")
 _TOKEN = re.compile(r"(\([^)]*\)|;.*)|([A-Z])\s*([-+]?[\d.]+|[^\sA-Z(;]*)")
-#: Words that hold lengths, and words besides them that a correction may change or add.
+#: Letters of words that hold lengths.
 _LENGTHS = frozenset("XYZIJKR")
+#: Letters of further words that a correction may change or add.
 _FREE = frozenset("FP")
 _AXIS_OF = {"X": 0, "Y": 1, "Z": 2, "I": 0, "J": 1, "K": 2, "R": 0}
+#: Unit of lengths in um, by G code.
 _UNIT_UM = {"20": 25400.0, "21": 1000.0, "70": 25400.0, "71": 1000.0}
-#: Behind these no word of an earlier line holds: moves of the control, changes of frame, cycles.
+#: G codes after which the position is unknown: moves of the control, changes of frame, cycles.
 _FORGET = frozenset(
     str(code)
     for code in (28, 30, 43, 44, 49, 52, 53, *range(54, 60), 73, 74, 76, *range(81, 90), 92.1, 92.2, 92.3)
 )
-#: Coordinates here are no positions of axes.
+#: G codes whose coordinates are not positions of axes.
 _NO_MOVE = frozenset(("4", "10"))
-#: statements that say a point or a centre, and the unit of their numbers
+#: Statements that state a point or a centre.
 _POINT = re.compile(r"\s*(GOTO|GODLTA|PTMEAS|CIRCLE|MOVARC)\s*/(?:\s*CART\s*,)?(.*)")
+#: Statements that state the unit of numbers.
 _UNITS = re.compile(r"\s*UNITS?\s*/\s*(INCH|MM)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 _UNKNOWN = (math.nan, math.nan, math.nan)
 
 Increments = tuple[float, float, float]
-Place = tuple[float, float, float]
+Position = tuple[float, float, float]
 Pair = tuple[int | None, int | None]
 
 
 @dataclass(slots=True)
 class Line:
-    """A line's text, its lengths in um by letter, the words that a correction leaves alone, and the place in
-    um where its words leave the axes."""
+    """A line's text, its lengths in um by letter, the words that a correction never changes, and the position
+    in um where its words leave the axes."""
 
     text: str
     lengths: dict[str, float]
     rest: list[str]
-    place_um: Place = _UNKNOWN
+    position_um: Position = _UNKNOWN
 
 
 class _Reader:
@@ -67,7 +75,7 @@ class _Reader:
         self._increments_mm = increments_mm
         self._unit_um = 1000.0
         self._incremental = False
-        self._place = _UNKNOWN
+        self._position = _UNKNOWN
 
     def read(self, data: bytes) -> list[Line]:
         return [self._line(text) for text in _END.split(data.decode("latin-1"))]
@@ -87,18 +95,18 @@ class _Reader:
         line = Line(text, {letter: self._um(letter, number) for letter, number in words}, rest)
         if _NO_MOVE.isdisjoint(codes):
             self._move(line, "92" in codes)
-        line.place_um = self._place
+        line.position_um = self._position
         if not _FORGET.isdisjoint(codes):
-            self._place = _UNKNOWN
+            self._position = _UNKNOWN
         return line
 
     def _move(self, line: Line, is_set: bool) -> None:
-        place = list(self._place)
+        position = list(self._position)
         for letter, value in line.lengths.items():
             if letter in AXES:
                 axis = _AXIS_OF[letter]
-                place[axis] = place[axis] + value if self._incremental and not is_set else value
-        self._place = (place[0], place[1], place[2])
+                position[axis] = position[axis] + value if self._incremental and not is_set else value
+        self._position = (position[0], position[1], position[2])
 
     def _um(self, letter: str, number: str) -> float:
         try:
@@ -111,7 +119,7 @@ class _Reader:
 
 
 class _StatementReader:
-    """Reads lines of statements (APT, DMIS) that say a point or a centre."""
+    """Reads lines of statements (APT, DMIS) that state a point or a centre."""
 
     def __init__(self) -> None:
         self._unit_um = 1000.0
@@ -120,17 +128,17 @@ class _StatementReader:
         return [self._line(text) for text in _END.split(data.decode("latin-1"))]
 
     def _line(self, text: str) -> Line:
-        found = _POINT.match(text.upper())
-        if found is None:
+        statement = _POINT.match(text.upper())
+        if statement is None:
             if unit := _UNITS.match(text.upper()):
                 self._unit_um = 25400.0 if unit[1] == "INCH" else 1000.0
             return Line(text, {}, [text] if text.strip() else [])
-        values = [float(n) * self._unit_um for n in _NUMBER.findall(found[2])[:3]]
+        values = [float(n) * self._unit_um for n in _NUMBER.findall(statement[2])[:3]]
         lengths = dict(zip(AXES, values, strict=False))
-        place = _UNKNOWN
-        if len(values) == 3 and found[1] != "GODLTA":
-            place = (values[0], values[1], values[2])
-        return Line(text, lengths, [found[1]], place)
+        position = _UNKNOWN
+        if len(values) == 3 and statement[1] != "GODLTA":
+            position = (values[0], values[1], values[2])
+        return Line(text, lengths, [statement[1]], position)
 
 
 def _same(nominal: Line, corrected: Line, near_um: float) -> bool:
@@ -138,15 +146,15 @@ def _same(nominal: Line, corrected: Line, near_um: float) -> bool:
         return True
     if not (nominal.lengths and corrected.lengths):
         return bool(nominal.rest) and nominal.rest == corrected.rest and not nominal.lengths
-    for here, there in zip(nominal.place_um, corrected.place_um, strict=True):
-        # An unknown place agrees with any other.
+    for here, there in zip(nominal.position_um, corrected.position_um, strict=True):
+        # An unknown position agrees with any other.
         if abs(here - there) > near_um:
             return False
     return all(word in nominal.rest for word in corrected.rest)
 
 
 def align(nominal: list[Line], corrected: list[Line], near_um: float) -> Iterator[Pair]:
-    """Indices of partners in the order of the texts; None stands where a line has no partner."""
+    """Indices of partners in the order of the texts; None where a line has no partner."""
     i = j = 0
     effort = EFFORT * (len(nominal) + 100)
     while i < len(nominal) and j < len(corrected):
@@ -171,7 +179,7 @@ def align(nominal: list[Line], corrected: list[Line], near_um: float) -> Iterato
 def _partner(
     nominal: list[Line], corrected: list[Line], i: int, j: int, near_um: float
 ) -> tuple[int, int, int]:
-    """How many lines of each text to pass until both agree again, fewest first, and the effort spent.
+    """How many lines of each text to skip until both agree again, fewest first, and the effort spent.
 
     Insertions come first: a correction leaves no line out.
     """
@@ -191,8 +199,8 @@ def _partner(
 
 
 def render(
-    before: bytes,
-    after: bytes,
+    nominal_data: bytes,
+    corrected_data: bytes,
     *,
     near_um: float = 1000.0,
     increments_mm: Increments | None = None,
@@ -201,12 +209,13 @@ def render(
 ) -> str:
     """The changed lines as text: line in the nominal program, nominal, corrected, change of lengths in um.
 
-    The change of an axis is that of its position: corrected command minus nominal command. No correction is
-    larger than `near_um`. `increments_mm` are the least increments of a control that counts them in numbers
-    without a point; `statements`: the texts are APT or DMIS.
+    The change of an axis is corrected command minus nominal command. No correction is larger than `near_um`.
+    `increments_mm` are the least increments of a control that counts them in numbers without a point.
+    `statements`: the texts are APT or DMIS.
     """
     nominal, corrected = (
-        (_StatementReader() if statements else _Reader(increments_mm)).read(data) for data in (before, after)
+        (_StatementReader() if statements else _Reader(increments_mm)).read(data)
+        for data in (nominal_data, corrected_data)
     )
     rows: list[tuple[str, str, str, str]] = []
     counts = {"changed": 0, "inserted": 0, "left out": 0}
@@ -230,12 +239,12 @@ def _changes(nominal: Line, corrected: Line, near_um: float) -> Iterator[str]:
     for letter, value in corrected.lengths.items():
         if letter in AXES:
             axis = _AXIS_OF[letter]
-            change = corrected.place_um[axis] - nominal.place_um[axis]
+            change = corrected.position_um[axis] - nominal.position_um[axis]
             if change == 0.0 and nominal.lengths.get(letter) == value:
                 continue
         else:
             change = value - nominal.lengths.get(letter, math.nan)
-            # The last part of a split arc has its centre elsewhere, seen from its own start.
+            # The centre of the last part of a split arc is stated from its own start.
             if change == 0.0 or not abs(change) <= near_um:
                 continue
         yield f"{letter} new" if math.isnan(change) else f"{letter}{change:+.1f}"
@@ -245,13 +254,15 @@ def _table(rows: list[tuple[str, str, str, str]], colour: bool) -> Iterator[str]
     if not rows:
         return
     number = max(4, max(len(row[0]) for row in rows))
-    left, right = (min(MAX_COLUMN, max(9, max(len(row[k]) for row in rows))) for k in (1, 2))
-    yield f"{'line':>{number}}  {'nominal':{left}}  {'corrected':{right}}  change in um\n"
+    nominal_width, corrected_width = (
+        min(MAX_COLUMN, max(9, max(len(row[k]) for row in rows))) for k in (1, 2)
+    )
+    yield f"{'line':>{number}}  {'nominal':{nominal_width}}  {'corrected':{corrected_width}}  change in um\n"
     for mark, nominal, corrected, changes in rows:
-        nominal = shortened(printable(nominal), left).ljust(left)
-        corrected = shortened(printable(corrected), right)
+        nominal = shortened(printable(nominal), nominal_width).ljust(nominal_width)
+        corrected = shortened(printable(corrected), corrected_width)
         if changes:
-            corrected = corrected.ljust(right)
+            corrected = corrected.ljust(corrected_width)
         tail = f"  {changes}" if changes else ""
         if colour:
             tint = _RED if mark[0] == "-" else _DIM

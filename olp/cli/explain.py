@@ -19,14 +19,26 @@ from olp.findings.rule import Rule
 @click.argument("code", required=False)
 @json_option("Print as JSON.")
 def command(code: str | None, as_json: bool) -> None:
-    """Explain the code of a finding, or list all codes."""
+    """Explain the code of a finding or a term of the glossary, or list all codes."""
+    if code is not None and code.upper() not in RULES:
+        from olp.workflows.help import meaning
+
+        term = meaning(code)
+        if term is not None:
+            name, text = term
+            lines = textwrap.fill(text, 96, initial_indent="  ", subsequent_indent="  ")
+            as_text = f"{name}\n{lines}\n"
+            put(json.dumps({"term": name, "meaning": text}, indent=2) + "\n" if as_json else as_text)
+            return
     rules = list(RULES.values()) if code is None else [_rule(code)]
     if as_json:
         put(json.dumps([_as_dict(rule) for rule in rules], indent=2) + "\n")
     elif code is None:
         put("".join(f"{rule.code}  {_severity(rule):7}  {rule.title}\n" for rule in rules))
     else:
-        put(_text(rules[0]))
+        from olp.reports.handbook import of_rule
+
+        put(of_rule(rules[0]))
 
 
 def _rule(code: str) -> Rule:
@@ -34,21 +46,14 @@ def _rule(code: str) -> Rule:
     if rule is None:
         longer = [other for other in RULES if other.startswith(code.upper())]
         near = longer or difflib.get_close_matches(code.upper(), RULES, 1)
-        hint = f"did you mean {near[0]}?" if near else "olp explain lists them all"
-        raise UsageError(f"{code!r} is no code of a finding; {hint}")
+        lists = "olp explain lists the codes, olp help glossary the terms"
+        hint = f"did you mean {near[0]}?" if near else lists
+        raise UsageError(f"{code!r} is neither the code of a finding nor a term of the glossary; {hint}")
     return rule
 
 
 def _severity(rule: Rule) -> str:
     return rule.severity.name.lower()
-
-
-def _text(rule: Rule) -> str:
-    parts = [f"{rule.code} {rule.title} ({_severity(rule)})"]
-    sections = (("Why it matters", rule.why), ("Example", rule.example), ("What to do", rule.remedy))
-    for title, sentence in sections:
-        parts.append(f"{title}:\n" + textwrap.fill(sentence, 96, initial_indent="  ", subsequent_indent="  "))
-    return "\n\n".join(parts) + "\n"
 
 
 def _as_dict(rule: Rule) -> dict[str, str]:

@@ -10,7 +10,7 @@ from olp.cli.common import diagnostic
 from olp.cli.options import force_option
 from olp.core.errors import OlpError, UsageError
 
-#: A small machine, to be replaced by the travel of the real one.
+#: Travel of a small machine in mm, to be replaced by that of the real one.
 TRAVEL_MM = {"X": (0.0, 500.0), "Y": (0.0, 400.0), "Z": (-300.0, 0.0)}
 
 Travel = tuple[tuple[str, float, float], ...]
@@ -26,7 +26,7 @@ Travel = tuple[tuple[str, float, float], ...]
     type=(click.Choice("XYZ"), float, float),
     multiple=True,
     metavar="AXIS MIN MAX",
-    help="Travel of an axis in mm, such as --travel X 0 2000; once an axis.",
+    help="Travel of an axis in mm, such as --travel X 0 2000; once per axis.",
 )
 @click.option("--from-linuxcnc", "ini", metavar="INI", help="Take the machine from a LinuxCNC configuration.")
 @force_option("files in DIR")
@@ -77,4 +77,4 @@ def _make_folder(folder: Path) -> None:
     except FileExistsError:
         raise UsageError("is a file; name a folder", file=str(folder)) from None
     except OSError as error:
-        raise OlpError(f"cannot be made ({error.strerror})", file=str(folder)) from error
+        raise OlpError(f"cannot be created ({error.strerror})", file=str(folder)) from error

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.argument("file", metavar="PROGRAM|machine.toml", required=False)
 @setup_options
 @click.option(
-    "--at", type=(float, float, float), metavar="X Y Z", help="Say the error at an axis position in mm."
+    "--at", type=(float, float, float), metavar="X Y Z", help="Show the error at an axis position in mm."
 )
 @click.option("--tool", type=int, help="Tool number for --at. Default: the tool at the start.")
 @plot_option("Draw the curves of the calibration, as .svg or .png.")
@@ -37,9 +37,9 @@ def command(
     as_json: bool,
     force: bool,
 ) -> None:
-    """Say what a program does, or what a machine's calibration holds.
+    """Show what a program does, or what a machine's calibration holds.
 
-    A file that ends in .toml is a machine file. --at and --plot ask the machine, not the program.
+    A file that ends in .toml is a machine file. --at and --plot are about the machine, not the program.
     """
     ask_program = False
     if file is not None and Path(file).suffix.lower() == ".toml":
@@ -89,7 +89,7 @@ def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> No
 
 
 def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """The statements of a support matrix by what becomes of them; the JSON holds the reasons too."""
+    """The statements of a support matrix, by kind of support; the JSON holds the reasons too."""
     kinds = dict.fromkeys(row["support"] for row in matrix)
     return {kind: " ".join(row["statement"] for row in matrix if row["support"] == kind) for kind in kinds}
 
@@ -104,7 +104,7 @@ def _calibration(session: Session) -> Calibration:
 
 
 def machine_summary(session: Session) -> dict[str, Any]:
-    """Axes, chain, calibration and what each of its error sources says, with units in the keys."""
+    """Axes, chain, calibration and each of its error sources, with units in the keys."""
     from olp.core.units import AXES
 
     setup = session.setup
@@ -136,7 +136,7 @@ def machine_summary(session: Session) -> dict[str, Any]:
         "axes": axes,
     }
     frame = calibration.frame(described.chain)
-    # what no correction removes stands last
+    # errors that no correction removes come last
     for kind, values in sorted(calibration.sources(), key=lambda pair: not pair[0].correctable):
         for name, axis in axes.items():
             axis |= kind.inspect_axis(values, name)

@@ -12,6 +12,7 @@ from olp.core.errors import UsageError
 from olp.findings.catalogue import Finding
 
 F = TypeVar("F", bound=Callable[..., Any])
+#: Endings of plots.
 PLOTS = (".svg", ".png")
 
 
@@ -46,7 +47,7 @@ def end(
     result: Mapping[str, Any], text: str, files: Mapping[str, bytes], inputs: Iterable[str],
     findings: Iterable[Finding], *, as_json: bool, fail_on: str, force: bool,
 ) -> None:  # fmt: skip
-    """Write the files, print the result, and end with 1 where a finding says so."""
+    """Write the files, print the result, and end with 1 where a finding is at or above `fail_on`."""
     from olp.files.write import write_files
     from olp.reports.report import to_json
 

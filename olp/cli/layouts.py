@@ -16,31 +16,31 @@ if TYPE_CHECKING:
 def layout_of(
     profile: str | None, columns: tuple[str, ...], unit: str | None, table: Source, sources: Sources
 ) -> Layout | None:
-    """The layout that a call asks for, None where the table tells its own."""
+    """The layout that a call asks for, None where it is detected from the table."""
     from olp.files.point_profile import BUILT_IN, from_layout, load_profile, with_options
-    from olp.program.text.delimited import first_lines, told
+    from olp.program.text.delimited import detected_layout, first_lines
 
     if profile is None and not columns and unit is None:
         return None
     if profile:
         return with_options(load_profile(profile, sources.read), columns, unit=unit).layout
-    found = told(first_lines(table.data))
-    if found is None and not columns:
+    layout = detected_layout(first_lines(table.data))
+    if layout is None and not columns:
         raise InputError(
-            "does not tell which columns hold X, Y and Z; name them with --column X=.. and so on",
+            "does not show which columns hold X, Y and Z; give their names with --column X=.. and so on",
             file=table.name or None,
         )
-    if not columns and found is not None:
-        return replace(found, unit=unit or found.unit)
-    start = BUILT_IN["olp"] if found is None else from_layout(found)
-    if found is None and all(item.partition("=")[2].isdigit() for item in columns):
+    if not columns and layout is not None:
+        return replace(layout, unit=unit or layout.unit)
+    start = BUILT_IN["olp"] if layout is None else from_layout(layout)
+    if layout is None and all(item.partition("=")[2].isdigit() for item in columns):
         start = start.model_copy(update={"header": False})
-    stated = unit or (found.unit if found else None)
+    stated = unit or (layout.unit if layout else None)
     return replace(with_options(start, columns).layout, unit=stated)
 
 
 def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], unit: str | None) -> Given:
-    """A call about a list of positions that is laid out as it says; the same call where it says nothing."""
+    """A call about a list of positions, with the layout that it states; unchanged where it states none."""
     from olp.program.pointlist.dialect import with_layout
 
     if profile is None and not columns and unit is None:

@@ -1,4 +1,4 @@
-"""Options of several verbs: each is defined once, and a verb says what its help tells."""
+"""Options of several verbs: each is defined once, and a verb may give the text of its help."""
 
 from __future__ import annotations
 
@@ -14,6 +14,19 @@ from olp.cli.common import DIALECT
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+def renamed_option(old: str, new: str, *, flag: bool = False) -> Callable[[F], F]:
+    """An option that has another name now: using it is an error that says which."""
+
+    def refuse(context: click.Context, _: click.Parameter, value: object) -> None:
+        if value not in (None, False):
+            raise click.UsageError(f"{old} is now {new}.", context)
+
+    return click.option(
+        old, f"renamed_{old.strip('-').replace('-', '_')}", is_flag=flag, hidden=True, expose_value=False,
+        callback=refuse,
+    )  # fmt: skip
+
+
 class Length(click.FloatRange):
     """A finite number above zero."""
 
@@ -27,9 +40,9 @@ class Length(click.FloatRange):
         return number
 
 
-def machine_option(says: str = "The machine file.", *, required: bool = False) -> Callable[[F], F]:
-    """-m, alone where a verb takes no job."""
-    return click.option("-m", "--machine", metavar="machine.toml", required=required, help=says)
+def machine_option(help: str = "The machine file.", *, required: bool = False) -> Callable[[F], F]:
+    """-m, for verbs without a job."""
+    return click.option("-m", "--machine", metavar="machine.toml", required=required, help=help)
 
 
 def setup_options(function: F) -> F:
@@ -39,9 +52,11 @@ def setup_options(function: F) -> F:
         metavar="NAME",
         expose_value=False,
         callback=_keep_dialect,
-        help="The dialect, such as apt, or a file that describes it. Default: what text and ending say.",
+        help="The dialect, such as apt, or a file that describes it. Default: detected from text and ending.",
     )(function)
-    function = click.option("-j", "--job", metavar="job.toml", help="What changes from job to job.")(function)
+    function = click.option(
+        "-j", "--job", metavar="job.toml", help="The job file: what changes from job to job."
+    )(function)
     return machine_option()(function)
 
 
@@ -57,29 +72,29 @@ def _day(
 
 def date_option(of: str = "run") -> Callable[[F], F]:
     """--date, which is compared with the validity of the calibration."""
-    return day_option(f"The day of the {of}, to be compared with valid_until of the calibration.")
+    return day_option(f"The day of the {of}; it is compared with valid_until of the calibration.")
 
 
-def day_option(says: str, name: str = "--date") -> Callable[[F], F]:
+def day_option(help: str, name: str = "--date") -> Callable[[F], F]:
     """--date and other days."""
     return click.option(
-        name, type=click.DateTime(["%Y-%m-%d"]), callback=_day, metavar="YYYY-MM-DD", help=says
+        name, type=click.DateTime(["%Y-%m-%d"]), callback=_day, metavar="YYYY-MM-DD", help=help
     )
 
 
-def output_option(metavar: str, says: str | None = None, **settings: Any) -> Callable[[F], F]:
+def output_option(metavar: str, help: str | None = None, **settings: Any) -> Callable[[F], F]:
     """-o."""
-    return click.option("-o", "--output", metavar=metavar, help=says, **settings)
+    return click.option("-o", "--output", metavar=metavar, help=help, **settings)
 
 
-def json_option(says: str = "Print the report as JSON.") -> Callable[[F], F]:
+def json_option(help: str = "Print the report as JSON.") -> Callable[[F], F]:
     """--json."""
-    return click.option("--json", "as_json", is_flag=True, help=says)
+    return click.option("--json", "as_json", is_flag=True, help=help)
 
 
-def quiet_option(says: str) -> Callable[[F], F]:
+def quiet_option(help: str) -> Callable[[F], F]:
     """-q; its help says what is left out."""
-    return click.option("-q", "--quiet", is_flag=True, help=says)
+    return click.option("-q", "--quiet", is_flag=True, help=help)
 
 
 def force_option(what: str = "output files") -> Callable[[F], F]:
@@ -87,20 +102,20 @@ def force_option(what: str = "output files") -> Callable[[F], F]:
     return click.option("--force", is_flag=True, help=f"Overwrite {what}.")
 
 
-def plot_option(says: str) -> Callable[[F], F]:
+def plot_option(help: str) -> Callable[[F], F]:
     """--plot."""
-    return click.option("--plot", metavar="FILE", help=says)
+    return click.option("--plot", metavar="FILE", help=help)
 
 
 def report_option(
-    metavar: str = "FILE", says: str = "Also write the report: .html, .json or .md."
+    metavar: str = "FILE", help: str = "Also write the report: .html, .json or .md."
 ) -> Callable[[F], F]:
     """--report."""
-    return click.option("--report", "report_file", metavar=metavar, help=says)
+    return click.option("--report", "report_file", metavar=metavar, help=help)
 
 
 def outside_box_option(refused: str, held: str) -> Callable[[F], F]:
-    """--outside-box; its help says what becomes of what is outside."""
+    """--outside-box; its help says what each choice does."""
     return click.option(
         "--outside-box",
         type=click.Choice(["refuse", "hold"]),
@@ -125,7 +140,7 @@ tolerance_option = click.option(
     type=Length(),
     default=1.0,
     show_default=True,
-    help="How far the corrected path may be from the nominal one, rounding apart.",
+    help="Numerical tolerance: largest deviation of the corrected path, without rounding.",
 )
 flatten_option = click.option(
     "--flatten", is_flag=True, help="Write out loops, subprograms and expressions first."
@@ -133,13 +148,12 @@ flatten_option = click.option(
 
 
 def unroll_options(function: F) -> F:
-    """--flatten, --expand-cycles and what that needs."""
+    """--flatten, --expand-cycles and --peck-clearance-mm."""
     for option in (
         click.option(
             "--peck-clearance-mm",
             type=Length(),
-            help="Clearance above the last peck, which Fanuc and Haas keep in a parameter; "
-            "for --expand-cycles.",
+            help="For --expand-cycles: clearance above the last peck, a parameter of Fanuc and Haas.",
         ),
         click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves."),
         flatten_option,
@@ -149,18 +163,18 @@ def unroll_options(function: F) -> F:
 
 
 def confidence_options(function: F) -> F:
-    """What every verb that looks at uncertainties has in common."""
+    """Options of every verb that shows uncertainties."""
     for option in (
+        renamed_option("--within-um", "--part-tolerance-um"),
         click.option(
-            "--within-um",
+            "--part-tolerance-um",
             type=Length(),
-            help="The tolerance of the part: how probable is it that the tip stays within? "
-            "Default: --tolerance-um.",
+            help="Part tolerance: give the probability that the tip is within it. Default: --tolerance-um.",
         ),
         click.option(
             "--only-sure-components",
             is_flag=True,
-            help="Leave out components of the calibration that are within their own uncertainty (2 sigma).",
+            help="Leave out calibration components that are within their expanded uncertainty (k = 2).",
         ),
     ):
         function = option(function)
@@ -168,7 +182,7 @@ def confidence_options(function: F) -> F:
 
 
 def proof_options(function: F) -> F:
-    """What `correct` and `verify` have in common."""
+    """Options of `correct` and `verify`."""
     for option in (fail_on_option, json_option(), date_option(), contour_option, tolerance_option):
         function = option(function)
     return function

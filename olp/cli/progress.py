@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 Report = Callable[[str, float], None]
 
-#: Shorter runs show nothing, and do not pay for importing rich.
+#: Seconds; shorter runs show nothing, and do not import rich.
 PATIENCE_S = 1.0
 
 
@@ -43,7 +43,7 @@ class _Bar:
 
 @contextlib.contextmanager
 def progress(quiet: bool) -> Iterator[Report | None]:
-    """What the library calls with (stage, fraction of it done); None where nobody is watching."""
+    """What the library calls with (stage, fraction of it done); None where stderr is not a terminal."""
     if quiet or not sys.stderr.isatty():
         yield None
         return

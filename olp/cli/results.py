@@ -1,14 +1,38 @@
-"""`olp correct --results`: what a measuring machine reported, corrected."""
+"""`olp results`."""
 
 from __future__ import annotations
 
 import datetime
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, given, put, refuse_early, refuse_twice
+import click
+
+from olp.cli.common import (
+    STREAM,
+    default_output,
+    diagnostic,
+    exit_for,
+    files_of,
+    given,
+    options_of,
+    put,
+    refuse_early,
+    refuse_twice,
+)
 from olp.cli.layouts import layout_of
+from olp.cli.options import (
+    date_option,
+    fail_on_option,
+    force_option,
+    json_option,
+    output_option,
+    outside_box_option,
+    quiet_option,
+    report_option,
+    setup_options,
+)
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -16,8 +40,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What the call asks for."""
+class _Asked:
+    """The options of the call."""
 
     profile: str | None
     columns: tuple[str, ...]
@@ -36,13 +60,39 @@ class Asked:
     force: bool
 
 
-def run(results: str | None, machine: str | None, job: str | None, asked: Asked) -> None:
-    """Correct a file of results, write it, and report."""
+@click.command("results")
+@click.argument("results")
+@setup_options
+@output_option("OUT", "Default: RESULTS.corrected.SUFFIX beside RESULTS.")
+@click.option("--profile", metavar="NAME|FILE", help="Layout of a table of points.")
+@click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
+@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a table.")
+@click.option(
+    "--frame", "frames", multiple=True, metavar="[NAME=]FRAME",
+    help="Work offset that the results are stated in, or machine; may be repeated.",
+)  # fmt: skip
+@click.option("--tool", "tools", multiple=True, metavar="[NAME=]N", help="Stylus; may be repeated.")
+@click.option("--tip-radius-mm", type=click.FloatRange(min=0.0), help="Radius of the tip, 0 for centres.")
+@click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
+@outside_box_option("refuse the results", "take the error at the box's face")
+@date_option()
+@report_option()
+@json_option()
+@fail_on_option
+@quiet_option("No report; only the exit code.")
+@force_option()
+def command(results: str, machine: str | None, job: str | None, **words: Any) -> None:
+    """Correct the points that a measuring machine reported.
+
+    RESULTS is a table of points or DMIS output. The machine's error is added to the reported points, so that
+    the corrected results are where the tip really was.
+    """
+    asked = options_of(_Asked, words)
     call = given(results, machine, job)
     output = asked.output or default_output(call.program)
     as_json = asked.as_json or asked.report_file == STREAM
     if as_json and output == STREAM:
-        raise UsageError("JSON on stdout does not go with -o -; write the report to a file with --report")
+        raise UsageError("JSON on stdout excludes -o -; write the report to a file with --report")
     inputs = (*call.inputs, *files_of(asked.profile))
     outputs = files_of(output, asked.report_file)
     refuse_early(outputs, inputs, force=asked.force)
@@ -79,20 +129,14 @@ def run(results: str | None, machine: str | None, job: str | None, asked: Asked)
     exit_for(result.findings, asked.fail_on)
 
 
-def default_output(program: str) -> str:
-    """PROGRAM.corrected.SUFFIX beside PROGRAM."""
-    path = Path(program)
-    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
-
-
 def _names(option: str, given: tuple[str, ...]) -> str | dict[str, str] | None:
-    """One name for all, or names of the file with those of machine and job."""
+    """One name for all, or a mapping of names in the file to those of machine and job."""
     if len(given) == 1 and "=" not in given[0]:
         return given[0]
     pairs = [item.partition("=") for item in given]
     wrong = next((item for item, (name, _, value) in zip(given, pairs, strict=True) if not value), None)
     if wrong is not None:
-        raise UsageError(f"{option} {wrong} is given beside others; expected NAME IN FILE=NAME, a pair each")
+        raise UsageError(f"{option} {wrong} is one of several; expected {option} NAME_IN_FILE=NAME for each")
     return {name: value for name, _, value in pairs} or None
 
 
@@ -101,6 +145,6 @@ def _numbers(given: tuple[str, ...]) -> int | dict[str, int] | None:
     values = named if isinstance(named, dict) else {"": named or "0"}
     wrong = next((value for value in values.values() if not value.isdigit()), None)
     if wrong is not None:
-        raise UsageError(f"--tool {wrong} is no tool number; expected the number of a table [tools.N]")
+        raise UsageError(f"--tool {wrong} is not a tool number; expected the number of a table [tools.N]")
     numbers = {name: int(value) for name, value in values.items()}
     return numbers if isinstance(named, dict) else None if named is None else numbers[""]

@@ -14,7 +14,7 @@ from olp.cli.common import put
 def command(kind: str) -> None:
     """Print the JSON Schema of a file that people write.
 
-    Editors complete and check TOML with it.
+    With it, editors complete and check TOML.
     """
     from olp.files.json_schema import json_schema_text
 

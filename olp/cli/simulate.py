@@ -26,7 +26,7 @@ def command(
     contour: bool,
     force: bool,
 ) -> None:
-    """Write the path that the machine would really take, as CSV.
+    """Write the path that the machine would take with its errors, as CSV.
 
     The points are those of the tool tip, in the first work frame of the program.
     """

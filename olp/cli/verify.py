@@ -21,10 +21,10 @@ def command(
     nominal: str, corrected: str, machine: str | None, job: str | None, as_json: bool, fail_on: str,
     **words: Any,
 ) -> None:  # fmt: skip
-    """Prove a corrected program from the two texts alone.
+    """Prove a corrected program from the nominal and the corrected text alone.
 
-    Whoever wrote CORRECTED: it is read, run through the model of the machine's errors, and compared with the
-    path of NOMINAL.
+    CORRECTED may come from any source. It is read, run through the model of the machine's errors, and
+    compared with the path of NOMINAL.
     """
     if nominal == corrected == STREAM:
         raise UsageError("NOMINAL and CORRECTED cannot both come from stdin; name one of the files")

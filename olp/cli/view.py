@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 @click.argument("program", required=False)
 @setup_options
 @click.option(
-    "--corrected", metavar="FILE", help="The corrected program. Default: PROGRAM is corrected here."
+    "--corrected", metavar="FILE", help="The corrected program. Default: correct PROGRAM."
 )
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
 )
 @output_option("review.html", "Default: PROGRAM.review.html beside PROGRAM.")
 @click.option(
-    "--live", is_flag=True, help="Serve the page on this machine, until Ctrl-C, and keep it up to date."
+    "--live", is_flag=True, help="Serve the page on this computer until Ctrl-C, and keep it up to date."
 )
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: one that is free."
+    "--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: a free one."
 )
 @tolerance_option
 @outside_box_option("refuse the program", "take the error at the box's face")
@@ -50,14 +50,14 @@ if TYPE_CHECKING:
 @unroll_options
 @confidence_options
 @click.option(
-    "--no-time", is_flag=True, help="Do not plan the motion; times are those of the programmed feed."
+    "--no-time", is_flag=True, help="Do not plan the motion; times come from the programmed feed."
 )
 @click.option(
     "--step-mm",
     type=Length(),
     help="Distance between points of the path. Default: about 100,000 points in all.",
 )
-@quiet_option("No progress and no talk.")
+@quiet_option("No progress and no messages.")
 @force_option("the output file")
 def command(
     program: str | None,
@@ -79,12 +79,12 @@ def command(
     """
     call = given(program, machine, job)
     if live and (output is not None or call.program == STREAM):
-        raise UsageError("--live serves files as they are: it goes with neither -o nor a program from stdin")
+        raise UsageError("--live serves files: leave out -o, and name PROGRAM as a file")
     if port and not live:
-        raise UsageError("--port belongs to --live")
+        raise UsageError("--port is for --live; add --live")
     if corrected is not None and (words["flatten"] or words["expand_cycles"]):
         raise UsageError(
-            "--flatten and --expand-cycles change the nominal program, so they go without --corrected"
+            "--flatten and --expand-cycles change the nominal program; leave them out, or --corrected"
         )
     if STREAM in (corrected, *measured):
         raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
@@ -98,7 +98,7 @@ def command(
     options = options_of(review.ViewOptions, words | {"time": not no_time})
 
     def make() -> Review:
-        # files may have changed since
+        # files may have changed since the last call
         now = given(program, machine, job) if live else call
         second = None if corrected is None else source(now.session.sources, corrected)
         with progress(quiet) as show, naming(call.stream):
@@ -134,5 +134,5 @@ def _serve(make: Callable[[], Review], inputs: tuple[str, ...], port: int, quiet
         diagnostic(f"serving {server.address} until Ctrl-C")
         server.run()
     except KeyboardInterrupt:
-        # the way to end it
+        # the regular end of --live
         diagnostic("ended")

@@ -1,1 +1,1 @@
-"""Measured runs beside the nominal path: frames, pairing, figures."""
+"""Comparison of measured runs with the nominal path: frames, pairing, figures."""

@@ -1,4 +1,4 @@
-"""Brings measured points in another frame onto the nominal path: best-fit rigid transform."""
+"""The best-fit rigid transform that brings measured points in another frame onto the nominal path."""
 
 from __future__ import annotations
 
@@ -12,44 +12,49 @@ from olp.comparison.path import Path
 from olp.core.arrays import Array
 from olp.core.rigid_fit import Rigid, fit_path, fit_points
 
-#: places that the search works on, and those of its first steps
-_FEW, _FIRST = 1536, 400
+#: points that the search uses
+_FEW = 1536
+#: points in its first steps
+_FIRST = 400
+#: rounds of pairing and fitting at most
 _ROUNDS = 12
 #: a step that moves no point by more than this share of the residual ends the search
 _STILL = 1e-3
 #: residuals within this factor are equally good; the first one is taken
 _AS_GOOD = 1.5
-#: so much nearer the nearest places are, where the order of the points is none of the path
+#: points are in no order if their distance without order is below this share of that in order
 _MUCH = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """What brings measured points into the nominal frame, the order of the points, and the motions of the
-    whole that the path does not determine. `rival`: another place fits as well, as on a symmetric path."""
+    """The transform of measured points into the nominal frame, the order of the points, and the rigid motions
+    that the path does not determine.
+
+    `ambiguous`: another transform fits equally well, as on a symmetric path."""
 
     rigid: Rigid
     order: Order
     loose: tuple[str, ...]
-    candidate: bool = False
+    ambiguous: bool = False
 
 
 def paired(path: Path, points_mm: Array, order: Order | None, reach_mm: float) -> tuple[Order, Pairing]:
-    """Pair points (m, 3) in the nominal frame in their order, which is found where it is not given.
+    """Pair points (m, 3) in the nominal frame in their order, which is detected where it is None.
 
-    Along or against the path, whichever costs less; in none, where order leaves many points farther than
-    `reach_mm` from their place and the nearest places do not.
+    The points run along or against the path, whichever costs less. They are in no order where an order puts
+    many of them farther than `reach_mm` from the path, and the nearest points of the path do not.
     """
     if order is not None:
         return order, pair(path, points_mm, order)
-    found: Order = "forward" if _cost(path, points_mm) <= _cost(path.reversed(), points_mm) else "backward"
-    pairing = pair(path, points_mm, found)
+    cheaper: Order = "forward" if _cost(path, points_mm) <= _cost(path.reversed(), points_mm) else "backward"
+    pairing = pair(path, points_mm, cheaper)
     typical = float(np.quantile(pairing.distance_mm, 0.75))
     if typical > reach_mm:
         some = points_mm[:: max(len(points_mm) // _FEW, 1)]
         if _typical(path, some, "free") <= _MUCH * typical:
             return "free", pair(path, points_mm, "free")
-    return found, pairing
+    return cheaper, pairing
 
 
 def _cost(path: Path, points: Array) -> float:
@@ -61,27 +66,27 @@ def _typical(path: Path, points: Array, order: Order) -> float:
 
 
 def align(path: Path, points_mm: Array, reach_mm: float, order: Order | None = None) -> Alignment:
-    """The best fit of points (m, 3) in an unknown frame, in the given order, or whatever theirs is.
+    """The best fit of points (m, 3) in an unknown frame, in the given order or, with None, in any.
 
-    First places at equal shares of both lengths are laid on each other, then pairing and fitting alternate.
-    Where that pairs nothing, principal axes are, and the points count as unordered. Residuals are distances
-    across the path, all points alike, without those farther than `reach_mm`.
+    The first fit pairs points at equal shares of both lengths; then pairing and fitting alternate. Where that
+    fails, the first fit uses principal axes, and the points count as unordered. Residuals are distances
+    across the path with equal weights, without points farther than `reach_mm`.
     """
-    found = []
+    fits = []
     for one, start in _starts(path, points_mm):
         if order not in (None, one):
             continue
         rigid = start
         for _ in range(3):
             rigid = _match(path, points_mm, rigid, one)
-        found.append((_typical(path, _sample(rigid(points_mm), one, _FIRST), one), one, rigid))
-        if one == "backward" and min(f[0] for f in found) <= reach_mm:
-            break  # in order, it need not be tried without
-    least = min(residual for residual, _, _ in found)
-    good = [f for f in found if f[0] <= _AS_GOOD * least]
+        fits.append((_typical(path, _sample(rigid(points_mm), one, _FIRST), one), one, rigid))
+        if one == "backward" and min(f[0] for f in fits) <= reach_mm:
+            break  # an order fits, so no order need not be tried
+    least = min(residual for residual, _, _ in fits)
+    good = [f for f in fits if f[0] <= _AS_GOOD * least]
     _, order, rigid = good[0]
     some = points_mm[:: max(len(points_mm) // _FIRST, 1)]
-    candidate = any(
+    ambiguous = any(
         np.abs(other(some) - rigid(some)).max() > 10.0 * max(residual, least) + reach_mm
         for residual, _, other in good[1:]
     )
@@ -92,11 +97,11 @@ def align(path: Path, points_mm: Array, reach_mm: float, order: Order | None = N
         if _moves(step, rigid(points_mm[:: max(len(points_mm) // _FEW, 1)])) <= _STILL * residual + 1e-9:
             break
     step, loose, _ = _step(path, rigid(points_mm), order, reach_mm)
-    return Alignment(step.after(rigid), order, loose, candidate)
+    return Alignment(step.after(rigid), order, loose, ambiguous)
 
 
 def refit(path: Path, runs: Sequence[Array], pairings: Sequence[Pairing], reach_mm: float) -> Alignment:
-    """One best fit of several runs (m, 3) that lie near their places already."""
+    """One best fit of several runs (m, 3) that are already near their positions on the path."""
     points, foot = np.concatenate(runs), np.concatenate([p.foot_mm for p in pairings])
     kept = np.concatenate([(p.distance_mm <= reach_mm) & ~p.beyond for p in pairings])
     along = path.axes(np.concatenate([p.segment for p in pairings]))[0]
@@ -106,8 +111,8 @@ def refit(path: Path, runs: Sequence[Array], pairings: Sequence[Pairing], reach_
 
 def _starts(path: Path, points: Array) -> Iterator[tuple[Order, Rigid]]:
     few, _ = thinned(points, _FIRST)
-    way = np.append(0.0, np.cumsum(np.sqrt((np.diff(few, axis=0) ** 2).sum(axis=1))))
-    share = way / max(way[-1], 1e-12) * path.length_mm
+    arc_mm = np.append(0.0, np.cumsum(np.sqrt((np.diff(few, axis=0) ** 2).sum(axis=1))))
+    share = arc_mm / max(arc_mm[-1], 1e-12) * path.length_mm
     yield "forward", fit_points(few, path.at(share)[0])
     yield "backward", fit_points(few, path.at(path.length_mm - share)[0])
     nodes = path.at(np.linspace(0.0, path.length_mm, _FEW))[0]
@@ -126,7 +131,7 @@ def _sample(points: Array, order: Order, count: int) -> Array:
 
 
 def _match(path: Path, points: Array, rigid: Rigid, order: Order) -> Rigid:
-    """One round of points onto places, which finds its way from afar."""
+    """One round of pairing and fitting that also works from far off."""
     few = _sample(points, order, _FIRST)
     if order == "free":
         return fit_points(few, pair(path, rigid(few), "free").foot_mm)

@@ -1,4 +1,4 @@
-"""What a measured run says: paired points, deviations, figures along the path and by line."""
+"""Figures of a measured run: paired points, deviations, along the path and by line."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from olp.comparison.path import Path, Split, split
 from olp.core.arrays import Array, Index, Mask
 from olp.core.units import UM_PER_MM
 
-#: places along the path at which runs are compared
+#: stations along the path at which runs are compared
 STATIONS = 2000
-#: a gap between points of so many usual ones is no path any more
+#: a distance between points of more than this many usual ones is a gap
 _GAP = 8.0
-#: so many times its reach from its end a path has left it
-_LEFT = 10.0
+#: distance from an end, in reaches, beyond which the path has left that end
+_AWAY = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A measured run in the nominal frame: points (m, 3) in mm, where they belong, and their deviation.
+    """A measured run in the nominal frame: points (m, 3) in mm, their pairing, and their deviation.
 
-    `good` (m,) are those with a place on the path within reach, from which all figures come.
+    `good` (m,) are those with a position on the path within reach; all figures come from them.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Run:
     def figures(self, path: Path) -> dict[str, Any]:
         """Counts and deviations in um, of cutting moves only."""
         size = self.deviation.across[self.counted] * UM_PER_MM
-        out: dict[str, Any] = {
+        report: dict[str, Any] = {
             "name": self.name,
             "points": len(self.points_mm),
             "counted": int(self.counted.sum()),
@@ -57,8 +57,8 @@ class Run:
             "covered": self.covered(path),
         }
         if not len(size):
-            return out | {"across_um": None, "normal_um": None, "binormal_um": None}
-        out["across_um"] = {
+            return report | {"across_um": None, "normal_um": None, "binormal_um": None}
+        report["across_um"] = {
             "max": float(size.max()),
             "rms": float(np.sqrt(np.mean(size * size))),
             "mean": float(size.mean()),
@@ -66,11 +66,11 @@ class Run:
         }
         for name in ("normal", "binormal"):
             value = getattr(self.deviation, name)[self.counted] * UM_PER_MM
-            out[f"{name}_um"] = {
+            report[f"{name}_um"] = {
                 "min": float(value.min()), "max": float(value.max()), "mean": float(value.mean()),
                 "rms": float(np.sqrt(np.mean(value * value))),
             }  # fmt: skip
-        return out
+        return report
 
     def covered(self, path: Path) -> float:
         """Share of the cutting path that lies between neighbouring measured points."""
@@ -82,7 +82,7 @@ class Run:
         return float(inside[cutting].mean()) if cutting.any() else 0.0
 
     def _near(self, places: Array, s: Array) -> Mask:
-        """Which places lie in no gap between sorted arc lengths."""
+        """Which arc lengths `places` lie in no gap between sorted arc lengths `s`."""
         gap = np.diff(s)
         wide = _GAP * float(np.quantile(gap, 0.9))
         after = np.clip(np.searchsorted(s, places), 1, len(s) - 1)
@@ -94,20 +94,20 @@ class Run:
         order = np.argsort(self.pairing.s_mm[self.good], kind="stable")
         s = self.pairing.s_mm[self.good][order]
         away = (self.points_mm - self.pairing.foot_mm)[self.good][order]
-        out = np.full((len(places_mm), 3), np.nan)
+        attained = np.full((len(places_mm), 3), np.nan)
         if len(s) < 2:
-            return out
+            return attained
         s, first, count = np.unique(s, return_index=True, return_counts=True)
         away = np.add.reduceat(away, first, axis=0) / count[:, None]
         if len(s) < 2:
-            return out
+            return attained
         place, segment = path.at(places_mm)
         along = path.axes(segment)[0]
         between = np.column_stack([np.interp(places_mm, s, away[:, i]) for i in range(3)])
         between -= np.einsum("ij,ij->i", between, along)[:, None] * along
         near = self._near(places_mm, s)
-        out[near] = (place + between)[near]
-        return out
+        attained[near] = (place + between)[near]
+        return attained
 
     def largest_by_line(self, path: Path) -> dict[int, float]:
         """The largest deviation in um of each line of the program."""
@@ -119,36 +119,36 @@ class Run:
 
 
 def _off_the_ends(path: Path, points: Array, pairing: Pairing, reach: float, order: Order) -> Mask:
-    """(m,) `beyond`, and what was measured on the way to the first place of the path and from its last one.
+    """(m,) `beyond`, and points measured before the start of the path is reached, or after its end is left.
 
-    That is there where the measurement begins out of reach; it ends where it is nearest to that place.
+    There are such points where the measurement begins out of reach; the one nearest to the start ends them.
     """
-    out = pairing.beyond.copy()
+    beyond = pairing.beyond.copy()
     ends = path.vertex_mm[[0, -1]] if order == "forward" else path.vertex_mm[[-1, 0]]
-    at = (0.0, path.length_mm) if order == "forward" else (path.length_mm, 0.0)
-    for end, s, turn in ((ends[0], at[0], slice(None)), (ends[1], at[1], slice(None, None, -1))):
-        distance, mask = pairing.distance_mm[turn], out[turn]
+    arc_ends = (0.0, path.length_mm) if order == "forward" else (path.length_mm, 0.0)
+    for end, s, turn in ((ends[0], arc_ends[0], slice(None)), (ends[1], arc_ends[1], slice(None, None, -1))):
+        distance, mask = pairing.distance_mm[turn], beyond[turn]
         inside = np.flatnonzero(distance <= reach)
         if not len(inside) or inside[0] == 0:
             continue
-        # as far as the path has left its end for good
-        gone = np.flatnonzero(np.abs(pairing.s_mm[turn][inside[0] :] - s) > _LEFT * reach)
+        # up to where the path is away from this end
+        gone = np.flatnonzero(np.abs(pairing.s_mm[turn][inside[0] :] - s) > _AWAY * reach)
         last = inside[0] + (gone[0] if len(gone) else len(distance) - inside[0])
         away = points[turn][: last + 1] - end
         size = np.einsum("ij,ij->i", away, away)
         arrival = int(size.argmin())
         mask[: arrival if size[arrival] <= reach * reach else inside[0]] = True
-    return out
+    return beyond
 
 
 def _cutting_places(path: Path) -> tuple[Array, Index, Mask]:
-    """Arc lengths of places even along the path, their segments, and which of them cut."""
+    """Arc lengths of equidistant stations along the path, their segments, and which are on cutting moves."""
     places = (np.arange(STATIONS, dtype=float) + 0.5) * (path.length_mm / STATIONS)
     segment = path.at(places)[1]
     return places, segment, path.cutting[segment]
 
 
 def stations(path: Path) -> Array:
-    """Arc lengths (k,) of places even along the path, on its cutting moves only."""
+    """Arc lengths (k,) of equidistant stations along the path, on its cutting moves only."""
     places, _, cutting = _cutting_places(path)
     return places[cutting]

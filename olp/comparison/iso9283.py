@@ -1,6 +1,6 @@
 """Accuracy and repeatability of poses and paths after ISO 9283:1998, positions only.
 
-All figures come from cycles that were run alike; the standard asks for 30 cycles for poses and 10 for paths.
+All figures come from equal cycles; the standard requires 30 cycles for poses and 10 for paths.
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ import numpy as np
 
 from olp.core.arrays import Array
 
+#: cycles that the standard requires for poses
 POSE_CYCLES = 30
+#: cycles that the standard requires for paths
 PATH_CYCLES = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Repeated:
-    """Per pose or station (m,), in mm: `accuracy`, distance of the command from the barycentre of what was
-    attained; `repeatability`, mean distance from that barycentre plus three standard deviations of it, NaN
-    with one cycle. `bias` (m, 3): barycentre minus command."""
+    """Per pose or station (m,), in mm: `accuracy`, distance of the command from the barycentre of the
+    attained positions; `repeatability`, mean distance from that barycentre plus three of its standard
+    deviations, NaN with one cycle. `bias` (m, 3): barycentre minus command."""
 
     accuracy: Array
     repeatability: Array
@@ -27,11 +29,11 @@ class Repeated:
 
 
 def repeated(command_mm: Array, attained_mm: Array) -> Repeated:
-    """Figures of each place from commands (m, 3) and attained positions (n, m, 3) of n cycles.
+    """Figures of each pose or station from commands (m, 3) and attained positions (n, m, 3) of n cycles.
 
     ISO 9283, 7.2: AP_P = |mean - command| and RP_l = l + 3 S_l, l_j = |attained_j - mean|, S_l with n - 1;
-    8.2 and 8.3 take the same for the places of a path in its normal planes. A place that a cycle did not
-    reach (NaN) takes the cycles that did.
+    8.2 and 8.3 define the same for stations of a path in its normal planes. Cycles that did not reach a
+    station (NaN) are left out there.
     """
     there = np.asarray(np.isfinite(attained_mm).all(axis=2), bool)
     count = there.sum(axis=0)
@@ -49,14 +51,14 @@ def repeated(command_mm: Array, attained_mm: Array) -> Repeated:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The largest value in mm and the index of its place; NaN and -1 where there is none."""
+    """The largest value in mm and the index of its pose or station; NaN and -1 where there is none."""
 
     value_mm: float
     place: int
 
 
 def largest(values: Array) -> Figure:
-    """AT, RT (and the largest AP, RP): the standard takes the worst place of the path."""
+    """AT, RT (and the largest AP, RP): the standard takes the worst station of the path."""
     if not np.isfinite(values).any():
         return Figure(float("nan"), -1)
     place = int(np.nanargmax(values))

@@ -1,4 +1,4 @@
-"""The nominal path of a program as a polyline, in axis positions or as the tip sees it from the part."""
+"""The nominal path of a program as a polyline, of axis positions or of the tip on the part."""
 
 from __future__ import annotations
 
@@ -14,25 +14,26 @@ from olp.core.geometry import arc_points
 from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 
-#: How far the chords that stand for arcs may leave them.
+#: mm; how far chords may be from their arcs.
 CHORD_MM = 2e-5
+#: Chords of an arc at most.
 _MOST_CHORDS = 20_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nominal:
-    """A path with the move of the program that each of its segments (n,) is part of."""
+    """A path, and the move of the program that each of its segments (n,) is part of."""
 
     path: Path
     move: Index
 
 
 def nominal_of(toolpath: Toolpath, model: ErrorModel | None, positions: Literal["tip", "axes"]) -> Nominal:
-    """The path that a program asks for, arcs within CHORD_MM.
+    """The commanded path of a program, arcs within CHORD_MM.
 
-    "axes": axis positions in the machine frame. "tip": of the tip in the first work frame, as
-    `simulate` states it. With a model, zeros that were touched off on the raw machine lie where it was then.
-    Moves of unknown axes are left out. Raises CannotCompute where no path is left.
+    "axes": axis positions in the machine frame. "tip": of the tip in the first work frame, as `simulate`
+    states it. With a model, zeros that were touched off on the uncompensated machine are shifted by its error
+    there. Moves of unknown axes are left out. Raises CannotCompute where no path is left.
     """
     shift = np.zeros((len(toolpath.frames), 3))
     if model is not None:
@@ -52,7 +53,7 @@ def nominal_of(toolpath: Toolpath, model: ErrorModel | None, positions: Literal[
 
 
 def _chords(toolpath: Toolpath, end: Array) -> tuple[Array, Index]:
-    """Ends of moves and places on arcs (m, 3), and the move of each (m,)."""
+    """Ends of moves and points on arcs (m, 3), and the move of each (m,)."""
     arcs = toolpath.arcs
     if not len(arcs):
         return end, np.arange(len(toolpath))

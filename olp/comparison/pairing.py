@@ -1,4 +1,4 @@
-"""Which place of the nominal path each measured point belongs to."""
+"""The position on the nominal path of each measured point."""
 
 from __future__ import annotations
 
@@ -13,28 +13,33 @@ from olp.core.arrays import Array, Index, Mask
 
 Order = Literal["forward", "backward", "free"]
 
-#: nodes of the coarsest level, how much finer each next one is, and nodes of the finest at most
-COARSE, _FINER, _MOST = 3072, 8, 2_000_000
+#: nodes of the coarsest level
+COARSE = 3072
+#: factor by which each next level is finer, at most
+_FINER = 8
+#: nodes of the finest level at most
+_MOST = 2_000_000
 #: half the width of a band, in nodes of the level before
 _HALF = 4
-#: time's share in the measure by which measured points are thinned, beside the way travelled
+#: weight of time, besides that of the distance travelled, in the measure by which points are thinned
 _TIME = 0.1
-#: means of so many points measure the way travelled, so that noise does not
+#: means of points, at most, from which the distance travelled is computed, to suppress noise
 _MEANS = 8192
+#: points per block
 _BLOCK = 1 << 17
-#: share of the size of a path beyond which a point is no part of it
+#: share of the size of a path beyond which a point is not on it
 FAR = 0.05
-#: nodes looked at where points come in no order
+#: nearest nodes that are compared where points come in no order
 _NEIGHBOURS = 24
-#: segments that a foot may wander from where the order put it
+#: segments by which a foot may move along the path from its node
 _STEPS = 256
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairing:
     """Per measured point (m,): `segment` of the path, `foot_mm` (m, 3) on it, `distance_mm`, arc length
-    `s_mm`; `beyond` marks points before the first or behind the last place of the path, `doubtful` those
-    for which a pass in another direction is as good."""
+    `s_mm`; `beyond` marks points before the start or behind the end of the path, `doubtful` those that a pass
+    in another direction fits equally well."""
 
     segment: Index
     foot_mm: Array
@@ -45,10 +50,10 @@ class Pairing:
 
 
 def pair(path: Path, points_mm: Array, order: Order) -> Pairing:
-    """Pair measured points (m, 3) with places of the path.
+    """Pair measured points (m, 3) with positions on the path.
 
     "forward": points in the order of the path; "backward": in the opposite one; "free": in none, each takes
-    the nearest place. Passes that repeat or cross are told apart by order only.
+    the nearest position. Only an order distinguishes passes that repeat or cross.
     """
     if order == "free":
         return _free(path, points_mm)
@@ -63,30 +68,30 @@ def pair(path: Path, points_mm: Array, order: Order) -> Pairing:
 
 
 def thinned(points_mm: Array, count: int) -> tuple[Array, Array]:
-    """At most `count` means of neighbouring points (L, 3), even along the way, and the index that each stands
-    for (L,)."""
+    """At most `count` means of neighbouring points (L, 3), even along the distance travelled, and the mean
+    index of each (L,)."""
     m = len(points_mm)
     if m <= count:
         return points_mm, np.arange(m, dtype=float)
     edges = np.linspace(0, m, min(m, _MEANS) + 1).astype(np.int64)
     means = _means(points_mm, edges)
-    way = np.append(0.0, np.cumsum(np.sqrt((np.diff(means, axis=0) ** 2).sum(axis=1))))
+    arc_mm = np.append(0.0, np.cumsum(np.sqrt((np.diff(means, axis=0) ** 2).sum(axis=1))))
     middle = 0.5 * (edges[:-1] + edges[1:] - 1)
-    measure = np.interp(np.arange(m), middle, way / max(way[-1], 1e-12) + _TIME * middle / m)
+    measure = np.interp(np.arange(m), middle, arc_mm / max(arc_mm[-1], 1e-12) + _TIME * middle / m)
     cuts = np.searchsorted(measure, np.linspace(measure[0], measure[-1], count + 1)[1:-1])
-    # a mean of places on both sides of a gap would be a place on neither
+    # a mean of points on both sides of a gap would be on neither
     cuts = np.unique(np.concatenate(([0], cuts, leaps(points_mm, count) + 1, [m])))
     return _means(points_mm, cuts), np.asarray(0.5 * (cuts[:-1] + cuts[1:] - 1), float)
 
 
 def leaps(points_mm: Array, count: int) -> Index:
-    """Indices of points whose next one lies farther off than places do of which `count` make up the way."""
+    """Indices of points farther from the next one than twice 1 / `count` of the whole distance."""
     step = np.sqrt((np.diff(points_mm, axis=0) ** 2).sum(axis=1))
     return np.flatnonzero(step > 2.0 * step.sum() / count)
 
 
-def _between(at: Array, index: Array, s: Array, gaps: Index) -> Array:
-    """Arc lengths at indices `at` between those of places; up to a gap they stay, and leap there."""
+def _between(query: Array, index: Array, s: Array, gaps: Index) -> Array:
+    """Arc lengths at indices `query`, interpolated between `index`; constant up to gaps, with jumps there."""
     if len(gaps):
         before = np.clip(np.searchsorted(index, gaps, side="right") - 1, 0, len(s) - 1)
         after = np.clip(before + 1, 0, len(s) - 1)
@@ -94,7 +99,7 @@ def _between(at: Array, index: Array, s: Array, gaps: Index) -> Array:
         s = np.concatenate((s, s[before], s[after]))
         order = np.argsort(index, kind="stable")
         index, s = index[order], s[order]
-    return np.interp(at, index, s)
+    return np.interp(query, index, s)
 
 
 def _means(points: Array, edges: Index) -> Array:
@@ -104,8 +109,8 @@ def _means(points: Array, edges: Index) -> Array:
 def coarse(
     path: Path, points_mm: Array, count: int = COARSE, far: float = np.inf
 ) -> tuple[Array, Array, Array, float]:
-    """Thinned points (L, 3), the index and the arc length of each (L,), and the cost of their way; `far` is
-    the share of the size of the path beyond which a point is no part of it."""
+    """Thinned points (L, 3), the index and the arc length of each (L,), and the cost of their match; `far` is
+    the share of the size of the path beyond which a point is not on it."""
     few, index = thinned(points_mm, count)
     s = np.linspace(0.0, path.length_mm, count)
     near, cost = whole(few, path.at(s)[0], far * float(np.linalg.norm(np.ptp(path.vertex_mm, axis=0))))
@@ -113,7 +118,7 @@ def coarse(
 
 
 def _in_order(path: Path, points: Array) -> tuple[Array, float]:
-    """Arc length (m,) of the node of each point, and the distance of nodes: level by level."""
+    """Arc length (m,) of the node of each point, and the distance between nodes: level by level."""
     m = len(points)
     _, index, s, _ = coarse(path, points, far=FAR)
     finest = int(np.clip(max(len(path), m), COARSE, min(max(4 * m, COARSE), _MOST)))
@@ -123,18 +128,18 @@ def _in_order(path: Path, points: Array) -> tuple[Array, float]:
         finer = min(_FINER, max(finest / count, 1.0))
         count = max(int(count * finer), count)
         last = count >= finest
-        few, at = (points, np.arange(m, dtype=float)) if last else thinned(points, count)
+        few, few_index = (points, np.arange(m, dtype=float)) if last else thinned(points, count)
         nodes_s = np.linspace(0.0, path.length_mm, count)
-        middle = np.rint(_between(at, index, s, gaps) / path.length_mm * (count - 1)).astype(np.int64)
+        middle = np.rint(_between(few_index, index, s, gaps) / path.length_mm * (count - 1)).astype(np.int64)
         near = banded(few, path.at(nodes_s)[0], middle, int(2 * _HALF * finer) + 16)
-        index, s = at, nodes_s[near]
+        index, s = few_index, nodes_s[near]
         if last:
             break
     return _between(np.arange(m, dtype=float), index, s, gaps), path.length_mm / (count - 1)
 
 
 def _project(path: Path, points: Array, s: Array, step: float) -> Pairing:
-    """The nearest place of the path within 1.5 nodes of arc length `s`."""
+    """The nearest position on the path within 1.5 nodes of arc length `s`."""
     m = len(points)
     segment, foot = np.empty(m, np.int64), np.empty((m, 3))
     square, share = np.full(m, np.inf), np.empty(m)
@@ -148,15 +153,15 @@ def _project(path: Path, points: Array, s: Array, step: float) -> Pairing:
         for side in (1, -1):
             _walk(path, points, np.arange(a, b), side, segment, foot, square, share)
     distance = np.sqrt(square)
-    at = path.s_mm[segment] + share * (path.s_mm[segment + 1] - path.s_mm[segment])
-    return Pairing(segment, foot, distance, at, _beyond(path, segment, share, distance), np.zeros(m, bool))
+    s_mm = path.s_mm[segment] + share * (path.s_mm[segment + 1] - path.s_mm[segment])
+    return Pairing(segment, foot, distance, s_mm, _beyond(path, segment, share, distance), np.zeros(m, bool))
 
 
 def _nearer(
     path: Path, points: Array, candidate: Index, rows: Index, segment: Index, foot: Array, square: Array,
     share: Array,
 ) -> None:  # fmt: skip
-    """Take a candidate segment for each of `rows` where it is nearer than what is known."""
+    """Take a candidate segment for each of `rows` where it is nearer than the best so far."""
     start = path.vertex_mm[candidate]
     along = path.vertex_mm[candidate + 1] - start
     part = np.einsum("ij,ij->i", points[rows] - start, along) / np.einsum("ij,ij->i", along, along)
@@ -180,7 +185,7 @@ def _walk(
     square: Array,
     share: Array,
 ) -> None:
-    """Go on along the path as long as it comes nearer: noise may hold the order off by some nodes."""
+    """Go on along the path while it comes nearer: by noise the order may be off by some nodes."""
     for _ in range(_STEPS):
         rows = rows[share[rows] == (1.0 if side > 0 else 0.0)]
         rows = rows[(segment[rows] + side >= 0) & (segment[rows] + side < len(path))]
@@ -192,14 +197,14 @@ def _walk(
 
 
 def _beyond(path: Path, segment: Index, share: Array, distance: Array) -> Mask:
-    """Points off an end of the path by more than what is usual across it."""
+    """Points farther from an end of the path than is usual across it."""
     end = ((segment == 0) & (share == 0.0)) | ((segment == len(path) - 1) & (share == 1.0))
     usual = float(np.median(distance[~end])) if (~end).any() else 0.0
     return np.asarray(end & (distance > 3.0 * usual + 1e-9), bool)
 
 
 def _free(path: Path, points: Array) -> Pairing:
-    """The nearest place of the whole path, and whether another pass is as near."""
+    """The nearest position on the whole path, and whether another pass is equally near."""
     from scipy.spatial import cKDTree
 
     m = len(points)

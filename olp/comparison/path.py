@@ -9,7 +9,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 
-#: Segments this much steeper than level have no left and right; X stands in for the vertical there.
+#: Above this share of Z in its direction, a segment counts as upright: it has no left and right.
 _UPRIGHT = 0.999
 
 
@@ -26,9 +26,9 @@ class Path:
 
     @staticmethod
     def through(points_mm: Array, line: Index | None = None, cutting: Mask | None = None) -> Path:
-        """A path through points (n, 3); `line` and `cutting` (n,) are those of the segment that ends there.
+        """A path through points (n, 3); `line` and `cutting` (n,) belong to the segment that ends there.
 
-        Repeated points are merged. Raises CannotCompute where fewer than two places are left.
+        Repeated points are merged. Raises CannotCompute for fewer than two different points.
         """
         points = np.asarray(points_mm, float)
         line = np.arange(1, len(points) + 1) if line is None else np.asarray(line, np.int64)
@@ -38,7 +38,7 @@ class Path:
         points, line, cutting = points[kept], line[kept], cutting[kept]
         if len(points) < 2:
             raise CannotCompute(
-                "the nominal path has fewer than two places; there is no path to compare with"
+                "the nominal path has fewer than two different points, so there is nothing to compare with"
             )
         s = np.append(0.0, np.cumsum(length[length > 0.0]))
         return Path(points, line[1:], cutting[1:], s)
@@ -52,7 +52,7 @@ class Path:
         return float(self.s_mm[-1])
 
     def reversed(self) -> Path:
-        """The same path gone through backwards."""
+        """The same path in the opposite direction."""
         return Path(
             self.vertex_mm[::-1].copy(), self.line[::-1].copy(), self.cutting[::-1].copy(),
             self.s_mm[-1] - self.s_mm[::-1],

@@ -15,6 +15,7 @@ from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import Flag
 
+#: (3, 3) axes of each plane: first, second, third.
 _AXES = np.array(PLANES)
 
 
@@ -57,7 +58,7 @@ class ArcRows:
 
 def solve(writer: Writer, rows: Rows) -> ArcRows:
     """The corrected arcs among rows, with their centres from the emitted end points and the bent path between
-    them. Raises ProgramError where the last digit decides what an arc is."""
+    them. Raises ProgramError where the last digit decides whether an arc is a whole circle."""
     path, plan = writer.path, writer.plan
     arc_row = np.flatnonzero(rows.arc & ~rows.take_up & ((rows.flag & np.uint8(Flag.PASS)) == 0))
     move = rows.move[arc_row]
@@ -115,7 +116,7 @@ def _check_sweep(
     plane: npt.NDArray[np.int8],
     line: npt.NDArray[np.int32],
 ) -> None:
-    """A tiny arc must not turn into a whole circle, nor the other way round, by rounding."""
+    """Raise ProgramError where rounding makes a tiny arc a whole circle, or a whole circle a tiny arc."""
     (x0, y0), (x1, y1) = arms(start, centre, plane), arms(end, centre, plane)
     a0, a1 = np.arctan2(y0, x0), np.arctan2(y1, x1)
     turn = np.where(sweep > 0, a1 - a0, a0 - a1) % (2 * np.pi)
@@ -127,7 +128,7 @@ def _check_sweep(
     bad = np.flatnonzero((off > 1.0) | (flipped & (np.minimum(np.abs(sweep), turn) < 0.1)))
     if bad.size:
         raise ProgramError(
-            "an arc is so short that the last digit decides whether it is a whole circle; let the machine "
-            "take more digits (least_increment_mm), or write this arc as a line",
+            "the last digit decides whether this short arc is a whole circle; state more digits "
+            "(least_increment_mm) if the control takes them, or write this arc as a line",
             line=int(line[bad[0]]),
         )

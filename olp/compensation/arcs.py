@@ -1,7 +1,7 @@
 """Arcs stay arcs: a circular or helical move is commanded as an arc wherever one fits the bent path.
 
-The corrected path of an arc is sampled; through its end points the circle that leaves the samples least is
-found by least squares; where it leaves them by more than the tolerance the piece is halved.
+The corrected path of an arc is sampled. Least squares finds the circle through its end points that leaves the
+samples least. Where it leaves them by more than the tolerance, the piece is divided.
 """
 
 from __future__ import annotations
@@ -24,10 +24,13 @@ from olp.errormodel.sampling import steps_needed
 
 #: a centre is moved by a millimetre only to gain a micrometre of fit
 _STIFFNESS = 1e-3
+#: rounds of division, at most
 _DEEPEST = 14
-#: arcs beyond this sweep are not held to equal radii at both ends
+#: rad; arcs beyond this sweep need not have equal radii at both ends
 WIDE = 0.95 * np.pi
+#: samples at a time, so that memory is small
 _BATCH = 1 << 16
+#: (3, 3) axes of each plane: first, second, third
 _AXES = np.array(PLANES)
 
 
@@ -82,12 +85,13 @@ def subdivide_arcs(
             departure[part] = fit_pieces(path, model, target, pieces.pick(part), tools, count)
         good = departure <= tolerance
         done.append(pieces.pick(good))
-        # what an arc cannot follow goes with about the third power of its length
+        # the departure of an arc goes with about the third power of its length
         parts = np.clip(np.ceil((departure[~good] / tolerance) ** (1 / 3) * 1.05), 2, 16)
         pieces = _divided(pieces.pick(~good), parts.astype(np.int64))
     if len(pieces):
         raise CannotCompute(
-            "an arc cannot be followed within the tolerance by any number of arcs; raise --tolerance-um",
+            f"no division of this arc into up to 16 to the power {_DEEPEST} arcs meets the tolerance; "
+            "raise --tolerance-um",
             line=int(path.line[arcs.move[pieces.arc[0]]]),
         )
     arc = np.concatenate([p.arc for p in done])
@@ -206,7 +210,7 @@ def _inside(play: Array) -> Array:
 def fit_pieces(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, count: int
 ) -> Array:
-    """(n,) how far the best arc leaves the bent path of each piece, in mm, looked at in `count` steps."""
+    """(n,) how far the best arc leaves the bent path of each piece, in mm, sampled at `count` steps."""
     bend = sampled(path, model, target, pieces, tools, count)
     sweep = path.arcs.sweep_rad[pieces.arc] * (pieces.end - pieces.begin)
     plane = path.arcs.plane[pieces.arc]
@@ -222,8 +226,8 @@ def fit(
     (n,).
 
     Least squares on the radial distance; the radius goes linearly from one end to the other. The nominal
-    difference of the radii (mostly none) is asked for strongly, but not where the short chord of more than
-    half a circle would swing its far side.
+    difference of the radii (mostly 0) has a large weight. The weight is small for more than half a circle,
+    where a short chord would swing the far side.
     """
     command, share = bend.command, bend.share
     rows = np.arange(len(command))
@@ -231,8 +235,8 @@ def fit(
     q0, q1, q2 = (np.take_along_axis(command, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in range(3))
     s0, s1, s2 = (start[rows, axes[:, i]][:, None] for i in range(3))
     e0, e1, e2 = (end[rows, axes[:, i]][:, None] for i in range(3))
-    out = bend.centre + (command[:, 0] - bend.point[:, 0] + command[:, -1] - bend.point[:, -1]) / 2
-    x, y = out[rows, axes[:, 0]][:, None], out[rows, axes[:, 1]][:, None]
+    centre = bend.centre + (command[:, 0] - bend.point[:, 0] + command[:, -1] - bend.point[:, -1]) / 2
+    x, y = centre[rows, axes[:, 0]][:, None], centre[rows, axes[:, 1]][:, None]
     x_start, y_start = x, y
     strong = np.where(np.abs(sweep) > WIDE, 1.0, 100.0)[:, None]
     mismatch = bend.mismatch[:, None]
@@ -261,8 +265,8 @@ def fit(
     reached = (angle + 2 * np.pi * np.rint((share * turn - angle) / (2 * np.pi))) / turn
     radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * reached)
     level = (q2 - (s2 + (e2 - s2) * reached)) * rs / np.hypot(rs, (e2 - s2) / turn)
-    out[rows, axes[:, 0]], out[rows, axes[:, 1]] = x[:, 0], y[:, 0]
-    return out, np.hypot(radial, level).max(axis=1)
+    centre[rows, axes[:, 0]], centre[rows, axes[:, 1]] = x[:, 0], y[:, 0]
+    return centre, np.hypot(radial, level).max(axis=1)
 
 
 def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask, band: float) -> Pieces:

@@ -12,6 +12,7 @@ from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
 from olp.program.text.edits import EditList, Edits
 
+#: (3, 3) axes of each plane: first, second, third.
 _AXES = np.array(PLANES)
 
 
@@ -29,7 +30,7 @@ def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
 
 
 def _is_plain(writer: Writer, rows: Rows, arcs: ArcRows) -> Mask:
-    """Arcs whose block keeps both its centre words, from the start: nearly all there are."""
+    """Arcs that keep their block and both its centre words: nearly all arcs."""
     index = np.searchsorted(writer.path.arcs.move, arcs.move)
     slots = writer.program.arc_slots.word[index]
     lone = np.arange(len(arcs.row))
@@ -47,7 +48,7 @@ def _plain_words(writer: Writer, arcs: ArcRows) -> list[Edits]:
     words, style = writer.words, writer.style
     index = np.searchsorted(writer.path.arcs.move, arcs.move)
     unit = writer.frame_unit_mm[writer.path.frame[arcs.move]]
-    out = []
+    edits = []
     for k in (0, 1):
         for axis in range(3):
             mine = np.flatnonzero(_AXES[arcs.plane][:, k] == axis)
@@ -61,14 +62,14 @@ def _plain_words(writer: Writer, arcs: ArcRows) -> list[Edits]:
             mantissa = np.rint(away * 10.0**decimals).astype(np.int64)
             new = np.flatnonzero(mantissa != words.mantissa[slot] * 10 ** (decimals - own))
             zero = np.zeros(len(new), np.int32)
-            out.append(
+            edits.append(
                 Edits(
                     words.number[slot[new]].astype(np.int64), words.end[slot[new]].astype(np.int64),
                     mantissa[new], decimals[new].astype(np.int8), zero, zero,
                 )
             )  # fmt: skip
             writer.tally.changed_words += len(new)
-    return out
+    return edits
 
 
 def _centre_words(
@@ -77,13 +78,13 @@ def _centre_words(
     """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own`
     words."""
     frame = writer.frame_of(arc.move)
-    out = []
+    words = []
     for axis in PLANES[arc.plane][:2]:
         base = frame.offset_mm[axis] if absolute else arc.start[axis]
         decimals = max(writer.style.centre(axis, frame.unit_mm), own.get(axis, 0))
         mantissa = round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
-        out.append((axis, mantissa, decimals))
-    return out
+        words.append((axis, mantissa, decimals))
+    return words
 
 
 def _head(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
@@ -121,7 +122,7 @@ def _turns(arc: Arc) -> int:
 
 
 def _radius_word(writer: Writer, arc: Arc, slot: int, edits: EditList) -> None:
-    """R of the corrected arc; where R cannot say it well (near half circles), I, J, K in its place."""
+    """R of the corrected arc; where R is too coarse (near half circles), I, J, K in its place."""
     words, style = writer.words, writer.style
     first, second, _ = PLANES[arc.plane]
     unit = writer.frame_of(arc.move).unit_mm
@@ -157,8 +158,7 @@ def _radius_word(writer: Writer, arc: Arc, slot: int, edits: EditList) -> None:
 
 
 def _tail(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
-    """A later part: a block of its own with both end points, the third axis where it moves, and the
-    centre."""
+    """A later part: a new block with both end words, the third axis where it moves, and the centre."""
     place = int(writer.program.line_end[arc.line - 1])
     index = int(np.searchsorted(writer.path.arcs.move, arc.move))
     absolute = bool(writer.program.arc_slots.absolute[index])
@@ -180,7 +180,7 @@ def _tail(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
 
 
 def _number(writer: Writer, rows: Rows, row: int, axis: int) -> tuple[int, int]:
-    """Mantissa and decimals that say where the axis is after a row, whether or not it changes."""
+    """Mantissa and decimals of the position of an axis after a row, whether or not it changes."""
     if rows.write[row, axis] or rows.flag[row] & np.uint8(Flag.INCREMENTAL):
         return int(rows.mantissa[row, axis]), int(rows.decimals[row, axis])
     frame = writer.frame_of(int(rows.move[row]))

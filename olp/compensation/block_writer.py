@@ -18,6 +18,7 @@ from olp.core.arrays import Index, Mask
 from olp.core.toolpath import Flag
 from olp.program.text.edits import EditList, Edits
 
+#: Moves whose words are not those of their end point.
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
 
 
@@ -42,7 +43,7 @@ class BlockWriter(Writer):
         return self._spliced(edits, begin, end)
 
     def _breaks(self, rows: Rows) -> list[int]:
-        """Where the way of counting changes: G90 and G91, units, canned cycles."""
+        """Rows at which the meaning of words changes: G90 and G91, units, canned cycles."""
         key = (rows.flag & np.uint8(Flag.INCREMENTAL | Flag.CYCLE)).astype(np.int64)
         key += (self.frame_unit_mm[self.path.frame[rows.move]] > 2) * 256
         cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
@@ -60,12 +61,12 @@ class BlockWriter(Writer):
         unit = self.frame_unit_mm[frame[:1]] if one else self.frame_unit_mm[frame]
         control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
         offset = self.frame_offset_mm[frame[0]] if one else self.frame_offset_mm[frame]
-        out = []
+        columns = []
         for axis in range(3):
             nominal = path.end_mm[rows.move, axis]
             slot = np.where(rows.head, self.program.slot[rows.move, axis], -1)
             given = slot >= 0
-            out.append(
+            columns.append(
                 AxisRows(
                     command=self.plan.command_mm[part, axis],
                     nominal=nominal,
@@ -78,10 +79,10 @@ class BlockWriter(Writer):
                     unit=1.0,
                 )
             )
-        return out
+        return columns
 
     def _digits(self, rows: Rows, columns: list[AxisRows], a: int, b: int) -> None:
-        """Digits of rows a..b, which all count the same way."""
+        """Digits of rows a..b, which are all G90 or all G91 and have one unit."""
         unit = float(self.frame_unit_mm[self.path.frame[rows.move[a]]])
         counting = bool(rows.flag[a] & np.uint8(Flag.INCREMENTAL))
         for axis, column in enumerate(columns):
@@ -132,7 +133,7 @@ class BlockWriter(Writer):
     def _word_edits(self, rows: Rows) -> list[Edits]:
         """Replaced and inserted axis words of the blocks that are there, and inserted blocks."""
         program, words = self.program, self.words
-        out: list[Edits] = []
+        edits: list[Edits] = []
         head = np.flatnonzero(rows.head & ((rows.flag & _BYPASS) == 0))
         slot = program.slot[rows.move[head]]
         write = rows.write[head]
@@ -140,7 +141,7 @@ class BlockWriter(Writer):
             mine = slot[:, axis]
             replace = np.flatnonzero(write[:, axis] & (mine >= 0))
             index = mine[replace]
-            out.append(
+            edits.append(
                 Edits(
                     words.number[index].astype(np.int64),
                     words.end[index].astype(np.int64),
@@ -152,13 +153,13 @@ class BlockWriter(Writer):
             )
             self.tally.changed_words += len(replace)
         missing = write & (slot < 0)
-        at = np.flatnonzero(missing.any(axis=1))
-        if at.size:
-            out += self._insertions(rows, head[at], slot[at], missing[at])
+        incomplete = np.flatnonzero(missing.any(axis=1))
+        if incomplete.size:
+            edits += self._insertions(rows, head[incomplete], slot[incomplete], missing[incomplete])
         tails = np.flatnonzero(~rows.head & ((rows.flag & _BYPASS) == 0))
         if tails.size:
-            out += block_edits(self, rows, tails)
-        return out
+            edits += block_edits(self, rows, tails)
+        return edits
 
     def _insertions(self, rows: Rows, row: Index, slot: npt.NDArray[np.int32], missing: Mask) -> list[Edits]:
         """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
@@ -172,21 +173,21 @@ class BlockWriter(Writer):
             last[i] = self.style.last_word(line)
             place[i] = words.end[last[i]]
         style = self.style.separators(last, self.program)
-        out = []
+        edits = []
         for axis in range(3):
             for which in np.unique(style[missing[:, axis]]).tolist():
                 chosen = np.flatnonzero(missing[:, axis] & (style == which))
                 prefix = self.prefixes(self.style.separator(which, axis))
                 count = len(chosen)
                 order = np.full(count, axis + 1, np.int32)
-                out.append(
+                edits.append(
                     Edits(
                         place[chosen], place[chosen], rows.mantissa[row[chosen], axis],
                         rows.decimals[row[chosen], axis], np.full(count, prefix, np.int32), order,
                     )
                 )  # fmt: skip
                 self.tally.inserted_words += count
-        return out
+        return edits
 
     def _captures(self, rows: Rows) -> list[Edits]:
         """Words that store the present position (G92, G10 L20) move with the correction of that position."""

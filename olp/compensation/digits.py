@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 
-#: powers of ten up to the digits of a mantissa, as doubles and as integers
+#: powers of ten up to the digits of a mantissa, as doubles
 POW10 = 10.0 ** np.arange(19)
+#: the same as integers
 INT10 = 10 ** np.arange(19, dtype=np.int64)
 #: relative slack when a command is compared with half a digit
 _SLACK = 1 + 1e-9
@@ -24,7 +25,7 @@ _SLACK = 1 + 1e-9
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisRows:
     """One axis of consecutive rows. `command` (n,) mm, NaN where unknown; `nominal` what the program says;
-    `word` the number as written in `decimals` digits (`given` where there is one, `raw` where it stays).
+    `word` the number as written in `decimals` digits (`given` where there is one, `raw` where it is kept).
     `offset` mm and `unit` mm lead from words to positions; `reset` rows make the axis unknown or take
     `nominal` as a position of the machine."""
 
@@ -66,7 +67,7 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
     order = np.arange(count)
     fix = rows.given & ~rows.raw
     decimals = np.where(rows.given, np.maximum(rows.decimals, least), usual)
-    # one number of digits all through is the common case, and the cheap one
+    # mostly all words have the same number of digits, which is cheap
     same_all = count > 0 and bool((decimals == decimals[0]).all())
     scale = POW10[decimals[:1]] if same_all else POW10[decimals]
     with np.errstate(invalid="ignore"):
@@ -122,21 +123,21 @@ def _incremental_raw(
     emitted = np.zeros(count)
     mantissa = np.zeros(count, np.int64)
     write = np.zeros(count, bool)
-    at, base, steps = before, before, 0
+    position, base, steps = before, before, 0
     for i in range(count):
-        if known[i] and at == at:
+        if known[i] and position == position:
             if base != base:
-                base, steps = at, 0
+                base, steps = position, 0
             new = round((rows.command[i] - base) / unit * 10.0**grid)
             mantissa[i] = new - steps
             write[i] = mantissa[i] != own[i] if rows.given[i] else mantissa[i] != 0
             steps = new
-            at = base + steps / 10.0**grid * unit
+            position = base + steps / 10.0**grid * unit
         else:
             if rows.reset[i]:
-                at = float(rows.nominal[i])
+                position = float(rows.nominal[i])
             elif rows.given[i]:
-                at += float(rows.word[i]) / 10.0 ** int(rows.decimals[i]) * unit
+                position += float(rows.word[i]) / 10.0 ** int(rows.decimals[i]) * unit
             base = float("nan")
-        emitted[i] = at
+        emitted[i] = position
     return Digits(emitted, mantissa, np.full(count, grid, np.int8), write)

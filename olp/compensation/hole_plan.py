@@ -21,8 +21,8 @@ from olp.program.program import Hole, Program
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HolePlan:
-    """(h, 3) commands at the R level and at the bottom of each hole, and how far its stroke leans (h,), in
-    mm."""
+    """(h, 3) commands at the R level and at the bottom of each hole, and how far its stroke leans, (h,);
+    all in mm."""
 
     holes: tuple[Hole, ...]
     level_mm: Array

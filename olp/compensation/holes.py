@@ -26,7 +26,7 @@ class HoleWords:
     def edits(self, writer: Writer, rows: Rows, a: int, b: int) -> list[Edits]:
         """Edits of the cycle block whose moves are rows a..b, and the positions after it.
 
-        Repeats of a block in G91 share its words but not their corrections: they are written out, one block a
+        Repeats of a block in G91 share its words but not their corrections: they are unrolled, one block per
         hole.
         """
         holes = writer.program.holes
@@ -91,8 +91,7 @@ class HoleWords:
 
 
 class _Words:
-    """Where a hole's words go: into its block, or, for the later repeats in G91, into a block of their
-    own."""
+    """Where a hole's words go: into its block or, for the later repeats in G91, into a new block."""
 
     def __init__(self, writer: Writer, hole: Hole, unit_mm: float, edits: EditList) -> None:
         self.writer, self.hole, self.unit_mm, self.edits = writer, hole, unit_mm, edits

@@ -1,6 +1,6 @@
 """Inserted blocks: the later parts of subdivided moves, and words of the old block that change with them.
 
-Each part is a line of its own behind the block, or in front of it to take up backlash before an arc.
+Each part is a new line behind the block, or in front of it to take up backlash before an arc.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ def _leads(writer: Writer, line_no: npt.NDArray[np.int32], turning: Mask, before
 def _check_take_up(writer: Writer, rows: Rows, row: int) -> None:
     if rows.flag[row] & np.uint8(Flag.INVERSE_TIME):
         raise ProgramError(
-            "an arc in G93 needs a step that takes up lost motion before it, which has no time of its "
-            "own; program the arc in G94",
+            "before this arc in G93 a step has to take up backlash, and G93 gives no time for it; program "
+            "the arc in G94",
             line=int(writer.path.line[rows.move[row]]),
         )
 
@@ -121,7 +121,7 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> 
         line = int(writer.path.line[move])
         index = writer.style.word(line, "F")
         if index is None:
-            raise ProgramError("a block in G93 needs its own F word", line=line)
+            raise ProgramError("this block in G93 has no F word; expected one in every block", line=line)
         value = float(writer.words.mantissa[index]) / 10.0 ** int(writer.words.decimals[index])
         reach = writer.plan.reach[rows.first + part]
         share = np.maximum(np.diff(reach, prepend=0.0), 1e-6)

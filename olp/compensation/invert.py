@@ -8,14 +8,15 @@ from olp.core.arrays import Array
 from olp.core.errors import NotInvertible
 from olp.errormodel.base import ErrorModel
 
-#: A command is good when its error differs from the one it was made with by less than this.
+#: mm; a command is good when the error there differs by less from the error with which it was computed.
 TOLERANCE_MM = 1e-9
+#: Steps of the iteration, at most.
 _ITERATIONS = 30
-#: errors up to this grow by less than a part in a thousand of themselves over their own length
+#: mm; smaller errors change by less than a thousandth of themselves over their own length.
 _SMALL_MM = 0.15
-#: Rate of growth of the error that is allowed for in any case.
+#: mm per mm; rate of growth of the error that is assumed at the least.
 _LEAST_RATE = 0.01
-#: Points at a time: the columns of one block stay in the second-level cache.
+#: Points at a time: the columns of one block fit in the second-level cache.
 BLOCK = 1 << 14
 
 
@@ -51,7 +52,7 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
         else:
             raise NotInvertible(
                 f"the error model cannot be inverted to {TOLERANCE_MM:g} mm: its errors grow as fast as the "
-                f"position (the last step was {change:.3g} mm)"
+                f"position (the last step was {change:.3g} mm); check the values of the calibration"
             )
         command[part] = guess
     return command

@@ -1,8 +1,8 @@
-"""Subdivision of straight moves: the fewest chords whose actual path stays at the nominal line.
+"""Subdivision of straight moves: the fewest chords whose actual path follows the nominal line.
 
-Between two corrected points the tip follows the line plus what the error departs from its own chord.
+Between two corrected points the tip follows the line plus the departure of the error from its own chord.
 Only the part across the line counts: along it the tip is early or late, but on the path. Moves that the
-model's bound clears are never sampled; the others are sampled finely, and cut greedily, each chord as
+model's bound clears are never sampled. The others are sampled finely and cut greedily: each chord is as
 long as it can be.
 """
 
@@ -20,12 +20,16 @@ Cuts = tuple[Index, Array, Array]
 
 #: between two samples the error bends by less than this share of the tolerance
 _SAMPLE_SHARE = 0.04
-#: chords may end at this many places from one sample to the next, where the error is as good as straight
+#: chords may end at so many positions per sample; between samples the error is practically straight
 _FINE = 4
-#: a chord is as long as it can be but for this part of it
+#: the search ends within 1/32 of the length of the longest chord
 _CLOSE = 32
+#: samples at a time, so that memory is small
 _BATCH = 1 << 17
-_FEW, _ALL = 16, 1 << 30
+#: samples of a chord that the search tests, at most
+_FEW = 16
+#: all samples of a chord
+_ALL = 1 << 30
 
 
 def no_cuts() -> Cuts:
@@ -37,7 +41,7 @@ def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask
     by more than `tolerance` mm."""
     tools = path.tool_mm()
     clear = clear_length_mm(model, path.tools_mm(), tolerance)
-    found: list[tuple[Index, Array, Array]] = []
+    bending: list[tuple[Index, Array, Array]] = []
     block = 1 << 16
     for a in range(0, len(path), block):
         b = min(a + block, len(path))
@@ -50,28 +54,28 @@ def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask
         bound = model.chord_bound(delta[long], tools if tools.ndim == 1 else tools[a + long])
         long = long[bound > tolerance]
         if long.size:
-            found.append((a + long, start[long], delta[long]))
-    if not found:
+            bending.append((a + long, start[long], delta[long]))
+    if not bending:
         return no_cuts()
-    move, start, delta = (np.concatenate([f[i] for f in found]) for i in range(3))
+    move, start, delta = (np.concatenate([f[i] for f in bending]) for i in range(3))
     return _cut(model, move, start, delta, tools if tools.ndim == 1 else tools[move], tolerance)
 
 
 def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, tolerance: float) -> Cuts:
     count = steps_needed(model, delta, tool, _SAMPLE_SHARE * tolerance, at_least=8)
     parts: list[Cuts] = []
-    at = 0
+    begin = 0
     totals = np.cumsum(count + 1)
-    while at < len(move):
-        stop = max(int(np.searchsorted(totals, (totals[at - 1] if at else 0) + _BATCH)), at + 1)
-        pick = slice(at, stop)
+    while begin < len(move):
+        stop = max(int(np.searchsorted(totals, (totals[begin - 1] if begin else 0) + _BATCH)), begin + 1)
+        pick = slice(begin, stop)
         parts.append(
             _cut_batch(
                 model, move[pick], start[pick], delta[pick], tool if tool.ndim == 1 else tool[pick],
                 count[pick], tolerance,
             )
         )  # fmt: skip
-        at = stop
+        begin = stop
     return (
         np.concatenate([p[0] for p in parts]),
         np.concatenate([p[1] for p in parts]),
@@ -100,7 +104,7 @@ def _cut_batch(
     stride = last.copy()
     while active.size:
         reach = _longest(across, first[active], begin[active], last[active], stride[active], tolerance, _FEW)
-        # the search looks at few samples of a long chord; what it found is tested at all of them
+        # the search tests few samples of a long chord; its result is tested at all of them
         wrong = np.flatnonzero(~_fits(across, first[active], begin[active], reach, tolerance, _ALL))
         if wrong.size:
             again = active[wrong]
@@ -120,7 +124,7 @@ def _cut_batch(
 def _longest(
     across: Array, first: Index, begin: Index, last: Index, stride: Index, tolerance: float, most: int
 ) -> Index:
-    """For each move the farthest place that one chord from `begin` reaches: gallop, then bisect, to 3 % of
+    """For each move the farthest position that one chord from `begin` reaches: gallop, then bisect, to 3 % of
     the chord."""
     good = begin + 1
     bad = last + 1
@@ -143,7 +147,7 @@ def _longest(
 
 
 def _fits(across: Array, first: Index, begin: Index, end: Index, tolerance: float, most: int) -> Mask:
-    """Whether the samples between the places `begin` and `end`, `most` of them at the most, stay within
+    """Whether the samples between the positions `begin` and `end`, at most `most` of them, are within
     tolerance of their chord."""
     fits = np.ones(len(begin), bool)
     low = begin // _FINE + 1
@@ -169,8 +173,8 @@ def _fits(across: Array, first: Index, begin: Index, end: Index, tolerance: floa
 
 
 def _between(values: Array, first: Index, place: Index) -> Array:
-    """Samples at places, linear between two of them."""
-    at = first + place // _FINE
+    """Values at positions, linear between two samples."""
+    sample = first + place // _FINE
     part = place % _FINE
-    out: Array = values[at] + (values[at + (part > 0)] - values[at]) * (part / _FINE)
-    return out
+    interpolated: Array = values[sample] + (values[sample + (part > 0)] - values[sample]) * (part / _FINE)
+    return interpolated

@@ -1,6 +1,6 @@
 """The plan of a correction: where every move is commanded, one or more rows per move.
 
-Knows nothing of text. `planning` makes it, the writers put it into the text of a program.
+A plan holds no text. `planning` makes it, and the writers put it into the text of a program.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class Plan:
     what the program says; (r,) `reach`, the share of the move that ends at the row; (r,) `take_up`: the
     row only takes up backlash.
 
-    `passed` are the moves left uncorrected for want of a position, `shift_mm` (frames, 3) what each
-    frame's touch-off holds.
+    `uncorrected` are moves that are left as they are for want of a position, `shift_mm` (frames, 3) the
+    error that the touch-off of each frame holds.
     """
 
     move: npt.NDArray[np.int32]
@@ -46,7 +46,7 @@ class Plan:
     raw: Mask
     reach: Array
     take_up: Mask
-    passed: Index
+    uncorrected: Index
     shift_mm: Array
     play: Array | None
 
@@ -57,7 +57,7 @@ class Plan:
 def zero_shifts(frames: tuple[Frame, ...], model: ErrorModel) -> Array:
     """(frames, 3): where the part really lies from where the offset says, per frame.
 
-    A point touched off on the uncompensated machine at axis position c0 is at c0 + e(c0), and stays there.
+    A point touched off on the uncompensated machine at axis position c0 is at c0 + e(c0), and remains there.
     """
     shifts = np.zeros((len(frames), 3))
     for i, frame in enumerate(frames):
@@ -69,7 +69,7 @@ def zero_shifts(frames: tuple[Frame, ...], model: ErrorModel) -> Array:
 
 
 def targets(path: Toolpath, shift_mm: Array) -> Array:
-    """(n, 3) where the tip has to be at the end of each move; a move of the control's own has none."""
+    """(n, 3) where the tip has to be at the end of each move; a move that the control adds has no target."""
     if not shift_mm.any():
         return path.end_mm
     vectors: list[Vector] = [(float(s[0]), float(s[1]), float(s[2])) for s in shift_mm]

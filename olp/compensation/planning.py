@@ -18,15 +18,16 @@ from olp.core.errors import OutsideBox, ProgramError
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 
-#: share of the tolerance that chords may use; the rest is for the search's own steps
+#: share of the tolerance that chords may use; the search's own steps need the other 5 %
 CHORD_SHARE = 0.95
 #: an arc through rounded ends with a rounded centre strays by about this much more of the last digit than
 #: a line
 ARC_DIGIT_SHARE = 0.6
-#: share that an axis with backlash may stay behind instead of turning round
+#: share of the tolerance by which an axis with backlash may lag instead of turning round
 DEAD_BAND_SHARE = 0.25
-
+#: moves that are left as they are
 _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: moves that are never split
 _UNSPLIT = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE)
 
 
@@ -35,7 +36,7 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     NotInvertible."""
     shift = zero_shifts(path.frames, model) if path.frames else np.zeros((0, 3))
     target = targets(path, shift)
-    raw, passed = _untouched(path, model)
+    raw, uncorrected = _untouched(path, model)
     command = _waypoints(path, model, target, raw)
     reversal = Reversal.of(model, limits.tolerance_mm * DEAD_BAND_SHARE)
     chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
@@ -48,7 +49,7 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
     cuts_arc = subdivide_arcs(path, model, target, raw, chord_arc, turning, band)
     rows = _expand(
-        path, target, command, raw, passed, shift, [cuts_line, cuts_arc], model, reversal is not None
+        path, target, command, raw, uncorrected, shift, [cuts_line, cuts_arc], model, reversal is not None
     )
     if reversal is not None:
         rows = carry_play(path, model, rows, reversal, insert=limits.insert)
@@ -58,11 +59,12 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
 
 
 def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
-    """(n, 3) axes that keep what the program says, and the moves left uncorrected as an axis is unknown."""
+    """(n, 3) axes that keep the program's words, and the moves left uncorrected because an axis is
+    unknown."""
     raw = np.zeros((len(path), 3), bool)
     raw[(path.flag & _UNTOUCHED) != 0] = True
     unknown = np.isnan(path.end_mm)
-    passed = np.zeros(0, np.int64)
+    uncorrected = np.zeros(0, np.int64)
     some = np.flatnonzero(unknown.any(axis=1))
     if some.size:
         blind = np.any(unknown[some][:, None, :] & model.depends_on[None], axis=2)
@@ -76,19 +78,19 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
             i = int(cutting[0])
             axes = " and ".join("XYZ"[a] for a in np.flatnonzero(unknown[i]))
             raise ProgramError(
-                f"a feed move needs the position of {axes} for its correction, but nothing has commanded it "
-                "yet; command all axes in a rapid first, or give start_mm in the job file",
+                f"the position of {axes} is not known at this feed move, and its correction needs it; command "
+                "all axes in a rapid first, or give start_mm in the job file",
                 line=int(path.line[i]),
             )
         raw[some] |= blind | unknown[some]
-        passed = wanting
+        uncorrected = wanting
     held = _hold_after_machine_moves(path, raw)
-    return raw, np.union1d(passed, held)
+    return raw, np.union1d(uncorrected, held)
 
 
 def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> Index:
-    """An axis that G53 sent to a machine position stays there in the rapids that follow without a word of it:
-    a word inserted there could drive it against its limit switch. Returns those rapids."""
+    """An axis that G53 sent to a machine position is held there in the rapids that follow without a word for
+    it: a word inserted there could drive it against its limit switch. Returns those rapids."""
     held = []
     machine = np.flatnonzero(path.flag & np.uint8(Flag.MACHINE))
     for i in machine.tolist():
@@ -116,7 +118,7 @@ def _expand(
     target: Array,
     command: Array,
     raw: Mask,
-    passed: Index,
+    uncorrected: Index,
     shift: Array,
     cuts: list[Cuts],
     model: ErrorModel,
@@ -129,7 +131,7 @@ def _expand(
     if not len(where):
         return Plan(
             np.arange(count, dtype=np.int32), target if keep_target else none, command, raw, np.ones(count),
-            np.zeros(count, bool), passed, shift, None,
+            np.zeros(count, bool), uncorrected, shift, None,
         )  # fmt: skip
     share = np.concatenate([c[1] for c in cuts])
     point = np.concatenate([c[2] for c in cuts])
@@ -151,7 +153,7 @@ def _expand(
     reach = np.ones(len(move))
     reach[is_cut] = share
     return Plan(
-        move, out_target, out_command, raw[move], reach, np.zeros(len(move), bool), passed, shift, None
+        move, out_target, out_command, raw[move], reach, np.zeros(len(move), bool), uncorrected, shift, None
     )
 
 

@@ -1,4 +1,4 @@
-"""Digits of programs whose statements say their whole point (APT, DMIS, lists, described languages)."""
+"""Digits of programs whose statements state their whole point (APT, DMIS, lists, described languages)."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from olp.program.text.numbers import MOST_DECIMALS
 
 #: digits of inserted numbers, where the program itself has as many
 FINE_DECIMALS = 6
+#: Moves whose numbers are kept as written.
 _BYPASS = np.uint8(Flag.CONTROL | Flag.PASS)
 
 
@@ -65,7 +66,7 @@ class PointWriter(Writer):
         counting = (rows.flag & np.uint8(Flag.INCREMENTAL)) != 0
         held = raw.any(axis=1) | ((rows.flag & _BYPASS) != 0) | ~(self.program.slot[move] >= 0).any(axis=1)
         written = np.where(unknown, local, mantissa / POW10[decimals])
-        # a number that stays says what the program says, to the last bit
+        # a number that is kept is the program's own, to the last bit
         nominal = self.path.end_mm[move]
         rows.emitted[:] = np.where(held[:, None], nominal, self.placed(written, frame))
         kept = same.all(axis=1) & ~held & rows.head & given.all(axis=1)
@@ -80,7 +81,7 @@ class PointWriter(Writer):
                 self._counted(rows, a, b, local, word, own, given, held)
 
     def _middled(self, rows: Rows, command: Array) -> Array:
-        """Commands with the places of holes corrected as the middle of their strokes asks for."""
+        """Commands with the positions of holes corrected as the middle of their strokes needs it."""
         strokes = self.statements.strokes
         low, high = np.searchsorted(strokes[:, 0], (rows.move[0], rows.move[-1] + 1))
         if high == low:
@@ -88,14 +89,14 @@ class PointWriter(Writer):
         top, bottom = (np.searchsorted(rows.move, strokes[low:high, k]) for k in (0, 1))
         end = self.path.end_mm
         away = command - end[rows.move]
-        out = command.copy()
-        out[top] += np.nan_to_num(away[bottom] - away[top]) / 2
-        return out
+        middled = command.copy()
+        middled[top] += np.nan_to_num(away[bottom] - away[top]) / 2
+        return middled
 
     def _counted(
         self, rows: Rows, a: int, b: int, local: Array, word: Index, own: Index, given: Mask, held: Mask
     ) -> None:
-        """Distances a..b: differences of rounded places, so that nothing drifts."""
+        """Distances a..b: differences of rounded positions, so that nothing drifts."""
         frame = self.path.frame[rows.move[a:b]]
         before = rows.emitted[a - 1] if a else rows.entry
         entry = self.local(before[None], frame[:1])[0]

@@ -21,13 +21,15 @@ from olp.errormodel.base import ErrorModel
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
+#: Backlash is looked for with no tool vector.
 _NO_TOOL = np.zeros(3)
+#: Iterations of the play states, at most.
 _PASSES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reversal:
-    """`axes` (3,) with backlash that matters; `band_mm` an axis may stay behind rather than turn."""
+    """`axes` (3,) with backlash that matters; `band_mm`: so far an axis may lag rather than turn round."""
 
     axes: Mask
     band_mm: float
@@ -51,8 +53,8 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     """The plan with play: commands lead by half the backlash, and where an axis turns round in a feed
     move, a row that only takes it up comes first; without `insert` not before moves that are never split.
 
-    Where one axis turns the straightness of another may jump with it, and that one turns too: the states are
-    gone through until they agree.
+    Where one axis turns, the straightness of another may jump with it, so that one turns too. The states are
+    iterated until they agree.
     """
     tools = path.tool_mm()
     tool = tools if tools.ndim == 1 else tools[rows.move]
@@ -61,17 +63,19 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     command, held = rows.command_mm, np.zeros((len(rows), 3))
     still = _still(path, rows)
     for _ in range(_PASSES):
-        lost = model.backlash_at(command)
-        assert lost is not None
-        lost = np.maximum(np.nan_to_num(lost), 0.0)
-        # where the load is: the command without its lead, and without the hold of the pass before
-        wanted = np.where(rows.raw, rows.target_mm, command - lost / 2 * play - held)
+        backlash = model.backlash_at(command)
+        assert backlash is not None
+        backlash = np.maximum(np.nan_to_num(backlash), 0.0)
+        # where the load is: the command without its lead, and without the hold of the iteration before
+        wanted = np.where(rows.raw, rows.target_mm, command - backlash / 2 * play - held)
         if still is not None:
             wanted = np.take_along_axis(wanted, still, axis=0)
         before = play.copy()
         for axis in np.flatnonzero(reversal.axes).tolist():
-            play[:, axis], load, turns[:, axis] = _follow(wanted[:, axis], lost[:, axis], reversal.band_mm)
-            # a held axis aims at where its load stays, not at where it should be
+            play[:, axis], load, turns[:, axis] = _follow(
+                wanted[:, axis], backlash[:, axis], reversal.band_mm
+            )
+            # a held axis aims at where its load is held, not at where it should be
             held[:, axis] = np.nan_to_num(load - wanted[:, axis])
         command = invert(model, rows.target_mm + held, tool, play)
         command[rows.raw] = rows.command_mm[rows.raw]
@@ -83,8 +87,8 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
 
 
 def _still(path: Toolpath, rows: Plan) -> Index | None:
-    """(r, 3) the row where each axis came to where it is: the strokes of one hole move no axis across them,
-    though the error there would ask for it. None without canned cycles."""
+    """(r, 3) the row at which each axis reached its present position. The strokes of one hole move no axis
+    across them, though the error there would ask for it. None without canned cycles."""
     cycle = (path.flag[rows.move] & np.uint8(Flag.CYCLE)) != 0
     if not cycle.any():
         return None
@@ -97,7 +101,7 @@ def _still(path: Toolpath, rows: Plan) -> Index | None:
 
 
 def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:
-    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known place.
+    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known position.
     Without `insert` not before those that are never split."""
     may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
@@ -108,7 +112,7 @@ def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:
     return np.asarray(may, bool)
 
 
-def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Mask]:
+def _follow(position: Array, backlash: Array, band: float) -> tuple[Array, Array, Mask]:
     """Play (n,) of one axis that has to bring its load to `position` with backlash `lost`, where the load
     then is, and the rows before which the drive has to turn.
 
@@ -117,15 +121,15 @@ def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Ma
     the band.
     """
     plays, loads, turns = [], [], []
-    at = low = high = float("nan")
-    for wanted, width in zip(position.tolist(), lost.tolist(), strict=True):
+    load = low = high = float("nan")
+    for wanted, width in zip(position.tolist(), backlash.tolist(), strict=True):
         half = max(width, 0.0) / 2
         turn = False
-        if wanted != wanted or at != at:
-            at, low, high = wanted, -1.0, 1.0
-        elif wanted != at:
-            sign = 1.0 if wanted > at else -1.0
-            step = abs(wanted - at)
+        if wanted != wanted or load != load:
+            load, low, high = wanted, -1.0, 1.0
+        elif wanted != load:
+            sign = 1.0 if wanted > load else -1.0
+            step = abs(wanted - load)
             # play that has to be taken up before the middle of the load moves, and until it is known
             first = 1.0 - (high if sign > 0 else -low)
             last = 1.0 - (low if sign > 0 else -high)
@@ -133,7 +137,7 @@ def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Ma
             if turn and step <= band:
                 turn = False
             else:
-                at = wanted
+                load = wanted
                 if half == 0.0 or step >= half * (last - first) / 2:
                     low = high = sign
                 else:
@@ -141,7 +145,7 @@ def _follow(position: Array, lost: Array, band: float) -> tuple[Array, Array, Ma
                     rest = last - first - 2 * step / half
                     low, high = (1.0 - rest, 1.0) if sign > 0 else (-1.0, -1.0 + rest)
         plays.append((low + high) / 2)
-        loads.append(at)
+        loads.append(load)
         turns.append(turn)
     return np.array(plays), np.array(loads), np.array(turns)
 

@@ -1,4 +1,4 @@
-"""Rows of the plan on their way into text: where each leads as written, and the digits that say so."""
+"""Rows of the plan that are being written: the position that each reaches as written, and its digits."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Rows:
         return len(self.move)
 
     def serial(self, row: int) -> int:
-        """Order of a row's words among insertions at one place."""
+        """Order of a row's words among insertions at one position of the text."""
         return row * 8 + 16
 
     def put(self, a: int, b: int, axis: int, digits: Digits) -> None:

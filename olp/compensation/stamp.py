@@ -6,11 +6,12 @@ import re
 
 from olp.core.version import __version__
 
+#: The stamp with the first digits of the hash of the calibration.
 _STAMP = re.compile(rb"olp-corrected [0-9a-f]{12}")
 
 
 def find_stamp(text: bytes) -> re.Match[bytes] | None:
-    """Where a text says that it is corrected already."""
+    """The stamp in a text that is corrected already."""
     return _STAMP.search(text)
 
 
@@ -21,15 +22,15 @@ def stamp_line(digest: str, comment: tuple[bytes, bytes]) -> bytes:
 
 
 def stamped(text: bytes, stamp: bytes, eol: bytes, first: tuple[bytes, ...]) -> bytes:
-    """The text with the stamp as a line of its own in front, behind lines that have to be `first`, such as a
-    tape mark and a program number: each kind of them once, in this order."""
-    at = 3 if text[:3] == b"\xef\xbb\xbf" else 0
+    """The text with the stamp as a new line in front, behind lines that have to be `first`, such as a tape
+    mark and a program number: one of each kind, in this order."""
+    position = 3 if text[:3] == b"\xef\xbb\xbf" else 0
     for beginnings in first:
-        if text[at : at + 40].lstrip(b" \t").upper().startswith(tuple(beginnings.split(b"|"))):
-            at = _line_after(text, at)
-    return text[:at] + stamp + eol + text[at:]
+        if text[position : position + 40].lstrip(b" \t").upper().startswith(tuple(beginnings.split(b"|"))):
+            position = _line_after(text, position)
+    return text[:position] + stamp + eol + text[position:]
 
 
-def _line_after(text: bytes, at: int) -> int:
-    end = text.find(b"\n", at)
+def _line_after(text: bytes, position: int) -> int:
+    end = text.find(b"\n", position)
     return len(text) if end < 0 else end + 1

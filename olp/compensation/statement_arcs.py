@@ -15,7 +15,7 @@ from olp.program.program import ArcText
 from olp.program.text.edits import BARE, EditList, Edits
 from olp.program.text.numbers import MOST_DECIMALS
 
-#: pieces of one inserted statement at the most, for their order among insertions at one place
+#: pieces of one inserted statement at the most, for their order among insertions at one position
 ROW = 64
 
 
@@ -45,8 +45,9 @@ def arc_edits(writer: PointWriter, rows: Rows) -> list[Edits]:
 def _arc_words(
     writer: PointWriter, arc: Arc, text: ArcText, number: list[float], unit: float, fewest: list[int]
 ) -> list[tuple[int, int, int]]:
-    """(word, mantissa, decimals) of all that says an arc beside its end; `number` is its centre as said."""
-    out = [
+    """(word, mantissa, decimals) of all words of an arc beside its end; `number` is its centre in the
+    program's numbers."""
+    changes = [
         _rounded(writer, word, number[axis], fewest[axis] + 1)
         for words in text.centres
         for axis, word in enumerate(words)
@@ -54,10 +55,10 @@ def _arc_words(
     if text.radius >= 0:
         a, b = PLANES[arc.plane][:2]
         away = (arc.start - arc.centre).tolist()
-        out.append(_rounded(writer, text.radius, math.hypot(away[a], away[b]) / unit, max(fewest) + 1))
+        changes.append(_rounded(writer, text.radius, math.hypot(away[a], away[b]) / unit, max(fewest) + 1))
     if text.angle >= 0:
-        out.append(_rounded(writer, text.angle, math.degrees(abs(_sweep(arc))), FINE_DECIMALS))
-    return out
+        changes.append(_rounded(writer, text.angle, math.degrees(abs(_sweep(arc))), FINE_DECIMALS))
+    return changes
 
 
 def _sweep(arc: Arc) -> float:
@@ -75,8 +76,8 @@ def _rounded(writer: PointWriter, word: int, value: float, fewest: int) -> tuple
 
 def _replace(writer: PointWriter, word: int, mantissa: int, decimals: int, edits: EditList) -> None:
     own = int(writer.words.decimals[word])
-    said = int(writer.words.mantissa[word])
-    same = said * 10 ** (decimals - own) if decimals >= own else round(said / 10 ** (own - decimals))
+    stated = int(writer.words.mantissa[word])
+    same = stated * 10 ** (decimals - own) if decimals >= own else round(stated / 10 ** (own - decimals))
     if same != mantissa:
         prefix = writer.statements.broken.get(word, b"")
         edits.add(int(writer.words.number[word]), int(writer.words.end[word]), mantissa, decimals, prefix)
@@ -91,7 +92,7 @@ def _arc_again(
     changes: Sequence[tuple[int, int, int]],
     edits: EditList,
 ) -> None:
-    """A later part: all that says the arc, and its end, once more with other numbers."""
+    """A later part: the words of the arc and of its end once more, with other numbers."""
     eol = writer.program.eol(arc.line)
     numbers = {word: (mantissa, decimals) for word, mantissa, decimals in changes}
     slot = writer.program.slot[arc.move].tolist()
@@ -119,16 +120,16 @@ def _again(
 ) -> int:  # fmt: skip
     """Bytes once more, with other numbers in place of some words. A comment at the end is left out, and
     what is `long`."""
-    at, lead = begin, eol
+    position, lead = begin, eol
     for word in sorted(values, key=lambda w: int(writer.words.number[w])):
         start = int(writer.words.number[word])
-        if long is not None and at <= long[0] < start:
-            lead += writer.program.data[at : long[0]] + writer.program.data[long[1] : start]
+        if long is not None and position <= long[0] < start:
+            lead += writer.program.data[position : long[0]] + writer.program.data[long[1] : start]
         else:
-            lead += writer.program.data[at:start]
+            lead += writer.program.data[position:start]
         edits.add(place, place, *values[word], lead, order)
-        at, lead, order = int(writer.words.end[word]), b"", order + 1
-    trail = writer.program.data[at:stop]
+        position, lead, order = int(writer.words.end[word]), b"", order + 1
+    trail = writer.program.data[position:stop]
     comment = trail.rfind(b"$$")
     if comment >= 0 and b"\n" not in trail[comment:]:
         trail = trail[:comment].rstrip()
@@ -137,15 +138,15 @@ def _again(
 
 
 def _direction(writer: PointWriter, arc: Arc, text: ArcText) -> dict[int, tuple[int, int]]:
-    """The way in which a part of an arc begins."""
+    """The direction in which a part of an arc begins."""
     first, second = PLANES[arc.plane][:2]
-    way = np.zeros(3)
+    tangent = np.zeros(3)
     away = arc.start - arc.centre
-    way[first], way[second] = -away[second] * np.sign(arc.sweep), away[first] * np.sign(arc.sweep)
-    way /= np.linalg.norm(way)
+    tangent[first], tangent[second] = -away[second] * np.sign(arc.sweep), away[first] * np.sign(arc.sweep)
+    tangent /= np.linalg.norm(tangent)
     if writer.turn is not None:
-        way = way @ writer.turn[int(writer.path.frame[arc.move])]
+        tangent = tangent @ writer.turn[int(writer.path.frame[arc.move])]
     return {
-        word: (round(float(way[axis]) * 10**FINE_DECIMALS), FINE_DECIMALS)
+        word: (round(float(tangent[axis]) * 10**FINE_DECIMALS), FINE_DECIMALS)
         for axis, word in enumerate(text.direction)
     }

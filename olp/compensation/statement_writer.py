@@ -26,7 +26,7 @@ class StatementWriter(PointWriter):
             self.stamp = self.stamp.ljust(self.statements.width + 8)
 
     def _start_of(self, move: int) -> int:
-        """Also what says an arc stands before its end point."""
+        """What states an arc comes before its end point, and belongs to the move too."""
         arc = self.statements.arcs.get(move)
         begin = super()._start_of(move)
         return begin if arc is None else min(begin, arc.begin)
@@ -48,7 +48,7 @@ class StatementWriter(PointWriter):
         slot = self.program.slot[rows.move]
         change = rows.write & rows.head[:, None]
         short = (slot[:, 2] >= 0) & (slot[:, 0] < 0)
-        out = [*self._spelled(rows, np.flatnonzero(short & change[:, :2].any(axis=1)))]
+        edits = [*self._spelled(rows, np.flatnonzero(short & change[:, :2].any(axis=1)))]
         change[short & change[:, :2].any(axis=1)] = False
         row, axis = np.nonzero(change & (slot >= 0))
         word = slot[row, axis]
@@ -56,14 +56,14 @@ class StatementWriter(PointWriter):
         if self._broken.size:
             for k in np.flatnonzero(np.isin(word, self._broken)).tolist():
                 prefix[k] = self.prefixes(self.statements.broken[int(word[k])])
-        out.append(
+        edits.append(
             Edits(
                 self.words.number[word].astype(np.int64), self.words.end[word].astype(np.int64),
                 rows.mantissa[row, axis], rows.decimals[row, axis], prefix, np.zeros(len(word), np.int32),
             )
         )  # fmt: skip
         self.tally.changed_words += len(word)
-        return out
+        return edits
 
     def _spelled(self, rows: Rows, which: Index) -> list[Edits]:
         """One distance along the tool axis becomes three, where the others change too."""
@@ -92,38 +92,42 @@ class StatementWriter(PointWriter):
             eol = self.program.eol(int(self.path.line[move]))
             pieces[i] = [self.prefixes(p) for p in (eol + lead, between, last, trail)]
             place[i] = self.statements.end[move], self._start_of(move)
-        out = []
+        edits = []
         ahead = rows.before[tails]
-        at = np.where(ahead, place[which, 1], place[which, 0])
+        position = np.where(ahead, place[which, 1], place[which, 0])
         order = (tails * ROW).astype(np.int32)
         zero = np.zeros(len(tails), np.int8)
         bare = np.full(len(tails), BARE)
         lead = pieces[which, 0]
         if ahead.any():
-            # in front of an arc the line end stands behind
+            # in front of an arc the line end comes behind
             for k in np.flatnonzero(ahead).tolist():
                 text = self.prefixes.table[int(lead[k])]
                 lead[k] = self.prefixes(text.lstrip(b"\r\n"))
         for axis in range(3):
             prefix = lead if axis == 0 else pieces[which, axis]
-            out.append(
+            edits.append(
                 Edits(
-                    at, at, rows.mantissa[tails, axis], rows.decimals[tails, axis],
+                    position, position, rows.mantissa[tails, axis], rows.decimals[tails, axis],
                     prefix.astype(np.int32), order + np.int32(axis),
                 )
             )  # fmt: skip
-        out.append(Edits(at, at, bare, zero, pieces[which, 3].astype(np.int32), order + np.int32(3)))
+        trailing = pieces[which, 3].astype(np.int32)
+        edits.append(Edits(position, position, bare, zero, trailing, order + np.int32(3)))
         ends = [self.prefixes(self.program.eol(int(self.path.line[m]))) for m in moves.tolist()]
         behind = np.flatnonzero(ahead)
         closing = np.array(ends, np.int32)[which[behind]]
-        out.append(
-            Edits(at[behind], at[behind], bare[behind], zero[behind], closing, order[behind] + np.int32(4))
-        )
+        edits.append(
+            Edits(
+                position[behind], position[behind], bare[behind], zero[behind], closing,
+                order[behind] + np.int32(4),
+            )
+        )  # fmt: skip
         self.tally.inserted_blocks += len(tails)
-        return out
+        return edits
 
     def _template(self, move: int) -> tuple[bytes, bytes, bytes, bytes]:
-        """The statement of a move without its three numbers: what stands before, between and behind them.
+        """The statement of a move without its three numbers: the text before, between and behind them.
         A comment at its end, and marks of continuation inside its words, are left out."""
         data, statements = self.program.data, self.statements
         slot = self.program.slot[move]

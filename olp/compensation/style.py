@@ -13,7 +13,9 @@ from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_INCH
 from olp.program.program import Program
 
+#: Digits behind the point, at most.
 _MOST_DECIMALS = 9
+#: The space before a word, by style number modulo 3.
 _SPACE = (b"", b" ", b"\t")
 
 Slots = npt.NDArray[np.int32] | npt.NDArray[np.int64]
@@ -29,7 +31,7 @@ def fewest_decimals(increment_mm: float, unit_mm: float, inch_decimals: int) -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Style:
-    """Observed once a program."""
+    """Observed once per program."""
 
     program: Program
     increments_mm: Vector
@@ -73,18 +75,18 @@ class Style:
         """Digits behind the point of words, counting the hidden ones of numbers in least increments."""
         words = self.program.words
         assert words is not None
-        out = words.decimals[slot].astype(np.int64)
+        digits = words.decimals[slot].astype(np.int64)
         if not self.program.calculator:
             hidden = self.bare_decimals[axis] + (np.asarray(unit_mm) != 1.0)
-            out = np.where(words.pointed[slot], out, hidden)
-        return out
+            digits = np.where(words.pointed[slot], digits, hidden)
+        return digits
 
     def decimals_of(self, slot: int, axis: int, unit_mm: float) -> int:
         """The same for one word."""
         return int(self.decimals(np.array([slot]), axis, unit_mm)[0])
 
     def lead(self, word: int) -> bytes:
-        """The space that stands before a word, or would."""
+        """The space before a word; of a first word, the usual one."""
         return _SPACE[int(self.separators(np.array([word]), self.program)[0]) % 3]
 
     def cased(self, word: int, letters: bytes) -> bytes:
@@ -108,7 +110,7 @@ class Style:
         return min(self.usual(axis, unit_mm) + self.program.dialect.free_digits, _MOST_DECIMALS)
 
     def block_start(self, line: int) -> bytes:
-        """What stands before the first word of a block that is inserted behind a line."""
+        """The text before the first word of a block that is inserted behind a line."""
         deleted = self.program.text(line).lstrip().startswith("/")
         return self.program.eol(line) + (b"/" if deleted else b"")
 
@@ -124,7 +126,7 @@ class Style:
         return int(words.first_word[line]) - 1
 
     def separators(self, word: npt.NDArray[np.integer], program: Program) -> npt.NDArray[np.int64]:
-        """Style number of each word: what stands before it, and its case."""
+        """Style number of each word: the space before it, and its case."""
         words = program.words
         assert words is not None
         text = np.frombuffer(program.data, np.uint8)

@@ -15,19 +15,19 @@ from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.program.text.numbers import Number, Placing, number, spliced, written
 
-#: Bytes of the text from a place up to another, and what comes there.
+#: Bytes of the text from one position up to another, and what replaces them.
 Replacement = tuple[int, int, bytes]
 
 
 class VerbatimWriter(PointWriter):
-    """A writer of numbers that keep their own form; one number may be that of several moves."""
+    """A writer of numbers that keep their own form; several moves may share one number."""
 
-    #: A number may be that of moves far apart.
+    #: Rows at a time: all, as moves far apart may share a number.
     chunk: ClassVar[int] = sys.maxsize
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         if not len(self.words.start):
-            # nothing but moves that the text says no place of
+            # the text states the position of none of the moves
             self.parts[:] = 1
             return None
         self._digits(rows)
@@ -42,8 +42,8 @@ class VerbatimWriter(PointWriter):
         placing = Placing(self.program.data, self.words.number, self.words.end)
         new: dict[int, tuple[int, int, int]] = {}
         for axis in range(3):
-            said = np.flatnonzero(slot[:, axis] >= 0)
-            for row, word in zip(head[said].tolist(), slot[said, axis].tolist(), strict=True):
+            stated = np.flatnonzero(slot[:, axis] >= 0)
+            for row, word in zip(head[stated].tolist(), slot[stated, axis].tolist(), strict=True):
                 self._share(rows, new, row, axis, word)
         changes: list[Replacement] = []
         for word, (row, axis, _) in new.items():
@@ -71,29 +71,29 @@ class VerbatimWriter(PointWriter):
             self.tally.inserted_blocks += 1
         return insertions
 
-    def _line_end(self, at: int) -> int:
-        """The end of the line in which a byte stands: what is inserted comes behind a comment."""
+    def _line_end(self, position: int) -> int:
+        """The end of the line of a byte: what is inserted comes behind a comment."""
         ends = self.program.line_end
-        return int(ends[min(int(np.searchsorted(ends, at)), len(ends) - 1)])
+        return int(ends[min(int(np.searchsorted(ends, position)), len(ends) - 1)])
 
     def _share(
         self, rows: Rows, new: dict[int, tuple[int, int, int]], row: int, axis: int, word: int
     ) -> None:
-        """All moves that one number serves have to want the same of it."""
+        """All moves that share a number have to need the same value of it."""
         mantissa = int(rows.mantissa[row, axis])
         before = new.setdefault(word, (row, axis, mantissa))
         if before[2] != mantissa:
             line, other = (int(self.path.line[rows.move[r]]) for r in (row, before[0]))
             raise ProgramError(
-                f"this position is that of line {other} too, and its correction differs (another "
-                "tool, or another way there); give each move a position of its own",
+                f"this position serves line {other} too, where its correction differs (another tool, or "
+                "another direction of approach); state the position separately for each move",
                 line=line,
             )
 
     def _omitted(self, rows: Rows, head: Index, slot: npt.NDArray[np.int32]) -> None:
-        """No word is put where a statement says nothing of an axis: what it needs would be lost."""
-        said = (slot >= 0).any(axis=1)
-        lost = np.flatnonzero((rows.write[head] & (slot < 0)).any(axis=1) & said)
+        """Raise ProgramError where a statement omits an axis that needs a correction: no word is inserted."""
+        stated = (slot >= 0).any(axis=1)
+        lost = np.flatnonzero((rows.write[head] & (slot < 0)).any(axis=1) & stated)
         if lost.size:
             line = int(self.path.line[rows.move[head[lost[0]]]])
             raise ProgramError(

@@ -6,41 +6,43 @@ import re
 
 import numpy as np
 
+#: The number of a card, in its last eight columns.
 _CARD_NUMBER = re.compile(rb"[A-Z]{0,4} *\d{1,8} *\Z")
 
 
 def wrapped(text: bytes, width: int, mark: bytes) -> bytes:
     """The text with lines of more than `width` bytes broken behind a comma, where `mark` joins them again.
-    A line without a comma, or with a comment, stays as it is."""
+    A line without a comma, or with a comment, is unchanged."""
     if not width:
         return text
     ends = np.flatnonzero(np.frombuffer(text, np.uint8) == 10)
     starts = np.concatenate(([0], ends + 1))
     stops = np.append(ends, len(text))
     long = np.flatnonzero(stops - starts > width)
-    parts, at = [], 0
+    parts, position = [], 0
     for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
         eol = b"\r\n" if text[stop - 1 : stop] == b"\r" else b"\n"
         line = text[start:stop].rstrip(b"\r")
-        parts += [text[at:start], _broken(line, width, mark, eol)]
-        at = start + len(line)
-    return b"".join([*parts, text[at:]]) if parts else text
+        parts += [text[position:start], _broken(line, width, mark, eol)]
+        position = start + len(line)
+    return b"".join([*parts, text[position:]]) if parts else text
 
 
 def carded(text: bytes, width: int, mark: bytes) -> bytes:
-    """A text of cards whose lines have grown, shrunk or come new: their numbers stand in the eight columns
-    behind `width` again, each once, and a line that is too long goes on in a card without a number."""
-    out: list[bytes] = []
+    """A text of cards, some of whose lines have another length or are new. Their numbers are put into the
+    eight columns behind `width` again, each once. A line that is too long goes on in a card without a
+    number."""
+    lines: list[bytes] = []
     last = b""
     for raw in text.split(b"\n"):
         end = b"\r" if raw.endswith(b"\r") else b""
         line = raw.removesuffix(b"\r")
         number = line[-8:]
-        said = len(line) > 8 and (line[-9:-8] == b" " or len(line) > width)
+        numbered = len(line) > 8 and (line[-9:-8] == b" " or len(line) > width)
         if not line.strip():
-            out.append(raw)
+            lines.append(raw)
             continue
-        if not (said and _CARD_NUMBER.match(number)):
+        if not (numbered and _CARD_NUMBER.match(number)):
             number, body = b" " * 8, line.rstrip()
         else:
             body = line[:-8].rstrip()
@@ -48,9 +50,9 @@ def carded(text: bytes, width: int, mark: bytes) -> bytes:
             number = b" " * 8
         last = number if number.strip() else last
         first, *more = _broken(body, width, mark, b"\n").split(b"\n")
-        out.append(first.ljust(width) + number + end)
-        out += [card.ljust(width) + b" " * 8 + end for card in more]
-    return b"\n".join(out)
+        lines.append(first.ljust(width) + number + end)
+        lines += [card.ljust(width) + b" " * 8 + end for card in more]
+    return b"\n".join(lines)
 
 
 def _broken(line: bytes, width: int, mark: bytes, eol: bytes) -> bytes:
@@ -58,9 +60,9 @@ def _broken(line: bytes, width: int, mark: bytes, eol: bytes) -> bytes:
         return line
     pieces = []
     while len(line) > width:
-        at = line.rfind(b",", 0, width - len(mark)) + 1
-        if not at:
+        cut = line.rfind(b",", 0, width - len(mark)) + 1
+        if not cut:
             break
-        pieces.append(line[:at] + mark)
-        line = line[at:]
+        pieces.append(line[:cut] + mark)
+        line = line[cut:]
     return eol.join([*pieces, line])

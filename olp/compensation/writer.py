@@ -1,8 +1,8 @@
 """What all writers of corrected programs have in common.
 
 A writer puts the rows of a plan into the program's own text: numbers are changed, words, blocks or statements
-inserted, nothing else. It goes through the rows in chunks, so that memory stays small: digits, then edits,
-then one splice per chunk of text.
+inserted, nothing else. It takes the rows in chunks, so that memory is small: digits, then edits, then one
+splice per chunk of text.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Writer(ABC):
 
     def text(self) -> bytes:
         """The corrected text; the program's own bytes where nothing changes. Raises ProgramError where the
-        plan cannot be said in the dialect."""
+        plan cannot be written in the dialect."""
         data, move = self.program.data, self.plan.move
         pieces: list[bytes] = []
         begin, changed = 0, False
@@ -107,8 +107,8 @@ class Writer(ABC):
 
     @abstractmethod
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
-        """The bytes `begin`..`end` of the program with these rows in it, None where nothing changes; the rows
-        then hold where they lead as written."""
+        """The bytes `begin`..`end` of the program with these rows in it, None where nothing changes. The rows
+        then hold the positions that they reach as written."""
 
     def _spliced(self, edits: list[Edits], begin: int, end: int) -> bytes | None:
         """The bytes `begin`..`end` of the program with edits made, None where there are none."""

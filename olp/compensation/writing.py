@@ -43,8 +43,8 @@ def write(
     increments_mm: Vector,
     stamp: bytes,
 ) -> Written:
-    """Write a plan. The program is one that was read with its words. Raises ProgramError where it cannot be
-    said in its dialect."""
+    """Write a plan. The program is one that was read with its words. Raises ProgramError where the plan
+    cannot be written in the dialect."""
     task = Task(program, plan, model, tolerance_mm, increments_mm, stamp)
     writer = _writer(program, plan)(task)
     text = writer.text()
@@ -61,8 +61,8 @@ def _writer(program: Program, plan: Plan) -> type[Writer]:
 
 
 def _plain(program: Program, plan: Plan) -> bool:
-    """Whether the writer of statements writes verbatim numbers just so: no column is padded, no number has a
-    sign or zeros that it need not have, none is shared, and nothing stands behind a move that is split."""
+    """Whether the writer of statements would write verbatim numbers the same: no column is padded, and no
+    number has a needless sign or needless zeros or is shared. Nothing comes behind a move that is split."""
     words, statements = program.words, program.statements
     if words is None or statements is None or not len(words.start):
         return False

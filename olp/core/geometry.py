@@ -28,11 +28,11 @@ def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Arr
     radius = np.hypot(s0, s1)
     radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
     angle = np.arctan2(s1, s0) + share * sweep
-    out = np.empty((len(start), 3))
-    out[rows, first] = c0 + radius * np.cos(angle)
-    out[rows, second] = c1 + radius * np.sin(angle)
-    out[rows, third] = start[rows, third] + share * (end[rows, third] - start[rows, third])
-    return out
+    points = np.empty((len(start), 3))
+    points[rows, first] = c0 + radius * np.cos(angle)
+    points[rows, second] = c1 + radius * np.sin(angle)
+    points[rows, third] = start[rows, third] + share * (end[rows, third] - start[rows, third])
+    return points
 
 
 def arms(point: Array, centre: Array, plane: Plane) -> tuple[Array, Array]:
@@ -96,11 +96,11 @@ def arc_directions(
     first, second, third = (_AXES[plane][:, i] for i in range(3))
     along, across = arms(start, centre, plane)
     angle = np.arctan2(across, along) + share * sweep
-    out = np.zeros((len(start), 3))
-    out[rows, first] = -np.sin(angle) * np.sign(sweep)
-    out[rows, second] = np.cos(angle) * np.sign(sweep)
-    out[rows, third] = end[rows, third] - start[rows, third]
-    return np.asarray(np.sign(np.where(np.abs(out) < 1e-9, 0.0, out)), float)
+    motion = np.zeros((len(start), 3))
+    motion[rows, first] = -np.sin(angle) * np.sign(sweep)
+    motion[rows, second] = np.cos(angle) * np.sign(sweep)
+    motion[rows, third] = end[rows, third] - start[rows, third]
+    return np.asarray(np.sign(np.where(np.abs(motion) < 1e-9, 0.0, motion)), float)
 
 
 def rotation_matrix(angles_deg: tuple[float, float, float]) -> Array:

@@ -1,9 +1,9 @@
 """Interpolation of many columns over a rectilinear grid of one to three arguments: linear or cubic.
 
-Both kinds are tensor products of one interpolation along each argument, so that they are linear in the
-values (fields add) and no order of the arguments is preferred; a monotone cubic (pchip) has neither
-property. "cubic" is the cubic Hermite with three-point parabolic slopes at the knots (Catmull-Rom on equal
-steps): continuous in its first derivatives, exact for fields of degree 2 in each argument. Outside the knots
+Both kinds are tensor products of one interpolation along each argument. So they are linear in the values
+(fields add), and no order of the arguments is preferred. A monotone cubic (pchip) has neither property.
+"cubic" is the cubic Hermite with three-point parabolic slopes at the knots (Catmull-Rom on equal steps). It
+is continuous in its first derivatives, and exact for fields of degree 2 in each argument. Outside the knots
 the end value is held.
 """
 
@@ -23,8 +23,9 @@ from olp.core.arrays import Array
 Index = npt.NDArray[np.intp]
 Kind = Literal["linear", "cubic"]
 
+#: The kinds of interpolation, by name.
 KINDS = ("linear", "cubic")
-#: Rows of points that are gone through at once: their columns stay in the second-level cache.
+#: Rows of points per block: their columns fit in the second-level cache.
 _BLOCK = 8192
 
 
@@ -39,7 +40,7 @@ class Line:
 
     @classmethod
     def through(cls, knots: Array, kind: Kind) -> Line:
-        """Through strictly increasing knots (n,); one knot stands for a constant."""
+        """Through strictly increasing knots (n,); one knot makes a constant."""
         n = len(knots)
         if n == 1:
             return cls(knots, np.zeros(1, np.intp), np.ones((1, 1, 1)))
@@ -73,8 +74,8 @@ class Line:
         return self.first[cell], value
 
     def hull(self, derivative: int) -> Array:
-        """(cells, points, nodes) what the nodes' values are to be multiplied by for points of control whose
-        hull holds the derivative (per mm) over each cell: Bernstein coefficients."""
+        """(cells, points, nodes) factors on the nodes' values that give Bernstein coefficients: control
+        points whose hull holds the derivative (per mm) over each cell."""
         n, cells = len(self.knots), max(len(self.knots) - 1, 1)
         degree = self.weights.shape[1] - 1
         power = self.weights
@@ -91,10 +92,10 @@ class Line:
             ]
         )
         points = np.einsum("ik,ckw->ciw", to_bernstein, power)
-        out = np.zeros((cells, degree + 1, n))
+        factors = np.zeros((cells, degree + 1, n))
         for c in range(cells):
-            out[c, :, self.first[c] : self.first[c] + points.shape[2]] = points[c]
-        return out
+            factors[c, :, self.first[c] : self.first[c] + points.shape[2]] = points[c]
+        return factors
 
 
 def _parabolic(knots: Array) -> Array:
@@ -128,7 +129,7 @@ class Grid:
         whole = np.ascontiguousarray(values, dtype=np.float64)
         rows = whole.reshape(-1, whole.shape[-1])
         window = lines[-1].weights.shape[2]
-        # rows that a window would leave the end of the table from are never asked for
+        # a window never begins so late that it leaves the end of the table
         side_by_side = [rows[k : len(rows) - window + 1 + k] for k in range(window)]
         windows = np.concatenate(side_by_side, axis=1)
         return cls(tuple(line.knots for line in lines), whole, kind, lines, windows)
@@ -136,26 +137,27 @@ class Grid:
     def __call__(self, q: Array) -> Array:
         """(n, m) values at finite arguments q (n, d)."""
         columns = self.values.shape[-1]
-        out = np.empty((len(q), columns))
+        result = np.empty((len(q), columns))
         sizes = self.values.shape[:-1]
         strides = [math.prod(sizes[k + 1 :]) for k in range(len(sizes))]
         for start in range(0, len(q), _BLOCK):
             part = q[start : start + _BLOCK]
-            found = [line.at(part[:, k]) for k, line in enumerate(self.lines)]
-            node = sum((first * stride for (first, _), stride in zip(found, strides, strict=True)), start=0)
+            stencils = [line.at(part[:, k]) for k, line in enumerate(self.lines)]
+            firsts = (first * stride for (first, _), stride in zip(stencils, strides, strict=True))
+            node = sum(firsts, start=0)
             total: Array | None = None
-            for corner in product(*(range(weight.shape[1]) for _, weight in found[:-1])):
+            for corner in product(*(range(weight.shape[1]) for _, weight in stencils[:-1])):
                 offset = sum(c * stride for c, stride in zip(corner, strides, strict=False))
                 value = self.windows.take(node + offset, axis=0)
-                for (_, weight), c in zip(found, corner, strict=False):
+                for (_, weight), c in zip(stencils, corner, strict=False):
                     value *= weight[:, c, None]
                 total = value if total is None else np.add(total, value, out=total)
             assert total is not None
-            last = found[-1][1]
+            last = stencils[-1][1]
             np.einsum(
-                "nkm,nk->nm", total.reshape(len(part), -1, columns), last, out=out[start : start + _BLOCK]
+                "nkm,nk->nm", total.reshape(len(part), -1, columns), last, out=result[start : start + _BLOCK]
             )
-        return out
+        return result
 
     def varies(self) -> npt.NDArray[np.bool_]:
         """(m, d): whether column i changes with argument k."""
@@ -201,7 +203,7 @@ class Grid:
         return np.asarray(high - low)
 
     def _control(self, hulls: Sequence[Array]) -> Iterator[Array]:
-        """Points of control, a slab of cells of the first argument at a time."""
+        """Control points, one slab of cells of the first argument at a time."""
         for of_cell in hulls[0]:
             block = np.tensordot(of_cell, self.values, axes=(1, 0))
             for k, hull in enumerate(hulls[1:], 1):

@@ -106,9 +106,9 @@ class Interpolant:
         m0, m1 = self.slopes[:-1], self.slopes[1:]
         start, end = self.second_derivatives()
         change = end - start
-        at = np.clip(-start / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
+        share = np.clip(-start / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
         h = np.diff(self.x)[:, None]
-        between = m0 + h * at * (start + 0.5 * at * change)
+        between = m0 + h * share * (start + 0.5 * share * change)
         return np.asarray(np.abs([m0, m1, between]).max(axis=(0, 1)))
 
 
@@ -160,9 +160,9 @@ class DenseTable:
         if self.guide is None:
             index = np.searchsorted(nodes, q, side="right") - 1
             return index, q - nodes[index]
-        at = q - self.low
-        at *= (len(self.guide) - 1) / (nodes[-1] - nodes[0])
-        index = self.guide.take(at.astype(np.intp), mode="clip")
+        bin_position = q - self.low
+        bin_position *= (len(self.guide) - 1) / (nodes[-1] - nodes[0])
+        index = self.guide.take(bin_position.astype(np.intp), mode="clip")
         # Rounding may name the bin before or after: one step either way mends it.
         index -= nodes.take(index, mode="clip") > q
         index += nodes.take(index + 1, mode="clip") <= q
@@ -191,8 +191,8 @@ def dense_table(
         cells = round(span / base)
         split = max(1, min(math.ceil(base / fine), MAX_CELLS // cells))
         step, count = base / split, cells * split + 1
-        at = low + step * np.arange(count, dtype=np.float64)
-        return DenseTable(low, step, count, None, _cells(evaluate(at), None))
+        positions = low + step * np.arange(count, dtype=np.float64)
+        return DenseTable(low, step, count, None, _cells(evaluate(positions), None))
     widths = np.diff(knots)
     fine = max(fine, span / max(1, MAX_CELLS - len(widths)))
     pieces = np.maximum(1, np.ceil(widths / fine)).astype(np.intp)

@@ -80,10 +80,10 @@ class Frame:
 
     def placed_mm(self, words: Sequence[float]) -> tuple[float, ...]:
         """The axis position that three words say."""
-        said = [w * self.unit_mm for w in words]
+        position_mm = [w * self.unit_mm for w in words]
         if self.turn is not None:
-            said = [sum(r * v for r, v in zip(row, said, strict=True)) for row in self.turn]
-        return tuple(v + o for v, o in zip(said, self.offset_mm, strict=True))
+            position_mm = [sum(r * v for r, v in zip(row, position_mm, strict=True)) for row in self.turn]
+        return tuple(v + o for v, o in zip(position_mm, self.offset_mm, strict=True))
 
     def tip_mm(self, point: Array) -> Array:
         """Places of the tip (n, 3) in this frame, from axis positions less the length."""
@@ -128,11 +128,11 @@ class Toolpath:
     def starts_mm(self, first: int = 0, last: int | None = None) -> Array:
         """(m, 3) axis positions at the start of moves `first`..`last`."""
         last = len(self) if last is None else last
-        out = np.empty((last - first, 3))
+        starts = np.empty((last - first, 3))
         if last > first:
-            out[1:] = self.end_mm[first : last - 1]
-            out[0] = self.end_mm[first - 1] if first else self.start_mm
-        return out
+            starts[1:] = self.end_mm[first : last - 1]
+            starts[0] = self.end_mm[first - 1] if first else self.start_mm
+        return starts
 
     def reach_mm(self) -> tuple[Array, Array]:
         """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, on the way there;
@@ -144,8 +144,8 @@ class Toolpath:
         start = self.starts_mm()[move]
         for quarter in range(4):
             share = quarter_shares(start, arcs.centre_mm, arcs.plane, arcs.sweep_rad, quarter)
-            at = arc_points(start, self.end_mm[move], arcs.centre_mm, arcs.plane, arcs.sweep_rad, share)
-            low[move], high[move] = np.fmin(low[move], at), np.fmax(high[move], at)
+            point = arc_points(start, self.end_mm[move], arcs.centre_mm, arcs.plane, arcs.sweep_rad, share)
+            low[move], high[move] = np.fmin(low[move], point), np.fmax(high[move], point)
         return low, high
 
     def tool_mm(self, first: int = 0, last: int | None = None) -> Array:

@@ -106,14 +106,14 @@ class RigidBody(Boxed):
     def backlash_at(self, axis_mm: Array) -> Array | None:
         points = as_points(axis_mm)
         position, unknown = self._positions(points)
-        found = {b.axis: b.components.backlash_at(position[b.axis]) for b in self.bodies}
-        if all(lost is None for lost in found.values()):
+        by_axis = {b.axis: b.components.backlash_at(position[b.axis]) for b in self.bodies}
+        if all(backlash is None for backlash in by_axis.values()):
             return None
         result = np.zeros(points.shape)
-        for j, lost in found.items():
-            if lost is not None:
-                result[:, j] = lost
-                if unknown is not None and isinstance(lost, np.ndarray):
+        for j, backlash in by_axis.items():
+            if backlash is not None:
+                result[:, j] = backlash
+                if unknown is not None and isinstance(backlash, np.ndarray):
                     result[unknown[:, j], j] = np.nan
         return result
 

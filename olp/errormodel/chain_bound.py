@@ -85,8 +85,8 @@ def axis_bounds(bodies: Sequence[Body], box_mm: Array, tool: Array, *, second_or
             )
     farthest = sum(float(r.max(axis=0).sum()) for r in reach.values())
     widened = displaced + extra * farthest
-    found = [_axis_bound(body, reach[body.axis], extra, widened, lipschitz) for body in bodies]
-    return [bound for bound in found if bound is not None]
+    limits = [_axis_bound(body, reach[body.axis], extra, widened, lipschitz) for body in bodies]
+    return [bound for bound in limits if bound is not None]
 
 
 def _axis_bound(body: Body, reach: Array, extra: float, widened: float, lipschitz: float) -> AxisBound | None:

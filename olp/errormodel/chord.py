@@ -2,7 +2,7 @@
 
 With f'' as a measure (kinks are point masses) the departure is the integral of a tent kernel, at most
 d/4 high and d^2/8 in area, against f''. Hence d^2/8 * max|f''|, d/4 * (variation of f' in any window of
-length d), and the range of f bound it; the least of them holds. A product f * m with a linear lever m
+length d), and the range of f bound it; the least of them holds. A product f * m with a linear lever arm m
 departs by at most bound(f) * max|m| + |change of f| * |change of m| / 4.
 
 Bounds are tabled over d on eight bins an octave; the bin is read off the bits of the number.
@@ -21,12 +21,17 @@ from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.errormodel.sources.cyclic import Cyclic
 
-#: Bins run from 2^-20 to 2^20 mm; a binary64 shifted by 49 bits keeps its exponent and 3 bits of mantissa.
+#: A binary64 shifted by so many bits keeps its exponent and 3 bits of mantissa: eight bins an octave.
 _SHIFT = 49
+#: The number of the first bin, which begins at 2^-20 mm.
 _FIRST = int(np.array([2.0**-20]).view(np.int64)[0]) >> _SHIFT
+#: Bins from 2^-20 to 2^20 mm.
 _COUNT = 40 * 8
 _EDGES = np.array((np.arange(_COUNT + 1) + _FIRST) << _SHIFT, dtype=np.int64).view(np.float64)
-LOWER_MM, UPPER_MM = _EDGES[:-1], _EDGES[1:]
+#: The lower edge of each bin, in mm.
+LOWER_MM = _EDGES[:-1]
+#: The upper edge of each bin, in mm.
+UPPER_MM = _EDGES[1:]
 #: Windows start on this many points per piece of a curve.
 _WINDOWS = 4
 
@@ -96,9 +101,9 @@ def _kink_windows(curve: Interpolant, column: int) -> Array:
     jumps = np.abs(np.diff(np.diff(curve.y[:, column]) / np.diff(curve.x)))
     if not len(jumps):
         return np.zeros(_COUNT)
-    at, total = curve.x[1:-1], np.concatenate([[0.0], np.cumsum(jumps)])
-    last = np.searchsorted(at, (at[:, None] + UPPER_MM[None, :]).ravel(), side="right").reshape(
-        len(at), _COUNT
+    kinks_mm, total = curve.x[1:-1], np.concatenate([[0.0], np.cumsum(jumps)])
+    last = np.searchsorted(kinks_mm, (kinks_mm[:, None] + UPPER_MM[None, :]).ravel(), side="right").reshape(
+        len(kinks_mm), _COUNT
     )
     return np.asarray((total[last] - total[:-1, None]).max(axis=0))
 
@@ -114,9 +119,8 @@ def _smooth_windows(curve: Interpolant, column: int) -> Array:
     second = np.abs(start[:, None] + (end - start)[:, None] * share)
     width = np.diff(curve.x)[:, None] / _WINDOWS
     pieces = (0.5 * width * (second[:, :-1] + second[:, 1:])).ravel()
-    at = np.concatenate([(curve.x[:-1, None] + width * np.arange(_WINDOWS)).ravel(), curve.x[-1:]])
+    position_mm = np.concatenate([(curve.x[:-1, None] + width * np.arange(_WINDOWS)).ravel(), curve.x[-1:]])
     total = np.concatenate([[0.0], np.cumsum(pieces)])
-    ends = np.searchsorted(at, (at[1:, None] + UPPER_MM[None, :]).ravel(), side="left").reshape(
-        len(pieces), _COUNT
-    )
+    stops = (position_mm[1:, None] + UPPER_MM[None, :]).ravel()
+    ends = np.searchsorted(position_mm, stops, side="left").reshape(len(pieces), _COUNT)
     return np.asarray((total[np.minimum(ends, len(pieces))] - total[:-1, None]).max(axis=0))

@@ -74,19 +74,19 @@ class AxisComponents:
         """(name, components) by source; their sum is `evaluate`."""
         mean, half = self._of_table(self.table.lookup(q))
         axis = AXES[self.axis]
-        found = [
+        contributions = [
             (f"E{DIRECTIONS[d]}{axis}", _only(d, value)) for d, value in enumerate(mean) if value is not None
         ]
         for term in self.cyclic:
             d = DIRECTIONS.index(term.component[1])
-            found.append((f"cyclic {term.component}", _only(d, cyclic_value(term, q))))
+            contributions.append((f"cyclic {term.component}", _only(d, cyclic_value(term, q))))
         if play is not None:
-            lost: list[Column | None] = [None if value is None else play * value for value in half]
+            directional: list[Column | None] = [None if value is None else play * value for value in half]
             if self.backlash_mm != 0.0:
-                lost[self.axis] = _plus(lost[self.axis], play * (-0.5 * self.backlash_mm))
-            if any(value is not None for value in lost):
-                found.append((f"lost motion {axis}", _six(lost)))
-        return found
+                directional[self.axis] = _plus(directional[self.axis], play * (-0.5 * self.backlash_mm))
+            if any(value is not None for value in directional):
+                contributions.append((f"lost motion {axis}", _six(directional)))
+        return contributions
 
     def backlash_at(self, q: Array) -> Column | None:
         """Lost motion at q (n,): backward minus forward; None where the axis has none."""

@@ -33,7 +33,7 @@ def lagged(time_s: Array, temperature_degC: Array, lag_s: float) -> Array:
     rate = np.diff(temperature_degC) / step
     # theta - T + lag * rate decays; so theta(end) = T(end) - lag rate + keep (theta - T(start) + lag rate)
     drive = temperature_degC[1:] - lag_s * rate - keep * (temperature_degC[:-1] - lag_s * rate)
-    out = [float(temperature_degC[0])]
+    structure_degC = [float(temperature_degC[0])]
     for k, d in zip(keep.tolist(), drive.tolist(), strict=True):
-        out.append(k * out[-1] + d)
-    return np.array(out)
+        structure_degC.append(k * structure_degC[-1] + d)
+    return np.array(structure_degC)

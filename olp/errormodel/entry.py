@@ -42,7 +42,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class AxisState:
     """Positions of one axis: (n,) `q` in mm and the play there, the axis's number, its datum in mm, and the
     levers of its angles, (rows, arms)."""
 
@@ -72,7 +72,7 @@ class Numbers:
         good = good and bool(np.isfinite(entry.factor).all() and np.isfinite(entry.rest).all())
         return good and bool((entry.rest >= 0.0).all())
 
-    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+    def acts(self, entry: Entry, state: AxisState) -> Iterator[tuple[int, Column]]:
         """Rows of the error that a number acts on, and with what coefficient."""
         raise NotImplementedError
 
@@ -89,7 +89,7 @@ class Numbers:
         yield np.zeros(len(q), np.int32), np.full(len(q), entry.rest[0])
 
 
-def component_acts(name: str, side: Column, place: Place) -> Iterator[tuple[int, Column]]:
+def component_acts(name: str, side: Column, state: AxisState) -> Iterator[tuple[int, Column]]:
     """What a component error does to the tip, `side` times."""
     d = "XYZABC".index(name[1])
     if d < 3:
@@ -98,7 +98,7 @@ def component_acts(name: str, side: Column, place: Place) -> Iterator[tuple[int,
     # eps x lever: an angle about a moves row a - 1 by its arm along a + 1, and row a + 1 by minus that along
     # a - 1
     after, before = (d - 2) % 3, (d - 1) % 3
-    for rows, arm in place.lever_arms:
+    for rows, arm in state.lever_arms:
         if before in rows:
             yield before, side * arm[after]
         if after in rows:
@@ -108,5 +108,5 @@ def component_acts(name: str, side: Column, place: Place) -> Iterator[tuple[int,
 def alone(kind: str, name: str, sigma: Array | float, position_mm: Array | None = None) -> Entry:
     """Numbers of which nothing but their standard uncertainty (n,) or one, in mm or rad, is known."""
     rest = np.atleast_1d(np.asarray(sigma, float))
-    at = np.zeros(0) if position_mm is None else position_mm
-    return Entry(kind, name, np.zeros((len(rest), 0)), rest, at)
+    positions = np.zeros(0) if position_mm is None else position_mm
+    return Entry(kind, name, np.zeros((len(rest), 0)), rest, positions)

@@ -71,7 +71,7 @@ def _windows(knots: Array, jumps: Array) -> Array | None:
     can hold; None where there are none."""
     if not np.any(jumps):
         return None
-    at = knots[1:-1]
+    inner = knots[1:-1]
     total = np.concatenate([np.zeros((1, jumps.shape[1])), np.cumsum(jumps, axis=0)])
-    last = np.searchsorted(at, at[:, None] + UPPER_MM[None, :], side="right")
+    last = np.searchsorted(inner, inner[:, None] + UPPER_MM[None, :], side="right")
     return np.asarray(0.25 * (total[last] - total[:-1, None]).max(axis=0))

@@ -81,71 +81,71 @@ class GridBody:
         value = self.grid(position[:, self.axes])
         value *= np.reshape(weight, (-1, 1))
         arms = [np.broadcast_to(tool[..., k], (len(position),)) for k in range(3)]
-        at = [np.ascontiguousarray(position[:, k]) for k in range(3)]
+        coordinates = [np.ascontiguousarray(position[:, k]) for k in range(3)]
         for d, column in enumerate(self.column):
             if column is None:
                 continue
-            out = np.zeros((len(position), 3))
+            error = np.zeros((len(position), 3))
             if d < 3:
-                out[:, d] = value[:, column]
+                error[:, d] = value[:, column]
             else:
                 for rows, lever_arm in self.lever_arms:
-                    arm = lever_arm.at(at, list(arms))
+                    arm = lever_arm.at(coordinates, list(arms))
                     for i, a, k, sign in CROSS:
                         if i in rows and a == d - 3:
-                            out[:, i] += sign * value[:, column] * arm[k]
-            yield f"E{DIRECTIONS[d]}{AXES[self.axis]}", out
+                            error[:, i] += sign * value[:, column] * arm[k]
+            yield f"E{DIRECTIONS[d]}{AXES[self.axis]}", error
 
     def rotation(self, position: Array, payload_kg: Array | float) -> Array:
-        out = np.zeros((len(position), 3))
+        angles = np.zeros((len(position), 3))
         if any(c is not None for c in self.column[3:]):
             value = self.grid(position[:, self.axes])
             value *= np.reshape(self.weight(payload_kg), (-1, 1))
             for a, column in enumerate(self.column[3:]):
                 if column is not None:
-                    out[:, a] = value[:, column]
-        return out
+                    angles[:, a] = value[:, column]
+        return angles
 
     def turns_with(self) -> Mask:
         """(3, 3): [a, j] whether angle a changes with axis j."""
-        out = np.zeros((3, 3), dtype=np.bool_)
+        turns = np.zeros((3, 3), dtype=np.bool_)
         varies = self.grid.varies()
         for a, column in enumerate(self.column[3:]):
             if column is not None:
-                out[a, list(self.axes)] = varies[column]
-        return out
+                turns[a, list(self.axes)] = varies[column]
+        return turns
 
     def depends_on(self) -> Mask:
-        out = np.zeros((3, 3), dtype=np.bool_)
+        depends = np.zeros((3, 3), dtype=np.bool_)
         varies, turns = self.grid.varies(), self.turns_with()
         for i, column in enumerate(self.column[:3]):
             if column is not None:
-                out[i, list(self.axes)] |= varies[column]
+                depends[i, list(self.axes)] |= varies[column]
         for rows, lever_arm in self.lever_arms:
             for i, a, k, _ in CROSS:
                 column = self.column[3 + a]
                 if i in rows and column is not None and np.any(self.grid.values[..., column]):
-                    out[i] |= turns[a]
-                    out[i, k] |= lever_arm.moves[k]
-        return out
+                    depends[i] |= turns[a]
+                    depends[i, k] |= lever_arm.moves[k]
+        return depends
 
     def chord_bound(self, delta: Array, tool: Array, payload_kg: Array | float, box_mm: Array) -> Array:
         """(n, 3) bound by row, for tool vectors (m, 3)."""
         departure, change = self.bound.departure(delta), self.bound.change(delta)
-        out = np.zeros((len(delta), 3))
+        bound = np.zeros((len(delta), 3))
         for i, column in enumerate(self.column[:3]):
             if column is not None:
-                out[:, i] += departure[:, column]
+                bound[:, i] += departure[:, column]
         for rows, lever_arm in self.lever_arms:
             reach = lever_arm.reach_mm(box_mm, tool)
             for i, a, k, _ in CROSS:
                 column = self.column[3 + a]
                 if i not in rows or column is None:
                     continue
-                out[:, i] += departure[:, column] * reach[k]
+                bound[:, i] += departure[:, column] * reach[k]
                 if lever_arm.moves[k]:
-                    out[:, i] += 0.25 * change[:, column] * np.abs(delta[:, k])
-        return np.asarray(out * np.reshape(np.abs(self.weight(payload_kg)), (-1, 1)))
+                    bound[:, i] += 0.25 * change[:, column] * np.abs(delta[:, k])
+        return np.asarray(bound * np.reshape(np.abs(self.weight(payload_kg)), (-1, 1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -82,8 +82,8 @@ def lever_arms_of(
             line = source.line_mm if source is not None and not own else None
             # On its own line an axis stands where it stands; seen from a reflector on its table, it has moved
             # from the datum.
-            at = (datum_mm if line is None else line)[k] if moves[k] else 0.0
-            offset[k] = at + tool
+            stood_mm = (datum_mm if line is None else line)[k] if moves[k] else 0.0
+            offset[k] = stood_mm + tool
         return LeverArm((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
 
     rows: dict[LeverArm, list[int]] = {}

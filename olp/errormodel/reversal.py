@@ -92,8 +92,8 @@ def _maps(
     slack = width > 0.0
     safe = np.where(slack, width, 1.0)
     gain[:] = np.where(slack & (before > 0.0), before / safe, 1.0)
-    sense = np.where(motion > 0.0, np.inf, np.where(motion < 0.0, -np.inf, 0.0))
-    shift[:] = np.where(slack, 2.0 * motion / safe, sense)
+    end = np.where(motion > 0.0, np.inf, np.where(motion < 0.0, -np.inf, 0.0))
+    shift[:] = np.where(slack, 2.0 * motion / safe, end)
     low[:] = np.clip(shift - gain, -1.0, 1.0)
     high[:] = np.clip(shift + gain, -1.0, 1.0)
 

@@ -1,7 +1,7 @@
-"""What an unknown part of the calibration's numbers does to the tip: linear, at any axis position.
+"""How uncertain numbers of the calibration act on the tip: linearly, at any axis position.
 
-The same first-order law as `olp.errormodel.bodies`; against the exact matrices it is off by parts of a
-thousand of an uncertainty.
+The same first-order law as `olp.errormodel.bodies`. Against the exact matrices it is off by some thousandths
+of an uncertainty.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from olp.core.units import AXES
 from olp.errormodel.bodies import Body, build_bodies
 from olp.errormodel.boxed import as_points
 from olp.errormodel.calibration import Calibration, Thermal
-from olp.errormodel.entry import Entry, Place, Slot
+from olp.errormodel.entry import AxisState, Entry, Slot
 from olp.errormodel.sources.expansion import REFERENCE_DEGC
 from olp.errormodel.sources.registry import NUMBERS
 from olp.errormodel.uncertainty import EXPANSION_PER_K, Uncertainty
@@ -35,8 +35,8 @@ Rows = npt.NDArray[np.float32]
 @dataclass(frozen=True, slots=True, eq=False)
 class Expansion:
     """Standard uncertainties of expansion: of each scale and of the workpiece, per mm from where it is
-    held. `unmodelled_K` is the largest difference of temperature that the job states and no expansion of the
-    calibration answers."""
+    held. `unmodelled_K` is the largest temperature difference that the job states and for which the
+    calibration has no expansion coefficient."""
 
     scale: Vector
     fixed_at_mm: Vector
@@ -48,8 +48,8 @@ class Expansion:
     def of(
         cls, calibration: Calibration, uncertainty: Uncertainty, temperatures_degC: dict[str, float]
     ) -> Expansion:
-        """By the uncertainty of temperatures, and in full by stated differences that the calibration has no
-        coefficient for."""
+        """From the uncertainty of temperatures, and in full from stated differences for which the
+        calibration has no coefficient."""
         thermal = calibration.thermal or Thermal()
         rest, unmodelled = uncertainty.temperature_K, 0.0
 
@@ -61,8 +61,9 @@ class Expansion:
                 unmodelled = max(unmodelled, difference)
             return float(np.hypot((known or EXPANSION_PER_K) * rest, EXPANSION_PER_K * difference))
 
-        at = calibration.temperature_degC
-        x, y, z = (slope(f"{a}_scale", k, at) for a, k in zip(AXES, thermal.scale_per_K, strict=True))
+        calibrated_degC = calibration.temperature_degC
+        scales = zip(AXES, thermal.scale_per_K, strict=True)
+        x, y, z = (slope(f"{a}_scale", per_K, calibrated_degC) for a, per_K in scales)
         workpiece = slope("workpiece", thermal.workpiece_per_K, REFERENCE_DEGC)
         return cls((x, y, z), thermal.fixed_at_mm, workpiece, thermal.clamped_at_mm, unmodelled)
 
@@ -99,16 +100,16 @@ class Sensitivity:
         bodies = build_bodies(calibration, chain, skip, tool_terms=tool_terms)
         entries = tuple(e for e in uncertainty.entries if e.name not in skip)
         first = np.cumsum([0, *(len(e.rest) for e in entries)]).tolist()
-        at, spare = first[-1], []
+        count, spare = first[-1], []
         for entry in entries:
             parts = 0
             if entry.rest.any():
                 parts = NUMBERS[entry.kind].parts(entry)
-            spare.append(at if parts else -1)
-            at += parts
-        at += 4 if expansion is not None else 0
-        rank, own = uncertainty.rank, at - first[-1]
-        table = np.zeros((at, rank + own), np.float32)
+            spare.append(count if parts else -1)
+            count += parts
+        count += 4 if expansion is not None else 0
+        rank, own = uncertainty.rank, count - first[-1]
+        table = np.zeros((count, rank + own), np.float32)
         if first[-1]:
             table[: first[-1], :rank] = np.concatenate([e.factor for e in entries])
         table[first[-1] :, rank:] = np.eye(own, dtype=np.float32)
@@ -137,40 +138,40 @@ class Sensitivity:
         for body in self.bodies:
             lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
             q = position[body.axis]
-            state = None if play is None else play[:, body.axis]
-            place = Place(body.axis, q, state, body.datum_mm, lever_arms)
+            axis_play = None if play is None else play[:, body.axis]
+            state = AxisState(body.axis, q, axis_play, body.datum_mm, lever_arms)
             for entry, first, spare in zip(self.entries, self.first, self.spare, strict=True):
                 if AXES.index(entry.name[-1]) != body.axis:
                     continue
-                acts = list(NUMBERS[entry.kind].acts(entry, place))
+                acts = list(NUMBERS[entry.kind].acts(entry, state))
                 own = list(_own(entry, first, spare, q)) if acts else []
                 for row, coefficient in acts:
                     slots[row].extend((number, weight * coefficient) for number, weight in own)
         if self.expansion is not None:
             for j, taken in enumerate(slots):
                 taken.extend(_expansion(self.expansion, j, unknowns - 4, position[j]))
-        out = []
+        matrices = []
         for taken in slots:
             width = len(taken)
             number, weight = np.zeros((n, width), np.int32), np.zeros((n, width), np.float32)
             for k, (one, value) in enumerate(taken):
                 number[:, k], weight[:, k] = one, value
             ends = np.arange(0, n * width + 1, width) if width else np.zeros(n + 1, np.int32)
-            out.append(csr_array((weight.ravel(), number.ravel(), ends), shape=(n, unknowns)))
-        return out
+            matrices.append(csr_array((weight.ravel(), number.ravel(), ends), shape=(n, unknowns)))
+        return matrices
 
 
 def value_rows(entry: Entry, q: Array) -> Array:
     """(n, columns) dependence of the value of an entry at q (n,) on independent unknowns of variance 1: those
     of the factor, and then its own."""
     numbers, rank, n = NUMBERS[entry.kind], entry.factor.shape[1], len(q)
-    out = np.zeros((n, rank + numbers.parts(entry)))
+    rows = np.zeros((n, rank + numbers.parts(entry)))
     if entry.factor.size:
         for number, weight in numbers.weights(entry, q):
-            out[:, :rank] += weight[:, None] * entry.factor[number]
+            rows[:, :rank] += weight[:, None] * entry.factor[number]
     for number, weight in numbers.part_weights(entry, q):
-        out[np.arange(n), rank + number] += weight
-    return out
+        rows[np.arange(n), rank + number] += weight
+    return rows
 
 
 def _expansion(expansion: Expansion, j: int, first: int, q: Array) -> Iterator[Slot]:

@@ -15,7 +15,7 @@ from olp.errormodel.boxed import as_points
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Total:
-    """Errors, rotations, lost motions and bounds add; the box is what all models share."""
+    """Errors, rotations, backlash and bounds add; the box is what all models share."""
 
     models: tuple[ErrorModel, ...]
 
@@ -36,8 +36,8 @@ class Total:
         return np.asarray(np.any([model.depends_on for model in self.models], axis=0))
 
     def backlash_at(self, axis_mm: Array) -> Array | None:
-        found = [lost for model in self.models if (lost := model.backlash_at(axis_mm)) is not None]
-        return sum(found[1:], found[0]) if found else None
+        parts = [part for model in self.models if (part := model.backlash_at(axis_mm)) is not None]
+        return sum(parts[1:], parts[0]) if parts else None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
         return self._added(lambda model: model.chord_bound(delta_mm, tool_mm))

@@ -1,1 +1,1 @@
-"""Files that people write and that `olp` writes; below the command line nothing else opens one."""
+"""The files that you write and that `olp` writes. Below the command line, no other package opens a file."""

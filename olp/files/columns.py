@@ -1,6 +1,6 @@
-"""Tables of numbers under named columns: read as one, whatever they hold, with every problem and its line.
+"""Tables of numbers under named columns: one reader for all, which lists every problem with its line.
 
-What differs from table to table is a value (`Wanted`): how lines become cells, what names are right, what a
+What differs from table to table is a value (`Wanted`): how lines become cells, which names are right, what a
 cell may hold, and the words for what is wrong.
 """
 
@@ -28,10 +28,10 @@ Record = tuple[int, list[str]]
 class Wanted:
     """What a table has to be.
 
-    `nothing` is said of a file without a header. `header` gives what is wrong with names of columns, from
-    their line and themselves; `number` the number in a cell by the name of its column, and what is wrong with
-    it. `one` and `many` end what is said of a row with more or fewer cells than columns, `many` where it has
-    more.
+    `nothing` is the message for a file without a header. `header` takes the line and the names of columns and
+    gives what is wrong with them. `number` takes the name of a column and a cell, and gives the number and
+    what is wrong with it. `one` ends the message for a row with more or fewer cells than columns; `many`
+    follows it where the row has more.
     """
 
     nothing: str
@@ -44,8 +44,8 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """The text of a table, the line of its header, its names, and the rows as written and as numbers: those
-    with as many cells as columns. `problems` are those of the rows."""
+    """The text of a table, the line of its header, and its names. `records` are the rows as written; `rows`
+    are those with as many cells as columns, as numbers. `problems` are those of the rows."""
 
     text: str
     line: int
@@ -71,8 +71,8 @@ class Sheet:
 
 
 def read_sheet(data: bytes, file: str, wanted: Wanted) -> Sheet:
-    """A table and what is wrong with its rows. Raises ConfigError where the file is no text or holds nothing,
-    and with the problems of its header."""
+    """A table and what is wrong with its rows. Raises ConfigError where the file is not text or is empty, and
+    with the problems of its header."""
     text = decoded(data, file)
     try:
         records = list(wanted.form.rows(text))
@@ -81,19 +81,19 @@ def read_sheet(data: bytes, file: str, wanted: Wanted) -> Sheet:
     if not records:
         raise config_error([(None, wanted.nothing)], file)
     line, header = records[0]
-    found = wanted.header(line, header)
-    if found:
-        raise config_error(found, file)
+    wrong_names = wanted.header(line, header)
+    if wrong_names:
+        raise config_error(wrong_names, file)
     problems: list[Problem] = []
     numbers: list[Row] = []
-    for at, cells in records[1:]:
+    for row_line, cells in records[1:]:
         if len(cells) != len(header):
             hint = wanted.many if len(cells) > len(header) else ""
-            problems.append((at, f"{len(cells)} values under {len(header)} columns{wanted.one}{hint}"))
+            problems.append((row_line, f"{len(cells)} values under {len(header)} columns{wanted.one}{hint}"))
             continue
-        said = [wanted.number(name, cell) for name, cell in zip(header, cells, strict=True)]
-        problems += [(at, wrong) for _, wrong in said if wrong]
-        numbers.append((at, [number for number, _ in said]))
+        parsed = [wanted.number(name, cell) for name, cell in zip(header, cells, strict=True)]
+        problems += [(row_line, wrong) for _, wrong in parsed if wrong]
+        numbers.append((row_line, [number for number, _ in parsed]))
     return Sheet(text, line, tuple(header), tuple(records[1:]), tuple(numbers), tuple(problems))
 
 
@@ -106,7 +106,7 @@ def decoded(data: bytes, file: str) -> str:
 
 
 def finite(cell: str) -> float:
-    """The finite number in a cell, else not a number."""
+    """The finite number in a cell, NaN for anything else."""
     try:
         value = float(cell) if "_" not in cell else math.nan
     except ValueError:
@@ -117,19 +117,19 @@ def finite(cell: str) -> float:
 def names(
     line: int, header: Sequence[str], wrong: Callable[[int, str], str | None], first: int = 1
 ) -> list[Problem]:
-    """What is wrong with the names of columns from the `first` on: those that stand before as well, and those
-    of which `wrong` says it, from their number and name."""
+    """What is wrong with the names of columns from column `first` on. No name may be repeated, and `wrong`
+    gives what is wrong with a name, from its number and itself."""
     problems: list[Problem] = []
     for number, name in enumerate(header[first - 1 :], first):
         if header.index(name) < number - 1:
             problems.append((line, f'column {number} repeats "{name}"; expected each column once'))
-        elif said := wrong(number, name):
-            problems.append((line, f'column {number} is "{name}"; {said}'))
+        elif problem := wrong(number, name):
+            problems.append((line, f'column {number} is "{name}"; {problem}'))
     return problems
 
 
 def unknown(name: str, known: Sequence[str], more: str = "") -> str | None:
-    """What is said of a name that is not among the known ones."""
+    """The message for a name that is not among the known ones, None for a known one."""
     if name in known:
         return None
     near = nearest(name, known)
@@ -142,10 +142,10 @@ def missing(line: int, header: Sequence[str], needed: Sequence[str]) -> list[Pro
 
 
 def place_in(header: Sequence[str], column: str | int, file: str, hint: str = "") -> int:
-    """The index of a column. Raises InputError, with a hint, where no column bears its name."""
-    place = place_of(column, header)
-    if place is None:
+    """The index of a column. Raises InputError, with a hint, where no column has its name."""
+    index = place_of(column, header)
+    if index is None:
         near = nearest(str(column), header)
         known = f"did you mean {near}?" if near else f"expected one of {', '.join(header) or 'their numbers'}"
         raise InputError(f'there is no column "{column}"; {known}{hint}', file=file)
-    return place
+    return index

@@ -22,27 +22,25 @@ __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
 
 
 def load_machine(path: PathLike) -> Machine:
-    """The machine of an olp-machine-1 file; `calibration` becomes a path that can be opened."""
+    """The machine of an olp-machine-1 file. `calibration` becomes a path that can be opened."""
     return _read_machine(path, read_bytes)[0]
 
 
 def load_job(path: PathLike) -> Job:
-    """The job of an olp-job-1 file; `program`, `machine` and meshes become paths that can be opened."""
+    """The job of an olp-job-1 file. `program`, `machine` and meshes become paths that can be opened."""
     return _read_job(path, read_bytes)[0]
 
 
 def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None = None) -> Setup:
-    """Machine and job together; without `machine_path` the job's `machine` is taken.
+    """Machine and job together. Without `machine_path` the key `machine` of the job names the machine file.
 
     Refuses names that neither file defines: the tool at the start, touch tools, frames of meshes. Raises
-    UsageError where no machine file is named anywhere.
+    UsageError where neither the call nor the job names a machine file.
     """
     return read_setup(machine_path, job_path, read_bytes)
 
 
-def read_setup(
-    machine_path: PathLike | None, job_path: PathLike | None, read: Reader
-) -> Setup:
+def read_setup(machine_path: PathLike | None, job_path: PathLike | None, read: Reader) -> Setup:
     """As `load_setup`, from the bytes that `read` gives for a path."""
     job, job_lines = _read_job(job_path, read) if job_path is not None else (Job(), {})
     machine_path = machine_path if machine_path is not None else job.machine
@@ -51,27 +49,26 @@ def read_setup(
         raise UsageError(f"{what}; name the machine file with -m, or with the key machine of the job file")
     machine, machine_lines = _read_machine(machine_path, read)
     setup = Setup(machine, job)
-    found = _undefined_tools(setup, machine.work_offsets, machine_lines)
+    problems = _undefined_tools(setup, machine.work_offsets, machine_lines)
     if machine.default_tool is not None and setup.tool(machine.default_tool) is None:
-        found.append(_no_tool(("job_defaults", "tool"), machine.default_tool, machine_lines))
-    if found:
-        raise config_error(found, str(machine_path))
-    found = _undefined_tools(setup, job.work_offsets, job_lines)
+        problems.append(_no_tool(("job_defaults", "tool"), machine.default_tool, machine_lines))
+    if problems:
+        raise config_error(problems, str(machine_path))
+    problems = _undefined_tools(setup, job.work_offsets, job_lines)
     for index, mesh in enumerate(job.meshes):
         if mesh.frame != "machine" and setup.work_offset(mesh.frame) is None:
             key: Path = ("meshes", index, "frame")
             sentence = (
-                f'{dotted(key)} = "{mesh.frame}" is no work offset of machine or job; expected "machine"'
+                f'{dotted(key)} = "{mesh.frame}" is not a work offset of machine or job; expected "machine" '
+                "or the name of a table [work_offsets.NAME]"
             )
-            found.append((line_of(key, job_lines), f"{sentence} or the name of one of [work_offsets]"))
-    if found:
-        raise config_error(found, str(job_path))
+            problems.append((line_of(key, job_lines), sentence))
+    if problems:
+        raise config_error(problems, str(job_path))
     return setup
 
 
-def _read_machine(
-    path: PathLike, read: Reader
-) -> tuple[Machine, Mapping[Path, int]]:
+def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, int]]:
     values, lines = read_toml(read(path), str(path))
     file = validate(MachineFile, values, lines, str(path))
     axes = {
@@ -81,9 +78,9 @@ def _read_machine(
             velocity_mm_s=table.velocity_mm_s,
             acceleration_mm_s2=table.acceleration_mm_s2,
             jerk_mm_s3=table.jerk_mm_s3,
-            compliance_um_per_m_s2=_compliance(table.compliance_um_per_m_s2, place),
+            compliance_um_per_m_s2=_compliance(table.compliance_um_per_m_s2, index),
         )
-        for place, (axis, table) in enumerate((axis, getattr(file.axes, axis)) for axis in AXES)
+        for index, (axis, table) in enumerate((axis, getattr(file.axes, axis)) for axis in AXES)
     }
     machine = Machine(
         name=file.name,
@@ -113,7 +110,8 @@ def _read_machine(
 
 
 def _compliance(stated: float | Vector, axis: int) -> Vector:
-    """What the tool stands off its place by; one number is how far it stays behind along the axis."""
+    """Deviation of the tool per acceleration, actual minus commanded. A single number is the lag along the
+    axis."""
     if isinstance(stated, tuple):
         return stated
     own = [0.0, 0.0, 0.0]
@@ -132,7 +130,7 @@ def _read_job(path: PathLike, read: Reader) -> tuple[Job, Mapping[Path, int]]:
         if not FilePath(where).is_file():
             key: Path = ("meshes", index, "file")
             sentence = (
-                f'{dotted(key)} = "{mesh.file}" is no file here; expected a path relative to the job file'
+                f'{dotted(key)} = "{mesh.file}" does not exist; expected a path relative to the job file'
             )
             missing.append((line_of(key, lines), sentence))
     if missing:
@@ -214,11 +212,10 @@ def _undefined_tools(
 
 
 def _no_tool(key: Path, number: int, lines: Mapping[Path, int]) -> Problem:
-    return line_of(
-        key, lines
-    ), f"{dotted(key)} = {number} is not defined; expected the number of a table [tools.N]"
+    sentence = f"{dotted(key)} = {number} is not defined; expected the number of a table [tools.N]"
+    return line_of(key, lines), sentence
 
 
 def beside(naming: PathLike, named: str | None) -> str | None:
-    """A path inside a file, as seen from the folder of that file; an absolute path stays as it is."""
+    """A path that a file names, relative to the folder of that file. An absolute path is unchanged."""
     return None if named is None else str(FilePath(naming).parent / named)

@@ -1,5 +1,5 @@
-"""Loads dialects that a file describes: olp-dialect-1 (a language of motion) and olp-points-1 (a list of
-positions); and those that come with `olp`."""
+"""Loads dialects that a file describes: olp-dialect-1 (a language of motion), olp-points-1 (a list of
+positions), and those that come with `olp`."""
 
 from __future__ import annotations
 
@@ -33,17 +33,19 @@ Speed = Literal["mm/s", "mm/min", "m/s", "m/min", "inch/min"]
 class StatementTable(Table):
     form: Text = Field(description="how the statement is written, such as LMOVE TRANS({x}, {y}, {z})")
     does: Does = Field(description="what it does: " + ", ".join(DOES))
-    why: Text | None = Field(default=None, description="why it is refused, or what becomes of it")
-    inside: str | None = Field(default=None, description="the section where the form holds; all if left out")
+    why: Text | None = Field(default=None, description="why it is refused, or how it is treated")
+    inside: str | None = Field(
+        default=None, description="the section where the form is valid; all if left out"
+    )
     enters: str | None = Field(
-        default=None, description='the section that the statement begins, "" for that at the start'
+        default=None, description='the section that the statement begins, "" for the one at the start'
     )
     frame: Text | None = Field(default=None, description="the frame that the statement makes active")
     unit: Literal["mm", "um", "m", "inch"] | None = Field(
         default=None, description="the unit that the statement makes active"
     )
     speed_unit: Speed | None = Field(
-        default=None, description="the unit of its speed; that of the dialect if left out"
+        default=None, description="the unit of its speed; the dialect's if left out"
     )
     incremental: bool = Field(default=False, description="whether its numbers are distances")
 
@@ -53,25 +55,31 @@ class DialectFile(Table):
 
     schema_: Literal["olp-dialect-1"] = Field(alias="schema", description='the format, "olp-dialect-1"')
     name: Text = Field(description="the name of the dialect")
-    title: Text = Field(description="the dialect's name for people")
+    title: Text = Field(description="the name of the dialect in reports")
     about: Text | None = Field(default=None, description="what is known of the language and what is not")
     unit: Literal["mm", "um", "m", "inch"] | None = Field(
-        default=None, description="the unit of positions, where no statement says it"
+        default=None, description="the unit of positions, where no statement sets it"
     )
-    speed_unit: Speed | None = Field(default=None, description="the unit of speeds; not known if left out")
-    comments: list[Text] = Field(default=[], description="what begins a comment, to the end of its line")
+    speed_unit: Speed | None = Field(default=None, description="the unit of speeds; unknown if left out")
+    comments: list[Text] = Field(
+        default=[], description="the marks that begin a comment, up to the end of its line"
+    )
     stamp: list[str] = Field(
         default=[], description="the marks before and behind the comment that marks a corrected program"
     )
-    quote: str = Field(default="", description="the mark around texts, in which nothing is a comment")
-    continuation: str = Field(default="", description="the mark at the end of a line that goes on")
+    quote: str = Field(default="", description="the mark around texts; there is no comment inside them")
+    continuation: str = Field(
+        default="", description="the mark at the end of a line that continues on the next"
+    )
     terminator: str = Field(default="", description="the mark at the end of a statement")
     label: Text | None = Field(default=None, description="what may stand before a statement, as a form")
     ignore_case: bool = Field(default=True, description="whether upper and lower case are the same")
     path_mode: Text = Field(
-        default="not stated", description="how the control passes from move to move, for people"
+        default="not stated", description="how the control moves from block to block, for reports"
     )
-    carry: list[Text] = Field(default=[], description="forms of statements that mean nothing to the path")
+    carry: list[Text] = Field(
+        default=[], description="forms of statements without effect on the path, kept as written"
+    )
     refuse: dict[str, Text] = Field(default={}, description="forms of statements that are refused, and why")
     statements: list[StatementTable] = Field(description="tables [[statements]], tried in their order")
 
@@ -82,13 +90,13 @@ def load_described(path: PathLike, read: Reader = read_bytes) -> Dialect:
     if values.get("schema") == "olp-points-1":
         return with_layout(validate(PointProfile, values, lines, str(path)).layout)
     file = validate(DialectFile, values, lines, str(path))
-    found: list[Problem] = []
+    problems: list[Problem] = []
 
     def formed(text: str, key: tuple[str | int, ...]) -> Form | None:
         try:
             return form(text, ignore_case=file.ignore_case)
         except ConfigError as error:
-            found.append((line_of(key, lines), error.message))
+            problems.append((line_of(key, lines), error.message))
             return None
 
     rules: list[Rule] = []
@@ -98,7 +106,7 @@ def load_described(path: PathLike, read: Reader = read_bytes) -> Dialect:
             continue
         wrong = _problem(table, made)
         if wrong is not None:
-            found.append((line_of(("statements", index), lines), f'the form "{table.form}" {wrong}'))
+            problems.append((line_of(("statements", index), lines), f'the form "{table.form}" {wrong}'))
         rules.append(Rule(
             made, table.does, table.why or "", table.inside, table.enters, table.frame, table.unit,
             table.speed_unit, table.incremental,
@@ -113,9 +121,9 @@ def load_described(path: PathLike, read: Reader = read_bytes) -> Dialect:
             rules.append(Rule(made, "carry"))
     label = formed(file.label, ("label",)) if file.label else None
     if len(file.stamp) not in (0, 2) or (not file.stamp and not file.comments):
-        found.append((line_of(("stamp",), lines), 'stamp needs two marks, such as ["; ", ""]'))
-    if found:
-        raise config_error(found, str(path))
+        problems.append((line_of(("stamp",), lines), 'stamp needs two marks, such as ["; ", ""]'))
+    if problems:
+        raise config_error(problems, str(path))
     stamp = file.stamp or [file.comments[0] + " ", ""]
     return UserDialect(
         name=file.name, title=file.title, path_mode=file.path_mode, reader=read_described,
@@ -128,18 +136,16 @@ def load_described(path: PathLike, read: Reader = read_bytes) -> Dialect:
     )  # fmt: skip
 
 
-def described(
-    name: str, path: PathLike | None = None, read: Reader = read_bytes
-) -> Dialect | None:
-    """The dialect that a name stands for, where a file describes it: one that comes with `olp`, or a path
-    (`path` where it is to be read from). None for the others. Raises InputError."""
+def described(name: str, path: PathLike | None = None, read: Reader = read_bytes) -> Dialect | None:
+    """The dialect of a name, where a file describes it: a dialect that comes with `olp`, or a path. `path` is
+    where the file is read from instead. None for other names. Raises InputError."""
     if name in SHIPPED:
         return load_described(FOLDER / f"{name}.toml", read)
     return load_described(path or name, read) if name.endswith(".toml") else None
 
 
 def _problem(table: StatementTable, made: Form) -> str | None:
-    """What a form lacks for what it does."""
+    """What is missing in a form for what the statement does."""
     position = {"x", "y", "z"} & made.fields
     if table.does in ("line", "rapid") and not position and "target" not in made.fields:
         return "moves, but has neither fields {x}, {y}, {z} nor {target}"
@@ -150,12 +156,12 @@ def _problem(table: StatementTable, made: Form) -> str | None:
     if table.does == "unit" and table.unit is None:
         return 'sets the unit; expected the key unit, such as unit = "inch"'
     if table.does == "section" and table.enters is None:
-        return 'begins a section; expected the key enters, "" for that at the start'
+        return 'begins a section; expected the key enters, "" for the section at the start'
     return None
 
 
 def _by_word(rules: list[Rule]) -> dict[str, tuple[Rule, ...]]:
-    """Rules by the word that their forms begin with, in their order; those that may begin with any word are
-    among all."""
+    """Rules by the first word of their forms, in their order. Rules that may begin with any word are under
+    every word."""
     words = {rule.form.first for rule in rules}
     return {word: tuple(r for r in rules if r.form.first in ("", word)) for word in words | {""}}

@@ -1,4 +1,4 @@
-"""The kinds of values in files: chains, controls, names of errors and of work offsets."""
+"""The types of values in files: chains, controls, names of errors and of work offsets."""
 
 from __future__ import annotations
 
@@ -14,20 +14,22 @@ from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
 from olp.core.schema import refusal
 from olp.program.registry import DESCRIBED, DIALECTS
 
-#: Dialect profiles that can be read and written today.
+#: Dialects that are built in.
 CONTROLLERS = tuple(DIALECTS)
 #: Dialects that are described by files which come with `olp`.
 SHIPPED = DESCRIBED
+#: ISO 230-1 names of the 21 errors.
 ISO_NAMES = COMPONENTS + SQUARENESS
+#: The one sign convention of calibration files.
 SIGN = "actual-minus-commanded"
 
-# Numbers only: a frame of another language may have any name, but a misspelt G-code would never be used.
 _TOOL_NUMBER = "(0|[1-9][0-9]*)"
+# Frames of other languages may have any name, but no program would ever select a misspelt G-code.
 _G_OFFSET = re.compile(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?")
 
 
 def shown(value: object) -> str:
-    """A value as it may stand in a TOML file, cut where it is long."""
+    """A value as TOML, cut where it is long."""
     if isinstance(value, str):
         text = json.dumps(value, ensure_ascii=False)
     elif isinstance(value, bool):
@@ -42,8 +44,8 @@ def shown(value: object) -> str:
 def _chain(value: object) -> object:
     if not isinstance(value, str) or value not in CHAINS:
         raise refusal(
-            f"= {shown(value)} is no chain; expected one of the 24 orders of F, X, Y, Z from workpiece to "
-            'tool, such as "FXYZ" (all axes carry the tool) or "YFXZ" (the table moves in Y)'
+            f"= {shown(value)} is not a chain; expected one of the 24 orders of F, X, Y, Z from workpiece to "
+            'tool. In "FXYZ" all axes carry the tool; in "YFXZ" the table moves in Y'
         )
     return value
 
@@ -51,7 +53,7 @@ def _chain(value: object) -> object:
 def _controller(value: object) -> object:
     if value not in (*CONTROLLERS, *SHIPPED):
         raise refusal(
-            f"= {shown(value)} is not a controller that olp knows; built are: "
+            f"= {shown(value)} is not a dialect that olp knows; expected one of "
             f"{', '.join((*CONTROLLERS, *SHIPPED))}"
         )
     return value
@@ -61,8 +63,8 @@ def _dialect(value: object) -> object:
     described = isinstance(value, str) and value.endswith(".toml")
     if not described and value not in (*CONTROLLERS, *SHIPPED):
         raise refusal(
-            f"= {shown(value)} is not a dialect that olp knows; built are: "
-            f"{', '.join((*CONTROLLERS, *SHIPPED))}; or name a file that describes one (.toml)"
+            f"= {shown(value)} is not a dialect that olp knows; expected one of "
+            f"{', '.join((*CONTROLLERS, *SHIPPED))}, or the path of a file that describes one (.toml)"
         )
     return value
 
@@ -70,7 +72,7 @@ def _dialect(value: object) -> object:
 def _sign(value: object) -> object:
     if value != SIGN:
         raise refusal(
-            f'= {shown(value)} is not taken; olp stores errors as "{SIGN}": for values of the opposite sense '
+            f'= {shown(value)} is not accepted; expected "{SIGN}". For the opposite sign convention '
             "(commanded minus actual, or compensation values) multiply curve columns, squareness and cyclic "
             f'amplitudes by -1, then write sign = "{SIGN}"'
         )
@@ -99,21 +101,21 @@ def _compliance(value: object) -> float | tuple[float, float, float]:
     one = len(parts) == 1
     if len(numbers) < len(parts) or not all(map(math.isfinite, numbers)) or (one and numbers[0] < 0.0):
         raise refusal(
-            f"= {shown(value)}; expected how far the tool stays behind, in um per m/s2 and 0 or above, or "
-            "[X, Y, Z] of it, actual minus commanded"
+            f"= {shown(value)}; expected the lag of the tool in um per m/s2, 0 or above, or its three values "
+            "[X, Y, Z], actual minus commanded"
         )
     return numbers[0] if one else (numbers[0], numbers[1], numbers[2])
 
 
 def _offset_name(name: str) -> str:
     if re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
-        raise refusal('is no work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
+        raise refusal('is not a work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
     return name
 
 
 def _tool_number(name: str) -> str:
     if not re.fullmatch(_TOOL_NUMBER, name):
-        raise refusal("is no tool number; expected a whole number as name, such as [tools.1]")
+        raise refusal("is not a tool number; expected an integer as name, such as [tools.1]")
     return name
 
 

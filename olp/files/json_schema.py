@@ -1,4 +1,4 @@
-"""JSON Schemas of the TOML files that people write, for editors that complete and check them."""
+"""JSON Schemas of the TOML files that you write, for editors that complete and check them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
 from olp.files.schemas import FILES
 
-#: kind of file to its model
+#: The model of each kind of file.
 KINDS: dict[str, type[Table]] = {
     **FILES,
     "measurements": MeasurementsFile,
     "points": PointProfile,
     "dialect": DialectFile,
 }
+#: The version of JSON Schema that is written.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(kind: str) -> dict[str, Any]:
-    """The JSON Schema of a kind of file, one of KINDS; raises UsageError for any other kind."""
+    """The JSON Schema of a kind of file, one of KINDS. Raises UsageError for any other kind."""
     if kind not in KINDS:
         raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(KINDS)}')
     schema = _cleaned(KINDS[kind].model_json_schema(by_alias=True, mode="validation"))
@@ -31,12 +32,12 @@ def json_schema(kind: str) -> dict[str, Any]:
 
 
 def json_schema_text(kind: str) -> str:
-    """The schema as JSON text; raises UsageError as `json_schema` does."""
+    """The schema as JSON text. Raises as `json_schema`."""
     return json.dumps(json_schema(kind), indent=2) + "\n"
 
 
 def _cleaned(node: Any) -> Any:
-    """Without titles that only repeat a key, and without null, which TOML cannot say."""
+    """Without titles that only repeat a key, and without null, which TOML does not have."""
     if isinstance(node, list):
         return [_cleaned(item) for item in node]
     if not isinstance(node, dict):

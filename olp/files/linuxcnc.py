@@ -1,8 +1,8 @@
 """Imports the machine from a LinuxCNC configuration: INI file, tool table and stored work offsets.
 
-Source: the LinuxCNC integrator manual (INI configuration, tool table) and the parameter list of its
-G-code manual: 5220 holds the active offset, 5221 to 5390 hold G54 to G59.3, nine axes and a rotation
-each, in machine units.
+Sources: the LinuxCNC integrator manual (INI configuration, tool table) and the parameter list of its G-code
+manual. Parameter 5220 holds the active offset. Parameters 5221 to 5390 hold G54 to G59.3, nine axes and a
+rotation each, in machine units.
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ from olp.core.machine import Axis, Machine, Tool, Vector, WorkOffset
 from olp.core.units import AXES, MM_PER_INCH
 from olp.files.write import PathLike, read_bytes
 
-#: Jerk where the configuration states none: full acceleration is reached within this time in s.
+#: In s: where the configuration states no jerk, full acceleration is reached within this time.
 JERK_TIME_S = 0.05
-#: LinuxCNC takes any number of decimals; this is what its users write.
+#: In mm. LinuxCNC takes any number of decimals; programs commonly have four.
 LEAST_INCREMENT_MM = 0.0001
 
+#: Work offsets in the order of their parameters.
 OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
 _UNITS_MM = {"mm": 1.0, "metric": 1.0, "in": MM_PER_INCH, "inch": MM_PER_INCH, "imperial": MM_PER_INCH}
 _CARTESIAN = ("trivkins", "corexykins")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TOOL_WORD = re.compile(rf"([A-Z])\s*({_NUMBER})", re.IGNORECASE)
+#: Depth of nested `#INCLUDE` files.
 _MAX_INCLUDES = 20
 
 Sections = dict[str, dict[str, str]]
@@ -36,7 +38,7 @@ Load = Callable[[Path], bytes]
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """A machine and what a person must know or decide about it, one sentence a note."""
+    """A machine, and notes on what you must know or decide about it, one sentence each."""
 
     machine: Machine
     notes: tuple[str, ...]
@@ -44,7 +46,7 @@ class Imported:
 
 @dataclass(slots=True)
 class Reading:
-    """An INI file that is read: its sections, what is noted on the way, and the length of its unit in mm."""
+    """An INI file while it is read: its sections, the notes so far, and the length of its unit in mm."""
 
     file: str
     sections: Sections
@@ -60,7 +62,7 @@ class Reading:
             return None
         match = re.match(_NUMBER, text)
         if match is None:
-            raise InputError(f'[{section}] {key} = "{text}" is no number', file=self.file)
+            raise InputError(f'[{section}] {key} = "{text}" is not a number', file=self.file)
         return float(match[0])
 
     def length(self, section: str, key: str) -> float | None:
@@ -69,10 +71,10 @@ class Reading:
 
 
 def from_linuxcnc(ini_path: PathLike, chain: str = "FXYZ") -> Imported:
-    """The machine that a LinuxCNC INI file describes; the file says nothing of the chain, so it is given.
+    """The machine that a LinuxCNC INI file describes. The file does not state the chain, so the call does.
 
-    Raises InputError where a file cannot be read, or where the INI file has no units, no limits, or
-    not all of the axes X, Y, Z.
+    Raises InputError where a file cannot be read, or where units, limits or one of the axes X, Y, Z are
+    missing in the INI file.
     """
     path = Path(ini_path)
     reading = Reading(str(path), sections_of(path))
@@ -97,18 +99,18 @@ def from_linuxcnc(ini_path: PathLike, chain: str = "FXYZ") -> Imported:
 
 
 def unit_mm(reading: Reading) -> float:
-    """Length of a machine unit in mm; LinuxCNC takes a name, or a number of units per mm."""
+    """Length of a machine unit in mm. LinuxCNC takes a name, or a number of units per mm."""
     units = (reading.text("TRAJ", "LINEAR_UNITS") or "").casefold()
     if units in _UNITS_MM:
         return _UNITS_MM[units]
     if re.fullmatch(_NUMBER, units) and float(units) > 0:
         return 1.0 / float(units)
-    found = f'"{units}"' if units else "missing"
-    raise InputError(f"[TRAJ] LINEAR_UNITS is {found}; expected mm or inch", file=reading.file)
+    stated = f'"{units}"' if units else "missing"
+    raise InputError(f"[TRAJ] LINEAR_UNITS is {stated}; expected mm or inch", file=reading.file)
 
 
 def _lines(path: Path, load: Load, depth: int = 0) -> Iterator[str]:
-    """The lines of an INI file, with those of `#INCLUDE` files in their place."""
+    """The lines of an INI file, with the lines of `#INCLUDE` files inserted."""
     for line in load(path).decode("utf-8", "replace").splitlines():
         include = re.match(r"\s*#INCLUDE\s+(\S.*)", line)
         if include and depth < _MAX_INCLUDES:
@@ -118,7 +120,7 @@ def _lines(path: Path, load: Load, depth: int = 0) -> Iterator[str]:
 
 
 def sections_of(path: Path, load: Load = read_bytes) -> Sections:
-    """Section to key to its first value; `load` gives the bytes of a file."""
+    """The first value of each key, by section and key. `load` gives the bytes of a file."""
     sections: Sections = {}
     current: dict[str, str] = {}
     for line in _lines(path, load):
@@ -131,7 +133,7 @@ def sections_of(path: Path, load: Load = read_bytes) -> Sections:
 
 
 def joints_of(reading: Reading) -> dict[str, list[str]]:
-    """The sections that describe the joints of each axis; none where kinematics lie between them."""
+    """The sections of the joints of each axis; none where the kinematics are not trivial."""
     coordinates = (reading.text("TRAJ", "COORDINATES") or "XYZ").upper().replace(" ", "")
     kinematics = reading.text("KINS", "KINEMATICS") or "trivkins"
     stated = re.search(r"coordinates\s*=\s*([A-Z]+)", kinematics, re.IGNORECASE)
@@ -198,7 +200,7 @@ def _axis(reading: Reading, letter: str, joints: list[str]) -> Axis:
 
 
 def _compensated(reading: Reading, joints: Mapping[str, list[str]]) -> frozenset[str]:
-    """ISO names of what COMP_FILE corrects; a control's own backlash has no such name and gives a note."""
+    """ISO names of the errors that COMP_FILE corrects. BACKLASH has no such name and gives a note."""
     names = set()
     for letter, sections in joints.items():
         for section in sections:
@@ -207,12 +209,12 @@ def _compensated(reading: Reading, joints: Mapping[str, list[str]]) -> frozenset
                 names.add(f"E{letter}{letter}")
                 reading.notes.append(
                     f"[{section}] COMP_FILE = {table} corrects E{letter}{letter}, so it is listed in "
-                    "compensated_by_controller (olp calibrate import --format linuxcnc reads it); if it was "
+                    "compensated_by_controller (olp calibrate import --format linuxcnc reads it). If it was "
                     "active while measuring, list it in active_during_measurement of the calibration instead."
                 )
             elif backlash := reading.length(section, "BACKLASH"):
                 reading.notes.append(
-                    f"[{section}] BACKLASH = {backlash:g} mm is taken up by the control: measure with it "
+                    f"[{section}] BACKLASH = {backlash:g} mm is compensated by the control. Measure with it "
                     f"active, or leave {letter}_um out of [backlash] in the calibration."
                 )
     return frozenset(names)
@@ -237,13 +239,13 @@ def _tools(reading: Reading, ini: Path) -> dict[int, Tool]:
         x, y, z = (words.get(letter, 0.0) * reading.mm for letter in AXES)
         number = int(words["T"])
         if number in tools:
-            reading.notes.append(f"Tool {number} stands twice in {name}; the last row is taken.")
+            reading.notes.append(f"Tool {number} is defined twice in {name}; the last row is used.")
         tools[number] = Tool(number, length_mm=(x, y, z), radius_mm=abs(words.get("D", 0.0)) * reading.mm / 2)
     negative = [str(number) for number, tool in tools.items() if tool.tool_vector_mm is None]
     if negative:
         reading.notes.append(
-            f"Tools {', '.join(negative)} have a negative Z, a touch-off value and no length: "
-            "give gauge_to_tip_mm to use them."
+            f"Tools {', '.join(negative)} have a negative Z: a touch-off value, not a length. "
+            "Give gauge_to_tip_mm to use them."
         )
     return tools
 
@@ -269,7 +271,7 @@ def _offsets(reading: Reading, ini: Path) -> tuple[dict[str, WorkOffset], str]:
         rotation: Vector = (0.0, 0.0, values.get(first + 9, 0.0))
         offsets[offset] = WorkOffset(offset, offset_mm=(x, y, z), rotation_deg=rotation)
     reading.notes.append(
-        'The work offsets count as touched off on the raw machine (set_by = "touch"); name the '
+        'The work offsets count as touched off on the uncompensated machine (set_by = "touch"). Name the '
         'tool in touch_tool, or write set_by = "true" where they were located by other means.'
     )
     active = int(values.get(5220, 1.0))

@@ -1,4 +1,4 @@
-"""Reading of meshes: STL, OBJ, PLY, GLB and what else trimesh reads."""
+"""Reading of meshes: STL, OBJ, PLY, GLB and every other format that trimesh reads."""
 
 from __future__ import annotations
 
@@ -13,24 +13,23 @@ from olp.core.errors import InputError
 from olp.files.write import PathLike, Reader, read_bytes
 
 
-def read_mesh(
-    path: PathLike, read: Reader = read_bytes
-) -> tuple[Array, Index]:
+def read_mesh(path: PathLike, read: Reader = read_bytes) -> tuple[Array, Index]:
     """(v, 3) vertices and (m, 3) triangles of a mesh, in the units and the frame of its file.
 
-    Triangles without an area stay: they are edges of something. Raises InputError for what is no mesh.
+    Triangles without an area are kept, because they may be edges. Raises InputError where the file is not a
+    mesh.
     """
     import trimesh
 
     data = read(path)
     try:
-        # the text of an ASCII file tells its kind as little as a suffix in capitals
+        # trimesh detects the format from the suffix in lower case only
         kind = Path(path).suffix.lower().removeprefix(".")
         loaded: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False).to_mesh()
         vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
-    except Exception as error:  # readers of many formats raise what they like
+    except Exception as error:  # the readers of many formats raise any exception
         raise InputError(
-            f"is no mesh that can be read ({type(error).__name__}); expected STL, OBJ, PLY or GLB",
+            f"cannot be read as a mesh ({type(error).__name__}); expected STL, OBJ, PLY or GLB",
             file=str(path),
         ) from None
     if not len(faces) or not np.isfinite(vertices).all():

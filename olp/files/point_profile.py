@@ -1,4 +1,4 @@
-"""How a file of measured points is laid out: profiles as TOML files, built-in ones, and a look at a file."""
+"""The layout of files of measured points: profiles as TOML files, built-in profiles, and detection."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from olp.core.schema import NotNegative, Positive, Table, Text
 from olp.files.problems import nearest, validate
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, Reader, read_bytes
-from olp.program.text.delimited import ROLES, Layout, mapping, told
+from olp.program.text.delimited import ROLES, Layout, detected_layout, mapping
 
-#: the columns of measured points that are compared
+#: The columns of measured points that are compared.
 MEASURED = ("X", "Y", "Z", "t", "name", "line")
 
-#: keys that a profile and a layout have alike
+#: Keys that a profile and a layout share.
 _SAME = (
     "delimiter", "decimal", "time_unit", "speed_unit", "header", "comment", "frame", "point", "tip_radius_mm",
     "approach_mm", "joined", "insert", "stamp",
@@ -53,7 +53,7 @@ class ColumnsTable(Table):
 
     @property
     def given(self) -> dict[str, str | int]:
-        """Column by what it holds, without those that the file has not."""
+        """Columns by what they hold, only those that the file has."""
         return {key: value for key in ROLES if (value := getattr(self, key)) is not None}
 
 
@@ -72,44 +72,43 @@ class PointProfile(Table):
     unit: Literal["mm", "um", "m", "inch"] = Field(default="mm", description="the unit of X, Y and Z")
     time_unit: Literal["s", "ms", "us"] = Field(default="s", description="the unit of time")
     speed_unit: Literal["mm/s", "mm/min", "m/s", "m/min", "inch/min"] | None = Field(
-        default=None, description="the unit of speed; not known if left out"
+        default=None, description="the unit of speed; unknown if left out"
     )
     sample_period_s: Positive | None = Field(
-        default=None, description="seconds from point to point, where points come without time"
+        default=None, description="seconds from point to point, where points have no time"
     )
     header: bool = Field(default=True, description="whether the first row names the columns")
-    comment: Text = Field(default="#", description="what lines begin with that hold no point")
+    comment: Text = Field(default="#", description="the mark at the beginning of lines that hold no point")
     positions: Literal["tip", "axes"] = Field(
         default="tip",
-        description='"tip" (where the tool or reflector is) or "axes" (axis positions, from a log of the '
-        "control)",
+        description='"tip" (of the tool or reflector) or "axes" (axis positions, from a log of the control)',
     )
     frame: Text | None = Field(
         default=None,
-        description='the frame that the points are stated in, such as "G54"; not known if left out',
+        description='the frame of the points, such as "G54"; unknown if left out',
     )
     point: Literal["surface", "centre"] | None = Field(
         default=None,
-        description='what a measured point states: "surface" or "centre" (of the tip); not known if left out',
+        description='what a measured point states: "surface" or "centre" (of the tip); unknown if left out',
     )
     tip_radius_mm: NotNegative | None = Field(
-        default=None, description="the radius of the tip, in mm; that of the tool if left out"
+        default=None, description="the radius of the tip, in mm; the tool's if left out"
     )
     approach_mm: NotNegative | None = Field(
         default=None,
-        description="how far the machine moves against the surface before a touch, in mm; not known if left "
-        "out",
+        description="the distance of the approach to the surface before a touch, in mm; unknown if left out",
     )
     joined: Literal["points", "lines"] = Field(
         default="points",
-        description='how the machine goes from row to row of a program: "points" (not known) or "lines" '
+        description='how the machine moves from row to row of a program: "points" (unknown) or "lines" '
         "(straight)",
     )
     insert: bool = Field(
-        default=False, description="whether rows may be inserted where a straight line would bend"
+        default=False, description="whether rows may be inserted where errors would bend a straight line"
     )
     stamp: bool = Field(
-        default=True, description="whether a corrected table may begin with a comment that says so"
+        default=True,
+        description="whether a corrected table may begin with a comment that marks it as corrected",
     )
     columns: ColumnsTable = Field(default_factory=ColumnsTable, description="the table [columns]")
 
@@ -129,6 +128,7 @@ class PointProfile(Table):
         return "\n".join((*toml_lines(values), "", "[columns]", *toml_lines(columns))) + "\n"
 
 
+#: Profiles by name.
 BUILT_IN = {
     "olp": PointProfile(),
     "spatial-analyzer": PointProfile(
@@ -150,7 +150,7 @@ def load_profile(name: PathLike, read: Reader = read_bytes) -> PointProfile:
 
 
 def with_options(profile: PointProfile, columns: Sequence[str], **values: str | float | None) -> PointProfile:
-    """A profile with what the command line says: `columns` such as "X=East", and keys that are not None."""
+    """A profile with options of the command line: `columns` such as "X=East", and keys that are not None."""
     table = dict(profile.columns.given)
     for item in columns:
         key, mark, column = item.partition("=")
@@ -170,18 +170,18 @@ def with_options(profile: PointProfile, columns: Sequence[str], **values: str | 
 
 
 def looked_at(lines: Sequence[str]) -> PointProfile | None:
-    """The profile of measured points that the first rows of a file suggest, in mm where they state no unit;
-    None where they leave a choice."""
-    found = told(lines)
-    if found is None:
+    """The profile of measured points detected from the first rows of a file, in mm where they state no unit.
+    None where it is ambiguous."""
+    layout = detected_layout(lines)
+    if layout is None:
         return None
-    columns = {role: column for role, column in found.columns.items() if role in MEASURED}
-    return from_layout(replace(found, columns=columns))
+    columns = {role: column for role, column in layout.columns.items() if role in MEASURED}
+    return from_layout(replace(layout, columns=columns))
 
 
-def from_layout(found: Layout) -> PointProfile:
+def from_layout(layout: Layout) -> PointProfile:
     """The profile of a layout, in mm where it states no unit."""
-    values = {key: getattr(found, key) for key in _SAME} | {
-        "unit": found.unit or "mm", "columns": ColumnsTable(**dict[str, Any](found.columns)),
+    values = {key: getattr(layout, key) for key in _SAME} | {
+        "unit": layout.unit or "mm", "columns": ColumnsTable(**dict[str, Any](layout.columns)),
     }  # fmt: skip
     return PointProfile(**values)

@@ -25,7 +25,7 @@ from olp.program.text.rows import Form, decoded, form_of, no_number
 class Points:
     """(n, 3) positions in mm, with times (n,) in s, names and program lines (n,) where the file has them.
 
-    `frame` is what the file says that they are stated in, None where it says nothing.
+    `frame` is the frame of the positions as the file states it, None where it does not.
     """
 
     file: str
@@ -41,19 +41,17 @@ class Points:
         return len(self.points_mm)
 
 
-def read_points(
-    path: PathLike, profile: PointProfile | None = None, read: Reader = read_bytes
-) -> Points:
-    """The points of a file; without a profile its layout is told from its first rows.
+def read_points(path: PathLike, profile: PointProfile | None = None, read: Reader = read_bytes) -> Points:
+    """The points of a file. Without a profile its layout is detected from its first rows.
 
-    Raises InputError where the file cannot be read, its layout cannot be told, or a row is wrong, with the
-    line.
+    Raises InputError where the file cannot be read, its layout cannot be detected, or a row is wrong, with
+    the line.
     """
     return parse_points(read(path), str(path), profile)
 
 
 def row_line(points: Points, row: int) -> int:
-    """The line of the file, counted from 1, in which a point stands."""
+    """The line of a point in its file, counted from 1."""
     text = decoded(read_bytes(points.file))
     form = form_of(points.profile.layout)
     skip, _ = _header(text, form, points.profile.header)
@@ -61,7 +59,7 @@ def row_line(points: Points, row: int) -> int:
 
 
 def layout_of(data: bytes) -> PointProfile | None:
-    """The layout that the first rows of a file tell, None where they leave a choice."""
+    """The layout detected from the first rows of a file, None where it is ambiguous."""
     return looked_at(first_lines(data))
 
 
@@ -71,40 +69,40 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         text = _lines(decoded(data))
     except InputError as error:
         raise error.in_file(file) from None
-    found = profile or layout_of(data)
+    layout = profile or layout_of(data)
     if not text.strip():
-        raise InputError("holds no points; expected a row a point", file=file)
-    if found is None:
+        raise InputError("holds no points; expected one row per point", file=file)
+    if layout is None:
         raise InputError(
-            "does not tell which columns hold X, Y and Z; name them by name or number with --column X=.. "
+            "does not show which columns hold X, Y and Z; give their names or numbers with --column X=.. "
             "--column Y=.. --column Z=.., or give a profile with --profile",
             file=file,
         )
     stated = stated_frame(list(itertools.islice(io.StringIO(text), LOOK)), file)
-    form = form_of(found.layout)
-    skip, header = _header(text, form, found.header)
+    form = form_of(layout.layout)
+    skip, header = _header(text, form, layout.header)
     if next(form.rows(text, skip), None) is None:
-        raise InputError("holds no points; expected a row a point", file=file)
+        raise InputError("holds no points; expected one row per point", file=file)
     columns = {
-        key: place_in(header, column, file) for key, column in found.columns.given.items() if key in MEASURED
+        key: place_in(header, column, file) for key, column in layout.columns.given.items() if key in MEASURED
     }
     numbers = [key for key in columns if key != "name"]
-    table = _table(text, file, found, skip, [columns[key] for key in numbers])
+    table = _table(text, file, layout, skip, [columns[key] for key in numbers])
     column = dict(zip(numbers, table.T, strict=True))
-    time = column["t"] * SECONDS[found.time_unit] if "t" in column else None
-    if time is None and found.sample_period_s is not None:
-        time = np.arange(len(table)) * found.sample_period_s
+    time = column["t"] * SECONDS[layout.time_unit] if "t" in column else None
+    if time is None and layout.sample_period_s is not None:
+        time = np.arange(len(table)) * layout.sample_period_s
     names = None
     if "name" in columns:
-        names = _texts(text, file, found, skip, columns["name"])
+        names = _texts(text, file, layout, skip, columns["name"])
     return Points(
         file,
-        np.column_stack([column[axis] for axis in "XYZ"]) * MM[found.unit],
+        np.column_stack([column[axis] for axis in "XYZ"]) * MM[layout.unit],
         time,
         names,
         column["line"].astype(np.int64) if "line" in column else None,
-        stated or found.frame,
-        found,
+        stated or layout.frame,
+        layout,
         hashlib.sha256(data).hexdigest(),
     )
 
@@ -115,7 +113,7 @@ def _lines(text: str) -> str:
 
 
 def _header(text: str, form: Form, named: bool) -> tuple[int, list[str]]:
-    """How many lines stand before the first row of data, and the names of columns where a row names them."""
+    """The number of lines before the first row of data, and the names of columns where a row names them."""
     first = list(itertools.islice(form.lines(text), LOOK))
     for line, whole in first:
         if form.holds(whole):
@@ -125,12 +123,12 @@ def _header(text: str, form: Form, named: bool) -> tuple[int, list[str]]:
 
 def _texts(text: str, file: str, profile: PointProfile, skip: int, column: int) -> tuple[str, ...]:
     """The cells of a column."""
-    out = []
+    texts = []
     for number, cells in form_of(profile.layout).rows(text, skip):
         if column >= len(cells):
             raise _too_short(cells, column, file, number, profile)
-        out.append(cells[column])
-    return tuple(out)
+        texts.append(cells[column])
+    return tuple(texts)
 
 
 def _too_short(
@@ -147,7 +145,7 @@ def _table(text: str, file: str, profile: PointProfile, skip: int, columns: Sequ
     body = text.replace(",", ".") if profile.decimal == "comma" else text
     if profile.decimal == "comma" and profile.delimiter == "comma":
         raise InputError("has commas both between columns and in numbers; name another delimiter", file=file)
-    # whole lines are comments, not what is behind a mark in a cell; empty lines keep the numbers of others
+    # only whole lines are comments, not text behind a mark in a cell; emptied lines keep the line numbers
     body = re.sub(rf"(?m)^[ \t]*((#|{re.escape(profile.comment)}).*)?$", "", body)
     try:
         table = np.loadtxt(

@@ -1,4 +1,4 @@
-"""Sentences for what pydantic finds wrong in a file: the key, its line, and what was expected."""
+"""Messages for what pydantic finds wrong in a file: the key, its line, and what was expected."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from olp.core.schema import Table, is_table
 from olp.files.fields import shown
 from olp.files.toml_text import Path, dotted, line_of
 
-#: A line, where it is known, and a sentence.
+#: A line, where it is known, and a message.
 Problem = tuple[int | None, str]
 T = TypeVar("T", bound=Table)
 
-#: More problems than this say no more than the first ones do.
+#: At most this many problems are listed; further ones are counted.
 MOST_PROBLEMS = 40
 
 _WANTED = {
     "float_type": "a number",
     "finite_number": "a finite number",
-    "int_type": "a whole number",
+    "int_type": "an integer",
     "bool_type": "true or false",
     "bool_parsing": "true or false",
     "string_type": "text in quotes",
@@ -39,7 +39,7 @@ _WANTED = {
 
 
 def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, int], file: str) -> T:
-    """The typed file; raises one ConfigError that lists every problem in the order of lines."""
+    """The typed file. Raises one ConfigError that lists every problem in the order of lines."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -50,17 +50,17 @@ def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, 
     raise config_error([_problem(model, item, lines) for item in kept], file)
 
 
-def config_error(found: Iterable[Problem], file: str | None) -> ConfigError:
-    """One error from (line, sentence) pairs, sorted by line; each sentence gets its line in front."""
-    ordered = sorted(dict.fromkeys(found), key=lambda item: item[0] or 0)
-    problems = tuple(f"line {line}: {text}" if line else text for line, text in ordered)
-    if len(problems) > MOST_PROBLEMS:
-        more = len(problems) - MOST_PROBLEMS
-        problems = (
-            *problems[:MOST_PROBLEMS],
+def config_error(problems: Iterable[Problem], file: str | None) -> ConfigError:
+    """One error from (line, message) pairs, sorted by line. Each message begins with its line."""
+    ordered = sorted(dict.fromkeys(problems), key=lambda item: item[0] or 0)
+    sentences = tuple(f"line {line}: {text}" if line else text for line, text in ordered)
+    if len(sentences) > MOST_PROBLEMS:
+        more = len(sentences) - MOST_PROBLEMS
+        sentences = (
+            *sentences[:MOST_PROBLEMS],
             f"and {more} more problems; correct the first ones and try again",
         )
-    return ConfigError("; ".join(problems), file=file, line=ordered[0][0], problems=problems)
+    return ConfigError("; ".join(sentences), file=file, line=ordered[0][0], problems=sentences)
 
 
 def _problem(model: type[Table], error: dict[str, Any], lines: Mapping[Path, int]) -> Problem:
@@ -93,7 +93,7 @@ def _wanted(kind: str, context: Mapping[str, Any]) -> str:
 
 
 def _list_wanted(path: Path, description: str) -> str:
-    """A list that is too short misses an item, whose path ends in a number."""
+    """The message for a list that is too short: the path of the missing item ends in a number."""
     return f"one more value: {description}" if isinstance(path[-1], int) else ""
 
 
@@ -110,7 +110,7 @@ def _field(model: type[Table], path: Path) -> tuple[type[Table], str]:
                 break
             description = field.description or ""
             inside = field.annotation
-            # The next part of the path names one of many tables, no key.
+            # The next part of the path names one of many tables, not a key.
             if get_origin(inside) in (dict, list):
                 continue
         inside = next(_tables(inside), inside)
@@ -129,14 +129,14 @@ def _unknown(owner: type[Table], path: Path, key: str, value: object) -> str:
     name = str(path[-1])
     if name in owner.not_built:
         return (
-            f"{key} ({owner.not_built[name]}) is part of the format but not built in this version of olp; "
-            "it is never ignored: remove it from the file if the correction does not need it"
+            f"{key} ({owner.not_built[name]}) is part of the format, but this version of olp does not "
+            "support it; remove it from the file if the correction does not need it"
         )
     if isinstance(value, dict) and len(path) > 1 and name.isdigit() and "work_offsets" in path:
         return f'{key} is split at the point; expected quotes: [work_offsets."{path[-2]}.{name}"]'
     known = _keys(owner)
     near = nearest(name, known)
-    return f"{key} is no known key; " + (
+    return f"{key} is not a known key; " + (
         f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
     )
 
@@ -154,6 +154,6 @@ def _meant(model: type[Table], path: Path) -> Path:
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that a misspelt one most likely means."""
     folded = {candidate.casefold(): candidate for candidate in known}
-    found = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
+    similar = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
     without_unit = [candidate for candidate in folded if candidate.startswith(name.casefold() + "_")]
-    return next((folded[candidate] for candidate in (*without_unit, *found)), None)
+    return next((folded[candidate] for candidate in (*without_unit, *similar)), None)

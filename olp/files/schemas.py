@@ -1,7 +1,7 @@
 """The keys of machine, calibration and job files, as pydantic models.
 
-One class per TOML table; a key that no class names is refused. Every description completes the sentence
-"expected ...", states the unit, and goes into the exported JSON Schema as well.
+One class per TOML table. A key that no class names is refused. Every description completes the sentence
+"expected ...", states the unit, and is part of the exported JSON Schema.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class AxisTable(Table):
     jerk_mm_s3: Positive = Field(description="the largest jerk of the axis, in mm/s3")
     compliance_um_per_m_s2: Compliance = Field(
         default=0.0,
-        description="how far the tool stays behind while the axis is accelerated, in um per m/s2; or "
-        "[X, Y, Z], actual minus commanded, where it gives way in other directions too",
+        description="the lag of the tool while the axis is accelerated, in um per m/s2; or [X, Y, Z], actual "
+        "minus commanded, where it gives way in other directions too",
     )
 
 
@@ -69,8 +69,8 @@ class WorkOffsetTable(Table):
     )
     touched_at_mm: Position = Field(
         default_factory=Position,
-        description="the axis positions in mm at the touch, { X = .., Y = .., Z = .. }; one left out takes "
-        "the offset plus the length of touch_tool",
+        description="the axis positions in mm at the touch, { X = .., Y = .., Z = .. }; the default of each "
+        "is the offset plus the length of touch_tool",
     )
     touch_tool: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="the number of the tool that touched, one of [tools]"
@@ -84,7 +84,7 @@ class WorkOffsetTable(Table):
     @classmethod
     def _only_if_touched(cls, value: object, info: ValidationInfo) -> object:
         if info.data.get("set_by") == "true" and value is not None:
-            raise refusal('contradicts set_by = "true"; expected set_by = "touch", or leave this key out')
+            raise refusal('contradicts set_by = "true"; expected set_by = "touch", or this key left out')
         return value
 
 
@@ -116,7 +116,8 @@ class ToolTable(Table):
     )
 
     cutting_length_mm: Positive | None = Field(
-        default=None, description="how far up from the tip the tool cuts, in mm; to the holder if left out"
+        default=None,
+        description="the length of the cutting part from the tip up, in mm; up to the holder if left out",
     )
     holder: list[HolderTable] = Field(
         default=[],
@@ -133,7 +134,7 @@ class ToolTable(Table):
         if value and total >= reach:
             raise refusal(
                 f"is {total:g} mm long, and the tip is {reach:g} mm below the gauge point; expected a holder "
-                "that leaves the tip free"
+                "that ends above the tip"
             )
         return value
 
@@ -142,7 +143,7 @@ class ToolTable(Table):
     def _with_touch(cls, value: Position | None, info: ValidationInfo) -> Position | None:
         set_by = info.data.get("set_by")
         if set_by == "true" and value is not None:
-            raise refusal('is given, but set_by is "true"; expected set_by = "touch", or leave this key out')
+            raise refusal('is given, but set_by is "true"; expected set_by = "touch", or this key left out')
         if set_by == "touch" and (value is None or value.complete is None):
             raise refusal(
                 'is incomplete; expected { X = .., Y = .., Z = .. } in mm, because set_by = "touch"'
@@ -158,26 +159,26 @@ class PathTable(Table):
     )
     blend_mm: Positive | None = Field(
         default=None,
-        description="how far the control may leave the path at corners where the program names no "
-        "tolerance, in mm; 0.01 if left out",
+        description="the path tolerance at corners where the program states none, in mm; 0.01 if left out",
     )
 
 
 class CheckTable(Table):
     largest_correction_um: Positive = Field(
-        default=1000.0, description="the largest correction that is taken for sane, in um; 1000 if left out"
+        default=1000.0, description="the largest plausible correction, in um; 1000 if left out"
     )
     tool_within_mm: Positive = Field(
         default=100.0,
-        description="how far the tip may be, from the gauge point and along any axis, from where it was with "
-        "the tools measured with, in mm; 100 if left out",
+        description="the largest difference, along any axis, between the tool vector and those of the "
+        "measurement, in mm; 100 if left out",
     )
     temperature_within_K: Positive = Field(
         default=5.0,
-        description="how far a temperature may be from that of the calibration, in K; 5 if left out",
+        description="the largest difference between a temperature and the calibration's, in K; 5 if left out",
     )
     calibration_days: Annotated[int, Field(ge=1)] = Field(
-        default=365, description="how old a calibration without valid_until may be, in days; 365 if left out"
+        default=365,
+        description="the largest age of a calibration without valid_until, in days; 365 if left out",
     )
     clearance_mm: NotNegative = Field(
         default=1.0, description="the least clearance of tool and holder to meshes, in mm; 1 if left out"
@@ -196,7 +197,7 @@ class JobDefaultsTable(Table):
 
 class StylusTable(Table):
     offset_mm: Triple = Field(
-        description="from the end of the ram to the centre of the tip, in mm; the lever of angular errors"
+        description="from the end of the ram to the centre of the tip, in mm; the lever arm of angular errors"
     )
 
 
@@ -229,10 +230,10 @@ class MachineFile(Table):
     )
     axes: AxesTable = Field(description="the tables [axes.X], [axes.Y] and [axes.Z]")
     path: PathTable = Field(
-        default_factory=PathTable, description="the table [path]: how the control passes from block to block"
+        default_factory=PathTable, description="the table [path]: how the control moves from block to block"
     )
     check: CheckTable = Field(
-        default_factory=CheckTable, description="the table [check]: what a check takes for sane"
+        default_factory=CheckTable, description="the table [check]: the limits of plausible inputs"
     )
     work_offsets: WorkOffsets = Field(default={}, description="tables [work_offsets.NAME]")
     tools: Tools = Field(default={}, description="tables [tools.NUMBER]")
@@ -250,16 +251,17 @@ class TemperaturesTable(Table):
     sensors: dict[str, float] | None = Field(
         default=None,
         description="the table [temperatures_degC.sensors]: the temperature of each sensor of the thermal "
-        "structure, in degC, where all has settled",
+        "structure, in degC, in steady state",
     )
     sensor_log: Text | None = Field(
         default=None,
-        description="the path of a log of the sensors instead (t_s, NAME_degC ...), relative to this file",
+        description="the path of a log of the sensors (t_s, NAME_degC ...), relative to this file; instead "
+        "of sensors",
     )
     sensor_log_at_s: float | None = Field(
         default=None,
         validate_default=True,
-        description="the time in that log, in s; its last one if left out",
+        description="the time in that log, in s; its last time if left out",
     )
 
     @field_validator("sensor_log_at_s")
@@ -268,7 +270,7 @@ class TemperaturesTable(Table):
         if info.data.get("sensors") is not None and info.data.get("sensor_log") is not None:
             raise refusal("or sensors: both sensors and sensor_log are given; expected one of the two")
         if value is not None and info.data.get("sensor_log") is None:
-            raise refusal("is given without sensor_log; expected the path of the log, or leave this key out")
+            raise refusal("is given without sensor_log; expected the path of the log, or this key left out")
         return value
 
 
@@ -288,9 +290,9 @@ class MeshTable(Table):
 
 class PayloadTable(Table):
     line: Annotated[int, Field(ge=1)] = Field(
-        description="the line of the program from which on it holds, counted from 1"
+        description="the first line of the program with this payload, counted from 1"
     )
-    payload_kg: NotNegative = Field(description="the payload from there on, in kg")
+    payload_kg: NotNegative = Field(description="the payload from that line on, in kg")
 
 
 class JobFile(Table):
@@ -303,7 +305,7 @@ class JobFile(Table):
     )
     dialect: ProgramDialect | None = Field(
         default=None,
-        description="the dialect of the program, where its text and its ending do not say: "
+        description="the dialect of the program, where its text and its file ending do not show it: "
         + ", ".join(CONTROLLERS),
     )
     start_mm: Position = Field(
@@ -311,13 +313,12 @@ class JobFile(Table):
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
     )
     payload_kg: NotNegative = Field(
-        default=0.0, description="what the machine carries at the start of the program, in kg"
+        default=0.0, description="the payload on the machine at the start of the program, in kg"
     )
     payloads: list[PayloadTable] = Field(
         default=[],
-        description="tables [[payloads]], the payload from a line of the program on; instead, the program "
-        "may "
-        "hold comments such as (OLP PAYLOAD 30 kg)",
+        description="tables [[payloads]], the payload from a line of the program on; or the program holds "
+        "comments such as (OLP PAYLOAD 30 kg)",
     )
     temperatures_degC: TemperaturesTable = Field(
         default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
@@ -340,5 +341,5 @@ class JobFile(Table):
         return value
 
 
-#: File kind to its model, in the order in which a user meets them.
+#: The model of each kind of file, in the order in which you write them.
 FILES: dict[str, type[Table]] = {"machine": MachineFile, "calibration": CalibrationFile, "job": JobFile}

@@ -1,4 +1,4 @@
-"""The inputs of a run: each file is opened once, and whoever reads it again gets the same bytes."""
+"""The inputs of a run: each file is opened once, and every later reader gets the same bytes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from olp.files.write import PathLike, read_bytes
 
 
 class Sources:
-    """Reads files and remembers their bytes for a run, so that all of it is made from one state of them."""
+    """Reads files and keeps their bytes for a run, so that the whole run uses one state of each file."""
 
     def __init__(self) -> None:
         self._bytes: dict[Path, bytes] = {}
@@ -27,7 +27,7 @@ class Sources:
         return self._bytes[key]
 
     def read_last(self, path: PathLike) -> bytes:
-        """The same for a large file that is not read again: its bytes are kept no longer."""
+        """As `read`, for a large file that is not read again: its bytes are no longer kept."""
         known = self._bytes.pop(Path(path), None)
         return read_bytes(path) if known is None else known
 
@@ -36,7 +36,7 @@ class Sources:
         return hashlib.sha256(self.read(path)).digest()
 
     def source(self, given: PathLike | bytes | Source) -> Source:
-        """What a caller gave as a source; a file is opened when its bytes are first wanted."""
+        """A source from what the caller gave. A file is opened when its bytes are first needed."""
         if isinstance(given, Source):
             return given
         if isinstance(given, bytes):
@@ -46,15 +46,15 @@ class Sources:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A program or results: a file, or bytes that a caller gave or a stream held. `name` is the path of the
-    file, "" for bytes; `data` can be had again and again."""
+    """A program or results: a file, or bytes from a caller or a stream. `name` is the path of the file, ""
+    for bytes. `data` can be read again and again."""
 
     name: str
     _read: Callable[[], bytes]
 
     @staticmethod
     def stream(read: Callable[[], bytes]) -> Source:
-        """What a stream holds, which can be read once; it is read when it is first wanted."""
+        """The contents of a stream, which can be read only once. It is read when it is first needed."""
         return Source("", functools.cache(read))
 
     def load(self) -> None:
@@ -62,7 +62,7 @@ class Source:
         self._read()
 
     def holding(self, data: bytes) -> Source:
-        """A text made of this one, under its name."""
+        """The same name with other bytes."""
         return Source(self.name, lambda: data)
 
     @property
@@ -75,8 +75,8 @@ class Source:
         return Path(self.name).name if self.name else ""
 
     def errors(self, role: str | None = None) -> AbstractContextManager[None]:
-        """Names the source in errors that name no file. With `role`, such as "<program>", which then stands
-        for bytes, in all of them; without, in those with a line, and bytes have no name."""
+        """Adds the name of the source to errors that name no file. With `role`, such as "<program>", to all
+        of them, and `role` is the name of bytes. Without it, to those with a line, and bytes have no name."""
         return naming(self.name) if role is None else _named(self.name or role)
 
 

@@ -21,11 +21,13 @@ __all__ = ["Imported", "from_linuxcnc", "machine_toml", "starter_machine", "star
 PLACEHOLDER_DATE = datetime.date(2000, 1, 1)
 Travel = Mapping[str, tuple[float, float]]
 
+#: Rows of each curve file.
 _POINTS = 11
 
 
 def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
-    """A machine as the text of an olp-machine-1 file, notes as comments; loads as an equal machine."""
+    """A machine as the text of an olp-machine-1 file, with notes as comments. An equal machine loads from
+    it."""
     lines = [line for note in notes for line in comment(note)]
     compensated = sorted(machine.compensated_by_controller)
     lines += toml_lines({"schema": "olp-machine-1", "name": machine.name})
@@ -43,9 +45,9 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
             del stated["compliance_um_per_m_s2"]
         lines += toml_lines(stated)
     if (machine.path_mode, machine.blend_mm) != ("blend", None):
-        lines += ["", *comment("How the control passes from block to block where a program does not say.")]
+        lines += ["", *comment("How the control moves from block to block where a program does not say.")]
         lines += ["[path]", *toml_lines({"mode": machine.path_mode, "blend_mm": machine.blend_mm})]
-    lines += ["", *comment("Axis position of the program's origin, no tool length active.")]
+    lines += ["", *comment("Axis position of the program's origin, without tool length.")]
     for offset in machine.work_offsets.values():
         lines += [f"[work_offsets.{toml_key(offset.name)}]", *_work_offset(offset)]
     lines += ["", *comment("The control's tool table: Z_mm is the tool length.")]
@@ -78,14 +80,14 @@ def _tool(tool: Tool) -> Iterator[str]:
     yield from toml_lines({"X_mm": x or None, "Y_mm": y or None, "Z_mm": z, "radius_mm": tool.radius_mm})
     yield from toml_lines({"gauge_to_tip_mm": tool.gauge_to_tip_mm})
     if tool.touched_at_mm is not None:
-        at = dict(zip(AXES, tool.touched_at_mm, strict=True))
-        yield from toml_lines({"set_by": tool.set_by, "touched_at_mm": at})
+        touched = dict(zip(AXES, tool.touched_at_mm, strict=True))
+        yield from toml_lines({"set_by": tool.set_by, "touched_at_mm": touched})
 
 
 def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = "linuxcnc") -> Machine:
     """A machine with plausible limits, one work offset at the middle of X and Y, and one tool."""
     if chain not in CHAINS:
-        raise UsageError(f'"{chain}" is no chain; expected an order of F, X, Y, Z from workpiece to tool')
+        raise UsageError(f'"{chain}" is not a chain; expected an order of F, X, Y, Z from workpiece to tool')
     for axis in AXES:
         low, high = travel_mm.get(axis, (0.0, 0.0))
         if not (np.isfinite([low, high]).all() and low < high):
@@ -115,7 +117,7 @@ def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = 
 
 
 def starter_set(machine: Machine, measured: datetime.date = PLACEHOLDER_DATE) -> dict[str, str]:
-    """File name to text: machine, calibration with one curve file an axis (all errors zero), and job."""
+    """Texts by file name: machine, calibration with one curve file per axis (all errors zero), and job."""
     notes = [f"Machine {machine.name}. Replace travel, limits, offsets and tools by those of your machine."]
     files = {
         "machine.toml": machine_toml(machine, notes),
@@ -128,7 +130,7 @@ def starter_set(machine: Machine, measured: datetime.date = PLACEHOLDER_DATE) ->
 def write_starter(
     folder: PathLike, machine: Machine, *, measured: datetime.date = PLACEHOLDER_DATE, force: bool = False
 ) -> list[Path]:
-    """Write the starter set into an existing folder, all files or none; raises as `write_files` does."""
+    """Write the starter set into an existing folder, all files or none. Raises as `write_files`."""
     files = {Path(folder) / name: text.encode() for name, text in starter_set(machine, measured).items()}
     write_files(files, force=force)
     return list(files)
@@ -140,7 +142,7 @@ def _calibration_toml(machine: Machine, measured: datetime.date) -> str:
         *comment(
             "Errors of the machine: actual minus commanded, of the tool relative to the workpiece. The curves"
         ),
-        *comment("hold zeros, which correct nothing: put measured values there, then set dates and box."),
+        *comment("hold zeros, which correct nothing. Put measured values there, then set dates and box."),
         *toml_lines({"schema": "olp-calibration-1", "machine": machine.name, "measured": measured}),
         *toml_lines({"valid_until": measured, "temperature_degC": 20.0, "sign": "actual-minus-commanded"}),
         *toml_lines({"model": "rigid-body", "datum_mm": ZERO}),
@@ -150,12 +152,12 @@ def _calibration_toml(machine: Machine, measured: datetime.date) -> str:
     for axis in AXES:
         others = {other: 0.0 for other in AXES if other != axis}
         lines += ["", "[[curves]]", *toml_lines({"file": f"{axis.lower()}.csv"})]
-        lines += [f"{line}  # where the other axes stood" for line in toml_lines({"line_mm": others})]
+        lines += [f"{line}  # positions of the other axes" for line in toml_lines({"line_mm": others})]
         lines += [f"{line}  # tool while measuring" for line in toml_lines({"tool_mm": ZERO})]
         lines += toml_lines({"interpolation": "pchip"})
     lines += ["", *comment("Squareness, right-handed: Y to X about Z, Z to X about Y, Z to Y about X.")]
     lines += ["[squareness]", *toml_lines({"C0Y_urad": 0.0, "B0Z_urad": 0.0, "A0Z_urad": 0.0})]
-    lines += ["", *comment("Constant lost motion of each axis.")]
+    lines += ["", *comment("Constant backlash of each axis.")]
     lines += ["[backlash]", *toml_lines({f"{axis}_um": 0.0 for axis in AXES})]
     return "\n".join(lines) + "\n"
 
@@ -176,9 +178,9 @@ def _curve_csv(axis: str, limits: Axis) -> str:
 def _job_toml(machine: Machine) -> str:
     job = Job(program="part.nc", machine="machine.toml")
     lines = [
-        *comment("What changes from job to job; offsets and tools here override the machine's, one by one."),
+        *comment("What changes from job to job. Offsets and tools here override the machine's, one by one."),
         *toml_lines({"schema": "olp-job-1", "program": job.program, "machine": job.machine}),
-        *comment("Where the axes stand at the start, if that is known:"),
+        *comment("Axis positions at the start, if they are known:"),
         "# start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }",
         *toml_lines({"payload_kg": job.payload_kg}),
         "",

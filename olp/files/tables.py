@@ -19,7 +19,7 @@ from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.rows import LOOSE_CSV
 
-#: A unit of error columns as a power of ten of the base unit.
+#: Units of error columns as powers of ten of the base unit (mm or rad).
 _POWER = {"um": -3, "urad": -6, "um/kg": -3, "urad/kg": -6}
 
 _COLUMN = re.compile(r"(sigma_)?(E[XYZABC][XYZ])_([A-Za-z]+)", re.IGNORECASE)
@@ -29,8 +29,8 @@ _COLUMN = re.compile(r"(sigma_)?(E[XYZABC][XYZ])_([A-Za-z]+)", re.IGNORECASE)
 class CurveTable:
     """One CSV file: (n,) positions in mm, ascending, and (n,) errors by ISO 230-1 name in mm or rad.
 
-    With a `direction` column `forward` and `backward` hold both directions and `columns` their mean;
-    without one both are None. `sigma` holds standard uncertainties in mm or rad.
+    With a `direction` column, `forward` and `backward` hold the two directions and `columns` their mean.
+    Without one, both are None. `sigma` holds standard uncertainties in mm or rad.
     """
 
     axis: str
@@ -44,7 +44,7 @@ class CurveTable:
 def read_curves(path: PathLike, read: Reader = read_bytes) -> CurveTable:
     """Read a curve file.
 
-    Header `X_mm[, direction], EXX_um, EBX_urad ...[, sigma_EXX_um]`, then one row a position. Lines that
+    Header `X_mm[, direction], EXX_um, EBX_urad ...[, sigma_EXX_um]`, then one row per position. Lines that
     start with `#` and empty lines are skipped. Raises InputError where the file cannot be read, and
     ConfigError with every problem and its line where the table is wrong.
     """
@@ -58,17 +58,17 @@ def parse_curves(data: bytes, file: str) -> CurveTable:
         file,
         unit_columns("holds no header; expected columns such as X_mm, EXX_um, EYX_um", _header_problems),
     )
-    # Order and repetition mean little while rows are missing from it.
-    found = sheet.problems or _order_problems(sheet.header, sheet.rows)
-    if found:
-        raise config_error(found, file)
+    # The order of rows is judged only where no row is missing.
+    problems = sheet.problems or _order_problems(sheet.header, sheet.rows)
+    if problems:
+        raise config_error(problems, file)
     return _table(sheet.header, sheet.rows, file)
 
 
 def unit_columns(nothing: str, header: Callable[[int, Sequence[str]], list[Problem]]) -> Wanted:
     """A table of numbers whose names end in their unit."""
     many = "; is a decimal comma in it? write a decimal point"
-    return Wanted(nothing, header, _number, "; expected one value a column", many, LOOSE_CSV)
+    return Wanted(nothing, header, _number, "; expected one value per column", many, LOOSE_CSV)
 
 
 def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
@@ -79,10 +79,10 @@ def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
             (line, f"columns are separated by {mark}; expected commas between columns and decimal points")
         ]
     if first not in [f"{axis}_mm" for axis in AXES]:
-        found = f'column 1 is "{first}"'
+        what = f'column 1 is "{first}"'
         if re.fullmatch(r"-?[\d.]+", first):
-            found = f"the header is missing, line {line} starts with {first}"
-        return [(line, f"{found}; expected X_mm, Y_mm or Z_mm, the position of the axis in mm")]
+            what = f"the header is missing, line {line} starts with {first}"
+        return [(line, f"{what}; expected X_mm, Y_mm or Z_mm, the position of the axis in mm")]
     problems = names(line, header, lambda number, name: _column_problem(number, name, first[0]), 2)
     if not problems and not any(name in _columns_of(first[0]).values() for name in header):
         known = ", ".join(_columns_of(first[0]).values())
@@ -114,7 +114,7 @@ def _column_problem(number: int, name: str, axis: str) -> str | None:
         return f"an error of axis {component[2]}, but column 1 is {axis}_mm; expected E, direction, {axis}"
     wanted = known[component]
     if match[3].casefold() != _unit(component):
-        return f"the unit {match[3]} is not taken here; expected {wanted}, values in {_unit(component)}"
+        return f"the unit {match[3]} is not accepted here; expected {wanted}, values in {_unit(component)}"
     return f"expected {match[1] or ''}{wanted}"
 
 
@@ -132,7 +132,7 @@ def _stated(name: str, cell: str) -> tuple[float, str | None]:
     except ValueError:
         if re.fullmatch(r"[-+]?\d*,\d+", cell):
             return 0.0, f"= {cell} has a decimal comma; expected a decimal point"
-        return 0.0, f'= "{cell}" is no number; expected a number in {unit}'
+        return 0.0, f'= "{cell}" is not a number; expected a number in {unit}'
     if name == "direction" and number not in (1.0, -1.0):
         return 0.0, f"= {cell}; expected +1 or -1"
     if not math.isfinite(number):
@@ -162,7 +162,8 @@ def _order_problems(header: Sequence[str], rows: Sequence[Row]) -> list[Problem]
 
 
 def _directions(header: Sequence[str], rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
-    """The rows of each direction with words to add to a message; all rows where there is no such column."""
+    """The rows of each direction, with the words that name it in a message. All rows where the table has no
+    column `direction`."""
     if "direction" not in header:
         return [("", list(rows))]
     return [

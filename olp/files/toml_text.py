@@ -1,4 +1,4 @@
-"""TOML text in and out: the values of a file with the line of each key, and values as TOML."""
+"""Reads and writes TOML text: the values of a file with the line of each key, and values as TOML."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int]]:
-    """Values and key lines of a TOML file; raises ConfigError with the line where the text is no TOML."""
+    """Values and key lines of a TOML file. Raises ConfigError with the line where the text is not TOML."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -34,27 +34,27 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(str(error), text, file) from None
     except (ValueError, RecursionError):
-        problem = "holds a number of thousands of digits or brackets nested beyond reason; correct it"
+        problem = "has a number with thousands of digits, or brackets nested too deeply; correct it"
         raise ConfigError(problem, file=file) from None
     return values, key_lines(text)
 
 
 def _syntax_error(message: str, text: str, file: str) -> ConfigError:
-    at = re.search(r"\(at (?:line (\d+), column \d+|end of document)\)", message)
+    position = re.search(r"\(at (?:line (\d+), column \d+|end of document)\)", message)
     lines = text.split("\n")
-    line = int(at[1]) if at and at[1] else max(len(lines), 1)
-    found = lines[line - 1].strip()
+    line = int(position[1]) if position and position[1] else max(len(lines), 1)
+    written = lines[line - 1].strip()
     what = re.sub(r"\s*\(at .*\)", "", message)
     hint = "correct this line"
-    value = _STRING_OR_COMMENT.sub("", found).partition("=")[2]
+    value = _STRING_OR_COMMENT.sub("", written).partition("=")[2]
     if "[" not in value and re.search(r"\d,\d", value):
         hint = "write a decimal point instead of the comma"
-    elif found.count('"') % 2:
+    elif written.count('"') % 2:
         hint = "close the quotes"
     elif "Invalid value" in what:
         hint = "text needs quotes, and a file name on Windows single quotes"
     problem = (
-        f"line {line}: {found!r} is no TOML ({what}); expected key = value, [table] or [[table]]; {hint}"
+        f"line {line}: {written!r} is not TOML ({what}); expected key = value, [table] or [[table]]; {hint}"
     )
     return ConfigError(problem, file=file, line=line)
 
@@ -123,7 +123,7 @@ def dotted(path: Path) -> str:
 
 
 def toml_value(value: object) -> str:
-    """A value as TOML; floats are written so that they read back exactly."""
+    """A value as TOML. Floats are written so that they read back exactly."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -143,12 +143,12 @@ def toml_key(name: str) -> str:
 
 
 def toml_lines(values: Mapping[str, object]) -> Iterator[str]:
-    """`key = value` lines; keys whose value is None are left out."""
+    """`key = value` lines. Keys whose value is None are left out."""
     return (f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items() if value is not None)
 
 
 def toml_document(tables: Iterable[tuple[str, Mapping[str, object]]]) -> str:
-    """Header and keys of each table, an empty line before each; the first may have no header: ""."""
+    """Header and keys of each table, with an empty line before it. A header "" writes keys alone."""
     lines: list[str] = []
     for header, values in tables:
         lines += [*(("", header) if header else ()), *toml_lines(values)]

@@ -1,7 +1,7 @@
-"""Trajectories as files: CSV, NPZ, Parquet, ROS JointTrajectory as JSON, a table of PVT points; and tables of
-their lines and slow places.
+"""Trajectories as files: CSV, NPZ, Parquet, ROS JointTrajectory as JSON, PVT points, and tables of lines and
+slow sections.
 
-All are given in parts, so that a long file never has to be in memory.
+Every file is written in parts, so that a long one never has to be in memory.
 """
 
 from __future__ import annotations
@@ -35,10 +35,11 @@ SLOW_COLUMNS = (
     "stretch", "t_s", "seconds", "lost_s", "line", "X_mm", "Y_mm", "Z_mm", "slowest_mm_s", "feed_mm_s",
     "limit",
 )  # fmt: skip
-#: rows that are in memory at a time
+#: Rows in memory at a time.
 ROWS = 1 << 14
-#: more samples than this are a mistake in the cycle
+#: A cycle that gives more samples than this is refused as a mistake.
 MOST_SAMPLES = 200_000_000
+#: Nanoseconds per second.
 _NANO = 1_000_000_000
 
 
@@ -69,7 +70,7 @@ def rows(trajectory: Trajectory, cycle_s: float) -> Iterator[tuple[np.ndarray, n
 
 
 def csv(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
-    """The samples as CSV; every number in the digits that give it back exactly."""
+    """The samples as CSV. Every number has the digits that read back exactly."""
     yield (",".join(COLUMNS) + "\n").encode()
     for numbers, lines in rows(trajectory, cycle_s):
         # adding 0.0 makes 0 of -0
@@ -81,7 +82,7 @@ def csv(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
 
 
 class _Parts(io.RawIOBase):
-    """Takes what is written until it is asked for."""
+    """Keeps what is written until `take`."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
@@ -100,7 +101,7 @@ class _Parts(io.RawIOBase):
 
 
 def npz(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
-    """The samples, and the pieces that they are taken from (see `olp.trajectory.motion.Motion`)."""
+    """The samples, and the pieces of motion that they come from (see `olp.trajectory.motion.Motion`)."""
     motion = trajectory.motion
     count = len(_times(trajectory, cycle_s))
 
@@ -183,20 +184,20 @@ def ros(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
 
 
 def pvt(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
-    """Position, velocity and time of each cycle, times counted from the point before, as PVT controls take
-    them."""
+    """Position, velocity and time of each cycle, as PVT controls take them: times count from the point
+    before."""
     yield b"dt_s,X_mm,VX_mm_s,Y_mm,VY_mm_s,Z_mm,VZ_mm_s\n"
     before = 0.0
     for numbers, _ in rows(trajectory, cycle_s):
-        out = []
+        lines = []
         for t, x, y, z, vx, vy, vz, *_rest in (numbers + 0.0).tolist():
-            out.append(f"{t - before!r},{x!r},{vx!r},{y!r},{vy!r},{z!r},{vz!r}\n")
+            lines.append(f"{t - before!r},{x!r},{vx!r},{y!r},{vy!r},{z!r},{vz!r}\n")
             before = t
-        yield "".join(out).encode()
+        yield "".join(lines).encode()
 
 
 def lines_csv(use: LineUse) -> Iterator[bytes]:
-    """A row a line that moves; the feed of a line with rapids alone is left empty."""
+    """One row per line that moves. The feed of a line with rapids only is empty."""
     yield (",".join(LINE_COLUMNS) + "\n").encode()
     limit = use.limit()
     held = use.at_limit_s[np.arange(len(use)), limit]
@@ -206,18 +207,18 @@ def lines_csv(use: LineUse) -> Iterator[bytes]:
     )  # fmt: skip
     for a in range(0, len(use), ROWS):
         part = zip(*(c[a : a + ROWS].tolist() for c in (*columns, limit, held)), strict=True)
-        out = []
-        for line, seconds, dwell, length, feed, achieved, fastest, lost, which, at in part:
+        texts = []
+        for line, seconds, dwell, length, feed, achieved, fastest, lost, which, at_limit in part:
             shown = f"{feed:.6g}" if np.isfinite(feed) else ""
-            out.append(
+            texts.append(
                 f"{line},{seconds:.9f},{dwell:.9g},{length:.6f},{shown},{achieved:.6g},{fastest:.6g},"
-                f"{lost:.9f},{LIMITS[which]},{at:.9f}\n"
+                f"{lost:.9f},{LIMITS[which]},{at_limit:.9f}\n"
             )
-        yield "".join(out).encode()
+        yield "".join(texts).encode()
 
 
 def slow_csv(parts: Sequence[SlowPlaces]) -> Iterator[bytes]:
-    """A row a place below half the feed; times count from the start of its stretch."""
+    """One row per section below half the feed. Times count from the start of its stretch."""
     yield (",".join(SLOW_COLUMNS) + "\n").encode()
     for stretch, slow in enumerate(parts, 1):
         for i in range(len(slow)):

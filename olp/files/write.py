@@ -1,4 +1,4 @@
-"""Reading of whole files, and writing that never leaves half a file or destroys an input."""
+"""Reads whole files, and writes files so that none is ever half written and no input is destroyed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 from olp.core.errors import InputError, OlpError, UsageError
 
 PathLike = str | os.PathLike[str]
-#: a whole file, or its parts in order
+#: A whole file, or its parts in order.
 Content = bytes | Iterable[bytes]
-#: reads a whole file, as `read_bytes` does; one that remembers opens each file once
+#: Reads a whole file, as `read_bytes` does. `Sources.read` keeps the bytes and opens each file once.
 Reader = Callable[[PathLike], bytes]
 
 
 def read_bytes(path: PathLike) -> bytes:
-    """The bytes of a file; raises InputError in one sentence where it cannot be read."""
+    """The bytes of a file. Raises InputError where it cannot be read."""
     try:
         return Path(path).read_bytes()
     except FileNotFoundError:
@@ -26,12 +26,9 @@ def read_bytes(path: PathLike) -> bytes:
     except IsADirectoryError:
         raise InputError("is a folder; expected a file", file=str(path)) from None
     except PermissionError:
-        what = (
-            "is a folder; expected a file"
-            if Path(path).is_dir()
-            else "may not be read; check its permissions"
-        )
-        raise InputError(what, file=str(path)) from None
+        folder = Path(path).is_dir()
+        sentence = "is a folder; expected a file" if folder else "may not be read; check its permissions"
+        raise InputError(sentence, file=str(path)) from None
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read ({_reason(error)})", file=str(path)) from None
 
@@ -46,14 +43,14 @@ def write_bytes(
 def write_files(
     files: Mapping[Path, Content], *, force: bool = False, inputs: Iterable[PathLike] = ()
 ) -> None:
-    """Write files, each whole or not at all; where one cannot be written, none is put in place.
+    """Write files, each whole or not at all. Where one cannot be written, no target is replaced.
 
-    What comes in parts is written part by part, so that a long file never has to be in memory.
+    Contents in parts are written part by part, so that a long file never has to be in memory.
 
-    Each goes to a temporary file beside its target and is synced; then all replace their targets. A device
-    such as the null device is written to directly. Raises UsageError where a target is one of `inputs`
-    (also with `force`), exists and `force` is not given, or lies in no folder; OlpError where the system
-    refuses to write.
+    Each file is first written beside its target under a temporary name and synced. Then all replace their
+    targets. A device such as the null device is written to directly. Raises UsageError where a target is one
+    of `inputs` (also with `force`), exists without `force`, or has no folder. Raises OlpError where the
+    system refuses to write.
     """
     sources = [Path(source) for source in inputs]
     for target in files:
@@ -66,7 +63,7 @@ def write_files(
                 with current.open("wb") as device:
                     device.writelines([data] if isinstance(data, bytes) else data)
                 continue
-            # A link keeps pointing to the file that is written.
+            # A link still points to the file that is written.
             final = Path(os.path.realpath(current))
             temporary = final.with_name(f".{final.name[:80]}.{secrets.token_hex(4)}.tmp")
             waiting.append((temporary, final))

@@ -1,7 +1,7 @@
-"""Findings: what a person should know about a run, as data with stable codes.
+"""Findings: what you should know about a run, as data with stable codes.
 
 Every code is a row in `olp.findings.codes`, so that the report, `--select`, `--fail-on` and `olp explain`
-agree. A module there that holds RULES is found by itself.
+agree. The catalogue finds every module there that holds RULES.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from olp.findings.rule import Rule, Severity
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding; `line` counts from 1 in the program, `lines` are all lines concerned (the first few)."""
+    """One finding; `line` counts from 1 in the program, `lines` are the first few of all lines concerned."""
 
     code: str
     message: str
@@ -46,10 +46,10 @@ def rows() -> Iterator[Rule]:
         yield from import_module(module.name).RULES
 
 
-#: every rule by its code, in the order of codes
+#: Every rule by its code, in the order of codes.
 RULES: dict[str, Rule] = {rule.code: rule for rule in sorted(rows(), key=lambda rule: rule.code)}
 
-#: the codes that a gate looks for
+#: The codes that `olp check` looks for.
 GATE_CODES = tuple(code for code, rule in RULES.items() if rule.gate)
 
 

@@ -1,4 +1,4 @@
-"""What a finding's code stands for."""
+"""What the code of a finding means."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class Severity(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A code with its title, its usual severity, why it matters, what to do, and a case of it.
+    """A code with its title, its severity, why it matters, what to do, and an example.
 
-    `topic` says what it is about; `gate` whether `olp check` looks for it in a program: findings of measured
-    paths, of results, and of measurements of a machine are not for it.
+    `topic` is the module of the code. `gate` says whether `olp check` looks for it in a program. It does not
+    look for findings of measured paths, of results, and of measurements of a machine.
     """
 
     code: str

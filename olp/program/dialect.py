@@ -1,10 +1,10 @@
 """What every dialect of programs gives: its names, its marks, its table of statements.
 
-A dialect is a value, `DIALECT` of a file of its own, which has a line in `olp.program.registry`. Its fields
-say all that others have to know of it: nothing outside asks for its name. A reading gives a `Program`:
+A dialect is a value, `DIALECT` in its own file, which has a line in `olp.program.registry`. Its fields say
+all that other modules have to know of it: none of them asks for its name. Reading gives a `Program`:
 immutable bytes, words, nominal moves, and which word holds which coordinate of which move.
 Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) are written by
-`olp.compensation.writing`, which needs nothing of the dialect but what is stated here and in the program.
+`olp.compensation.writing`. It needs only what is stated here and in the program.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Support(Enum):
     """What becomes of a statement."""
 
     CORRECTED = "corrected"  #: its coordinates are edited
-    READ = "read"  #: changes how later statements are understood; its bytes are carried
+    READ = "read"  #: changes how later statements are understood; its bytes are unchanged
     UNCHANGED = "carried"  #: means nothing to the path
     REFUSED = "refused"  #: may move the machine in a way that is not read
 
@@ -50,19 +50,19 @@ class Row:
 class Dialect:
     """A dialect of programs.
 
-    `reader` reads a text: called with data, setup, this dialect, options, and `words` by keyword, it returns
-    a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out: called with
-    data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes; None where the
-    dialect has none.
+    `reader` reads a text. Called with data, setup, this dialect, options, and `words` by keyword, it returns
+    a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is called
+    with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It is None
+    where the dialect has none.
 
-    `path_mode` is how the control passes from move to move where a program does not say; `inch_decimals` are
+    `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
     may have beyond those of positions. `marks`: a corrected program says so in a comment. `comment` are the
-    marks around a comment, and `first` the beginnings of lines, in capitals, that have to stay in front of
-    any other, in their order (`|` between such as stand for each other).
+    marks around a comment. `first` are the beginnings of lines, in capitals, that stay before all others, in
+    this order; `|` separates alternatives.
 
-    `endings` are endings of files, in small letters, that only this dialect has; `sign` matches what only its
-    texts say at the start of a line, `shared_sign` what they say and those of other dialects too. With
+    `endings` are endings of files, in small letters, that only this dialect has. `sign` matches what only its
+    texts say at the start of a line, `shared_sign` what texts of other dialects say too. With
     `payload_comments` the payload may change inside a program. `path_tolerance`: programs state how far the
     control may leave the path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions
     count at the end of the ram, whatever stylus or tool is active.

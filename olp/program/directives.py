@@ -1,10 +1,11 @@
-"""Comments that tell `olp` something: `(olp off)`, `(olp on)`, and `(olp payload 30 kg)`.
+"""Comments that instruct `olp`: `(olp off)`, `(olp on)`, and `(olp payload 30 kg)`.
 
-Any comment of the dialect serves, in any case of letters. A section between `olp off` and `olp on` stays as
-it is. A payload holds from its line on, motion of that line included. Payloads that the job file gives by
-line (`[[payloads]]`) are put into the text as such comments, marked with their line, before it is read: so
-they stay with their blocks when a program is unrolled or corrected, and a text that carries the marks is not
-marked again.
+Any comment of the dialect serves, in capital or small letters. A section between `olp off` and `olp on` is
+left uncorrected. A payload holds from its line on, including the motion of that line.
+
+The job file may give payloads by line (`[[payloads]]`). These are put into the text as such comments, marked
+with their line, before it is read. So they keep to their blocks when a program is unrolled or corrected. A
+text that has the marks is not marked again.
 """
 
 from __future__ import annotations
@@ -39,20 +40,20 @@ class Directives:
         self._data = data
         self._text = np.frombuffer(data, np.uint8)
         self._lines = np.zeros(0, np.int64)
-        # the first entry stands for the lines before any switch
+        # the first entry is for the lines before any switch
         self._off = np.zeros(1, bool)
 
     def follow(self, chunk: WordChunk) -> dict[int, float]:
-        """Take in the comments of the next chunk. Returns the payload in kg that holds from a line of the
-        chunk on, counted from 0. Raises ProgramError for a payload that cannot be read."""
+        """Read the comments of the next chunk. Returns payloads in kg by the line of the chunk, from 0, from
+        which they hold. Raises ProgramError for a payload that cannot be read."""
         after = self._text[np.minimum(chunk.comments + 1, len(self._text) - 1)]
         may_be = chunk.comments[((after | 32) == ord("o")) | (after <= 32)]
-        found = [m for m in (_DIRECTIVE.match(self._data, at) for at in may_be.tolist()) if m]
+        matches = [m for m in (_DIRECTIVE.match(self._data, start) for start in may_be.tolist()) if m]
         payloads: dict[int, float] = {}
-        if not found:
+        if not matches:
             return payloads
-        places = np.searchsorted(chunk.line_start, [m.start() for m in found], "right") - 1
-        for match, place in zip(found, places.tolist(), strict=True):
+        places = np.searchsorted(chunk.line_start, [m.start() for m in matches], "right") - 1
+        for match, place in zip(matches, places.tolist(), strict=True):
             switch = _SWITCH.match(match[2])
             if switch:
                 self._lines = np.append(self._lines, chunk.first_line + place)
@@ -64,12 +65,11 @@ class Directives:
             if payload is None:
                 continue
             if place in payloads:
-                raise ProgramError("two payloads stand in this line; expected one", line=number)
+                raise ProgramError("this line has two payloads; expected one", line=number)
             if chunk.deleted[place]:
                 raise ProgramError(
-                    "a payload stands under block delete, so it is not known later whether it holds; "
-                    "expected it in a "
-                    "block without `/`",
+                    "a payload is under block delete, so it is not known whether it holds afterwards; "
+                    "move it to a block without `/`",
                     line=number,
                 )
             payloads[place] = payload
@@ -91,8 +91,8 @@ def _payload(content: str, line: int) -> float | None:
     match = _PAYLOAD.fullmatch(content)
     if match is None or not math.isfinite(float(match[1])):
         raise ProgramError(
-            f"the comment `olp {content[:40]}` is not understood; expected a mass in kg, such as (OLP "
-            f"PAYLOAD 30 kg)",
+            f"the comment `olp {content[:40]}` is not understood; "
+            "expected a mass in kg, such as (OLP PAYLOAD 30 kg)",
             line=line,
         )
     return float(match[1])
@@ -108,53 +108,51 @@ def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[byt
     for match in _MARKED.finditer(data):
         if match[2] is None:
             raise ProgramError(
-                "the program states a payload here, and the job file does in [[payloads]]; expected one "
-                "of the two",
+                "the program states a payload here, and the job file states payloads in [[payloads]]; "
+                "expected one of the two",
                 line=len(_LINE_END.findall(data, 0, match.start())) + 1,
             )
         marks[int(match[2])] = float(match[1])
     if marks:
         if marks != dict(payloads):
             raise ProgramError(
-                "the payloads in the comments of this program are not those of [[payloads]] in the job "
-                "file; it was "
-                "made with another job file"
+                "the payloads in the comments of this program are not those of [[payloads]] in the job file; "
+                "give the job file that it was made with"
             )
         return data
     ends = [m.start() for m in _LINE_END.finditer(data)]
     starts = [0, *(m.end() for m in _LINE_END.finditer(data))]
     ends += [len(data)]
-    out, at = [], 0
+    pieces, done = [], 0
     for line, mass in sorted(payloads.items()):
         if line > len(ends) or (line == len(ends) and starts[-1] == len(data)):
             raise ProgramError(
-                f"[[payloads]] of the job file names line {line}, and the program has fewer; expected one "
-                f"of its "
-                "lines"
+                f"[[payloads]] of the job file names line {line}, and the program has fewer lines; "
+                "give the number of one of its lines"
             )
         text = data[starts[line - 1] : ends[line - 1]]
         semicolon = _outside_brackets(text)
         place = ends[line - 1] if semicolon is None else starts[line - 1] + semicolon
         stated = comment[0] + f"OLP PAYLOAD {_short(mass)} kg, line {line}".encode() + comment[1]
         blank = b" " if text[: place - starts[line - 1]].strip() else b""
-        out += [data[at:place], blank, stated]
-        at = place
-    return b"".join([*out, data[at:]])
+        pieces += [data[done:place], blank, stated]
+        done = place
+    return b"".join([*pieces, data[done:]])
 
 
 def _outside_brackets(text: bytes) -> int | None:
     """Where a comment to the end of the line opens; None where there is none."""
     depth = False
-    for at, byte in enumerate(text):
+    for index, byte in enumerate(text):
         if byte == 40:
             depth = True
         elif byte == 41:
             depth = False
         elif byte == 59 and not depth:
-            return at
+            return index
     return None
 
 
 def _short(mass: float) -> str:
-    """A decimal number without an exponent that reads back the same."""
+    """A decimal number without an exponent that is read back as the same value."""
     return np.format_float_positional(mass, trim="-")

@@ -1,4 +1,4 @@
-"""Named frames, tools and their levers, as frames of a toolpath: shared by all readers of programs."""
+"""Named frames and tools with their tool vectors, as frames of a toolpath: shared by all readers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def turn_of(angles_deg: Vector) -> Turn | None:
 
 
 def turned(turn: Turn | None, vector: Vector) -> Vector:
-    """A direction of a frame, as the machine sees it."""
+    """A direction of a frame, in machine coordinates."""
     if turn is None:
         return vector
     x, y, z = (sum(r * v for r, v in zip(row, vector, strict=True)) for row in turn)
@@ -51,7 +51,7 @@ def tool_vector_of(setup: Setup, number: int, line: int) -> Vector:
     tool_vector = tool.tool_vector_mm
     if tool_vector is None:
         raise ProgramError(
-            f"tool {number} has Z_mm = {tool.length_mm[2]:g}, a touch-off value and no length; "
+            f"tool {number} has Z_mm = {tool.length_mm[2]:g}, which is a touch-off value and not a length; "
             f"give tools.{number}.gauge_to_tip_mm",
             line=line,
         )
@@ -59,8 +59,8 @@ def tool_vector_of(setup: Setup, number: int, line: int) -> Vector:
 
 
 def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
-    """Where a work offset was touched off on the raw machine, axis position, lever and payload; None where it
-    was located by other means."""
+    """Where a work offset was touched off on the uncompensated machine: axis position, tool vector, payload;
+    None where it was located by other means."""
     if work.set_by == "true":
         return None
     length = tool_vector = ZERO
@@ -69,20 +69,20 @@ def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
         if tool is None or tool.tool_vector_mm is None:
             raise ProgramError(
                 f"work offset {work.name} was touched off with tool {work.touch_tool}, "
-                "whose lever is not defined; give its Z_mm or gauge_to_tip_mm",
+                "whose tool vector is not defined; give its Z_mm or gauge_to_tip_mm",
                 line=line,
             )
         length, tool_vector = tool.length_mm, tool.tool_vector_mm
-    at = [
+    axis_mm = [
         work.offset_mm[i] + length[i] if stated is None else stated
         for i, stated in enumerate(work.touched_at_mm)
     ]
     payload = setup.job.payload_kg if work.touched_payload_kg is None else work.touched_payload_kg
-    return (at[0], at[1], at[2]), carried(tool_vector, payload)
+    return (axis_mm[0], axis_mm[1], axis_mm[2]), carried(tool_vector, payload)
 
 
 class FrameTable:
-    """Frames of one reading: each is made once, where it is first used."""
+    """Frames of one program: each is made once, where it is first used."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
@@ -90,15 +90,15 @@ class FrameTable:
         self._index: dict[Frame, int] = {}
 
     def work_offset(self, name: str, line: int, what: str) -> WorkOffset:
-        """A frame of machine or job by its name. Raises ProgramError: never the identity in silence."""
-        found = self.setup.work_offset(name)
-        if found is None:
+        """A frame of machine or job by its name. Raises ProgramError where there is none."""
+        work = self.setup.work_offset(name)
+        if work is None:
             raise ProgramError(
                 f"{what} needs the frame {name}, which is not defined; give [work_offsets.{name}] in the job "
                 "file: X_mm, Y_mm, Z_mm and, where it is turned, A_deg, B_deg, C_deg",
                 line=line,
             )
-        return found
+        return work
 
     def index(
         self,
@@ -113,7 +113,7 @@ class FrameTable:
         tool_touched: Touch | None = None,
     ) -> int:
         """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
-        machine from tip to gauge point. Raises ProgramError for a tilted tool with a lever to the side."""
+        machine from tip to gauge point. Raises ProgramError for a tilted tool with X or Y in its vector."""
         if axis != UP:
             length, tool_vector = (_tilted(v, axis, tool, line) for v in (length, tool_vector))
         x, y, z = (o + n for o, n in zip(work.offset_mm, length, strict=True))
@@ -125,7 +125,7 @@ class FrameTable:
         return self._known(frame)
 
     def lifted(self, number: int, lift: Vector) -> int:
-        """A frame in which the tip stays off the points that are said."""
+        """A frame in which the tip keeps this distance from the stated points."""
         frame = self.frames[number]
         x, y, z = (o + v for o, v in zip(frame.offset_mm, lift, strict=True))
         return self._known(replace(frame, offset_mm=(x, y, z), lift_mm=lift))
@@ -141,8 +141,8 @@ class FrameTable:
 def _tilted(vector: Vector, axis: Vector, tool: int | None, line: int) -> Vector:
     if vector[0] or vector[1]:
         raise ProgramError(
-            f"tool {tool} is tilted and has a lever across its axis, and how the head turns that one is not "
-            "known; give its X and Y as 0",
+            f"tool {tool} is tilted, and its vector has X or Y, which the head turns in a way that is not known; "
+            "give its X and Y as 0",
             line=line,
         )
     x, y, z = (vector[2] * a for a in axis)

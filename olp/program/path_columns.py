@@ -1,5 +1,4 @@
-"""The columns of a path on their way, chunk by chunk, whatever the dialect: moves and arcs; at their end the
-`Toolpath` of them."""
+"""The columns of a path, collected chunk by chunk: moves and arcs, and at the end their `Toolpath`."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from olp.program.text.columns import Columns
 
 
 class PathColumns:
-    """Without `keep_words` the columns that only writing needs are left out. `moves` counts what came so far;
+    """Without `keep_words` the columns that only writing needs are left out. `moves` counts the moves so far;
     `expected` is how many there may be."""
 
     def __init__(self, expected: int, *, keep_words: bool) -> None:
@@ -49,7 +48,7 @@ class PathColumns:
         self.columns.put("arc_sweep", sweep, np.float64)
 
     def toolpath(self, frames: Sequence[Frame], start_mm: tuple[float, float, float]) -> Toolpath:
-        """All of it. Takes the columns: once only."""
+        """The whole path. Takes the columns: call it once only."""
         take = self.columns.take
         return Toolpath(
             kind=take("kind", np.uint8),

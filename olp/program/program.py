@@ -49,10 +49,10 @@ class ArcSlots:
 class Hole:
     """One hole of a canned cycle: its moves `first`..`last` of the toolpath and its block's words by letter.
 
-    `place_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions;
-    `series` counts contiguous cycles; a block of one series inherits R and Z of the one before. `repeat`
-    counts the `repeats` holes of one block from 0. `rests` are the places in it where the motion rests, as
-    (number of its moves before, seconds): dwells and turns of the spindle.
+    `place_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions. `series` counts
+    contiguous cycles; a block of one series inherits R and Z of the block before. `repeat` counts the
+    `repeats` holes of one block from 0. `rests` says where the motion rests, as (number of its moves before,
+    seconds): dwells and reversals of the spindle.
     """
 
     line: int
@@ -74,11 +74,13 @@ class Hole:
 
 @dataclass(frozen=True, slots=True)
 class ArcText:
-    """How a program of statements says an arc: bytes `begin`..`end` of what says it beside its end point,
-    indices of the words of its centre (two of them where it stands twice), of its `radius` and of its `angle`
-    in degrees (-1 where not said) and of the direction in which it begins (empty where not said). `whole`:
-    its end point is said in there too. `long` are the bytes that belong to arcs of more than half a circle
-    only."""
+    """How a program of statements states an arc: bytes `begin`..`end` of what states it beside its end point.
+
+    `centres` are the words of its centre, two sets where the centre is stated twice. `radius` and `angle` (in
+    degrees) are words, -1 where not stated; `direction` are the words of the direction in which it begins,
+    empty where not stated. `whole`: the bytes state its end point too. `long` are the bytes that only arcs of
+    more than half a circle have.
+    """
 
     begin: int
     end: int
@@ -92,7 +94,7 @@ class ArcText:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedFeeds:
-    """(k,) feeds as they are said: the first `move` of each, its `line`, and the `word` of its number, -1
+    """(k,) feeds as stated: the first `move` of each, its `line`, and the `word` of its number, -1
     where no word could be changed."""
 
     move: Index
@@ -104,14 +106,15 @@ class StatedFeeds:
 class Statements:
     """What a program of whole statements has beside its words.
 
-    (n,) `begin`, `end`: the bytes that say the end of each move, -1 where no statement does. (n,)
-    `feed_mm_s`, inf for rapids and NaN where it is not known; (n + 1,) `rest` and `dwell_s` of the places
-    before, between and after the moves; `feeds` are where feeds are said. `arcs` by move. `broken`: the marks
-    of continuation inside words, by word. `rapid` is the line that makes the next statement a rapid; `mark`
-    joins lines, none of which becomes longer than `width` bytes (0: as long as they come); `cards` have
-    their numbers behind that width, in the last eight columns. `strokes` (k, 2):
-    the moves to the place and to the bottom of each hole. `decimal` is the decimal mark of texts
-    whose numbers keep their own form and column, empty for others.
+    (n,) `begin`, `end`: the bytes that state the end of each move, -1 where no statement does. (n,)
+    `feed_mm_s`: inf for rapids, NaN where it is not known. (n + 1,) `rest` and `dwell_s`: before, between and
+    after the moves. `feeds`: where feeds are stated. `arcs`: by move. `broken`: the marks of continuation
+    inside words, by word.
+
+    `rapid` is the line that makes the next statement a rapid. `mark` joins lines, none of which becomes longer
+    than `width` bytes (0: no limit). `cards` have their numbers after that width, in the last eight columns.
+    `strokes` (k, 2): the moves to the hole and to its bottom. `decimal` is the decimal mark of texts whose
+    numbers keep their own form and column, empty for others.
     """
 
     begin: Small
@@ -133,7 +136,7 @@ class Statements:
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
-    a decimal point are whole units. `statements` is there where the text is no blocks of words."""
+    a decimal point are whole units. `statements` is None for blocks of words."""
 
     data: bytes
     dialect: Dialect
@@ -162,7 +165,7 @@ class Program:
         return self.dialect
 
     def text(self, line: int) -> str:
-        """The text of a line, counted from 1, for people."""
+        """The text of a line, counted from 1, for messages."""
         return self.data[int(self.line_start[line - 1]) : int(self.line_end[line - 1])].decode("latin-1")
 
     def eol(self, line: int) -> bytes:

@@ -1,6 +1,6 @@
-"""All dialects by name, which of them a text is written in, and the one way to read any of them.
+"""All dialects by name, which of them a text is written in, and the function that reads any of them.
 
-A new dialect is a file with its value, `DIALECT`, and a line in `_MODULES` here; one that a file describes is
+A new dialect is a file with its value, `DIALECT`, and a line in `_MODULES` here. One that a file describes is
 that file and its name in `DESCRIBED`. Only this module looks names up.
 """
 
@@ -31,13 +31,13 @@ DESCRIBED = ("kawasaki-as", "val2", "karel")
 
 
 def _registered() -> dict[str, Dialect]:
-    found: dict[str, Dialect] = {}
+    by_name: dict[str, Dialect] = {}
     for module in _MODULES:
         dialect: Dialect = import_module(module).DIALECT
-        if dialect.name in found:
+        if dialect.name in by_name:
             raise ValueError(f"two dialects have the name {dialect.name}")
-        found[dialect.name] = dialect
-    return found
+        by_name[dialect.name] = dialect
+    return by_name
 
 
 _BY_NAME = _registered()
@@ -45,6 +45,7 @@ _BY_NAME = _registered()
 DIALECTS: Mapping[str, Dialect] = MappingProxyType(_BY_NAME)
 
 _VERSION = re.compile(r"\.\d+$")
+#: bytes of a text that are searched for signs of a dialect
 _LOOKED_AT = 1 << 16
 _PAYLOAD = re.compile(rb"(?im)^[^\r\n]*\bolp[ \t]+payload\b")
 
@@ -53,7 +54,7 @@ def read(
     data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
-    right.
+    correctly.
 
     Without `words` the columns that only writing needs are left out.
     """
@@ -70,10 +71,10 @@ def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
     )
     if setup.job.payloads:
         raise ProgramError(f"[[payloads]] of the job file: {what}", line=min(setup.job.payloads))
-    said = _PAYLOAD.search(data)
-    if said:
+    comment = _PAYLOAD.search(data)
+    if comment:
         raise ProgramError(
-            f"a comment changes the payload: {what}", line=data.count(b"\n", 0, said.start()) + 1
+            f"a comment changes the payload: {what}", line=data.count(b"\n", 0, comment.start()) + 1
         )
 
 
@@ -91,28 +92,28 @@ def named(name: str) -> Dialect:
 
 
 def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Dialect:
-    """The dialect of a program: the one that is named, else what its text and the ending of its file say,
-    else that of the control. Raises UsageError for a name that there is not, ProgramError where text and
-    ending contradict each other or tell too little."""
+    """The dialect of a program: the one that is named, else what its text and the ending of its file show,
+    else that of the control. Raises UsageError for an unknown name, ProgramError where text and ending
+    contradict each other or leave several dialects possible."""
     if name is not None:
         return named(name)
-    said = _by_text(data)
+    names = _by_text(data)
     ending = _by_ending(file)
-    if len(said) > 1 and ending in said:
+    if len(names) > 1 and ending in names:
         return DIALECTS[ending]
-    if len(said) > 1 and control.name in said:
+    if len(names) > 1 and control.name in names:
         return control
-    if len(said) > 1:
+    if len(names) > 1:
         raise ProgramError(
-            f"the text may be {' or '.join(sorted(said))}; say which with --dialect, or with the key dialect "
-            "of the job file"
+            f"the text may be {' or '.join(sorted(names))}; name its dialect with --dialect, "
+            "or with the key dialect of the job file"
         )
-    if said:
-        (one,) = said
+    if names:
+        (one,) = names
         if ending not in (None, one):
             raise ProgramError(
-                f"the file ends as {ending} and its text reads as {one}; say which it is with --dialect, or "
-                "with the key dialect of the job file"
+                f"the ending of the file is that of {ending}, and its text is {one}; name its dialect with "
+                "--dialect, or with the key dialect of the job file"
             )
         return DIALECTS[one]
     return DIALECTS[ending] if ending is not None else control
@@ -125,7 +126,7 @@ def _by_ending(file: str) -> str | None:
 
 
 def _by_text(data: bytes) -> set[str]:
-    """The dialects of statements that a text may be written in; none where it holds no statements."""
+    """The dialects of statements that a text may be written in; none where it has no statements."""
     start = data[:_LOOKED_AT]
     counts = {name: len(d.sign.findall(start)) for name, d in DIALECTS.items() if d.sign is not None}
     most = max(counts.values(), default=0)

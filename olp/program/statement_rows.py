@@ -1,5 +1,5 @@
-"""What the reading of a program of statements collects: points of a chunk, then words, moves and arcs of all
-of it, at its end the `Program`."""
+"""What is collected while a program of statements is read: points of a chunk, then words, moves and arcs of
+the whole text, and at the end the `Program`."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
 _POW10 = 10.0 ** np.arange(19)
 _NONE = (-1, -1, -1)
-#: columns of cards and of old terminals: a text that keeps to them goes on keeping to them
+#: columns of cards and of old terminals: a text within one of these widths is kept within it
 _WIDTHS = (72, 80)
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point that was read by itself: its line, the bytes of its statement, the fields of its coordinates
-    and of its direction, and whether these are distances (then one alone is along Z)."""
+    """A point that was read singly: its line, the bytes of its statement, the fields of its coordinates and
+    of its direction. `incremental`: the coordinates are distances, and a single one is along Z."""
 
     line: int
     begin: int
@@ -38,7 +38,7 @@ class Point:
 @dataclass(slots=True, eq=False)
 class Points:
     """The points of a chunk in order: (m,) `line` from 1, `begin` and `end` of their statements, (m, 3)
-    `slot` word or -1, `value` as written, `direction` (NaN where none is said), (m,) `incremental`."""
+    `slot` word or -1, `value` as written, `direction` (NaN where none is stated), (m,) `incremental`."""
 
     line: Index
     begin: Index
@@ -53,7 +53,7 @@ class Points:
 
 
 class StatementCollector(PathColumns):
-    """Columns of one program on their way. Without `keep_words` those that only writing needs are left
+    """Columns of one program while it is read. Without `keep_words` those that only writing needs are left
     out."""
 
     def __init__(self, data: bytes, dialect: Dialect, *, keep_words: bool) -> None:
@@ -78,7 +78,7 @@ class StatementCollector(PathColumns):
         self._put_words(chunk.mantissa, chunk.decimals, chunk.pointed, chunk.start, chunk.end)
 
     def finish(self) -> None:
-        """End a chunk: the words that were read alone stand behind those of its plain points."""
+        """End a chunk: the words that were read singly come after those of its plain points."""
         if self._lone:
             mantissa, decimals, pointed, start, end = zip(*self._lone, strict=True)
             self.words -= len(self._lone)
@@ -86,7 +86,7 @@ class StatementCollector(PathColumns):
             self._put_words(mantissa, decimals, pointed, start, end)
 
     def points(self, chunk: Chunk, alone: Sequence[Point]) -> Points:
-        """The points of a chunk, those that were read in columns and those that were read alone."""
+        """The points of a chunk, those that were read in columns and those that were read singly."""
         three = np.arange(3)
         slot = chunk.first[:-1, None] + three
         direction = np.full((len(slot), 3), np.nan)
@@ -94,7 +94,7 @@ class StatementCollector(PathColumns):
         wide = chunk.width == 6
         if wide.any():
             direction[wide] = value[slot[wide] + 3]
-        out = Points(
+        points = Points(
             line=chunk.point + (chunk.first_line + 1),
             begin=chunk.line_start[chunk.point],
             end=chunk.line_end[chunk.point],
@@ -103,7 +103,7 @@ class StatementCollector(PathColumns):
             direction=direction,
             incremental=np.zeros(len(slot), bool),
         )
-        return _merged(out, [self._alone(p) for p in alone]) if alone else out
+        return _merged(points, [self._alone(p) for p in alone]) if alone else points
 
     def _alone(self, point: Point) -> tuple[Point, tuple[int, ...], Array, Array]:
         slot = tuple(self.word(f) for f in point.fields)
@@ -114,18 +114,18 @@ class StatementCollector(PathColumns):
         return point, slot, value, direction
 
     def word(self, field: Field) -> int:
-        """A word of its own for a number; returns its index."""
-        found = field.number
-        assert found is not None
+        """Add a word for a number; returns its index."""
+        pair = field.number
+        assert pair is not None
         if not self.keep_words:
             return -1
-        mantissa, decimals = found
-        said = self.data[field.start : field.end]
-        if b"$" in said:
-            at = said.index(b"$")
-            stop = max(said.rfind(b"\n"), said.rfind(b"\r")) + 1
-            self.broken[self.words] = said[at:stop]
-        self._lone.append((mantissa, decimals, b"." in said, field.start, field.end))
+        mantissa, decimals = pair
+        text = self.data[field.start : field.end]
+        if b"$" in text:
+            mark = text.index(b"$")
+            stop = max(text.rfind(b"\n"), text.rfind(b"\r")) + 1
+            self.broken[self.words] = text[mark:stop]
+        self._lone.append((mantissa, decimals, b"." in text, field.start, field.end))
         self.words += 1
         return self.words - 1
 
@@ -180,7 +180,7 @@ class StatementCollector(PathColumns):
         )  # fmt: skip
 
     def put_feed(self, move: int, mm_s: float, line: int, word: int = -1) -> None:
-        """A feed from a move on, and the word that says it."""
+        """A feed from a move on, and the word that states it."""
         self._feeds.append((move, mm_s, line, word))
 
     # -- the end -------------------------------------------------------------------------------------
@@ -188,7 +188,7 @@ class StatementCollector(PathColumns):
     def program(
         self, frames: Sequence[Frame], start_mm: tuple[float, float, float], end_line: int, rapid: bytes
     ) -> Program:
-        """All of it. Takes the columns: once only."""
+        """The whole program. Takes the columns: call it once only."""
         take = self.columns.take
         path = self.toolpath(frames, start_mm)
         line_start, line_end = take("line_start", np.int32), take("line_end", np.int32)
@@ -225,13 +225,13 @@ class StatementCollector(PathColumns):
 
     def _feed(self, kind: npt.NDArray[np.uint8], flag: npt.NDArray[np.uint8]) -> Array:
         move, value, *_ = (np.array(column) for column in zip(*self._feeds, strict=True))
-        out = value[np.searchsorted(move, np.arange(len(kind)), "right") - 1]
-        out[kind == Kind.RAPID] = np.inf
-        out[(flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
-        return np.asarray(out, float)
+        feed = value[np.searchsorted(move, np.arange(len(kind)), "right") - 1]
+        feed[kind == Kind.RAPID] = np.inf
+        feed[(flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
+        return np.asarray(feed, float)
 
     def _words(self) -> Words:
-        """Words as they came, which is not in the order of lines: so nothing leads from lines to words."""
+        """Words in the order of reading, which is not that of lines: so no index leads from lines to words."""
         take = self.columns.take
         start = take("word_start", np.int32)
         return Words(
@@ -247,13 +247,13 @@ class StatementCollector(PathColumns):
 
 
 def _value(field: Field) -> float:
-    found = field.number
-    assert found is not None
-    return found[0] / 10.0 ** found[1]
+    pair = field.number
+    assert pair is not None
+    return pair[0] / 10.0 ** pair[1]
 
 
 def _merged(points: Points, alone: Sequence[tuple[Point, tuple[int, ...], Array, Array]]) -> Points:
-    """Points read in columns and points read alone, in the order of their lines."""
+    """Points read in columns and points read singly, in the order of their lines."""
     more = Points(
         line=np.array([p.line for p, *_ in alone], np.int64),
         begin=np.array([p.begin for p, *_ in alone], np.int64),

@@ -1,4 +1,4 @@
-"""Programs of lists and described languages: what their readers found, as columns."""
+"""Programs of lists and described languages: the moves and numbers that their readers collect, as columns."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Word
 from olp.program.text.numbers import MOST_DECIMALS, number
 
 Small = npt.NDArray[np.int32]
-#: speeds are read, and none is written back
+#: speeds are read, and none is written
 _UNWRITTEN = StatedFeeds(np.zeros(1, np.int64), np.ones(1, np.int64), np.full(1, -1))
 
-
-#: what is kept of a move, and of a number (`spans`): kind of value and how many of them
+#: what is kept of a move, and of a number (`spans`): type of the values and how many there are
 _KEPT: dict[str, tuple[Any, int]] = {
     "kind": (np.uint8, 0), "flag": (np.uint8, 0), "line": (np.int32, 0), "frame": (np.int32, 0),
     "end": (np.float64, 3), "slot": (np.int32, 3), "bounds": (np.int32, 2), "feed": (np.float64, 0),
@@ -32,21 +31,23 @@ _KEPT: dict[str, tuple[Any, int]] = {
 
 @dataclass(slots=True)
 class Moves:
-    """Moves on their way, one by one or many at once: `kind`, `flag`, `line`, `frame`, `end` and the `slot`
-    of each, the bytes of its statement (-1, -1 where none may be copied), its feed; and the numbers of the
-    text by their bytes. `plain` are mantissa, decimals, first byte and last of all numbers, where they are
-    known as columns."""
+    """Moves that are collected singly or many at once, and the numbers of the text by their bytes.
+
+    Each move has `kind`, `flag`, `line`, `frame`, `end`, `slot`, the bytes of its statement (-1, -1 where none
+    may be copied), and its feed. `plain` are mantissa, decimals, first byte and last byte of all numbers,
+    where they are known as columns.
+    """
 
     lists: dict[str, list[Any]] = field(default_factory=lambda: {name: [] for name in _KEPT})
     columns: list[dict[str, npt.NDArray[Any]]] = field(default_factory=list)
     plain: tuple[Index, npt.NDArray[np.int8], Index, Index] | None = None
-    said: int = 0
+    number_count: int = 0
 
     def number(self, start: int, end: int) -> int:
         """A number of the text; returns its slot."""
         self.lists["spans"].append((start, end))
-        self.said += 1
-        return self.said - 1
+        self.number_count += 1
+        return self.number_count - 1
 
     def put(self, **move: Any) -> None:
         """One move."""
@@ -54,14 +55,14 @@ class Moves:
             self.lists[name].append(value)
 
     def put_all(self, **moves: npt.ArrayLike) -> None:
-        """Many moves; with `spans` their numbers, whose slots count on from `said`."""
+        """Many moves; with `spans` their numbers, whose slots continue from `number_count`."""
         self._close()
         made = {name: _column(name, values) for name, values in moves.items()}
-        self.said += len(made["spans"]) if "spans" in made else 0
+        self.number_count += len(made["spans"]) if "spans" in made else 0
         self.columns.append(made)
 
     def _close(self) -> None:
-        """Turn what came one by one into columns."""
+        """Turn the moves that were put singly into columns."""
         if any(self.lists.values()):
             self.columns.append({name: _column(name, values) for name, values in self.lists.items()})
             self.lists = {name: [] for name in _KEPT}
@@ -77,7 +78,7 @@ class Moves:
         decimal: bytes,
         words: bool,
     ) -> Program:
-        """All of it."""
+        """The whole program."""
         self._close()
         all_ = {
             name: np.concatenate([c[name] for c in self.columns if name in c] or [_column(name, [])])
@@ -116,8 +117,8 @@ class Moves:
             text = np.frombuffer(data, np.uint8)
             order = np.argsort(start, kind="stable")
             apart = bool((start[order][1:] >= stop[order][:-1]).all())
-            found = plain_numbers(text, start, stop, decimal == b",") if apart else None
-            self.plain = None if found is None else (*found, start, stop)
+            parsed = plain_numbers(text, start, stop, decimal == b",") if apart else None
+            self.plain = None if parsed is None else (*parsed, start, stop)
         if self.plain is not None:
             mantissa, decimals, start, stop = self.plain
             fine = decimals > MOST_DECIMALS
@@ -125,8 +126,8 @@ class Moves:
                 mantissa = np.where(fine, np.rint(mantissa / 10.0 ** (decimals - MOST_DECIMALS)), mantissa)
                 decimals = np.minimum(decimals, MOST_DECIMALS)
         else:
-            told = [number(data[a:b], decimal) for a, b in spans.tolist()]
-            known = [n for n in told if n is not None]
+            parsed_numbers = [number(data[a:b], decimal) for a, b in spans.tolist()]
+            known = [n for n in parsed_numbers if n is not None]
             decimals = np.array([min(max(n.places, 0), MOST_DECIMALS) for n in known], np.int8)
             value = np.array([n.value for n in known], float)
             mantissa = np.rint(value * 10.0 ** decimals.astype(np.int64))
@@ -156,9 +157,9 @@ def _line_bounds(data: bytes) -> tuple[Small, Small]:
         ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
         return np.concatenate(([0], ends[:-1] + 1)).astype(np.int32), ends.astype(np.int32)
     starts, stops = [], []
-    at = 0
+    begin = 0
     for raw in data.splitlines(keepends=True):
-        starts.append(at)
-        stops.append(at + len(raw.rstrip(b"\r\n")))
-        at += len(raw)
+        starts.append(begin)
+        stops.append(begin + len(raw.rstrip(b"\r\n")))
+        begin += len(raw)
     return np.array(starts or [0], np.int32), np.array(stops or [0], np.int32)

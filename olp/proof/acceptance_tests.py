@@ -58,23 +58,24 @@ def _circle(model: ErrorModel, tool: Array, digit: float, plane: str) -> dict[st
     radius = min(_RADIUS_MM, round(_SHARE * side))
     # a lap and a quarter: the first quarter takes up what is not known of the play
     angle = 2.0 * np.pi * np.arange(_PLACES * 5 // 4) / _PLACES
-    out: dict[str, Any] = {"plane": plane, "radius_mm": radius, "centre_mm": centre.tolist()}
+    result: dict[str, Any] = {"plane": plane, "radius_mm": radius, "centre_mm": centre.tolist()}
     radial: dict[str, list[Array]] = {"before": [], "after": []}
-    for sense in (1.0, -1.0):
+    for direction in (1.0, -1.0):
         target = np.tile(centre, (len(angle), 1))
-        target[:, first] += radius * np.cos(sense * angle)
-        target[:, second] += radius * np.sin(sense * angle)
+        target[:, first] += radius * np.cos(direction * angle)
+        target[:, second] += radius * np.sin(direction * angle)
         for name, actual in _runs(model, target, tool, digit).items():
             lap = (actual - centre)[-_PLACES:, [first, second]]
-            radial[name].append(_radial(lap, radius)[np.argsort((sense * angle[-_PLACES:]) % (2 * np.pi))])
+            order = np.argsort((direction * angle[-_PLACES:]) % (2 * np.pi))
+            radial[name].append(_radial(lap, radius)[order])
     for name, (forward, backward) in radial.items():
-        out[name] = {
+        result[name] = {
             "G_ccw_um": float(np.ptp(forward)) * UM_PER_MM,
             "G_cw_um": float(np.ptp(backward)) * UM_PER_MM,
             "H_um": float(np.abs(forward - backward).max()) * UM_PER_MM,
             "radial_um": (forward * UM_PER_MM).tolist(),
         }
-    return out
+    return result
 
 
 def _radial(lap: Array, radius: float) -> Array:

@@ -44,9 +44,9 @@ class Deviation:
 
     def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
         """Largest and rms in um, at waypoints of all judged moves and along those that are `cutting`."""
-        at = self.waypoint[self.judged & np.isfinite(self.waypoint)]
+        waypoints = self.waypoint[self.judged & np.isfinite(self.waypoint)]
         along = self.path[self.judged & cutting & np.isfinite(self.path)]
-        return {"waypoints": _figures(at), "between": _figures(along)}
+        return {"waypoints": _figures(waypoints), "between": _figures(along)}
 
 
 def _figures(values: Single) -> dict[str, float]:
@@ -101,17 +101,18 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     width = model.backlash_at(path.end_mm) if len(groups) else None
     if width is None:
         return np.zeros(len(groups))
-    out = np.zeros(len(path))
+    unknown = np.zeros(len(path))
     for axis in np.flatnonzero((np.nan_to_num(width) > 0).any(axis=0)).tolist():
-        command, lost = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
+        command, backlash = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
         resets = np.flatnonzero(np.isnan(command))
         edges = [0, *(resets + 1).tolist(), len(command)]
         for a, b in pairwise(edges):
             if b > a:
                 part = command[a:b]
                 reach = np.maximum.accumulate(part) - np.minimum.accumulate(part)
-                out[a:b] = np.hypot(out[a:b], np.maximum(lost[a:b] - np.nan_to_num(reach), 0.0) / 2)
-    return np.maximum(out[groups], np.concatenate((out[:1], out[groups[:-1]])))
+                half = np.maximum(backlash[a:b] - np.nan_to_num(reach), 0.0) / 2
+                unknown[a:b] = np.hypot(unknown[a:b], half)
+    return np.maximum(unknown[groups], np.concatenate((unknown[:1], unknown[groups[:-1]])))
 
 
 class Tracer:
@@ -302,6 +303,6 @@ def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:
     """(n,) index into the arcs of each move, -1 where it is none."""
     if not len(path.arcs):
         return None
-    out = np.full(len(path), -1, np.int64)
-    out[path.arcs.move] = np.arange(len(path.arcs))
-    return out
+    index = np.full(len(path), -1, np.int64)
+    index[path.arcs.move] = np.arange(len(path.arcs))
+    return index

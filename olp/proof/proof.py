@@ -49,9 +49,9 @@ class Proof:
         """(n,) the deviation that counts per nominal move: along the path of cutting moves, at the end of
         others; 0 where the move is not judged."""
         counts = self.after.judged
-        at = np.where(counts, np.nan_to_num(self.after.waypoint), 0.0)
+        waypoint = np.where(counts, np.nan_to_num(self.after.waypoint), 0.0)
         along = np.where(counts & self.cutting & ~self.lean, np.nan_to_num(self.after.path), 0.0)
-        return np.asarray(np.maximum(at, along), float)
+        return np.asarray(np.maximum(waypoint, along), float)
 
     def owner(self) -> Index:
         """(m,) the nominal move that each move of the corrected program belongs to."""
@@ -62,9 +62,9 @@ class Proof:
         return bool(self.size_mm().max(initial=0.0) <= self.allowed_mm)
 
 
-def uncorrected_starts(path: Toolpath, passed: Mask) -> Mask:
+def uncorrected_starts(path: Toolpath, uncorrected: Mask) -> Mask:
     """(n,) feed moves that begin where the move before ended uncorrected, or a canned cycle left the tool."""
-    loose = passed | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
+    loose = uncorrected | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
     before = np.concatenate(([False], loose[:-1]))
     return np.asarray(before & cutting_moves(path), bool)
 
@@ -76,16 +76,16 @@ def prove(
     *,
     tolerance_mm: float,
     digit_mm: float,
-    passed: Index,
+    uncorrected: Index,
     parts: npt.NDArray[np.int32] | None = None,
 ) -> Proof:
-    """Hold the corrected path against the nominal one. `passed` are nominal moves written uncorrected;
+    """Hold the corrected path against the nominal one. `uncorrected` are nominal moves written as they were;
     `parts` (n,) says how many corrected moves each nominal one became, and is found from the paths where it
     is not given."""
     path, written = nominal.toolpath, corrected.toolpath
     target = targets(path, zero_shifts(path.frames, model))
     exempt = np.zeros(len(path), bool)
-    exempt[passed] = True
+    exempt[uncorrected] = True
     loose = uncorrected_starts(path, exempt)
     if parts is None:
         groups = match(nominal, target, corrected, model, tolerance_mm + digit_mm)

@@ -1,1 +1,1 @@
-"""What a run found, for people and programs: text, JSON, SARIF, documents, plots. No verdict is made here."""
+"""Results of a run for people and programs: text, JSON, SARIF, documents, plots. No verdict is made here."""

@@ -1,5 +1,4 @@
-"""The report of measured lines and of a calibration made from them: for people as text, and as a document
-with the plots of a metrologist."""
+"""The report of measured lines and of a calibration made from them, as text and as a document with plots."""
 
 from __future__ import annotations
 
@@ -26,27 +25,32 @@ from olp.reports.plots.base import Format, calibration_curves
 from olp.reports.plots.calibration import Fitted, name_of_straightness, name_of_turn
 from olp.reports.report import findings_text, number, pairs, printable, table
 
+#: Figures of lines approached from both sides.
 _FIGURES = ("A", "E", "R", "M", "B", "B_mean")
+#: Figures of lines approached from one side.
 _ONE_SIDE = ("A_up", "E_up", "R_up", "A_down", "E_down", "R_down")
-#: Over what the table of cyclic errors stands.
+#: Title of the table of cyclic errors.
 _CYCLIC = "Cyclic errors of at least three times their standard uncertainty"
-_SURE = 3.0
+#: Least amplitude of a listed cyclic error in standard uncertainties; noise alone exceeds it in 1 % of cases.
+_SIGNIFICANT = 3.0
+#: Order of quantities in tables and plots.
 _ORDER = {"positioning": 0, "straightness": 1, "angle": 2}
+#: Points of a drawn curve.
 _DENSE = 200
-#: places in the box where errors are stated
-_PLACES = 400
-#: What the figures say, for who reads them once a year.
+#: Number of random points in the box for the figures over the box.
+_POINTS = 400
+#: The meaning of the figures.
 _LEGEND = (
     "A accuracy, E systematic deviation, R repeatability, M mean systematic deviation, B reversal (largest, "
-    "and mean with its sign: approached in + less approached in -). Five runs and more are asked for. "
-    "Straightness counts from its reference line."
+    "and mean with its sign: approached in + less approached in -). Five runs or more are required. "
+    "Straightness is stated from its reference line."
 )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitSummary:
-    """What a fit found, for its report: the adjustment, the calibration made of it, its summary as a mapping
-    ("olp-fit-1") and its findings."""
+    """The results of a fit, for its report: the adjustment, the calibration made from it, its summary as a
+    mapping ("olp-fit-1") and its findings."""
 
     fit: Fit
     calibration: Calibration
@@ -55,17 +59,17 @@ class FitSummary:
 
 
 def fitted_lines(fit: Fit) -> tuple[Fitted, ...]:
-    """Each line of a fit beside its curve. Readings are the curve plus what the fit left of them, so their
-    zero, slope, drift and reversal are out."""
-    out = []
+    """Each line of a fit with its curve. Readings are the curve plus their residuals, so that their zero,
+    slope, drift and reversal are removed."""
+    lines = []
     for result in fit.of(LineState):
         line = result.state.observation
         x = np.linspace(line.target_mm.min(), line.target_mm.max(), _DENSE)
         rows = fit.curve(line.component, x)
         sigma = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", rows, fit.covariance, rows, optimize=True), 0.0))
         reading = fit.curve(line.component, line.target_mm) @ fit.theta + result.residual
-        out.append(Fitted(line, x, np.asarray(rows @ fit.theta), sigma, np.asarray(reading)))
-    return tuple(sorted(out, key=lambda item: _place_in_order(item.line)))
+        lines.append(Fitted(line, x, np.asarray(rows @ fit.theta), sigma, np.asarray(reading)))
+    return tuple(sorted(lines, key=lambda item: _place_in_order(item.line)))
 
 
 def _place_in_order(line: Line) -> tuple[int, int, str]:
@@ -75,29 +79,29 @@ def _place_in_order(line: Line) -> tuple[int, int, str]:
 #: Plots of a fit in their order.
 _FIT_CAPTIONS = {
     "curves": "The curves of the calibration, each on its measuring line.",
-    "fitted": "Readings, freed of zero, slope, drift and reversal (blue approached in +, red in -), and the "
-    "fitted curves with twice their standard uncertainty.",
-    "residuals": "What the fit leaves of every reading.",
+    "fitted": "Readings with zero offset, slope, drift and reversal removed (blue approached in +, red in "
+    "-), and the fitted curves with twice their standard uncertainty.",
+    "residuals": "Residual of every reading.",
 }
 
 
 # -- text ------------------------------------------------------------------------------------------------
 
 
-def to_text(found: Evaluated) -> str:
+def to_text(evaluated: Evaluated) -> str:
     """Plain text of an evaluation."""
-    m = found.measurements
+    m = evaluated.measurements
     sections = (
         list(pairs([
             ("Machine", printable(m.machine)),
-            ("Lines", f"{len(found.evaluations)} evaluated" + _plural(len(found.sweeps), "sweep")),
+            ("Lines", f"{len(evaluated.evaluations)} evaluated" + _plural(len(evaluated.sweeps), "sweep")),
         ])),
-        list(_table_text(found, bidirectional=True)),
-        list(_table_text(found, bidirectional=False)),
-        list(_cyclic_text(found)),
-        list(_reversal_text(found)),
-        list(_squareness_text(found)),
-        list(findings_text([f.as_dict() for f in found.findings])),
+        list(_table_text(evaluated, bidirectional=True)),
+        list(_table_text(evaluated, bidirectional=False)),
+        list(_cyclic_text(evaluated)),
+        list(_reversal_text(evaluated)),
+        list(_squareness_text(evaluated)),
+        list(findings_text([f.as_dict() for f in evaluated.findings])),
     )  # fmt: skip
     return "\n\n".join("\n".join(lines) for lines in sections if lines) + "\n"
 
@@ -110,16 +114,16 @@ def _sorted(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
     return sorted(evaluations, key=lambda e: _place_in_order(e.line))
 
 
-def _rows(found: Evaluated, keys: Sequence[str], *, both: bool) -> list[list[str]]:
-    """Component, what it is, figures, unit."""
+def _rows(evaluated: Evaluated, keys: Sequence[str], *, both: bool) -> list[list[str]]:
+    """Component, its name, figures, unit."""
     rows = []
-    for e in _sorted(found.evaluations):
+    for e in _sorted(evaluated.evaluations):
         if (len(e.sides) == 2) != both:
             continue
         unit, scale = scale_of(e.line)
         figures = e.figures()
         label = _name(e.component)
-        if len(found.of(e.component)) > 1 and e.line.source:
+        if len(evaluated.of(e.component)) > 1 and e.line.source:
             label += f", {printable(FilePath(e.line.source).name)}"
         cells = [number(figures[k] * scale) if k in figures else "" for k in keys]
         rows.append([e.component, label, *cells, unit])
@@ -134,9 +138,9 @@ def _name(component: str) -> str:
     return f"straightness {name_of_straightness(component)}"
 
 
-def _table_text(found: Evaluated, *, bidirectional: bool) -> Iterator[str]:
+def _table_text(evaluated: Evaluated, *, bidirectional: bool) -> Iterator[str]:
     keys = _FIGURES if bidirectional else _ONE_SIDE
-    rows = _rows(found, keys, both=bidirectional)
+    rows = _rows(evaluated, keys, both=bidirectional)
     if rows:
         yield "ISO 230-2" if bidirectional else "ISO 230-2, approached from one side"
         yield from table(["", "", *map(_head, keys), ""], rows, left=2)
@@ -147,21 +151,21 @@ def _head(key: str) -> str:
     return base + {"": "", "up": "+", "down": "-", "mean": " mean"}[rest]
 
 
-def _cyclic_text(found: Evaluated) -> Iterator[str]:
-    rows = _cyclic_rows(found)
-    if any(s.harmonics for s in found.separations):
+def _cyclic_text(evaluated: Evaluated) -> Iterator[str]:
+    rows = _cyclic_rows(evaluated)
+    if any(s.harmonics for s in evaluated.separations):
         yield _CYCLIC
         header = ["", "", "period mm", "amplitude", "+-", "phase rad"]
         yield from table(header, rows or [["none"] + [""] * 5], left=2)
 
 
-def _cyclic_rows(found: Evaluated) -> list[list[str]]:
-    """Those that noise alone would hardly show (1 %)."""
+def _cyclic_rows(evaluated: Evaluated) -> list[list[str]]:
+    """Cyclic errors above `_SIGNIFICANT` standard uncertainties."""
     rows = []
-    for s in found.separations:
+    for s in evaluated.separations:
         unit, scale = scale_of(s.line)
         for h in s.harmonics:
-            if h.amplitude < _SURE * h.sigma_amplitude:
+            if h.amplitude < _SIGNIFICANT * h.sigma_amplitude:
                 continue
             rows.append([
                 s.line.component, unit, f"{h.period_mm:g}", number(h.amplitude * scale),
@@ -170,16 +174,16 @@ def _cyclic_rows(found: Evaluated) -> list[list[str]]:
     return rows
 
 
-def _reversal_text(found: Evaluated) -> Iterator[str]:
-    rows = _reversal_rows(found)
+def _reversal_text(evaluated: Evaluated) -> Iterator[str]:
+    rows = _reversal_rows(evaluated)
     if rows:
-        yield "Reversal (B of all targets, drift taken out)"
+        yield "Reversal (B of all targets, drift removed)"
         yield from table(["", "", "B", "+-", "along the axis"], rows, left=2)
 
 
-def _reversal_rows(found: Evaluated) -> list[list[str]]:
+def _reversal_rows(evaluated: Evaluated) -> list[list[str]]:
     rows = []
-    for r in sorted(found.reversals, key=lambda r: _place_in_order(r.line)):
+    for r in sorted(evaluated.reversals, key=lambda r: _place_in_order(r.line)):
         unit, scale = scale_of(r.line)
         rows.append([
             r.line.component, unit, number(r.mean * scale), number(2.0 * r.sigma * scale),
@@ -188,14 +192,14 @@ def _reversal_rows(found: Evaluated) -> list[list[str]]:
     return rows
 
 
-def _squareness_text(found: Evaluated) -> Iterator[str]:
-    rows = _squareness_rows(found)
+def _squareness_text(evaluated: Evaluated) -> Iterator[str]:
+    rows = _squareness_rows(evaluated)
     if rows:
-        yield "Squareness of straightness pairs, as at their place"
+        yield "Squareness of straightness pairs, at their position"
         yield from table(["", "urad", "+-", "angle", "lines", "square"], rows)
 
 
-def _squareness_rows(found: Evaluated) -> list[list[str]]:
+def _squareness_rows(evaluated: Evaluated) -> list[list[str]]:
     return [
         [
             p.reading.component, number(p.reading.value_rad / RAD_PER_URAD),
@@ -203,21 +207,21 @@ def _squareness_rows(found: Evaluated) -> list[list[str]]:
             angle_words(p.reading.component, p.reading.value_rad),
             f"{p.first.component}, {p.second.component}", printable(p.square.name),
         ]
-        for p in found.pairs
+        for p in evaluated.pairs
     ]  # fmt: skip
 
 
 # -- plots -----------------------------------------------------------------------------------------------
 
 
-def plots_of(found: Evaluated, kind: Format = "svg") -> dict[str, bytes]:
+def plots_of(evaluated: Evaluated, kind: Format = "svg") -> dict[str, bytes]:
     """Every plot of an evaluation by its name, in the order of a report."""
-    out: dict[str, bytes] = {}
+    plots: dict[str, bytes] = {}
     for axis in AXES:
-        own = [e for e in _sorted(found.evaluations) if e.component[2] == axis]
+        own = [e for e in _sorted(evaluated.evaluations) if e.component[2] == axis]
         for e in own:
             if e.line.quantity == "positioning":
-                out[_free(f"positioning-{e.component}", out)] = plots_calibration.positioning(e, kind)
+                plots[_free(f"positioning-{e.component}", plots)] = plots_calibration.positioning(e, kind)
         for quantity, draw in (
             ("straightness", plots_calibration.straightness),
             ("angle", plots_calibration.angles),
@@ -225,19 +229,19 @@ def plots_of(found: Evaluated, kind: Format = "svg") -> dict[str, bytes]:
             group = [e for e in own if e.line.quantity == quantity]
             if group:
                 name = "straightness" if quantity == "straightness" else "angles"
-                out[f"{name}-{axis}"] = draw(group, kind=kind)
-    for pair in found.pairs:
-        name = _free(f"squareness-{pair.reading.component}", out)
-        out[name] = plots_calibration.squareness(pair, kind)
-    for separation in found.separations:
+                plots[f"{name}-{axis}"] = draw(group, kind=kind)
+    for pair in evaluated.pairs:
+        name = _free(f"squareness-{pair.reading.component}", plots)
+        plots[name] = plots_calibration.squareness(pair, kind)
+    for separation in evaluated.separations:
         if separation.harmonics and separation.line.quantity == "positioning":
-            out[_free(f"cyclic-{separation.line.component}", out)] = plots_calibration.cyclic(
+            plots[_free(f"cyclic-{separation.line.component}", plots)] = plots_calibration.cyclic(
                 separation, kind
             )
-    lost = [r for r in found.reversals if r.line.quantity == "positioning"]
-    if lost:
-        out["reversal"] = plots_calibration.reversals(lost, kind)
-    return out
+    reversals = [r for r in evaluated.reversals if r.line.quantity == "positioning"]
+    if reversals:
+        plots["reversal"] = plots_calibration.reversals(reversals, kind)
+    return plots
 
 
 def _free(name: str, taken: Mapping[str, bytes]) -> str:
@@ -253,24 +257,24 @@ def _free(name: str, taken: Mapping[str, bytes]) -> str:
 
 
 def evaluation(
-    found: Evaluated, plots: Mapping[str, bytes], version: str, date: datetime.date | None
+    evaluated: Evaluated, plots: Mapping[str, bytes], version: str, date: datetime.date | None
 ) -> Document:
     """The document of measured lines."""
     return Document(
         "Geometric accuracy of a machine",
-        _subtitle(found, date),
+        _subtitle(evaluated, date),
         None,
         [
-            Section("Measurement", [Pairs(_measurement(found))]),
-            *_evaluated(found, plots),
-            Section("Findings", list(_notices(found.findings))),
+            Section("Measurement", [Pairs(_measurement(evaluated))]),
+            *_evaluated(evaluated, plots),
+            Section("Findings", list(_notices(evaluated.findings))),
         ],
         _footer(version),
     )
 
 
 def calibration(
-    found: Evaluated,
+    evaluated: Evaluated,
     summary: FitSummary,
     plots: Mapping[str, bytes],
     version: str,
@@ -279,51 +283,54 @@ def calibration(
     """The document of a calibration: what was fitted, and the measured lines behind it. `plots` are those of
     `fit_plots` and `plots_of`."""
     report = summary.report
-    said = {f.code for f in summary.findings}
-    findings = [*summary.findings, *(f for f in found.findings if f.code not in said)]
-    worth = report["chi_square_per_freedom"]
+    codes = {f.code for f in summary.findings}
+    findings = [*summary.findings, *(f for f in evaluated.findings if f.code not in codes)]
+    reduced = report["chi_square_per_freedom"]
     box = ", ".join(f"{a} {low:g} to {high:g}" for a, (low, high) in report["box_mm"].items())
-    lost = ", ".join(f"{a} {number(v)}" for a, v in report["lost_motion_um"].items())
-    sigma = [
+    backlash = ", ".join(f"{a} {number(v)}" for a, v in report["lost_motion_um"].items())
+    rows = [
         ("Readings", f"{report['readings']}, {report['left_out']} left out"),
-        ("Chi square", f"{number(worth)} a degree of freedom, of {number(report['degrees_of_freedom'], 0)}"),
+        (
+            "Reduced chi-square",
+            f"{number(reduced)}, {number(report['degrees_of_freedom'], 0)} degrees of freedom",
+        ),
         ("Calibrated box", f"{box} mm"),
         ("Datum", ", ".join(f"{a} {v:g}" for a, v in zip(AXES, report["datum_mm"], strict=True)) + " mm"),
-        ("Lost motion", f"{lost} um"),
+        ("Backlash", f"{backlash} um"),
         ("Over the box", _volume(summary.fit)),
     ]
     fitted: list[Block] = [
-        Pairs(sigma),
+        Pairs(rows),
         *_component_tables(report),
         *(Plot(plots[name], caption) for name, caption in _FIT_CAPTIONS.items() if name in plots),
     ]
     return Document(
         "Calibration of a machine",
-        _subtitle(found, date),
+        _subtitle(evaluated, date),
         None,
         [
-            Section("Measurement", [Pairs(_measurement(found))]),
+            Section("Measurement", [Pairs(_measurement(evaluated))]),
             Section("Errors found", fitted),
             Section("Findings and limits", [*_not_observed(report), *_notices(findings)]),
-            *_evaluated(found, plots),
+            *_evaluated(evaluated, plots),
         ],
         _footer(version),
     )
 
 
 def _volume(fit: Fit) -> str:
-    """How far the tool is off over the box, and how well that is known: rms lengths at places of a Latin
-    hypercube, with the tool vector that most lines were read with."""
+    """The error of the tool over the box, and its uncertainty: rms lengths at points of a Latin hypercube,
+    with the tool vector that most lines were measured with."""
     random = np.random.default_rng(0)
-    share = (np.argsort(random.random((3, _PLACES)), axis=1).T + random.random((_PLACES, 3))) / _PLACES
-    at = fit.box_mm[:, 0] + share * np.ptp(fit.box_mm, axis=1)
+    share = (np.argsort(random.random((3, _POINTS)), axis=1).T + random.random((_POINTS, 3))) / _POINTS
+    position_mm = fit.box_mm[:, 0] + share * np.ptp(fit.box_mm, axis=1)
     tools = [line.tool_mm for line in fit.measurements.lines if line.quantity != "angle"]
     tool = np.array(max(set(tools), key=tools.count) if tools else (0.0, 0.0, 0.0))
-    size = np.linalg.norm(fit.error(at, tool), axis=1) * UM_PER_MM
-    known = np.linalg.norm(fit.sigma(at, tool), axis=1) * UM_PER_MM
+    size = np.linalg.norm(fit.error(position_mm, tool), axis=1) * UM_PER_MM
+    sigma = np.linalg.norm(fit.sigma(position_mm, tool), axis=1) * UM_PER_MM
     return (
-        f"{number(_rms(size))} um rms as it is, {number(float(size.max()))} um at most; known within "
-        f"{number(_rms(known))} um rms, with the tool vector {_vector(tool.tolist())}"
+        f"uncorrected error {number(_rms(size))} um rms, {number(float(size.max()))} um at most; standard "
+        f"uncertainty {number(_rms(sigma))} um rms; with the tool vector {_vector(tool.tolist())}"
     )
 
 
@@ -332,21 +339,21 @@ def _rms(values: Array) -> float:
 
 
 def fit_plots(summary: FitSummary) -> dict[str, bytes]:
-    """The plots of a fit as SVG; those of lines where it had any."""
+    """The plots of a fit as SVG; those of lines where there are any."""
     curves = calibration_curves(summary.calibration)
-    out = {"curves": curves[curves.index(b"<svg") :]}
+    plots = {"curves": curves[curves.index(b"<svg") :]}
     results = sorted(
         summary.fit.of(LineState), key=lambda r: _place_in_order(r.state.observation)
     )
     if results:
-        out["fitted"] = plots_calibration.fitted(fitted_lines(summary.fit))
-        out["residuals"] = plots_calibration.residuals([(r.state.observation, r.residual) for r in results])
-    return out
+        plots["fitted"] = plots_calibration.fitted(fitted_lines(summary.fit))
+        plots["residuals"] = plots_calibration.residuals([(r.state.observation, r.residual) for r in results])
+    return plots
 
 
-def _subtitle(found: Evaluated, date: datetime.date | None) -> str:
-    day = date or found.measurements.measured
-    return ", ".join(v for v in (found.measurements.machine, day.isoformat() if day else "") if v)
+def _subtitle(evaluated: Evaluated, date: datetime.date | None) -> str:
+    day = date or evaluated.measurements.measured
+    return ", ".join(v for v in (evaluated.measurements.machine, day.isoformat() if day else "") if v)
 
 
 def _footer(version: str) -> str:
@@ -356,10 +363,10 @@ def _footer(version: str) -> str:
     )
 
 
-def _measurement(found: Evaluated) -> list[tuple[str, str]]:
-    m = found.measurements
+def _measurement(evaluated: Evaluated) -> list[tuple[str, str]]:
+    m = evaluated.measurements
     lengths = [line for line in m.lines if line.quantity != "angle"]
-    places = sorted({_place(line) for line in lengths})
+    lines_mm = sorted({_place(line) for line in lengths})
     tool_vectors = sorted({_vector(line.tool_mm) for line in lengths})
     periods = ", ".join(
         f"{axis} {', '.join(f'{p:g}' for p in own)} mm"
@@ -371,16 +378,16 @@ def _measurement(found: Evaluated) -> list[tuple[str, str]]:
         ("Measured", m.measured.isoformat() if m.measured else ""),
         ("Temperature of the scales", f"{m.temperature_degC:g} degC"),
         ("Lines", f"{len(m.lines)}, {sum(len(line.value) for line in m.lines)} readings"),
-        ("Lines stood at", "; ".join(places[:6]) + ("; ..." if len(places) > 6 else "")),
+        ("Lines measured at", "; ".join(lines_mm[:6]) + ("; ..." if len(lines_mm) > 6 else "")),
         ("Tool vectors", "; ".join(tool_vectors[:6]) + ("; ..." if len(tool_vectors) > 6 else "")),
         ("Periods looked for", periods),
-        ("Corrected by the control then", ", ".join(sorted(m.active_during_measurement))),
+        ("Corrected by the control while measuring", ", ".join(sorted(m.active_during_measurement))),
         ("Instruments", ", ".join(sorted({line.instrument for line in m.lines if line.instrument}))),
     ]
 
 
 def _place(line: Line) -> str:
-    """The moving axis, and where the others stood."""
+    """The moving axis, and the position of the others."""
     others = " ".join(
         f"{a}{v:g}" for k, (a, v) in enumerate(zip(AXES, line.line_mm, strict=True)) if k != line.axis
     )
@@ -391,12 +398,12 @@ def _vector(values: Sequence[float]) -> str:
     return " ".join(f"{axis}{v:g}" for axis, v in zip(AXES, values, strict=True))
 
 
-def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section]:
-    if not found.evaluations:
+def _evaluated(evaluated: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section]:
+    if not evaluated.evaluations:
         return
     blocks: list[Block] = [Paragraph(_LEGEND)]
     for keys, both in ((_FIGURES, True), (_ONE_SIDE, False)):
-        rows = _rows(found, keys, both=both)
+        rows = _rows(evaluated, keys, both=both)
         if rows:
             blocks.append(Grid(["", "", *map(_head, keys), ""], rows, left=2))
     yield Section("Accuracy and repeatability (ISO 230-2)", blocks)
@@ -409,18 +416,18 @@ def _evaluated(found: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Section
         if drawn:
             yield Section(f"Axis {axis}", drawn, 2)
     blocks = []
-    if found.pairs:
-        blocks.append(Grid(["", "urad", "+-", "angle", "lines", "square"], _squareness_rows(found)))
+    if evaluated.pairs:
+        blocks.append(Grid(["", "urad", "+-", "angle", "lines", "square"], _squareness_rows(evaluated)))
         blocks += [Plot(plots[n], _caption(n)) for n in plots if n.startswith("squareness")]
         yield Section("Squareness", blocks)
     parts: list[Block] = []
-    rows = _cyclic_rows(found)
-    if any(s.harmonics for s in found.separations):
+    rows = _cyclic_rows(evaluated)
+    if any(s.harmonics for s in evaluated.separations):
         parts.append(Paragraph(f"{_CYCLIC}."))
     if rows:
         parts.append(Grid(["cyclic error", "", "period mm", "amplitude", "+-", "phase rad"], rows, left=2))
         parts += [Plot(plots[n], _caption(n)) for n in plots if n.startswith("cyclic")]
-    if rows := _reversal_rows(found):
+    if rows := _reversal_rows(evaluated):
         parts.append(Grid(["reversal", "", "B", "+-", "along the axis"], rows, left=2))
         parts += [Plot(plots[n], _caption(n)) for n in plots if n == "reversal"]
     if parts:
@@ -435,12 +442,12 @@ def _caption(name: str) -> str:
     kind = name.split("-")[0]
     return {
         "positioning": "Positioning: means and twice the standard deviation of both directions, readings as "
-        "triangles, less the mean of the first target; A, E and M as spans.",
+        "triangles, minus the mean of the first target; A, E and M as spans.",
         "straightness": "Straightness of both directions about one reference line.",
-        "angles": "Angular errors of both directions, less the mean of the first target.",
-        "squareness": "Both lines of the pair as read against the legs of the square, and their slopes.",
+        "angles": "Angular errors of both directions, minus the mean of the first target.",
+        "squareness": "Both lines of the pair as measured against the legs of the square, and their slopes.",
         "cyclic": "Non-cyclic and cyclic part of the mean of both directions.",
-        "reversal": "Reversal at each target with twice its standard uncertainty, drift taken out.",
+        "reversal": "Reversal at each target with twice its standard uncertainty, drift removed.",
     }[kind]
 
 
@@ -480,7 +487,7 @@ def _not_observed(report: Mapping[str, Any]) -> Iterator[Block]:
     rows = [[row["name"], number(row["costs_um"])] for row in report["not_observed"]]
     if rows:
         yield Paragraph(
-            "Not observed, taken as zero, and what that may cost at the longest lever in the box."
+            "Not observed, assumed zero, and the error of that at the longest lever arm in the box."
         )
         yield Grid(["", "um"], rows)
 

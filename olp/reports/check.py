@@ -16,9 +16,10 @@ from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
 from olp.reports.report import Report, findings_text, number, pairs, printable, table, to_json
 
+#: Level of SARIF by severity.
 _LEVEL = {Severity.INFO: "note", Severity.WARNING: "warning", Severity.ERROR: "error"}
 _SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
-#: rows of the table of clearances
+#: Most rows of the table of clearances.
 _NEAREST = 8
 
 
@@ -47,7 +48,7 @@ def _clearance(report: Report) -> Iterator[str]:
     blocks = report.get("clearance") or ()
     if not blocks:
         return
-    yield "Least clearance in mm, place in the frame of the mesh"
+    yield "Least clearance in mm, point in the frame of the mesh"
     rows = [
         [
             str(b["line"]), b["part"], printable(b["mesh"]), number(b["clearance_mm"], 3),
@@ -55,7 +56,7 @@ def _clearance(report: Report) -> Iterator[str]:
         ]
         for b in sorted(blocks, key=lambda b: b["clearance_mm"])[:_NEAREST]
     ]  # fmt: skip
-    yield from table(["line", "part", "mesh", "clearance", "place"], rows, left=3)
+    yield from table(["line", "part", "mesh", "clearance", "point"], rows, left=3)
 
 
 def _verdict(report: Report, fail_on: str) -> Iterator[str]:
@@ -75,8 +76,8 @@ def failures(report: Report, fail_on: str) -> list[Mapping[str, Any]]:
 
 
 def to_sarif(report: Report, fail_on: str) -> str:
-    """SARIF 2.1.0 (OASIS): a run with every rule that was checked; a finding without a line stands at the
-    program as a whole, further lines are related locations."""
+    """SARIF 2.1.0 (OASIS): a run with every rule that was checked. A finding without a line is located at the
+    program as a whole; further lines are related locations."""
     rules = [RULES[code] for code in report["rules"]]
     uri = _uri(report["program"]["path"])
     run = {
@@ -122,14 +123,14 @@ def _sarif_result(finding: Mapping[str, Any], rules: Sequence[str], uri: str) ->
 
 
 def _uri(path: str) -> str:
-    """The URI reference of a program: relative as it was named, else with the scheme of files."""
+    """The URI reference of a program: relative where it was named so, else with the scheme of files."""
     pure = PurePath(path or "stdin")
     return pure.as_uri() if pure.is_absolute() else quote(pure.as_posix())
 
 
 def to_junit(report: Report, fail_on: str) -> str:
-    """JUnit XML as Jenkins, GitLab and others read it: a test a code, failed where a finding fails the gate;
-    milder findings go into the output of the suite."""
+    """JUnit XML as Jenkins, GitLab and others read it: one test per code, failed where a finding fails the
+    gate; milder findings go into the output of the suite."""
     failing = {id(f) for f in failures(report, fail_on)}
     name = report["program"]["name"] or "stdin"
     failed = {f["code"] for f in report["findings"] if id(f) in failing}
@@ -148,8 +149,8 @@ def to_junit(report: Report, fail_on: str) -> str:
             classname=f"olp.check.{printable(name)}",
             time="0",
         )
-        found = [f for f in report["findings"] if f["code"] == code]
-        texts = [printable(_sentence(f, name)) for f in found]
+        findings = [f for f in report["findings"] if f["code"] == code]
+        texts = [printable(_sentence(f, name)) for f in findings]
         if code in failed:
             failure = ElementTree.SubElement(case, "failure", type=code, message=texts[0])
             failure.text = "\n".join([*texts, f"What to do: {RULES[code].remedy}"])
@@ -169,8 +170,8 @@ def _sentence(finding: Mapping[str, Any], name: str) -> str:
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the place in the frame
-    named."""
+    """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the point in the named
+    frame."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"])
@@ -181,7 +182,7 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
     return buffer.getvalue().encode()
 
 
-#: format to what writes it, from the report ("olp-check-1") and the severity that fails the gate
+#: Writer of each format, from the report ("olp-check-1") and the severity that fails the gate.
 FORMATS: dict[str, Callable[[Report, str], str]] = {
     "text": to_text,
     "json": lambda report, fail_on: to_json(report).decode(),

@@ -1,4 +1,4 @@
-"""The report of a comparison for people: before and after, frame, ISO 9283 figures, worst lines."""
+"""The report of a comparison for people: uncorrected and corrected, frame, ISO 9283 figures, worst lines."""
 
 from __future__ import annotations
 
@@ -7,21 +7,35 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, shortened, table
+from olp.reports.report import (
+    CORRECTED,
+    SIDES,
+    UNCORRECTED,
+    WIDTH,
+    Report,
+    findings_text,
+    number,
+    pairs,
+    printable,
+    shortened,
+    table,
+)
 
-#: Titles of figures of a group of runs, with the keys that lead to them.
+#: Titles of figures across the path of a group of runs, with their keys in the report.
 ACROSS = (
     ("largest distance from the path", ("across_um", "max")),
     ("95 % of points within", ("across_um", "q95")),
     ("rms distance", ("across_um", "rms")),
     ("mean distance", ("across_um", "mean")),
 )
+#: Titles of figures of ISO 9283, with their keys in the report.
 ISO = (
     ("path accuracy AT", ("iso_9283", "AT_um")),
     ("path repeatability RT", ("iso_9283", "RT_um")),
     ("pose accuracy AP", ("iso_9283", "AP_um")),
     ("pose repeatability RP", ("iso_9283", "RP_um")),
 )
+#: Most rows of a table of poses.
 _MAX_ROWS = 20
 
 
@@ -46,22 +60,22 @@ def figure(group: Report | None, keys: tuple[str, str]) -> Any:
 
 
 def change(before: Any, after: Any) -> str:
-    """How much smaller a figure became, such as "12.3 x smaller"; empty where it cannot be said."""
+    """The change of a figure, such as "12.3 x smaller"; empty where it is not defined."""
     if not isinstance(before, float) or not isinstance(after, float) or not before > 0 or not after > 0:
         return ""
     return f"{before / after:.1f} x smaller" if before >= after else f"{after / before:.1f} x larger"
 
 
-def taken_by_fit(frame: Report) -> str:
-    """How much of an error the best fit leaves, where that is known."""
+def absorbed_by_fit(frame: Report) -> str:
+    """The part of an error that is absorbed by the best fit, where that is known."""
     if "error_rms_um" not in frame:
         return ""
     before, after = number(frame["error_rms_um"]), number(frame["left_by_fit_rms_um"])
-    return f"of {before} um rms {frame['error_is']}, such a fit leaves {after} um"
+    return f"of {before} um rms {frame['error_is']}, {after} um remain after such a fit"
 
 
 def table_rows(report: Report) -> list[tuple[str, Any, Any]]:
-    """Title, figure before, figure after in um, of what there is."""
+    """Title, figure without and with correction in um, where there are any."""
     rows = [
         (title, figure(report.get("before"), keys), figure(report.get("after"), keys))
         for title, keys in (*ACROSS, *ISO)
@@ -79,7 +93,7 @@ def _heads(report: Report) -> Iterator[str]:
     yield from pairs([
         ("Nominal", f"{printable(nominal.get('name', ''))}{length}"),
         ("Measured", files(report.get("measured"))),
-        ("Before", files(report.get("measured_before"))),
+        ("Uncorrected", files(report.get("measured_before"))),
         ("Machine", ", ".join(str(v) for v in machine.values())),
     ])  # fmt: skip
 
@@ -92,8 +106,8 @@ def _frame(report: Report) -> Iterator[str]:
     a, b, c = frame["angles_deg"]
     yield "Best-fit frame, measured to nominal"
     yield f"  shift in mm {x:.4f}, {y:.4f}, {z:.4f}; turn A, B, C in deg {a:.6f}, {b:.6f}, {c:.6f}"
-    if taken := taken_by_fit(frame):
-        yield from textwrap.wrap(taken, WIDTH, initial_indent="  ", subsequent_indent="  ")
+    if absorbed := absorbed_by_fit(frame):
+        yield from textwrap.wrap(absorbed, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
 def _verdict(report: Report) -> Iterator[str]:
@@ -101,7 +115,7 @@ def _verdict(report: Report) -> Iterator[str]:
         return
     size = figure(report.get("after"), ("across_um", "max"))
     if size is None:
-        yield "NOT SHOWN TO BE WITHIN TOLERANCE: no measured point of a cutting move counts."
+        yield "NOT VERIFIED TO BE WITHIN TOLERANCE: no measured point of a cutting move counts."
         return
     verdict = "Within tolerance" if report["holds"] else "ABOVE TOLERANCE"
     yield from textwrap.wrap(
@@ -116,9 +130,9 @@ def _before_after(report: Report) -> Iterator[str]:
     if not rows:
         return
     if report.get("before"):
-        yield "Before and after, in um"
+        yield "Uncorrected and corrected, in um"
         cells = [[title, number(a), number(b), change(a, b)] for title, a, b in rows]
-        yield from table(["", "before", "after", ""], cells)
+        yield from table(["", UNCORRECTED, CORRECTED, ""], cells)
     else:
         yield "Measured, in um"
         yield from table(["", ""], [[title, number(b)] for title, _, b in rows])
@@ -127,7 +141,7 @@ def _before_after(report: Report) -> Iterator[str]:
 def _runs(report: Report) -> Iterator[str]:
     rows = [
         [
-            printable(row["name"]), name, str(row.get("counted", row["points"])),
+            printable(row["name"]), SIDES[name], str(row.get("counted", row["points"])),
             *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
             *(number((row.get(f"{side}_um") or {}).get("mean")) for side in ("normal", "binormal")),
             *(number((row.get(f"{side}_um") or {}).get("rms")) for side in ("normal", "binormal")),
@@ -136,7 +150,7 @@ def _runs(report: Report) -> Iterator[str]:
         for row in (report.get(name) or {}).get("runs") or ()
     ]  # fmt: skip
     if rows:
-        yield "Runs, in um; normal is level and to the left of travel, binormal up from it"
+        yield "Runs, in um; normal is level and to the left of travel, binormal points up from it"
         header = ["", "", "points", "max", "rms", "normal", "binormal", "n rms", "b rms"]
         yield from table(header, rows, left=2)
 
@@ -146,7 +160,7 @@ def _poses(report: Report) -> Iterator[str]:
         poses = (report.get(name) or {}).get("poses") or ()
         if not poses:
             continue
-        yield f"Poses {name}, in um" if report.get("before") else "Poses, in um"
+        yield f"Poses, {SIDES[name]}, in um" if report.get("before") else "Poses, in um"
         rows = [
             [printable(str(p["name"])), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
             for p in poses[:_MAX_ROWS]
@@ -161,7 +175,7 @@ def _worst(report: Report) -> Iterator[str]:
     if not worst:
         return
     texts = {row["line"]: printable(row["text"]) for row in report.get("worst") or ()}
-    yield "Lines that are farthest off, in um"
+    yield "Lines with the largest deviation, in um"
     rows = [
         [str(row["line"]), number(row["max_um"]), shortened(texts.get(row["line"], ""), 60)]
         for row in worst[:5]

@@ -1,6 +1,6 @@
 """A report as a document of headed sections, and its two forms: one HTML page, and Markdown.
 
-The page has everything in itself, asks no network, and prints on A4.
+The page contains all it needs, loads nothing from a network, and prints on A4.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """`verdict` is (good, sentence), None where nothing was to be decided."""
+    """`verdict` is (good, sentence), None where there is nothing to decide."""
 
     title: str
     subtitle: str
@@ -77,8 +77,9 @@ class Document:
     footer: str = ""
 
 
-#: Tables of no more rows stay on one page.
+#: Tables of at most this many rows are kept on one page.
 _SHORT = 12
+#: A SHA-256 digest.
 _HASH = re.compile(r"[0-9a-f]{64}")
 
 _CSS = """
@@ -126,7 +127,7 @@ footer { color: var(--soft); font-size: 8pt; border-top: .5pt solid var(--line);
 
 
 def to_html(document: Document) -> bytes:
-    """One page that loads nothing: its policy forbids the browser to."""
+    """One page that loads nothing: its policy forbids it to the browser."""
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
     parts = [
         "<!DOCTYPE html>", '<html lang="en"><head><meta charset="utf-8">',
@@ -154,7 +155,7 @@ def in_form(document: Document, name: str) -> bytes:
 
 
 def to_markdown(document: Document) -> bytes:
-    """The same without its plots, whose captions stay out too."""
+    """The same without plots and their captions."""
     lines = [f"# {_mark(document.title)}", "", _mark(document.subtitle), ""]
     if document.verdict is not None:
         lines += [f"**{_mark(document.verdict[1])}**", ""]
@@ -182,7 +183,7 @@ def _text(text: str) -> str:
 
 def _html(block: Block, after: Block | None) -> str:
     if isinstance(block, Paragraph):
-        # what announces a table or a plot stays with it
+        # a paragraph that announces a table or a plot is kept on its page
         lead = ' class="lead"' if isinstance(after, Grid | Plot) else ""
         return f"<p{lead}>{_text(block.text)}</p>"
     if isinstance(block, Pairs):
@@ -195,20 +196,20 @@ def _html(block: Block, after: Block | None) -> str:
     if isinstance(block, Plot):
         return f"<figure>{block.svg.decode()}<figcaption>{_text(block.caption)}</figcaption></figure>"
     if isinstance(block, Notice):
+        severity, message, remedy = _text(block.severity), _text(block.message), _text(block.remedy)
         return (
-            f'<div class="notice {_text(block.severity)}"><b>{_text(block.code)} {_text(block.title)}</b> '
-            f"<span>({_text(block.severity)})</span><br>{_text(block.message)}<br><span>{_text(block.remedy)}"
-            "</span></div>"
+            f'<div class="notice {severity}"><b>{_text(block.code)} {_text(block.title)}</b> '
+            f"<span>({severity})</span><br>{message}<br><span>{remedy}</span></div>"
         )
 
     def row(cells: Sequence[str], tag: str) -> str:
-        out = []
+        html_cells = []
         for column, cell in enumerate(cells):
             kind = "l" if column < block.left or column in (block.code, block.aside) else "r"
             kind += " aside" if column == block.aside else ""
             kind += " code" if column == block.code else ""
-            out.append(f'<{tag} class="{kind}">{_text(cell)}</{tag}>')
-        return "<tr>" + "".join(out) + "</tr>"
+            html_cells.append(f'<{tag} class="{kind}">{_text(cell)}</{tag}>')
+        return "<tr>" + "".join(html_cells) + "</tr>"
 
     body = "".join(row(cells, "td") for cells in block.rows)
     short = "short" if len(block.rows) <= _SHORT else "long"
@@ -216,7 +217,7 @@ def _html(block: Block, after: Block | None) -> str:
 
 
 def _mark(text: str) -> str:
-    """Text of Markdown that means itself."""
+    """Text with the marks of Markdown escaped."""
     return re.sub(r"([\\`*_\[\]<>|#])", r"\\\1", printable(text))
 
 
@@ -227,11 +228,11 @@ def _markdown(block: Block) -> Iterator[str]:
         yield from (f"- {_mark(a)}: {_mark(b)}" for a, b in block.rows if b)
         yield ""
     elif isinstance(block, Notice):
-        said = f"{_mark(block.message)} {_mark(block.remedy)}"
-        yield f"- **{block.code} {_mark(block.title)}** ({block.severity}): {said}"
+        sentence = f"{_mark(block.message)} {_mark(block.remedy)}"
+        yield f"- **{block.code} {_mark(block.title)}** ({block.severity}): {sentence}"
     elif isinstance(block, Grid):
-        left = {*range(block.left), block.code, block.aside}
-        rule = ("---" if column in left else "---:" for column in range(len(block.header)))
+        left_columns = {*range(block.left), block.code, block.aside}
+        rule = ("---" if column in left_columns else "---:" for column in range(len(block.header)))
         yield "| " + " | ".join(map(_mark, block.header)) + " |"
         yield "| " + " | ".join(rule) + " |"
         yield from ("| " + " | ".join(map(_mark, row)) + " |" for row in block.rows)

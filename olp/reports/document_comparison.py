@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from olp.reports.compare import change, figure, table_rows, taken_by_fit
+from olp.reports.compare import absorbed_by_fit, change, figure, table_rows
 from olp.reports.document import Block, Document, Grid, Pairs, Paragraph, Section
 from olp.reports.document_parts import (
     MOST_POSES,
@@ -21,7 +21,7 @@ from olp.reports.document_parts import (
     subtitle_of,
     test_sections,
 )
-from olp.reports.report import Report, number
+from olp.reports.report import CORRECTED, SIDES, UNCORRECTED, Report, number
 
 
 def comparison(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:
@@ -29,7 +29,7 @@ def comparison(report: Report, plots: Plots, version: str, date: datetime.date |
     verdict = None
     wrong = any(f["code"] == "OLP601" for f in report["findings"])
     if wrong:
-        verdict = (False, "Measured and nominal do not belong together: no figures are stated.")
+        verdict = (False, "Measured and nominal path do not match: no figures are given.")
     elif "holds" in report:
         size = figure(report["after"], ("across_um", "max"))
         words = "Within tolerance" if report["holds"] else "Above tolerance"
@@ -65,7 +65,7 @@ def _comparison_result(report: Report) -> Iterator[Block]:
         yield Paragraph("No figures.")
     elif report.get("before"):
         cells = [[title, number(a), number(b), change(a, b)] for title, a, b in rows]
-        yield Grid(["in um", "before", "after", ""], cells)
+        yield Grid(["in um", UNCORRECTED, CORRECTED, ""], cells)
     else:
         yield Grid(["in um", "measured"], [[title, number(b)] for title, _, b in rows])
 
@@ -84,15 +84,15 @@ def _measurement(report: Report) -> Iterator[Block]:
     yield Pairs([
         ("Compared", compared),
         ("Frame", how),
-        ("What the fit takes", taken_by_fit(frame)),
+        ("Absorbed by the fit", absorbed_by_fit(frame)),
         ("Order of points", ", ".join(dict.fromkeys(frame.get("order") or ()))),
-        ("Points in no figure", f"farther than {report['reach_mm']:g} mm from their place"),
+        ("Points in no figure", f"farther than {report['reach_mm']:g} mm from the path"),
         ("Machine's errors", "added to the axis positions of the log, from the calibration" if added else ""),
     ])  # fmt: skip
 
 
 def _iso(figures: Report) -> Iterator[str]:
-    """The figures of ISO 9283 that there are, with their places."""
+    """The figures of ISO 9283 that there are, with their line or pose."""
     for name in ("AT", "RT", "AP", "RP"):
         value = figures.get(f"{name}_um")
         if isinstance(value, float) and math.isfinite(value):
@@ -105,7 +105,7 @@ def _measured(report: Report, plots: Plots) -> Iterator[Block]:
     sides = ("normal_um", "binormal_um")
     rows = [
         [
-            row["name"], name, str(row.get("counted", row["points"])),
+            row["name"], SIDES[name], str(row.get("counted", row["points"])),
             *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
             *(number((row.get(side) or {}).get(key)) for side in sides for key in ("mean", "rms")),
         ]
@@ -122,18 +122,18 @@ def _measured(report: Report, plots: Plots) -> Iterator[Block]:
         iso = (report.get(name) or {}).get("iso_9283") or {}
         if iso:
             cycles = f"{iso['cycles']} cycle{'s' if iso['cycles'] > 1 else ''}"
-            yield Paragraph(f"ISO 9283, {name}, {cycles}: {'; '.join(_iso(iso))}.")
+            yield Paragraph(f"ISO 9283, {SIDES[name]}, {cycles}: {'; '.join(_iso(iso))}.")
     yield from path_plot_blocks(plots)
     worst = report.get("worst") or (report.get("after") or {}).get("worst") or ()
     if worst:
-        yield Paragraph("Lines that are farthest off after correction, in um:")
+        yield Paragraph("Lines with the largest deviation, corrected, in um:")
         yield Grid(["line", "largest", "block"], [
             [str(w["line"]), number(w["max_um"]), w.get("text", "")] for w in worst
         ], code=2)  # fmt: skip
     for name in ("before", "after"):
         poses: Sequence[Mapping[str, Any]] = (report.get(name) or {}).get("poses") or ()
         if poses:
-            yield Paragraph(f"Poses {name}, in um:")
+            yield Paragraph(f"Poses, {SIDES[name]}, in um:")
             yield Grid(["pose", "AP", "RP", "X", "Y", "Z"], [
                 [str(p["name"]), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
                 for p in poses[:MOST_POSES]

@@ -20,8 +20,9 @@ from olp.reports.document_parts import (
     subtitle_of,
     test_sections,
 )
-from olp.reports.report import Report, number, percent
+from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, percent
 
+#: Titles of the parts of the budget.
 _PART = {
     "model_and_chords": "model and chords",
     "inversion": "inversion of the model",
@@ -37,8 +38,8 @@ def correction(report: Report, plots: Plots, version: str, date: datetime.date |
     name = program.get("name") or "program"
     largest, allowed = deviation["path_max_um"], deviation["allowed_um"]
     sentence = (
-        f"{'Within tolerance' if deviation['holds'] else 'Above tolerance'}: after correction the path is at "
-        f"most {number(largest)} um from the nominal one; {number(allowed)} um are allowed "
+        f"{'Within tolerance' if deviation['holds'] else 'Above tolerance'}: the corrected path is at most "
+        f"{number(largest)} um from the nominal one; {number(allowed)} um are allowed "
         f"(tolerance {report['tolerance_um']:g} um, and rounding)."
     )
     sections = [
@@ -61,16 +62,16 @@ def correction(report: Report, plots: Plots, version: str, date: datetime.date |
 def _correction_result(report: Report) -> Iterator[Block]:
     before, after = report["deviation"]["before"], report["deviation"]["after"]
     rows = []
-    for title, place in (("at way-points", "waypoints"), ("between way-points", "between")):
+    for title, where in (("at waypoints", "waypoints"), ("between waypoints", "between")):
         for key, words in (("max_um", "largest"), ("rms_um", "rms")):
-            a, b = before[place][key], after[place][key]
+            a, b = before[where][key], after[where][key]
             rows.append([f"{words} deviation {title}", number(a), number(b), change(a, b)])
-    yield Grid(["in um", "before", "after", ""], rows)
+    yield Grid(["in um", UNCORRECTED, CORRECTED, ""], rows)
 
 
 def _applied(report: Report) -> Iterator[Block]:
     moves, digits = report.get("moves") or {}, report.get("digits") or {}
-    words = (("corrected", "corrected"), ("approximated", "approximated"), ("passed", "passed uncorrected"))
+    words = (("corrected", "corrected"), ("approximated", "approximated"), ("passed", "left uncorrected"))
     changes = (
         ("split", "moves split"), ("inserted_blocks", "blocks inserted"), ("changed_words", "words changed"),
         ("inserted_words", "words inserted"),
@@ -95,11 +96,11 @@ def _applied(report: Report) -> Iterator[Block]:
 def _validation(report: Report, plots: Plots) -> Iterator[Block]:
     yield Paragraph(
         "The written program was read back from its bytes and run through the model of the machine's errors. "
-        "Deviations are those of the tool tip from the nominal path, at way-points and between them."
+        "Deviations are those of the tool tip from the nominal path, at waypoints and between them."
     )
     budget = report.get("budget_um") or {}
     yield Grid(
-        ["what is left, largest in um", ""],
+        ["residual, largest in um", ""],
         [[_PART.get(key, key.replace("_", " ")), number(value)] for key, value in budget.items()],
     )
     angle = report.get("orientation") or {}
@@ -110,16 +111,16 @@ def _validation(report: Report, plots: Plots) -> Iterator[Block]:
     yield from path_plot_blocks(plots)
     worst = report.get("worst") or ()
     if worst:
-        yield Paragraph("Blocks that stay farthest from the nominal path, in um:")
+        yield Paragraph("Blocks with the largest residual deviation, in um:")
         yield Grid(
-            ["line", "before", "after", "block"],
+            ["line", UNCORRECTED, CORRECTED, "block"],
             [[str(w["line"]), number(w["before_um"]), number(w["after_um"]), w["text"]] for w in worst],
             code=3,
         )
 
 
 def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
-    """How sure it is, in the form of the GUM: expanded uncertainties with their coverage factor."""
+    """Uncertainty in the form of the GUM: expanded uncertainties with their coverage factor."""
     part = report.get("uncertainty")
     if not part:
         return
@@ -128,8 +129,8 @@ def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
     repeat = ", ".join(number(value) for value in part["repeatability_um"])
     blocks: list[Block] = [
         Paragraph(
-            "Expanded uncertainty of where the tip really is, from the covariance of the calibration "
-            f"propagated to {part['waypoints']} way-points (JCGM 100, coverage factor "
+            "Expanded uncertainty of the position of the tip, from the covariance of the calibration "
+            f"propagated to {part['waypoints']} waypoints (JCGM 100, coverage factor "
             f"k = {part['coverage_factor']:g}, about 95 % for normal errors)."
         ),
         Pairs([
@@ -145,13 +146,13 @@ def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
             ("Not included", "; ".join(part["not_included"])),
         ]),
         Grid(
-            ["", "before", "after"],
+            ["", UNCORRECTED, CORRECTED],
             [
                 ["rms deviation expected, um", number(expected["before_rms_um"]),
                  number(expected["after_rms_um"])],
                 [f"whole program within {within['tolerance_um']:g} um", percent(within["before"]["program"]),
                  percent(within["after"]["program"])],
-                ["least sure way-point", percent(within["before"]["least"]),
+                ["waypoint with the least probability", percent(within["before"]["least"]),
                  percent(within["after"]["least"])],
             ],
         ),
@@ -163,13 +164,16 @@ def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
     ]  # fmt: skip
     if "bands" in plots:
         blocks.append(Plot(
-            plots["bands"], "Expected distance from the nominal place with its band, and the probability of "
+            plots["bands"], "Expected distance from the nominal point with its band, and the probability of "
             "being within the tolerance.",
         ))  # fmt: skip
     if part["lines"]:
-        blocks.append(Paragraph("Lines that are least sure to be within it:"))
+        blocks.append(Paragraph("Lines with the least probability of being within the tolerance:"))
         blocks.append(Grid(
-            ["line", "before, um", "band, um", "within before", "within after", "nearer after"],
+            [
+                "line", "uncorrected, um", "band, um", "within, uncorrected", "within, corrected",
+                "corrected is nearer",
+            ],
             [
                 [str(row["line"]), number(row["before_um"]), number(row["band_um"]),
                  percent(row["within_before"]), percent(row["within_after"]), percent(row["nearer"])]

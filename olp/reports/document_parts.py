@@ -7,14 +7,17 @@ from collections.abc import Iterator, Mapping
 
 from olp.findings.catalogue import RULES
 from olp.reports.document import Block, Grid, Notice, Pairs, Paragraph, Plot, Section
-from olp.reports.report import Report, by_severity, number
+from olp.reports.report import CORRECTED, UNCORRECTED, Report, by_severity, number
 
 Plots = Mapping[str, bytes]
-MOST_SOURCES, MOST_POSES = 24, 60
+#: Most rows of the table of error sources.
+MOST_SOURCES = 24
+#: Most rows of a table of poses.
+MOST_POSES = 60
 
 
 def subtitle_of(name: str, report: Report, date: datetime.date | None) -> str:
-    """What a document is about, and its day."""
+    """The subject of a document, and its day."""
     machine = (report.get("machine") or {}).get("name", "")
     return ", ".join(v for v in (name, machine, date.isoformat() if date else "") if v)
 
@@ -23,7 +26,7 @@ def footer_of(version: str) -> str:
     """The last line of a document."""
     return (
         f"Written by olp {version}. Deviations are distances of the tool tip from the nominal path, unless "
-        "said otherwise; error = actual minus commanded."
+        "stated otherwise; error = actual minus commanded."
     )
 
 
@@ -36,12 +39,12 @@ def machine_rows(report: Report) -> list[tuple[str, str]]:
         ("Machine", str(machine.get("name", ""))),
         ("Axes, workpiece to tool", str(machine.get("chain", ""))),
         ("Numerical controller", str(machine.get("controller", ""))),
-        ("Scope", "three linear axes, quasi-static errors; forces and dynamics are no part of it"),
+        ("Scope", "three linear axes, quasi-static errors; without forces and dynamics"),
     ]
 
 
 def calibration_blocks(report: Report, date: datetime.date | None) -> list[Block]:
-    """How the errors were determined."""
+    """The determination of the errors."""
     calibration = report.get("calibration") or {}
     if not calibration:
         return [Pairs([])]
@@ -51,8 +54,8 @@ def calibration_blocks(report: Report, date: datetime.date | None) -> list[Block
         days = (date - measured).days
         age = f"{days} days on {date.isoformat()}"
         if isinstance(until, datetime.date):
-            left = (until - date).days
-            age += f", {left} days valid" if left >= 0 else f", expired {-left} days ago"
+            remaining = (until - date).days
+            age += f", {remaining} days valid" if remaining >= 0 else f", expired {-remaining} days ago"
     temperature = calibration.get("temperature_degC")
     return [Pairs([
         ("Measured", date_text(measured)), ("Valid until", date_text(until)), ("Age", age),
@@ -63,30 +66,30 @@ def calibration_blocks(report: Report, date: datetime.date | None) -> list[Block
 
 
 def date_text(value: object) -> str:
-    """A day, or that there is none."""
+    """A day, or "not stated"."""
     return value.isoformat() if isinstance(value, datetime.date) else str(value or "not stated")
 
 
 def path_plot_blocks(plots: Plots) -> Iterator[Block]:
-    """Plots along the path, those that there are."""
+    """The plots along the path that there are."""
     captions = {
         "picture": "The path in plan view, coloured by its distance from the nominal one.",
         "along": "Distance from the nominal path along it; rapids and gaps are left out.",
-        "histogram": "How far points of the path are from the nominal one.",
+        "histogram": "Distances of points of the path from the nominal one.",
         "components": "Deviation normal (level, to the left of travel) and binormal (up) along the path.",
     }
     yield from (Plot(plots[name], text) for name, text in captions.items() if name in plots)
 
 
 def test_sections(report: Report, plots: Plots) -> Iterator[Section]:
-    """Circle and diagonals that can be measured next day."""
+    """Predicted acceptance tests: circles and diagonals that can be measured."""
     tests = report.get("test_paths")
     if not tests:
         return
     blocks: list[Block] = [Paragraph(
-        "What a ball-bar should show in the middle of the calibrated volume, before and after "
-        "correction: circular deviation G in both directions and hysteresis H (ISO 230-4). A result far "
-        "from it says that the calibration no longer describes the machine, or that dynamics add to it."
+        "Predicted ball-bar results in the middle of the calibrated volume, uncorrected and corrected: "
+        "circular deviation G in both directions and hysteresis H (ISO 230-4). A result far from them means "
+        "that the calibration no longer describes the machine, or that dynamics add to it."
     )]  # fmt: skip
     if "circles" in plots:
         blocks.append(Plot(plots["circles"], "Predicted circles, counter-clockwise, deviations magnified."))
@@ -95,13 +98,13 @@ def test_sections(report: Report, plots: Plots) -> Iterator[Section]:
         a, b = circle["before"], circle["after"]
         cells = [number(side[key]) for key in ("G_ccw_um", "G_cw_um", "H_um") for side in (a, b)]
         rows.append([f"{circle['plane']}, radius {circle['radius_mm']:g} mm", *cells])
-    header = ["in um", *(f"{k} {w}" for k in ("G ccw", "G cw", "H") for w in ("before", "after"))]
+    header = ["in um", *(f"{k} {w}" for k in ("G ccw", "G cw", "H") for w in (UNCORRECTED, CORRECTED))]
     blocks.append(Grid(header, rows))
     yield Section("Predicted circular tests, ISO 230-4", blocks, 2)
     diagonals = tests["diagonals"]
     blocks = [Paragraph(
-        "What a laser along the body diagonals of the calibrated volume should show: systematic deviation of "
-        "positioning E and reversal B of each diagonal, as ISO 230-6 asks."
+        "Predicted laser results along the body diagonals of the calibrated volume: systematic deviation of "
+        "positioning E and reversal B of each diagonal (ISO 230-6)."
     )]  # fmt: skip
     if "diagonals" in plots:
         blocks.append(
@@ -115,14 +118,15 @@ def test_sections(report: Report, plots: Plots) -> Iterator[Section]:
         for row in diagonals["rows"]
     ]
     worst = [number(diagonals[side][key]) for key in ("E_um", "B_um") for side in ("before", "after")]
-    blocks.append(Grid(["in um", "E before", "E after", "B before", "B after"], [*rows, ["largest", *worst]]))
+    header = ["in um", *(f"{k} {w}" for k in "EB" for w in (UNCORRECTED, CORRECTED))]
+    blocks.append(Grid(header, [*rows, ["largest", *worst]]))
     yield Section("Predicted body diagonals, ISO 230-6", blocks, 2)
 
 
 def notice_blocks(report: Report) -> Iterator[Block]:
     """Findings, the worst first."""
-    found = by_severity(report.get("findings") or ())
-    for f in found:
+    findings = by_severity(report.get("findings") or ())
+    for f in findings:
         rule = RULES[f["code"]]
         lines = f["lines"][:8]
         place = (
@@ -132,12 +136,12 @@ def notice_blocks(report: Report) -> Iterator[Block]:
         )
         message = f"{f['message'][:1].upper()}{f['message'][1:]}.{place}"
         yield Notice(f["severity"], f["code"], rule.title, message, rule.remedy)
-    if not found:
+    if not findings:
         yield Paragraph("None.")
 
 
 def documentation_blocks(report: Report, version: str, date: datetime.date | None) -> Iterator[Block]:
-    """Digests and versions that the document rests on."""
+    """Digests and versions of the inputs of the document."""
     rows = [("Software", f"olp {version}"), ("Date", date_text(date))]
     for key, title in (
         ("program", "Nominal program"),
@@ -146,10 +150,10 @@ def documentation_blocks(report: Report, version: str, date: datetime.date | Non
     ):
         part = report.get(key)
         if part:
-            said = (part.get("name"), f"{part['lines']} lines" if "lines" in part else "")
-            rows.append((title, ", ".join(str(v) for v in said if v)))
+            words = (part.get("name"), f"{part['lines']} lines" if "lines" in part else "")
+            rows.append((title, ", ".join(str(v) for v in words if v)))
             rows.append(("SHA-256", part["sha256"]))
-    for key, title in (("measured_before", "Measured before"), ("measured", "Measured")):
+    for key, title in (("measured_before", "Measured, uncorrected"), ("measured", "Measured")):
         for part in report.get(key) or ():
             rows.append((title, f"{part['name']}, {part['points']} points"))
             rows.append(("SHA-256", part["sha256"]))

@@ -1,6 +1,6 @@
 """The report of a run for people (`to_text`) and for programs (`to_json`).
 
-A report is a mapping in the form "olp-report-1" whose keys end in their units. What is absent is left out.
+A report is a mapping in the form "olp-report-1" whose keys end in their units. Absent values are left out.
 """
 
 from __future__ import annotations
@@ -14,11 +14,20 @@ from typing import Any
 
 from olp.findings.catalogue import RULES
 
+#: Columns of a text report.
 WIDTH = 100
 #: Lines of the program that a finding lists by number.
 MAX_LINES = 8
+#: Most rows of the table of error sources.
 MAX_SOURCES = 24
+#: Most rows of the table of worst blocks.
 MAX_WORST = 10
+#: The predicted or measured path of the tip with the nominal program.
+UNCORRECTED = "uncorrected"
+#: The predicted or measured path of the tip with the corrected program.
+CORRECTED = "corrected"
+#: What the keys of reports mean, in words.
+SIDES = {"before": UNCORRECTED, "after": CORRECTED}
 
 Report = Mapping[str, Any]
 
@@ -29,7 +38,7 @@ def to_json(report: Report) -> bytes:
 
 
 def to_text(report: Report) -> str:
-    """Plain text of at most 100 columns, with nothing but ASCII in its own words and tables."""
+    """Plain text of at most 100 columns; its own words and tables are ASCII."""
     sections = (
         _heads(report),
         _verdict(report),
@@ -69,7 +78,7 @@ def pairs(values: Iterable[tuple[str, str]]) -> Iterator[str]:
 
 
 def number(value: object, digits: int = 2) -> str:
-    """A number for a table: fixed point, a dash where there is none, and never a nonzero shown as 0."""
+    """A number for a table: fixed point, a dash where there is none; a nonzero number is never shown as 0."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return "-"
     text = f"{value + 0.0:.{digits}f}"
@@ -79,7 +88,7 @@ def number(value: object, digits: int = 2) -> str:
 
 
 def printable(text: str) -> str:
-    """Text of a program in one line, without what a terminal would act on."""
+    """Text of a program in one line, without control characters."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
@@ -88,7 +97,7 @@ def shortened(text: str, width: int) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Only what JSON knows; arrays and their scalars have `tolist`."""
+    """The value with types of JSON only; arrays and their scalars have `tolist`."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):
@@ -189,7 +198,7 @@ def _deviation(report: Report) -> Iterator[str]:
     ]
     if rows:
         yield "Deviation from the nominal path in um"
-        yield from table(["", *(f"{side} {name}" for side in sides for name in ("max", "rms"))], rows)
+        yield from table(["", *(f"{SIDES[side]} {name}" for side in sides for name in ("max", "rms"))], rows)
 
 
 def _budget(report: Report) -> Iterator[str]:
@@ -200,14 +209,14 @@ def _budget(report: Report) -> Iterator[str]:
         "increment": "least increment of the control",
         "random_2_sigma": "random: repeatability, two standard deviations",
         "inversion": "inversion of the model",
-        "lost_motion_unknown": "lost motion not yet taken up",
+        "lost_motion_unknown": "backlash of unknown side",
     }
-    # What a later version adds shows under its own key.
+    # keys of a later version are shown as they are
     others = (key for key in sorted(budget) if key not in titles and not isinstance(budget[key], Mapping))
     names = (name for name in (*titles, *others) if name in budget)
     rows = [[titles.get(name, name.replace("_", " ")), number(budget[name])] for name in names]
     if rows:
-        yield "What is left after correction, largest in um"
+        yield "Residual after correction, largest in um"
         yield from table(["", "max"], rows)
     angle = _part(report, "orientation")
     if angle:
@@ -226,7 +235,7 @@ def _moves(report: Report) -> Iterator[str]:
         for key, title in (
             ("corrected", "corrected"),
             ("approximated", "approximated"),
-            ("passed", "passed uncorrected"),
+            ("passed", "left uncorrected"),
         )
         if key in moves
     )
@@ -248,7 +257,7 @@ def _sources(report: Report) -> Iterator[str]:
     sources = report.get("sources") or ()
     if not sources:
         return
-    yield "Error before correction by source in um, largest first"
+    yield "Uncorrected error by source in um, largest first"
     rows = (
         [source.get("name", ""), number(source.get("max_um")), number(source.get("rms_um"))]
         for source in sources[:MAX_SOURCES]
@@ -267,7 +276,7 @@ def _worst(report: Report) -> Iterator[str]:
         [str(block.get("line", "")), number(block.get("before_um")), number(block.get("after_um"))]
         for block in blocks[:MAX_WORST]
     )
-    lines = list(table(["line", "before", "after"], rows, left=0))
+    lines = list(table(["line", UNCORRECTED, CORRECTED], rows, left=0))
     room = WIDTH - max(map(len, lines)) - 2
     yield lines[0] + "  text"
     for line, block in zip(lines[1:], blocks, strict=False):
@@ -275,7 +284,7 @@ def _worst(report: Report) -> Iterator[str]:
 
 
 def percent(value: object) -> str:
-    """A probability for a table: 100 % only where no draw says otherwise."""
+    """A probability for a table: 100 % and 0 % only where they are exact."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return "-"
     text = f"{100.0 * value:.1f}"
@@ -285,12 +294,12 @@ def percent(value: object) -> str:
 
 
 def uncertainty_text(report: Report) -> Iterator[str]:
-    """How sure the corrected path is, where the calibration states uncertainties."""
+    """Uncertainty of the corrected path, where the calibration states uncertainties."""
     part = _part(report, "uncertainty")
     if not part:
         return
     band, within, expected = part["band_um"], part["within"], part["expected"]
-    yield f"Uncertainty of the tip at {part['waypoints']} way-points, from the calibration"
+    yield f"Uncertainty of the tip at {part['waypoints']} waypoints, from the calibration"
     yield from pairs(
         [
             (
@@ -300,15 +309,16 @@ def uncertainty_text(report: Report) -> Iterator[str]:
             ),
             (
                 "  Deviation",
-                f"{number(expected['before_rms_um'])} um rms expected before, "
-                f"{number(expected['after_rms_um'])} um after; better with probability "
+                f"expected {number(expected['before_rms_um'])} um rms uncorrected, "
+                f"{number(expected['after_rms_um'])} um corrected; better with probability "
                 f"{percent(expected['probability_better'])}",
             ),
             (
                 f"  Within {within['tolerance_um']:g} um",
-                f"all of the program with probability {percent(within['before']['program'])} before, "
-                f"{percent(within['after']['program'])} after; the worst way-point "
-                f"{percent(within['before']['least'])} before, {percent(within['after']['least'])} after",
+                f"all of the program with probability {percent(within['before']['program'])} uncorrected, "
+                f"{percent(within['after']['program'])} corrected; the worst waypoint "
+                f"{percent(within['before']['least'])} uncorrected, "
+                f"{percent(within['after']['least'])} corrected",
             ),
             ("  From", str(part["source"])),
             ("  Zero", str(part["zero_setting"])),

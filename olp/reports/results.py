@@ -9,8 +9,9 @@ from olp.findings.catalogue import RULES
 from olp.reports.document import Block, Document, Grid, Notice, Pairs, Paragraph, Section
 from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, sentences, table
 
-#: points and sources that are shown
+#: Most rows of the table of largest errors.
 _ROWS = 10
+#: Head of that table.
 _WORST = ("line", "point", "X", "Y", "Z", "size")
 
 
@@ -63,10 +64,10 @@ def _head(report: Report) -> list[tuple[str, str]]:
 
 
 def _figures(report: Report) -> list[tuple[str, str, str]]:
-    found = report["correction"]
-    rows = [("in space", number(found["max_um"]), number(found["rms_um"]))]
-    rows += [(axis, number(most), "") for axis, most in zip("XYZ", found["max_by_axis_um"], strict=True)]
-    return [*rows, ("left by rounding", number(found["rounding_um"]), "")]
+    correction = report["correction"]
+    rows = [("in space", number(correction["max_um"]), number(correction["rms_um"]))]
+    rows += [(axis, number(most), "") for axis, most in zip("XYZ", correction["max_by_axis_um"], strict=True)]
+    return [*rows, ("rounding error", number(correction["rounding_um"]), "")]
 
 
 def _sources(report: Report) -> list[tuple[str, str, str]]:

@@ -8,9 +8,9 @@ from typing import Any
 
 from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, shortened, table
 
-#: rows of a table that are shown
+#: Most rows of a table.
 _ROWS = 8
-#: of the name of another program
+#: Most characters of the name of another program.
 _NAME = 50
 
 
@@ -32,7 +32,7 @@ def _head(report: Report) -> Iterator[str]:
     stretches = report["stretches"]
     yield from pairs(
         [
-            ("Program", f"{printable(report['program']) or '<stdin>'}, {report['waypoints']} way-points"),
+            ("Program", f"{printable(report['program']) or '<stdin>'}, {report['waypoints']} waypoints"),
             ("Machine", report["machine"]),
             ("Time", clock(float(report["duration_s"])) + (f", {dwell:.2f} s of it dwells" if dwell else "")),
             (
@@ -87,7 +87,7 @@ def _blend_study(report: Report) -> Iterator[str]:
     study = report.get("blend_study")
     if not study:
         return
-    yield "What the path tolerance costs and gains; tolerances that the program names are scaled as well"
+    yield "Time and deviation by path tolerance; tolerances of the program are scaled as well"
     rows = [
         (
             f"x {row['factor']:g}", ", ".join(f"{v:g}" for v in row["tolerance_um"][:4]) or "-",
@@ -102,26 +102,26 @@ def _budget(report: Report) -> Iterator[str]:
     budget = report["budget_um"]
     titles = {
         "blending": "blending: rounded corners, merged blocks",
-        "chords_of_arcs": "chords that stand for arcs, at most",
-        "inertial": "inertial: the machine gives way to acceleration",
+        "chords_of_arcs": "chords in place of arcs, at most",
+        "inertial": "inertial: the machine deflects under acceleration",
     }
     proof = report.get("proof")
-    yield "Off the programmed path, largest in um"
+    yield "Deviation from the programmed path, largest in um"
     rows = [(titles.get(k, k), number(v)) for k, v in budget.items() if v]
     if proof:
-        axes = f"the axes, by the proof of {shortened(printable(proof['program']), _NAME)}"
+        axes = f"axis errors, by the proof of {shortened(printable(proof['program']), _NAME)}"
         rows.insert(0, (axes, number(proof["path_max_um"])))
-        rows.append(("all of it in one place, at most", number(proof["at_most_um"])))
+        rows.append(("sum of all, at most", number(proof["at_most_um"])))
     yield from table(("", "max"), rows)
     path = report["path"]
     stated = ", ".join(f"{v:g}" for v in path["stated_um"][:6])
-    parts = [f"{stated} um named by the program" if stated else ""]
+    parts = [f"{stated} um from the program" if stated else ""]
     if path["default_um"] is not None:
         parts.append(f"{path['default_um']:g} um from {path['default_from']} where it names none")
     if path["exact_stop_at_start"]:
         parts.append("exact stop from the start, by the machine file")
-    found = "; ".join(filter(None, parts)) or "none, the program asks for the exact path all through"
-    text = f"Path tolerance: {found}"
+    tolerances = "; ".join(filter(None, parts)) or "none: the program asks for the exact path everywhere"
+    text = f"Path tolerance: {tolerances}"
     yield from textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")
     inertial = report.get("inertial")
     if inertial:
@@ -130,7 +130,7 @@ def _budget(report: Report) -> Iterator[str]:
         bound = (
             ""
             if allowed is None
-            else f"; {allowed:g} um are allowed, so accelerations of X, Y, Z are held to {held} mm/s2"
+            else f"; {allowed:g} um are allowed, so accelerations of X, Y, Z are limited to {held} mm/s2"
         )
         text = (
             f"Inertial deviation: {inertial['max_um']:.2f} um max in line {inertial['line']}, "
@@ -151,9 +151,9 @@ def _slow(report: Report) -> Iterator[str]:
     slow = report["below_half_feed"]
     if not slow["places"]:
         return
-    places = _count(slow["places"], "place", "places")
+    sections = _count(slow["places"], "section", "sections")
     yield (
-        f"{places} below half of the feed, {slow['seconds']:.2f} s in all, {slow['lost_s']:.2f} s lost there"
+        f"{sections} below half of the feed, {slow['seconds']:.2f} s in all, {slow['lost_s']:.2f} s lost there"
     )
     rows = [
         (
@@ -197,18 +197,18 @@ def _feeds_written(report: Report) -> Iterator[str]:
         took = (
             "took the least planned feed of them"
             if written["rule"] == "least"
-            else "took the feed that takes as long in all"
+            else "took the mean feed (same total time)"
         )
         lines = _count(written["slower_lines"], "line was", "lines were")
         yield from textwrap.wrap(
             f"{_count(written['shared'], 'F word holds', 'F words hold')} for several blocks and {took}; "
-            f"{lines} planned slower than the feed that is there now.",
+            f"{lines} planned slower than the new feed.",
             WIDTH, initial_indent="  ", subsequent_indent="  ",
         )  # fmt: skip
     if written["kept_lines"]:
         kept = ", ".join(map(str, written["kept_lines"][:_ROWS]))
         yield from textwrap.wrap(
-            f"Left as they are, because moves under them are not timed: lines {kept}",
+            f"Kept as written, because their moves are not timed: lines {kept}",
             WIDTH, initial_indent="  ", subsequent_indent="  ",
         )  # fmt: skip
 
@@ -219,14 +219,14 @@ def _notes(report: Report) -> Iterator[str]:
         lines = ", ".join(map(str, untimed["lines"]))
         more = ", ..." if untimed["moves"] > len(untimed["lines"]) else ""
         yield from textwrap.wrap(
-            f"Not timed: {_count(untimed['moves'], 'move', 'moves')} from or to places that are not known "
+            f"Not timed: {_count(untimed['moves'], 'move', 'moves')} from or to unknown positions "
             f"(lines {lines}{more}): at the start without start_mm, and where the control moves by itself.",
             WIDTH,
         )
 
 
 def _cut(lines: Iterator[str], count: int) -> Iterator[str]:
-    """The head of a table and its first rows; how many more there are."""
+    """The head of a table, its first rows, and the number of the others."""
     for k, line in enumerate(lines):
         if k <= _ROWS:
             yield line

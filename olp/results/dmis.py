@@ -1,8 +1,8 @@
 """Reads reported points from DMIS output (ISO 22093): feature actuals of points, and point data.
 
 Only points can be corrected one by one: `FA(name)=FEAT/POINT,CART,x,y,z,i,j,k`, and `PTDATA` and `RAWDAT` in
-the same form. Features of several touches and tolerances evaluated from them are carried, with the reason;
-nominals (`F`, `T`) are nobody's error.
+the same form. Features of several touches, and tolerances evaluated from them, stay unchanged, with the
+reason. Nominals (`F`, `T`) have no error of the machine.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from olp.program.text.statements import Comment, Statement, chunks
 from olp.results.reported import Reported, Stated, Unchanged
 from olp.results.table import stated_in
 
+#: mm per unit of length
 _UNITS = {b"MM": 1.0, b"CM": 10.0, b"M": 1000.0, b"INCH": 25.4, b"FEET": 304.8}
 _HEAD = re.compile(rb"\s*(?:([A-Za-z]+)\s*\(\s*([^)]*?)\s*\)\s*=\s*)?([A-Za-z]\w*)\s*(?:/\s*|$)")
 _LABEL = re.compile(rb"\s*([A-Za-z]+)\s*\(\s*([^)]*?)\s*\)")
@@ -29,11 +30,12 @@ _IS_DMIS = re.compile(
     re.MULTILINE | re.IGNORECASE,
 )
 _MOTION = {b"GOTO", b"FROM", b"RAPID", b"PTMEAS", b"GOHOME", b"RMEAS", b"PATH"}
-#: In DMIS text stands in quotes.
+#: DMIS puts text in quotes, so no statement takes the rest of its line as text.
 _NO_TEXT = re.compile(rb"(?!)")
 T = TypeVar("T")
 _COMPOSED = "its touches are not in it one by one; correct the touch points and evaluate the feature again"
 _EVALUATED = "it was evaluated from values before correction; evaluate it again"
+#: bytes that are searched for a statement of DMIS
 _LOOK = 1 << 16
 
 
@@ -44,8 +46,7 @@ def is_dmis(data: bytes) -> bool:
 
 def _refuse_motion(major: bytes, line: int) -> NoReturn:
     raise InputError(
-        f"{major.decode('latin-1')} makes this a part program, no file of results; correct it without "
-        "--results",
+        f"{major.decode('latin-1')} makes this a part program, not a file of results; use olp correct",
         line=line,
     )
 
@@ -73,34 +74,34 @@ class _Reader:
         self.carried: list[Unchanged] = []
         self.stated: list[Stated] = []
 
-    def statement(self, found: Statement) -> None:
-        head = _HEAD.match(found.text)
+    def statement(self, statement: Statement) -> None:
+        head = _HEAD.match(statement.text)
         if head is None:
             return
         kind, label, major = (
             part.upper() if part and i != 1 else part for i, part in enumerate(head.groups())
         )
-        rest, at = found.text[head.end() :], head.end()
+        rest, offset = statement.text[head.end() :], head.end()
         if kind == b"FA" and major == b"FEAT":
-            self._actual(found, (label or b"").decode("latin-1"), rest, at)
+            self._actual(statement, (label or b"").decode("latin-1"), rest, offset)
         elif kind is None and major in (b"PTDATA", b"RAWDAT"):
-            self._point(found, major.decode(), rest, at)
+            self._point(statement, major.decode(), rest, offset)
         elif kind == b"TA":
             name = f"TA({(label or b'').decode('latin-1')})"
-            self.carried.append(Unchanged(found.line, name, _EVALUATED))
+            self.carried.append(Unchanged(statement.line, name, _EVALUATED))
         elif kind in (b"D", b"DA"):
             self.frame = (label or b"").decode("latin-1")
         elif kind is None:
-            self._state(found, major or b"", rest)
+            self._state(statement, major or b"", rest)
 
-    def _state(self, found: Statement, major: bytes, rest: bytes) -> None:
+    def _state(self, statement: Statement, major: bytes, rest: bytes) -> None:
         words = [w.strip().upper() for w in rest.split(b",")]
         if major == b"UNITS":
             if words[0] not in _UNITS:
                 raise InputError(
-                    f"UNITS/{words[0].decode('latin-1')} is no unit of length; expected MM, CM, M, INCH, "
-                    "FEET",
-                    line=found.line,
+                    f"UNITS/{words[0].decode('latin-1')} is not a unit of length; "
+                    "expected MM, CM, M, INCH or FEET",
+                    line=statement.line,
                 )
             self.unit_mm = _UNITS[words[0]]
         elif major in (b"RECALL", b"SNSLCT"):
@@ -113,66 +114,66 @@ class _Reader:
             elif kind in ("D", "DA"):
                 self.frame = name
         elif major == b"SNSET" and words[0] == b"APPRCH" and len(words) > 1:
-            told = number(words[1])
-            self.approach = float("nan") if told is None else told.value * (self.unit_mm or 1.0)
+            distance = number(words[1])
+            self.approach = float("nan") if distance is None else distance.value * (self.unit_mm or 1.0)
         elif major == b"TECOMP" and b"ON" in words:
-            text = found.text.strip().decode("latin-1")
-            self.stated.append(Stated(found.line, "temperature", text))
+            text = statement.text.strip().decode("latin-1")
+            self.stated.append(Stated(statement.line, "temperature", text))
         elif major in _MOTION:
-            _refuse_motion(major, found.line)
+            _refuse_motion(major, statement.line)
 
     def remarks(self) -> None:
-        """What comments say of compensation that was active."""
+        """Collect what comments say of compensation that was active."""
         for line, raw in enumerate(self.data.splitlines(), 1):
-            at = raw.find(b"$$")
-            said = stated_in(line, raw[at + 2 :].decode("latin-1").strip()) if at >= 0 else None
-            if said is not None:
-                self.stated.append(said)
+            mark = raw.find(b"$$")
+            stated = stated_in(line, raw[mark + 2 :].decode("latin-1").strip()) if mark >= 0 else None
+            if stated is not None:
+                self.stated.append(stated)
 
-    def _actual(self, found: Statement, label: str, rest: bytes, at: int) -> None:
+    def _actual(self, statement: Statement, label: str, rest: bytes, offset: int) -> None:
         name = f"FA({label})"
         kind, _, tail = rest.partition(b",")
         if kind.strip().upper() != b"POINT":
             what = kind.strip().upper().decode("latin-1")
-            self.carried.append(Unchanged(found.line, f"{name}, a {what},", _COMPOSED))
+            self.carried.append(Unchanged(statement.line, f"{name}, a {what},", _COMPOSED))
             return
-        self._point(found, name, tail, at + len(kind) + 1)
+        self._point(statement, name, tail, offset + len(kind) + 1)
 
-    def _point(self, found: Statement, name: str, rest: bytes, at: int) -> None:
+    def _point(self, statement: Statement, name: str, rest: bytes, offset: int) -> None:
         system, _, tail = rest.partition(b",")
         if system.strip().upper() != b"CART":
             raise InputError(
                 f"{name} is stated in {system.strip().decode('latin-1') or 'no coordinates'}; only Cartesian "
-                "points (CART) are read; let the machine write them so",
-                line=found.line,
+                "points (CART) are read; have the machine write them in CART",
+                line=statement.line,
             )
         if self.unit_mm is None:
             raise InputError(
-                f"{name} stands before any UNITS statement, so its unit is not known; put UNITS/MM,ANGDEC or "
-                "the like in front",
-                line=found.line,
+                f"{name} comes before any UNITS statement, so its unit is not known; "
+                "put a statement such as UNITS/MM,ANGDEC before it",
+                line=statement.line,
             )
-        at += len(system) + 1
+        offset += len(system) + 1
         spans: list[tuple[int, int]] = []
         values: list[Number] = []
         for word in tail.split(b","):
             bare = word.strip()
-            told = number(bare)
-            if told is None:
+            value = number(bare)
+            if value is None:
                 if len(values) < 3:
                     raise InputError(
-                        f'{name}: "{bare.decode("latin-1")[:40]}" is no number; expected x, y, z',
-                        line=found.line,
+                        f'{name}: "{bare.decode("latin-1")[:40]}" is not a number; expected x, y, z',
+                        line=statement.line,
                     )
                 break
-            first = at + word.index(bare)
-            # behind the last byte, not before the next: a continuation may stand between
-            spans.append((found.place(first), found.place(first + len(bare) - 1) + 1))
-            values.append(told)
-            at += len(word) + 1
+            first = offset + word.index(bare)
+            # the end is after the last byte, not before the next: a continuation may be between them
+            spans.append((statement.place(first), statement.place(first + len(bare) - 1) + 1))
+            values.append(value)
+            offset += len(word) + 1
         if len(values) < 3:
-            raise InputError(f"{name} has {len(values)} coordinates; expected x, y, z", line=found.line)
-        self.lines.append(found.line)
+            raise InputError(f"{name} has {len(values)} coordinates; expected x, y, z", line=statement.line)
+        self.lines.append(statement.line)
         self.spans.append(spans[:3])
         self.forms.append(tuple(values[:3]))
         normal = [v.value for v in values[3:6]]
@@ -198,18 +199,18 @@ def read_dmis(data: bytes) -> Reported:
         if len(chunk.point):
             _refuse_motion(b"GOTO", chunk.first_line + int(chunk.point[0]) + 1)
         goes_on = 0
-        for found in chunk.statements(_NO_TEXT):
-            if isinstance(found, Comment):
-                text = found.text.rstrip()
-                goes_on = found.line + 1 if text.endswith(b"$") and text.strip() != b"$$" else 0
+        for statement in chunk.statements(_NO_TEXT):
+            if isinstance(statement, Comment):
+                text = statement.text.rstrip()
+                goes_on = statement.line + 1 if text.endswith(b"$") and text.strip() != b"$$" else 0
                 continue
-            if found.line == goes_on:
+            if statement.line == goes_on:
                 raise InputError(
-                    "a comment that ends in $ stands before this statement, which may be part of it then; "
+                    "the comment before this statement ends in $, so the statement may be part of it; "
                     "take the $ off the comment, or begin this line with $$",
-                    line=found.line,
+                    line=statement.line,
                 )
-            reader.statement(found)
+            reader.statement(statement)
     if not reader.lines:
         why = f" ({reader.carried[0].name} {reader.carried[0].reason})" if reader.carried else ""
         raise InputError(f"holds no points (FA(..)=FEAT/POINT or PTDATA){why}")

@@ -1,7 +1,7 @@
 """Reported points to true ones: true = reported + e(axis position at the touch, stylus vector).
 
-What a measuring machine reports is where its scales say that the tip is, so the error of the machine adds to
-it (error = actual - commanded): the model runs forward, and nothing is inverted.
+A measuring machine reports where its scales say that the tip is. So the error of the machine is added
+(error = actual - commanded): the model runs forward, and nothing is inverted.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from olp.core.toolpath import Touch
 from olp.errormodel.base import ErrorModel
 from olp.results.reported import Reported
 
-#: Where the touch lies about a tip is tried in these directions where nothing states it.
+#: Directions of the touch from the centre of the tip that are tried where none is stated.
 _ROUND = np.array([s * np.eye(3)[i] for i in range(3) for s in (1.0, -1.0)])
-#: A direction out of the surface must be a unit vector within this.
+#: A direction out of the surface must have length 1 within this.
 _UNIT = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class ReportFrame:
     """A frame of reported points: axis position = `rotation` @ point + `offset_mm`. `touched` is (axis
-    position, lever and payload) where its zero was set on the raw machine, None where it was set by other
-    means."""
+    position, tool vector and payload) where its zero was set on the uncompensated machine, None where it was
+    set by other means."""
 
     name: str
     rotation: Array
@@ -39,7 +39,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stylus:
-    """Length that enters axis positions, lever from gauge point to tip, radius of the tip, all in mm."""
+    """Length that enters axis positions, tool vector (gauge point to tip), radius of the tip, all in mm."""
 
     length_mm: Vector
     tool_vector_mm: Vector
@@ -48,11 +48,11 @@ class Stylus:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forward:
-    """(n, 3) `axis_mm` at the touches with levers `lever_mm`, what to add to the reported points in their own
-    frame `added_mm`, and play of the axes (n, 3), None where no axis has lost motion.
+    """(n, 3) `axis_mm` at the touches with their tool vectors `tool_vector_mm`; `added_mm`, what to add to the
+    reported points in their own frame; `play` of the axes (n, 3), None where no axis has backlash.
 
-    `doubt_mm` (n,) is how far the sum may differ because the side of the touch is not stated, `play_mm` (n,)
-    because the direction of the approach is not.
+    `doubt_mm` (n,) is how far the sum may differ because the side of the touch is not stated. `play_mm` (n,) is
+    how far because the direction of the approach is not stated.
     """
 
     axis_mm: Array
@@ -65,7 +65,7 @@ class Forward:
 
 def forward(
     reported: Reported,
-    places: Sequence[Place],
+    frames: Sequence[ReportFrame],
     styli: Sequence[Stylus],
     model: ErrorModel,
     *,
@@ -73,19 +73,19 @@ def forward(
     hold: bool,
     payload_kg: float = 0.0,
 ) -> Forward:
-    """What has to be added to each point. `places` are the frames, `styli` the tools of `reported`. Axis
-    positions count at the tip, or stand off it by the lengths of the tools, or count at the end of the ram,
-    which the stylus leads from to the tip.
+    """What has to be added to each point. `frames` and `styli` are those of `reported`. Axis positions count
+    at the tip ("tip"), at the tip less the length of the tool ("tool"), or at the end of the ram, where the
+    stylus begins ("ram").
 
     Raises OutsideBox, with the line, for a touch outside the calibrated box unless it is held at its face.
     """
-    rotation = np.array([p.rotation for p in places])[reported.frame]
-    offset = np.array([p.offset_mm for p in places])[reported.frame]
+    rotation = np.array([f.rotation for f in frames])[reported.frame]
+    offset = np.array([f.offset_mm for f in frames])[reported.frame]
     length = np.array([s.length_mm for s in styli])[reported.tool]
     tool_vector = np.array([s.tool_vector_mm for s in styli], float)[reported.tool]
     radius = np.array([s.radius_mm for s in styli])[reported.tool]
     own = np.isfinite(reported.stylus_mm).all(axis=1)
-    # a row's own stylus vector stands for the tool's, whose length is minus its vector
+    # a row's own stylus vector replaces that of the tool; the length of a stylus is minus its vector
     length[own], tool_vector[own] = -reported.stylus_mm[own], reported.stylus_mm[own]
     if axes == "ram":
         length = -tool_vector
@@ -107,17 +107,17 @@ def forward(
     )
     error = model.error(axis, arms, play)
     doubt = np.zeros(len(reported))
-    # centre or surface, and from which side: the error at the other places of the tip bounds the doubt
+    # centre or surface, and from which side: the error at other positions of the tip bounds the doubt
     blind = np.flatnonzero((radius > 0) & surface & ~known)
-    for way in _ROUND:
-        about = model.error(axis[blind] + way * radius[blind, None], arms[blind], None)
+    for direction in _ROUND:
+        about = model.error(axis[blind] + direction * radius[blind, None], arms[blind], None)
         away = np.abs(about - model.error(axis[blind], arms[blind], None)).max(axis=1, initial=0.0)
         doubt[blind] = np.maximum(doubt[blind], away)
-    shift = np.zeros((len(places), 3))
-    for k, place in enumerate(places):
-        if place.touched is not None:
-            at, arm = place.touched
-            shift[k] = model.error(np.array([at]), np.array(arm, float))[0]
+    shift = np.zeros((len(frames), 3))
+    for k, frame in enumerate(frames):
+        if frame.touched is not None:
+            touched_mm, arm = frame.touched
+            shift[k] = model.error(np.array([touched_mm]), np.array(arm, float))[0]
     added = np.einsum("nji,nj->ni", rotation, error - shift[reported.frame])
     return Forward(axis, tool_vector, added, play, doubt, play_doubt)
 
@@ -126,8 +126,8 @@ def _unit(normal: Array) -> Array:
     """Unit vectors; NaN where a row states none. DMIS writes 0, 0, 0 for none."""
     size = np.sqrt((normal * normal).sum(axis=1, keepdims=True))
     with np.errstate(invalid="ignore", divide="ignore"):
-        out = np.where(np.abs(size - 1.0) <= _UNIT, normal / size, np.nan)
-    return np.asarray(out, float)
+        unit = np.where(np.abs(size - 1.0) <= _UNIT, normal / size, np.nan)
+    return np.asarray(unit, float)
 
 
 def _inside(reported: Reported, axis: Array, model: ErrorModel) -> None:
@@ -138,24 +138,24 @@ def _inside(reported: Reported, axis: Array, model: ErrorModel) -> None:
     j = int(np.flatnonzero(~inside[i])[0])
     low, high = model.box_mm[j]
     raise OutsideBox(
-        f"axis {'XYZ'[j]} stood at {axis[i, j]:.3f} mm, outside the calibrated box {low:g} to {high:g} mm; "
+        f"axis {'XYZ'[j]} was at {axis[i, j]:.3f} mm, outside the calibrated box {low:g} to {high:g} mm; "
         "check the frame, calibrate there, or accept the error at the box face with --outside-box hold",
         line=int(reported.line[i]),
     )
 
 
 def _play(model: ErrorModel, axis: Array, toward: Array, approach: Array) -> tuple[Array | None, Array]:
-    """Play of the axes at the touch, and half the lost motion where it is not known.
+    """Play of the axes at the touch, and half the backlash where the play is not known.
 
-    A touch is made while the machine moves against the surface, so axes that took up their lost motion on the
-    way of the approach rest on that flank.
+    A touch is made while the machine moves against the surface. So the approach decides on which side of its
+    backlash an axis is, where the approach was long enough to take the backlash up.
     """
-    lost = model.backlash_at(axis)
-    if lost is None:
+    backlash = model.backlash_at(axis)
+    if backlash is None:
         return None, np.zeros(len(axis))
     away = np.nan_to_num(toward)
     reach = np.abs(away) * np.nan_to_num(approach)[:, None]
-    known = np.asarray((reach > np.abs(lost)) | (lost == 0.0))
+    known = np.asarray((reach > np.abs(backlash)) | (backlash == 0.0))
     play = np.asarray(np.where(known, -np.sign(away), 0.0), float)
-    doubt = np.sqrt((np.where(known, 0.0, 0.5 * lost) ** 2).sum(axis=1))
+    doubt = np.sqrt((np.where(known, 0.0, 0.5 * backlash) ** 2).sum(axis=1))
     return play, np.asarray(doubt, float)

@@ -1,5 +1,4 @@
-"""Where reported points lie on the machine: frames and styli of a job, by the names that a file gives
-them."""
+"""Frames and styli of a job, by the names that a file of reported points gives them."""
 
 from __future__ import annotations
 
@@ -9,33 +8,32 @@ from olp.core.errors import ConfigError, InputError
 from olp.core.geometry import rotation_matrix
 from olp.core.machine import ZERO, Setup, Tool
 from olp.program.frames import touch_of
-from olp.results.forward import Place, Stylus
+from olp.results.forward import ReportFrame, Stylus
 
 #: the frame whose points are axis positions
 MACHINE = "machine"
 
 
-def place_of(setup: Setup, name: str | None) -> Place:
+def frame_of(setup: Setup, name: str | None) -> ReportFrame:
     """The frame with a name. Raises InputError where the file names none, ConfigError where nothing defines
     it."""
     if name is None:
         raise InputError(
-            "states no frame, so where its points lie on the machine is not known; name one of "
-            "[work_offsets] with --frame, or --frame machine for axis positions"
+            "states no frame, so the position of its points on the machine is not known; "
+            "name one of [work_offsets] with --frame, or give --frame machine for axis positions"
         )
     if name == MACHINE:
-        return Place(MACHINE, np.eye(3), ZERO, None)
+        return ReportFrame(MACHINE, np.eye(3), ZERO, None)
     known = (*setup.job.work_offsets, *setup.machine.work_offsets)
-    # labels of DMIS are the same in any case of letters
+    # DMIS does not distinguish capital and small letters in labels
     meant = name if name in known else next((n for n in known if n.upper() == name.upper()), name)
     work = setup.work_offset(meant)
     if work is None:
         raise ConfigError(
-            f'frame {name} is not defined; give [work_offsets."{name}"] in the job file: where the part '
-            "lies, "
-            "with X_mm, Y_mm, Z_mm and A_deg, B_deg, C_deg"
+            f'frame {name} is not defined; give [work_offsets."{name}"] in the job file, '
+            "with X_mm, Y_mm, Z_mm and A_deg, B_deg, C_deg of the part"
         )
-    return Place(name, rotation_matrix(work.rotation_deg), work.offset_mm, touch_of(setup, work, None))
+    return ReportFrame(name, rotation_matrix(work.rotation_deg), work.offset_mm, touch_of(setup, work, None))
 
 
 def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
@@ -52,7 +50,7 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
         return Stylus(ZERO, ZERO, 0.0)
     if number is None:
         raise ConfigError(
-            "no stylus is known, and angular errors act through it; give job_defaults.tool in the machine "
+            "no stylus is known, and angular errors act through its vector; give job_defaults.tool in the machine "
             "file, --tool, or columns SX, SY, SZ (gauge point to tip)"
         )
     if isinstance(number, str) and number.isdigit():
@@ -66,5 +64,5 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
             "or job file, end of the ram to centre of the tip, or the number of a tool with --tool"
         )
     if tool.tool_vector_mm is None and not by_row:
-        raise ConfigError(f"stylus {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm")
+        raise ConfigError(f"stylus {number} has no tool vector; give tools.{number}.Z_mm or gauge_to_tip_mm")
     return Stylus(tool.length_mm, tool.tool_vector_mm or ZERO, tool.radius_mm)

@@ -1,5 +1,4 @@
-"""Reported points as read from a file: values with their places in the text, and what else the file
-states."""
+"""Reported points as read from a file: values, their positions in the text, and what else the file states."""
 
 from __future__ import annotations
 
@@ -11,7 +10,7 @@ from olp.program.text.numbers import Number
 
 @dataclass(frozen=True, slots=True)
 class Unchanged:
-    """A statement whose values stay as they are, and why."""
+    """A statement whose values are not changed, and why."""
 
     line: int
     name: str
@@ -32,11 +31,12 @@ class Reported:
     """(n, 3) `value_mm` of points as reported, in the frame `frames[frame]` of each; `normal` (n, 3) out of
     the surface, NaN where not stated.
 
-    `start`, `end` (n, 3) are the places of the numbers in `data`, `form` the numbers as written, `unit_mm`
-    (n,) mm per unit. `tool` (n,) indexes `tools`, labels or numbers of styli (None: the one of the job),
-    `stylus_mm` (n, 3) gauge point to tip where a row states it. `approach_mm` (n,) is the way before a touch,
-    NaN where not known. `axes_at_ram`: axis positions count at the end of the ram. `comment` are the marks of
-    a comment, None where the form has none. `assumed` says in words what was told from the file.
+    `start`, `end` (n, 3) are the positions of the numbers in `data`, `form` the numbers as written, `unit_mm`
+    (n,) mm per unit. `tool` (n,) indexes `tools`, labels or numbers of styli (None: the one of the job).
+    `stylus_mm` (n, 3) is gauge point to tip where a row states it. `approach_mm` (n,) is the distance of the
+    approach before a touch, NaN where not known. `axes_at_ram`: axis positions count at the end of the ram.
+    `comment` are the marks of a comment, None where the form has none. `carried` are statements that stay
+    unchanged. `assumed` says in words what was detected from the file.
     """
 
     data: bytes

@@ -1,4 +1,4 @@
-"""Reads reported points from a table (CSV and kin)."""
+"""Reads reported points from a table (CSV and similar)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from olp.results.reported import Reported, Stated
 
 _DIRECTION = ("I", "J", "K")
 _STYLUS = ("SX", "SY", "SZ")
+#: problems that one message names at most
 _MOST_PROBLEMS = 5
-#: a comment that says that the instrument's own correction was at work
+#: a comment that says that the instrument's own correction was active
 _ACTIVE = re.compile(
     r"(?P<geometry>(error|volumetric|geometr\w*|caa?|vec)[ _-]*(map|comp\w*|correction|matrix))|"
     r"(?P<temperature>(temperature|thermal)[ _-]*(comp\w*|correction))",
@@ -44,30 +45,30 @@ def read_table(data: bytes, layout: Layout) -> Reported:
     tools: list[str | int | None] = []
     problems: list[tuple[int, str]] = []
     for line, row in cells.rows():
-        found: list[Number] = []
+        values: list[Number] = []
         for place in wanted:
             assert place is not None
-            told = cells.number(row, place)
-            if isinstance(told, str):
-                problems.append((line, told))
+            value = cells.number(row, place)
+            if isinstance(value, str):
+                problems.append((line, value))
                 break
-            found.append(told)
+            values.append(value)
         else:
             lines.append(line)
             spans.append([row[p] for p in places if p is not None])
-            forms.append(tuple(found))
+            forms.append(tuple(values))
             names.append(cells.word(row, others["name"]))
             tools.append(_tool(cells.word(row, others["tool"])))
         if len(problems) >= _MOST_PROBLEMS:
             break
     if problems:
         first = problems[0]
-        more = "".join(f"; line {line}: {said}" for line, said in problems[1:])
+        more = "".join(f"; line {line}: {text}" for line, text in problems[1:])
         raise InputError(first[1] + more, line=first[0])
     if not lines:
-        raise InputError("holds no points; expected a row a point")
+        raise InputError("holds no points; expected one row per point")
     count = len(lines)
-    value = np.array([[n.value for n in row] for row in forms])
+    numbers = np.array([[n.value for n in row] for row in forms])
     nothing = np.full((count, 3), np.nan)
     has_normal = others["I"] is not None
     has_stylus = others["SX"] is not None
@@ -80,14 +81,14 @@ def read_table(data: bytes, layout: Layout) -> Reported:
         start=span[:, :, 0],
         end=span[:, :, 1],
         form=tuple((row[0], row[1], row[2]) for row in forms),
-        value_mm=value[:, :3] * unit,
+        value_mm=numbers[:, :3] * unit,
         unit_mm=np.full(count, unit),
-        normal=value[:, 3:6] if has_normal else nothing,
+        normal=numbers[:, 3:6] if has_normal else nothing,
         frame=np.zeros(count, np.int64),
         frames=(stated_frame(first_lines(data)) or layout.frame,),
         tool=np.array([labels.index(t) for t in tools], np.int64),
         tools=labels,
-        stylus_mm=value[:, -3:] * unit if has_stylus else nothing,
+        stylus_mm=numbers[:, -3:] * unit if has_stylus else nothing,
         approach_mm=np.full(count, np.nan if layout.approach_mm is None else layout.approach_mm),
         names=tuple(names),
         decimal=cells.decimal,
@@ -105,16 +106,16 @@ def _tool(text: str) -> str | int | None:
 
 def stated_in(line: int, comment: str) -> Stated | None:
     """What a comment says of compensation that was active, None where it says nothing of it."""
-    said = _ACTIVE.search(comment)
-    if said is None or not _YES.search(comment, said.end()):
+    match = _ACTIVE.search(comment)
+    if match is None or not _YES.search(comment, match.end()):
         return None
-    return Stated(line, "geometry" if said["geometry"] else "temperature", comment)
+    return Stated(line, "geometry" if match["geometry"] else "temperature", comment)
 
 
 def _stated(data: bytes, layout: Layout) -> list[Stated]:
-    found = []
+    stated = []
     for line, raw in enumerate(data.splitlines(), 1):
         text = raw.decode("latin-1").strip()
         if text.startswith(("#", layout.comment)):
-            found.append(stated_in(line, text))
-    return [said for said in found if said is not None]
+            stated.append(stated_in(line, text))
+    return [entry for entry in stated if entry is not None]

@@ -30,7 +30,7 @@ from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, retimed, table
 from olp.review.page import page
 from olp.review.samples import Samples, by_source, sample
-from olp.review.scene import Frame, Scene, Sureness
+from olp.review.scene import Frame, Scene, TipUncertainty
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
 from olp.workflows import retime
@@ -42,13 +42,13 @@ from olp.workflows.proof import ProofOptions, last_digit_mm, verify_programs
 from olp.workflows.retime import RetimeOptions, Retiming
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
-#: shorter stays at a sample are none
+#: Shortest rest at a sample that counts, in s.
 _REST_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViewOptions(ProofOptions):
-    """What `view` takes beside its files; see there."""
+    """The options of `view`."""
 
     outside_box: Outside = "refuse"
     flatten: bool = False
@@ -60,14 +60,14 @@ class ViewOptions(ProofOptions):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Review:
-    """A job ready to be looked at. `scene` is what the page shows, as plain arrays."""
+    """A job ready for its page. `scene` has all that the page shows, as plain arrays."""
 
     scene: Scene
     _packed: list[tuple[dict[str, Any], bytes]] = field(default_factory=list, init=False, repr=False)
 
     def parts(self, live: str | None = None) -> Iterator[bytes]:
         """The page in parts; `live` is the address, relative to the page, that answers with the digest of the
-        inputs of the day."""
+        current inputs."""
         if not self._packed:
             manifest, arrays = manifest_of(self.scene)
             self._packed.append((manifest, arrays.encoded()))
@@ -75,7 +75,7 @@ class Review:
         return page(manifest | {"live": live}, data, live=live is not None)
 
     def html(self) -> bytes:
-        """The page: one file, which needs nothing else and asks no network."""
+        """The page: one file, which needs no other file and no network."""
         return b"".join(self.parts())
 
     def write(self, path: PathLike, *, force: bool = False) -> None:
@@ -98,27 +98,27 @@ def view(
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
-    within_um: float | None = None,
+    part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
     time: bool = True,
     step_mm: float | None = None,
     progress: Progress | None = None,
 ) -> Review:
-    """A program, its correction and measurements of it, to be looked at in a browser.
+    """A program, its correction and measurements of it, for a browser.
 
-    `corrected` is the corrected program, which is proved as `verify` does; without it the program is
-    corrected as `correct` does, or `correction` is what that gave, to be called `corrected_name`. `measured`
-    are files of positions of the tip, read and placed on the path as `olp.compare` does; what that finds
-    stands beside the other findings. Without `time` the motion is not planned: times are those of the
-    programmed feed. `step_mm` is the distance between samples. `within_um`,
+    `corrected` is the corrected program, which is proved as in `verify`. Without it the program is corrected
+    as in `correct`, or `correction` is the result of that, under the name `corrected_name`. `measured` are
+    files of tip positions, read and placed on the path as in `olp.compare`; the findings of that are added
+    to the others. Without `time` the motion is not planned: times are those of the
+    programmed feed. `step_mm` is the distance between samples. `part_tolerance_um`,
     `only_sure_components` and `date` are those of `correct`. Raises InputError (ProgramError with its line,
     ConfigError) and CannotCompute.
     """
     session, source = opened(program, machine, job)
     options = ViewOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
-        expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, within_um=within_um,
+        expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, part_tolerance_um=part_tolerance_um,
         only_sure_components=only_sure_components, date=date, time=time, step_mm=step_mm,
     )  # fmt: skip
     second = None if corrected is None else session.sources.source(corrected)
@@ -173,8 +173,8 @@ def run(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Texts:
-    """The nominal program as it is shown, unrolled where that was asked for, and the corrected one, as bytes
-    and as read; `report` is that of the correction or of its verification."""
+    """The nominal program as shown, unrolled where the call asks for it, and the corrected one, as bytes and
+    as read; `report` is that of the correction or of its verification."""
 
     source: Source
     data: bytes
@@ -238,15 +238,15 @@ def _scene(
     frame = Frame.of(nominal.toolpath)
     position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
     report = texts.report
-    seen: list[Matched] = []
+    runs: list[Matched] = []
     digests: list[str] = []
     if measured:
         matcher = Matcher(nominal.toolpath, samples, loaded.model, setup, np.array(frame.origin_mm))
         for path in measured:
             points = read_points(path, read=session.sources.read_last)
-            seen.append(matcher.match(points))
+            runs.append(matcher.match(points))
             digests.append(points.sha256)
-        more = [finding.as_dict() for found in seen for finding in found.findings]
+        more = [finding.as_dict() for run in runs for finding in run.findings]
         report = report | {"findings": [*report["findings"], *more]}
     bodies = tuple(_bodies(session, setup, nominal, samples, frame, position))
     return Scene(
@@ -264,35 +264,35 @@ def _scene(
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
         listing=aligned(nominal, texts.second, shown.groups),
         bodies=bodies,
-        measured=tuple(seen),
+        measured=tuple(runs),
         report=report,
         tolerance_um=options.tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
-        sureness=_sureness(
-            loaded, nominal, samples, options.within_um or options.tolerance_um, options.date
+        uncertainty=_uncertainty(
+            loaded, nominal, samples, options.part_tolerance_um or options.tolerance_um, options.date
         ),
     )
 
 
-def _sureness(
-    loaded: Loaded, nominal: Program, samples: Samples, within_um: float, date: datetime.date | None
-) -> Sureness | None:
-    """Of samples, as `olp.workflows.confidence` of way-points."""
+def _uncertainty(
+    loaded: Loaded, nominal: Program, samples: Samples, part_tolerance_um: float, date: datetime.date | None
+) -> TipUncertainty | None:
+    """Bands and probabilities of samples, as `olp.workflows.confidence` gives them for waypoints."""
     if loaded.uncertainty is None:
         return None
     unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)
     points = Points(samples.move, samples.axis_mm, samples.uncorrected, samples.result, samples.play)
     covariance = covariances(unknowns, nominal.toolpath, points)
-    radius = within_um * MM_PER_UM
+    radius = part_tolerance_um * MM_PER_UM
     beyond = {
         name: np.asarray(1.0 - within(covariance, deviation, radius), np.float32)
         for name, deviation in (("uncorrected", points.before_mm), ("result", points.after_mm))
     }
-    return Sureness(radius, bands(covariance).astype(np.float32), beyond)
+    return TipUncertainty(radius, bands(covariance).astype(np.float32), beyond)
 
 
 def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples, Array]:
-    """Samples at which the motion rests are there twice, when it comes and when it leaves; and the times."""
+    """Samples and their times; a sample at which the motion rests is repeated, for arrival and departure."""
     rests = np.flatnonzero(leaving - arrival > _REST_S)
     order = np.sort(np.concatenate((np.arange(len(samples)), rests)), kind="stable")
     again = np.diff(order, prepend=-1) == 0
@@ -302,14 +302,14 @@ def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples,
 
 
 def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sources) -> str:
-    """12 digits that change with whatever the page is made of; `measured` are the digests of those files."""
+    """12 digits that change with every input of the page; `measured` are the digests of those files."""
     parts = (texts.data, texts.corrected, loaded.digest.encode(), repr(loaded.setup).encode())
-    found = hashlib.sha256(b"\0".join(parts))
+    combined = hashlib.sha256(b"\0".join(parts))
     for digest in measured:
-        found.update(bytes.fromhex(digest))
+        combined.update(bytes.fromhex(digest))
     for mesh in loaded.setup.job.meshes:
-        found.update(sources.digest(mesh.file))
-    return found.hexdigest()[:12]
+        combined.update(sources.digest(mesh.file))
+    return combined.hexdigest()[:12]
 
 
 def _groups(nominal: Program, second: Program, loaded: Loaded, tolerance_um: float) -> Index:

@@ -1,7 +1,7 @@
 """The texts of both programs side by side, by the line numbers of their files.
 
-A row pairs a line with what stands for it in the corrected program; a block that was inserted has a row of
-its own. Lines end where the reader of programs ends them.
+A row pairs a line with its partner in the corrected program; an inserted block has a separate row. Lines end
+where the reader of programs ends them.
 """
 
 from __future__ import annotations
@@ -19,22 +19,23 @@ from olp.program.program import Program
 Small = npt.NDArray[np.int32]
 Single = npt.NDArray[np.float32]
 
-#: a longer line is cut: nobody reads on, and a browser would choke on it
+#: Most characters of a line; a longer one is cut, as browsers are slow with it.
 LONGEST = 2000
 
+#: Ends of lines other than line feeds.
 _END = re.compile(r"\r\n|\r")
-#: what would act on a terminal, hide text, or turn its direction: everything of that kind but tab and line
-#: feed
+#: Characters that act on a terminal, hide text, or change its direction, except tab and line feed.
 _CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
 )
+#: A line that is too long.
 _LONG = re.compile(rf"[^\n]{{{LONGEST + 1},}}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listing:
-    """Texts with one line of the file a line, made harmless; (r,) `row_nominal` and `row_corrected`, line
-    numbers counted from 1, 0 where a row has no such line."""
+    """Texts with the lines of the files, without control characters; (r,) `row_nominal` and `row_corrected`,
+    line numbers counted from 1, 0 where a row has no such line."""
 
     nominal: str
     corrected: str
@@ -53,8 +54,8 @@ class Listing:
 
 
 def shown(data: bytes) -> str:
-    """The text of a program as people see it: lines end with a line feed, controls are pictures of
-    themselves, and what is too long is cut. Bytes that are no UTF-8 are taken as Latin-1."""
+    """The text of a program for display: lines end with a line feed, control characters are replaced by their
+    pictures, and long lines are cut. Bytes that are not UTF-8 are read as Latin-1."""
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     try:
@@ -66,7 +67,7 @@ def shown(data: bytes) -> str:
     if _CONTROL.search(text):
         text = _CONTROL.sub(_picture, text)
     text = _LONG.sub(lambda m: f"{m[0][:LONGEST]} … ({len(m[0])} characters)", text)
-    # what ends the last line begins no other
+    # the end of the last line begins no further line
     return text.removesuffix("\n")
 
 
@@ -76,7 +77,7 @@ def _picture(match: re.Match[str]) -> str:
 
 
 def aligned(nominal: Program, corrected: Program, groups: Index) -> Listing:
-    """Both texts, their lines paired: by the moves that they make, and between those by what they say."""
+    """Both texts, their lines paired: by the moves that they make, and between those by their text."""
     first, second = shown(nominal.data), shown(corrected.data)
     mine, theirs = _anchors(nominal, corrected, groups)
     count, other = nominal.lines, corrected.lines
@@ -86,9 +87,9 @@ def aligned(nominal: Program, corrected: Program, groups: Index) -> Listing:
 
 def largest(rows: Index, values: Array, count: int) -> Single:
     """(count,) the largest of the values of each row, NaN where it has none."""
-    out = np.full(count, np.nan, np.float32)
-    np.fmax.at(out, rows, values.astype(np.float32))
-    return out
+    peaks = np.full(count, np.nan, np.float32)
+    np.fmax.at(peaks, rows, values.astype(np.float32))
+    return peaks
 
 
 def _anchors(nominal: Program, corrected: Program, groups: Index) -> tuple[Index, Index]:
@@ -105,7 +106,7 @@ def _anchors(nominal: Program, corrected: Program, groups: Index) -> tuple[Index
 def _pairs(
     first: str, second: str, mine: Index, theirs: Index, count: int, other: int
 ) -> tuple[Small, Small]:
-    """Rows of line numbers from 1: lines between anchors go side by side where there are as many in both."""
+    """Rows of line numbers from 1: lines between anchors are paired where both texts have as many."""
     begin = np.concatenate(([0], mine + 1))
     begin_other = np.concatenate(([0], theirs + 1))
     gap = np.append(mine, count) - begin
@@ -124,8 +125,7 @@ def _pairs(
 
 
 def _without_partner(some: list[str], more: list[str]) -> Iterator[int]:
-    """Which of the lines that are more have no partner: those behind the equal ones in front, and before the
-    equal ones at the end."""
+    """The lines of `more` without a partner: those between the equal ones at the beginning and at the end."""
     spare = len(more) - len(some)
     if spare <= 0:
         return
@@ -136,12 +136,12 @@ def _without_partner(some: list[str], more: list[str]) -> Iterator[int]:
 
 
 def _woven(count: int, other: int, inserted: Index, left_out: Index) -> tuple[Small, Small]:
-    """Rows of all lines: a pair each, and those without a partner by themselves."""
+    """Rows of all lines: one per pair, and one per line without a partner."""
     single = np.zeros(count, bool)
     single[left_out] = True
     single_other = np.zeros(other, bool)
     single_other[inserted] = True
-    # a row is placed by how many pairs stand before it
+    # the order of rows is that of the pairs before them
     key = np.cumsum(~single) - ~single
     key_other = np.cumsum(~single_other) - ~single_other
     own = np.flatnonzero(single)

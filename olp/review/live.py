@@ -1,4 +1,4 @@
-"""The page served on this machine alone, made anew when its inputs change."""
+"""The page served on this computer alone, and updated when its inputs change."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 from olp.core.errors import OlpError
 from olp.review.job import Review
 
-#: never another address: a page holds the job
+#: The only address that is served, as the page holds the job.
 LOOPBACK = "127.0.0.1"
-#: where the page asks whether it is out of date
+#: Path at which the page asks whether it is out of date.
 VERSION = "version"
-#: seconds between looks at the inputs
+#: Seconds between checks of the inputs.
 WATCH_S = 0.5
 
 Make = Callable[[], Review]
@@ -24,9 +24,9 @@ _Stamp = tuple[tuple[str, int, int], ...]
 
 
 class Server:
-    """Serves the page of what `make` gives, at `address`, and makes it anew when one of `inputs` changes.
+    """Serves the page of the result of `make` at `address`, and updates it when one of `inputs` changes.
 
-    An input that is wrong for the moment leaves the page as it was; `tell` says why.
+    Where an input is wrong for the moment, the page is kept unchanged, and `tell` gets the reason.
     """
 
     def __init__(self, make: Make, inputs: Iterable[str], tell: Tell, port: int = 0) -> None:
@@ -48,7 +48,7 @@ class Server:
         return f"http://{LOOPBACK}:{self._http.server_address[1]}/"
 
     def run(self) -> None:
-        """Serve until `stop`, or until the person interrupts; KeyboardInterrupt passes."""
+        """Serve until `stop`, or until KeyboardInterrupt, which is raised."""
         thread = threading.Thread(target=self._http.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
         thread.start()
         try:
@@ -70,22 +70,22 @@ class Server:
         try:
             self._set(self._make())
         except OlpError as error:
-            self._tell(f"the page stays as it was: {error}")
+            self._tell(f"the page is unchanged: {error}")
         else:
             self._tell("the page is up to date again")
 
     def _look(self) -> _Stamp:
-        """When each input was last written, and its size."""
+        """Time of the last change and size of each input."""
         return tuple(self._stamps())
 
     def _stamps(self) -> Iterator[tuple[str, int, int]]:
         for name in self._inputs:
             try:
-                found = Path(name).stat()
+                status = Path(name).stat()
             except OSError:
                 yield name, 0, 0
             else:
-                yield name, found.st_mtime_ns, found.st_size
+                yield name, status.st_mtime_ns, status.st_size
 
     def _set(self, review: Review) -> None:
         self._page = b"".join(review.parts(live=VERSION))
@@ -106,7 +106,7 @@ class Server:
                     self.send_error(HTTPStatus.NOT_FOUND)
 
             def _from_here(self) -> bool:
-                """The address asked for is this machine's: a foreign name that leads here is not served."""
+                """Whether the request names this computer; a foreign name that leads here is not served."""
                 host = self.headers.get("Host", "").rpartition(":")[0]
                 return host in (LOOPBACK, "localhost")
 
@@ -120,6 +120,6 @@ class Server:
                 self.wfile.write(data)
 
             def log_message(self, format: str, *args: object) -> None:
-                """Requests of the page are no news."""
+                """Requests of the page are not reported."""
 
         return Handler

@@ -1,4 +1,4 @@
-"""From a scene to what the page reads: a manifest ("olp-review-1") and packed arrays."""
+"""From a scene to the input of the page: a manifest ("olp-review-1") and packed arrays."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ from olp.findings.catalogue import RULES
 from olp.proof.deviation import cutting_moves
 from olp.review.listing import largest
 from olp.review.meshes import nodes
-from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, WAY_MM, Arrays, resolution
+from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 from olp.review.scene import Scene
 
-#: colours that stay apart for eyes that take red for green, on dark and on light
+#: Name, label, colour and width in pixels of layers; the colours differ also for red-green colour blindness.
 LAYERS = (
     ("nominal", "nominal path", "#4477aa", 1.5),
     ("uncorrected", "uncorrected machine", "#ee7733", 2.0),
     ("corrected", "command, corrected", "#009988", 2.0),
     ("result", "corrected, predicted", "#33bbee", 2.0),
 )
+#: Colours of measured runs.
 MEASURED = ("#cc3377", "#ddaa33", "#997700", "#bbbbbb")
+#: Name, label and kind of scale of the parts of a deviation.
 _PARTS = (
     ("magnitude", "distance", "sequential"),
     ("x", "X", "diverging"),
@@ -34,13 +36,15 @@ _PARTS = (
     ("along", "along the path", "diverging"),
     ("normal", "across the path", "sequential"),
 )
-#: steps of an error source over its range, at the least: colours show no more
-_SOURCE_LEVELS, _FINEST_UM = 200, 0.001
-#: step of a probability
+#: Fewest steps of an error source over its range: colours show no more.
+_SOURCE_LEVELS = 200
+#: Finest step of an error source in um.
+_FINEST_UM = 0.001
+#: Step of a probability in %.
 _PERCENT = 0.1
-#: bits of the largest error of a line that are kept: a part in a thousand, and far smaller than all of them
+#: Stored bits of the largest error of a line: a part in a thousand, much smaller than a full float.
 _ERROR_BITS = 9
-#: of motion, relative to the largest value of the column
+#: Fewest steps of a column of the motion over its range.
 _MOTION_LEVELS = 20_000
 
 
@@ -55,7 +59,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", _rapid(scene), "u1")
     arrays.quantised("t", scene.time_s, TIME_S)
-    arrays.quantised("s", scene.samples.way_mm, WAY_MM)
+    arrays.quantised("s", scene.samples.arc_mm, ARC_MM)
     deviations = list(_deviations(scene))
     manifest = {
         "schema": "olp-review-1",
@@ -113,7 +117,7 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
             "d_result", samples.result, DEVIATION_MM, plus=["d_uncorrected", "d_corrected"]
         ),
     }
-    out = [
+    layers = [
         _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in LAYERS
     ]
     for k, (name, measured) in enumerate(zip(_measured(scene), scene.measured, strict=True)):
@@ -121,8 +125,8 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
         label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
-        out.append(_layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0))
-    return out
+        layers.append(_layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0))
+    return layers
 
 
 def _measured(scene: Scene) -> list[str]:
@@ -142,46 +146,46 @@ def _layer(
 
 def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
     names = ["uncorrected", "corrected", "result", *_measured(scene)]
-    out: list[dict[str, Any]] = [
+    metrics: list[dict[str, Any]] = [
         {
             "name": part, "label": label, "unit": "um", "kind": kind, "of": part,
             "by_layer": dict.fromkeys(names), "limit": scene.tolerance_um,
         }
         for part, label, kind in _PARTS
     ]  # fmt: skip
-    out += _sureness(scene, arrays)
+    metrics += _uncertainty(scene, arrays)
     for name, size in scene.sources:
         value = size * UM_PER_MM
         step = resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
         array = arrays.quantised(f"source:{name}", value, step)
-        out.append(
+        metrics.append(
             {
                 "name": f"source:{name}", "label": f"share of {name}", "unit": "um", "kind": "sequential",
                 "by_layer": {"uncorrected": array}, "limit": None,
             }
         )  # fmt: skip
-    return out
+    return metrics
 
 
-def _sureness(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
-    """The band, and the probability of being beyond the tolerance: what is worse is larger in both."""
-    sure = scene.sureness
-    if sure is None:
+def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
+    """The band, and the probability of being beyond the tolerance: in both, larger is worse."""
+    uncertainty = scene.uncertainty
+    if uncertainty is None:
         return
-    band = sure.band_mm * UM_PER_MM
+    band = uncertainty.band_mm * UM_PER_MM
     step = resolution(float(band.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
     array = arrays.quantised("band", band, step)
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
-        "by_layer": dict.fromkeys(sure.beyond, array), "limit": scene.tolerance_um,
+        "by_layer": dict.fromkeys(uncertainty.beyond, array), "limit": scene.tolerance_um,
     }  # fmt: skip
     by_layer = {
         layer: arrays.quantised(f"beyond:{layer}", 100.0 * value, _PERCENT)
-        for layer, value in sure.beyond.items()
+        for layer, value in uncertainty.beyond.items()
     }
     yield {
-        "name": "beyond", "label": f"probability beyond {sure.within_mm * UM_PER_MM:g} µm", "unit": "%",
-        "kind": "sequential", "by_layer": by_layer, "limit": None,
+        "name": "beyond", "label": f"probability beyond {uncertainty.within_mm * UM_PER_MM:g} µm",
+        "unit": "%", "kind": "sequential", "by_layer": by_layer, "limit": None,
     }  # fmt: skip
 
 
@@ -200,7 +204,7 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
         axes.append(
             {
                 "name": axis,
-                "position": arrays.quantised(f"m_{axis}", table.position_mm[:, i], WAY_MM),
+                "position": arrays.quantised(f"m_{axis}", table.position_mm[:, i], ARC_MM),
                 "velocity": column(f"V{axis}", table.velocity[:, i]),
                 "acceleration": column(f"A{axis}", table.acceleration[:, i]),
                 "jerk": column(f"J{axis}", table.jerk[:, i]),
@@ -248,7 +252,7 @@ def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 
 
 def _rounded(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Values to _ERROR_BITS bits; NaN stays NaN."""
+    """Values to _ERROR_BITS bits; NaN is unchanged."""
     fraction, exponent = np.frexp(values)
     return np.asarray(np.ldexp(np.rint(np.ldexp(fraction, _ERROR_BITS)), exponent - _ERROR_BITS), np.float32)
 
@@ -275,7 +279,7 @@ _Deviation = tuple[str, Array, npt.NDArray[np.bool_]]
 
 
 def _deviations(scene: Scene) -> Iterator[_Deviation]:
-    """(layer, (n,) um, (n,) whether the sample is on a move whose path counts) of what the tip does."""
+    """(layer, (n,) um, (n,) whether the sample is on a cutting move) of the deviations of the tip."""
     samples = scene.samples
     feed = cutting_moves(scene.nominal.toolpath)[samples.move]
     yield "uncorrected", _size(samples.uncorrected) * UM_PER_MM, feed
@@ -303,12 +307,13 @@ def _statistics(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict
         yield {"label": "within tolerance", "value": within, "unit": "%", "layer": layer}
     deviation = scene.report.get("deviation") or {}
     for side, layer in (("before", "uncorrected"), ("after", "result")):
-        for place, label in (("waypoints", "proof, at way-points"), ("between", "proof, between them")):
-            found = (deviation.get(side) or {}).get(place)
-            if found:
-                yield {"label": label, "value": float(found["max_um"]), "unit": "um", "layer": layer}
+        for where, label in (("waypoints", "proof, at waypoints"), ("between", "proof, between them")):
+            proved = (deviation.get(side) or {}).get(where)
+            if proved:
+                yield {"label": label, "value": float(proved["max_um"]), "unit": "um", "layer": layer}
     moves = scene.nominal.toolpath
-    yield {"label": "way", "value": float(scene.samples.way_mm[-1]) * 1e-3, "unit": "m", "layer": None}
+    length_m = float(scene.samples.arc_mm[-1]) * 1e-3
+    yield {"label": "path length", "value": length_m, "unit": "m", "layer": None}
     yield {"label": "time", "value": scene.duration_s, "unit": "s", "layer": None}
     yield {"label": "moves", "value": len(moves), "unit": "", "layer": None}
     yield {"label": "lines", "value": scene.nominal.lines, "unit": "", "layer": None}
@@ -329,14 +334,14 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _callouts(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict[str, Any]]:
-    """The worst point before and after, on moves whose path counts."""
+    """The worst point, uncorrected and corrected, on cutting moves."""
     lines = scene.nominal.toolpath.line[scene.samples.move]
     for layer, value, feed in deviations:
         if layer not in ("uncorrected", "result") or not feed.any():
             continue
         worst = int(np.where(feed, value, -1.0).argmax())
-        when = "before correction" if layer == "uncorrected" else "after correction"
-        text = f"largest {when}: {value[worst]:.2f} µm, line {int(lines[worst])}"
+        which = "uncorrected" if layer == "uncorrected" else "corrected"
+        text = f"largest, {which}: {value[worst]:.2f} µm, line {int(lines[worst])}"
         yield {"sample": worst, "text": text, "layer": layer}
 
 

@@ -1,4 +1,4 @@
-"""Measured runs on the page: each point beside its place on the nominal path, as `olp compare` pairs them."""
+"""Measured runs on the page: each point with its point of the nominal path, paired as in `olp compare`."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from olp.files.points import Points, row_line
 from olp.findings.catalogue import Finding
 from olp.review.samples import Samples
 
-#: points farther from their place are left out
+#: Points farther from the path are left out, in mm.
 REACH_MM = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matched:
-    """Of n measured points in the order of the path: (n, 3) `base_mm`, the nearest place of the path,
+    """Of n measured points in the order of the path: (n, 3) `base_mm`, the nearest point of the path,
     `delta_mm` from there, and (n,) the `index` of the sample next to it. `findings` are those of
     `olp compare` on how the run was placed."""
 
@@ -38,8 +38,8 @@ class Matched:
 
 
 class Matcher:
-    """Places measured points on the path of a program whose samples are shown about `origin_mm`, where the
-    machine is when the tip, tool lengths apart, is at the zero of the page."""
+    """Places measured points on the path of a program whose samples are shown about `origin_mm`: the axis
+    position, without tool lengths, of the zero of the page."""
 
     def __init__(
         self, path: Toolpath, samples: Samples, model: ErrorModel, setup: Setup, origin_mm: Array
@@ -49,14 +49,14 @@ class Matcher:
         self._shift = zero_shifts(path.frames, model)
         self._home = self._zero(int(path.frame[0]))
         self._origin = origin_mm
-        self._samples, self._way = samples, _ways(self._nominal, samples)
+        self._samples, self._arc_mm = samples, _arc_lengths(self._nominal, samples)
 
     def match(self, points: Points) -> Matched:
-        """Raises InputError with the line of the first point that is off, where points are not of this path,
-        and ConfigError for a frame that is none of the machine's."""
-        at = points.points_mm + self._from_frame(points)
+        """The run on the path. Raises InputError with the line of the first point that is not on it, and
+        ConfigError for a frame that the machine does not have."""
+        point_mm = points.points_mm + self._from_frame(points)
         nominal = self._nominal.path
-        placed = runs.place(nominal, [Path(points.file).name], [at], "auto", None, REACH_MM)
+        placed = runs.place(nominal, [Path(points.file).name], [point_mm], "auto", None, REACH_MM)
         run = placed.runs[0]
         if not placed.right[0]:
             raise _refusal(points, run)
@@ -66,28 +66,28 @@ class Matcher:
         elif placed.orders[0] == "free":
             rows = rows[np.argsort(run.pairing.s_mm[rows], kind="stable")]
         foot = run.pairing.foot_mm[rows]
-        # the page shows the program's own positions, without where touched zeros really lie
+        # the page shows the program's own positions, without the errors of touched zeros
         move = self._nominal.move[run.pairing.segment[rows]]
         base = foot + self._home - self._shift[self._path.frame[move]] - self._origin
         index = np.maximum.accumulate(self._nearest(run.pairing.s_mm[rows], move))
-        found = tuple(runs.findings(nominal, placed))
-        return Matched(run.name, base, run.points_mm[rows] - foot, index, found)
+        findings = tuple(runs.findings(nominal, placed))
+        return Matched(run.name, base, run.points_mm[rows] - foot, index, findings)
 
     def _nearest(self, s_mm: Array, move: Index) -> Index:
-        """(n,) the sample next to each arc length; not the last one of the move before."""
-        way = self._way
-        after = np.clip(np.searchsorted(way, s_mm), 0, len(way) - 1)
+        """(n,) the sample next to each arc length, but not the last one of the move before."""
+        arc_mm = self._arc_mm
+        after = np.clip(np.searchsorted(arc_mm, s_mm), 0, len(arc_mm) - 1)
         before = np.maximum(after - 1, 0)
-        nearer = (s_mm - way[before] < way[after] - s_mm) & (self._samples.move[before] >= move)
+        nearer = (s_mm - arc_mm[before] < arc_mm[after] - s_mm) & (self._samples.move[before] >= move)
         return np.where(nearer, before, after).astype(np.int64)
 
     def _zero(self, frame: int) -> Array:
-        """Where the zero of a frame of the program is on the machine, tool lengths apart."""
+        """The axis position of the zero of a frame of the program, without tool lengths."""
         known = self._path.frames[frame]
         return np.asarray(np.subtract(known.offset_mm, known.length_mm) + self._shift[frame], float)
 
     def _from_frame(self, points: Points) -> Array:
-        """What brings positions in the frame that a file states into the first frame of the program."""
+        """The shift from the frame that a file states into the first frame of the program."""
         first = self._path.frames[int(self._path.frame[0])]
         if points.frame in (None, first.work_offset):
             return np.zeros(3)
@@ -100,7 +100,7 @@ class Matcher:
         offset = self._setup.work_offset(points.frame)
         if offset is None or any(offset.rotation_deg):
             raise ConfigError(
-                f"frame {points.frame!r} is no work offset without rotation of machine or job; expected "
+                f"frame {points.frame!r} is not an unrotated work offset of machine or job; expected "
                 f'{first.work_offset!r} or "machine"',
                 file=points.file,
             )
@@ -111,14 +111,14 @@ def _refusal(points: Points, run: Run) -> InputError:
     off = np.flatnonzero(~run.good & ~run.pairing.beyond)
     worst = int(off[0]) if len(off) else int(run.pairing.distance_mm.argmax())
     return InputError(
-        f"the point is {run.pairing.distance_mm[worst]:.3g} mm from its place on the path, or the points are "
-        f"not in its order; expected points within {REACH_MM:g} mm of it; olp compare says more",
+        f"the point is {run.pairing.distance_mm[worst]:.3g} mm from the path, or the points are not in its "
+        f"order; expected points within {REACH_MM:g} mm of it; run olp compare for details",
         file=points.file, line=row_line(points, worst),
     )  # fmt: skip
 
 
-def _ways(nominal: Nominal, samples: Samples) -> Array:
-    """(n,) arc length on the nominal path at each sample; a move that is none of it has the place before."""
+def _arc_lengths(nominal: Nominal, samples: Samples) -> Array:
+    """(n,) arc length on the nominal path at each sample; a move that is not on it has the one before."""
     s, of = nominal.path.s_mm, nominal.move
     begin = s[np.searchsorted(of, samples.move, "left")]
     end = s[np.searchsorted(of, samples.move, "right")]

@@ -1,7 +1,7 @@
-"""Bodies beside the path: meshes that the job file names, and a simple machine drawn from the machine file.
+"""Bodies of the page: meshes that the job file names, and a simple machine drawn from the machine file.
 
-Everything is shown from the workpiece. Along the chain from workpiece to tool every axis moves what comes
-after it, whether it carries the workpiece or the tool: so the machine is a tree of nodes that follow the axis
+All is shown in the frame of the workpiece. Along the chain from workpiece to tool every axis moves all that
+follows it, whether it moves the workpiece or the tool. So the machine is a tree of nodes that follow the axis
 positions.
 """
 
@@ -21,10 +21,13 @@ from olp.core.units import AXES
 from olp.files.meshes import read_mesh
 from olp.files.write import Reader
 
-#: more faces than this are drawn coarser
+#: Most faces of a mesh; a larger one is drawn coarser.
 MOST_FACES = 150_000
+#: Colour by role.
 _COLOURS = {"workpiece": "#9aa7b5", "fixture": "#7d8f69", "machine": "#5f7a96", "tool": "#b0803a"}
+#: Opacity by role.
 _OPACITY = {"workpiece": 0.55, "fixture": 0.5, "machine": 0.25, "tool": 0.8}
+#: Triangles of a box, by the indices of its corners.
 _FACES = np.array(
     [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2],
      [2, 4, 6], [1, 3, 5], [3, 7, 5]], np.int64,
@@ -33,7 +36,7 @@ _FACES = np.array(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """(v, 3) `vertices` in mm in the frame shown, (f, 3) `faces`; `path` names the nodes that carry it."""
+    """(v, 3) `vertices` in mm in the frame shown, (f, 3) `faces`; `path` names its nodes in the tree."""
 
     name: str
     label: str
@@ -52,10 +55,10 @@ class Body:
 
 
 def of_job(setup: Setup, origin_mm: Array, read: Reader) -> list[Body]:
-    """The meshes of the job, placed by their frames; `origin_mm` is what the frame shown counts from on the
+    """The meshes of the job, placed by their frames; `origin_mm` is the zero of the frame shown on the
     machine, `read` opens their files.
 
-    Raises InputError for a file that is no mesh.
+    Raises InputError for a file that is not a mesh.
     """
     return [_placed(mesh, k, setup, origin_mm, read) for k, mesh in enumerate(setup.job.meshes, 1)]
 
@@ -96,8 +99,8 @@ def nodes(machine: Machine) -> list[tuple[tuple[str, ...], int]]:
 def of_machine(
     machine: Machine, axes_mm: Array, gauge_mm: Array, tip_mm: Array, radius_mm: float
 ) -> Iterator[Body]:
-    """A machine of boxes where its axes stand at `axes_mm`; `gauge_mm` and `tip_mm` (3,) is where the gauge
-    point and the tip of the tool are then in the frame shown. Nothing of it is to scale but the travels."""
+    """A machine of boxes with its axes at `axes_mm`; `gauge_mm` and `tip_mm` (3,) are the gauge point and the
+    tip of the tool there, in the frame shown. Only the travels are to scale."""
     travel = np.array([machine.axes[axis].travel_mm for axis in AXES])
     # the gauge point at both ends of all axes, in the frame shown
     low, high = gauge_mm + (travel[:, 0] - axes_mm), gauge_mm + (travel[:, 1] - axes_mm)
@@ -124,7 +127,7 @@ def _carrier(
     axis: str, after: str | None, path: tuple[str, ...], low: Array, high: Array, gauge: Array, thick: float,
     floor: float, *, on_floor: bool,
 ) -> Iterator[Body]:  # fmt: skip
-    """What an axis moves: a ram at the end of the chain, else the guide of the axis after it."""
+    """The bodies that an axis moves: a ram at the end of the chain, else the guide of the axis after it."""
     top = high[2] + 2 * thick
     if after is None:
         i = AXES.index(axis)

@@ -1,4 +1,4 @@
-"""When the machine is where: times of samples on the re-timed motion, and its speeds beside their limits."""
+"""Times of samples on the re-timed motion, and its speeds with their limits."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 
-#: rows of a table of motion, and of what is thinned to them at once
+#: Most rows of a table of motion, about.
 MOST_ROWS = 20_000
+#: Pieces that are thinned at once, to bound memory.
 _BLOCK = 1 << 16
-#: shares of a run that are the same
+#: Difference of shares of a run that are equal but for rounding.
 _ROUNDING = 1e-9
-#: where a piece of a motion is looked at: a polynomial of time has its peaks at or near one of these
-_PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+#: Sampled instants of a piece, as shares of its time: its peaks are at or near one of them.
+_INSTANTS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTable:
     """Of m times in order: (m,) `time_s`, `line` of the corrected program, `speed_mm_s`, and `feed_mm_s`, NaN
-    in rapids; (m, 3) axis positions mm, velocities mm/s, accelerations mm/s2 and jerks mm/s3. What was left
-    out lies between neighbours that are there, for each of the columns."""
+    in rapids; (m, 3) axis positions mm, velocities mm/s, accelerations mm/s2 and jerks mm/s3. In each column,
+    values that are left out are between those of the rows beside them."""
 
     time_s: Array
     line: Index
@@ -49,8 +50,8 @@ class MotionTable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Runs:
-    """Runs of one line: (r,) `line` of each, how often the line had a run before (`again`), and (k,) which
-    run each of k moves or pieces belongs to."""
+    """Runs of one line: (r,) `line` of each, how many runs the line had before (`again`), and (k,) the run of
+    each of k moves or pieces."""
 
     line: Index
     again: Index
@@ -80,16 +81,16 @@ class _Runs:
 
 
 def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajectory]) -> tuple[Array, Array]:
-    """(n,) s at which the motion of the corrected program comes to each sample, and at which it leaves it;
+    """(n,) s at which the motion of the corrected program arrives at each sample, and at which it leaves it;
     stretches follow one another.
 
-    Along each line the way that is done tells the time: a motion that rounds corners meets no way-point
-    itself.
+    The time of a sample is that of its distance along the line, as a motion that rounds corners does not
+    reach the waypoints.
     """
     length = lengths_mm(corrected)
-    way = ~(length <= SHORTEST_MM)
-    driven = np.isfinite(length) & way
-    moves = np.flatnonzero(way)
+    moving = ~(length <= SHORTEST_MM)
+    driven = np.isfinite(length) & moving
+    moves = np.flatnonzero(moving)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], driven[moves], [False])).astype(np.int8)))
     arrival, leaving = np.full((2, len(samples)), np.nan)
     begin = 0.0
@@ -99,8 +100,8 @@ def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajec
         mine = moves[first:stop]
         a = int(np.searchsorted(samples.part, mine[0], "left"))
         b = int(np.searchsorted(samples.part, mine[-1], "right"))
-        found = _along(corrected, length, mine, samples, a, b, trajectory.motion)
-        arrival[a:b], leaving[a:b] = begin + found[0], begin + found[1]
+        times = _along(corrected, length, mine, samples, a, b, trajectory.motion)
+        arrival[a:b], leaving[a:b] = begin + times[0], begin + times[1]
         begin += trajectory.duration_s
     arrival = _filled(arrival)
     return arrival, np.maximum(_filled(leaving), arrival)
@@ -113,84 +114,84 @@ def _along(
     runs = _Runs.find(path.line[moves].astype(np.int64))
     size = length[moves]
     done = np.concatenate(([0.0], np.cumsum(size)))
-    # moves without a length stand where the one before them ended
+    # moves without a length are where the one before them ended
     rank = np.searchsorted(moves, samples.part[a:b], "right") - 1
     exact = (rank >= 0) & (moves[np.maximum(rank, 0)] == samples.part[a:b])
     rank = np.maximum(rank, 0)
-    place = done[rank] + np.where(exact, samples.within[a:b], 1.0) * size[rank]
+    position = done[rank] + np.where(exact, samples.within[a:b], 1.0) * size[rank]
     run = runs.of[rank]
     start, total = _spans(runs.of, size, done)
-    share = (place - start[run]) / np.maximum(total[run], 1e-12)
+    share = (position - start[run]) / np.maximum(total[run], 1e-12)
 
     time, travelled, piece = _travel(motion)
     pieces = _Runs.find(motion.line)
     mine, theirs = runs.partners(pieces)
-    at = np.full(len(pieces.line), -1, np.int64)
-    at[theirs] = mine
+    run_of_piece = np.full(len(pieces.line), -1, np.int64)
+    run_of_piece[theirs] = mine
     of = pieces.of[piece]
     steps = np.bincount(of, np.diff(travelled, prepend=0.0), minlength=len(pieces.line))
     begin = np.concatenate(([0.0], np.cumsum(steps)))[:-1]
-    known = at[of] >= 0
+    known = run_of_piece[of] >= 0
     done_share = np.clip((travelled - begin[of]) / np.maximum(steps[of], 1e-12), 0.0, 1.0)
-    progress = np.maximum.accumulate(_snapped(np.asarray(at[of] + done_share, float)[known]))
+    progress = np.maximum.accumulate(_snapped(np.asarray(run_of_piece[of] + done_share, float)[known]))
     wanted = _snapped(np.asarray(run + np.clip(share, 0.0, 1.0), float))
     return _passing(wanted, progress, time[known])
 
 
-def _snapped(place: Array) -> Array:
-    """What is an end of a run but for rounding is one: there the motion may rest."""
-    whole = np.rint(place)
-    return np.where(np.abs(place - whole) < _ROUNDING, whole, place)
+def _snapped(position: Array) -> Array:
+    """Positions with rounding at the ends of runs removed, as the motion may rest there."""
+    whole = np.rint(position)
+    return np.where(np.abs(position - whole) < _ROUNDING, whole, position)
 
 
-def _passing(place: Array, progress: Array, time: Array) -> tuple[Array, Array]:
-    """First and last time at which a progress that never falls is at each place."""
-    after = np.clip(np.searchsorted(progress, place, "left"), 0, len(progress) - 1)
+def _passing(position: Array, progress: Array, time: Array) -> tuple[Array, Array]:
+    """First and last time at which a progress that never falls is at each position."""
+    after = np.clip(np.searchsorted(progress, position, "left"), 0, len(progress) - 1)
     before = np.maximum(after - 1, 0)
     gap = progress[after] - progress[before]
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(gap > 0.0, (place - progress[before]) / gap, 1.0)
+        share = np.where(gap > 0.0, (position - progress[before]) / gap, 1.0)
     first = time[before] + np.clip(share, 0.0, 1.0) * (time[after] - time[before])
-    last = np.clip(np.searchsorted(progress, place, "right") - 1, 0, len(progress) - 1)
-    return first, np.where(progress[last] == place, np.maximum(time[last], first), first)
+    last = np.clip(np.searchsorted(progress, position, "right") - 1, 0, len(progress) - 1)
+    return first, np.where(progress[last] == position, np.maximum(time[last], first), first)
 
 
 def _spans(of: Index, size: Array, done: Array) -> tuple[Array, Array]:
-    """Of each run the way before it, and its length."""
+    """Of each run the distance before it, and its length."""
     total = np.bincount(of, size).astype(float)
     first = np.searchsorted(of, np.arange(len(total)), "left")
     return done[first], total
 
 
 def _travel(motion: Motion) -> tuple[Array, Array, Index]:
-    """Times, the way travelled by then, and the piece, at several places of each piece of a motion."""
+    """Times, the distance travelled until then, and the piece, at several instants of each piece."""
     seconds = np.diff(motion.start_s)
-    count = len(_PLACES) - 1
+    count = len(_INSTANTS) - 1
     piece = np.repeat(np.arange(len(motion)), count)
-    # each piece answers for the way from its start to its end
-    u = (seconds[:, None] * _PLACES[1:]).ravel()
-    way = np.empty(len(piece))
+    # each piece has the distance from its start to its end
+    u = (seconds[:, None] * _INSTANTS[1:]).ravel()
+    travelled = np.empty(len(piece))
     for a in range(0, len(motion), _BLOCK):
         some = np.arange(a, min(a + _BLOCK, len(motion)))
-        at = motion.of(np.repeat(some, len(_PLACES)), (seconds[some, None] * _PLACES).ravel())[0]
-        step = np.diff(at.reshape(len(some), len(_PLACES), 3), axis=1)
-        way[a * count : (a + len(some)) * count] = np.sqrt((step * step).sum(axis=2)).ravel()
+        position = motion.of(np.repeat(some, len(_INSTANTS)), (seconds[some, None] * _INSTANTS).ravel())[0]
+        step = np.diff(position.reshape(len(some), len(_INSTANTS), 3), axis=1)
+        travelled[a * count : (a + len(some)) * count] = np.sqrt((step * step).sum(axis=2)).ravel()
     time = motion.start_s[piece] - motion.start_s[0] + u
     return (
         np.concatenate(([0.0], time)),
-        np.concatenate(([0.0], np.cumsum(way))),
+        np.concatenate(([0.0], np.cumsum(travelled))),
         np.concatenate((piece[:1], piece)),
     )
 
 
 def _filled(time: Array) -> Array:
-    """Samples that no motion reaches take the time before them."""
+    """Times, with the one before for samples that no motion reaches."""
     return np.maximum.accumulate(np.nan_to_num(time, nan=0.0))
 
 
 def by_feed(program: Program, samples: Samples, machine: Machine) -> Array:
-    """(n,) s at which the nominal program passes each sample, at the programmed feed, or where there is none
-    and in rapids at the limits of velocity, as if nothing took time to speed up."""
+    """(n,) s at which the nominal program reaches each sample, without accelerations: at the programmed feed,
+    or in rapids and without feed at the limits of velocity."""
     path = program.toolpath
     try:
         feed = timing(program).feed_mm_s
@@ -206,7 +207,7 @@ def by_feed(program: Program, samples: Samples, machine: Machine) -> Array:
 
 
 def table(trajectories: Sequence[Trajectory], routes: Sequence[Route]) -> MotionTable:
-    """The motion as at most about MOST_ROWS rows that keep every peak of what they show."""
+    """The motion as at most about MOST_ROWS rows that keep every peak."""
     parts = []
     begin = 0.0
     total = max(sum(len(t.motion) for t in trajectories), 1)
@@ -226,7 +227,7 @@ def table(trajectories: Sequence[Trajectory], routes: Sequence[Route]) -> Motion
 
 
 def _feeds(route: Route) -> tuple[Index, Array]:
-    """Lines of a route and the feed that each has, NaN for rapids."""
+    """Lines of a route and the feed of each, NaN for rapids."""
     line, first = np.unique(route.line, return_index=True)
     feed = np.where(np.isfinite(route.feed_mm_s[first]), route.feed_mm_s[first], np.nan)
     return line, feed
@@ -234,16 +235,16 @@ def _feeds(route: Route) -> tuple[Index, Array]:
 
 def _rows(motion: Motion, a: int, b: int, begin: float, feed: tuple[Index, Array]) -> Array:
     """Rows of pieces a..b: time, line, speed, feed, and the axes' positions and their three derivatives."""
-    count = len(_PLACES)
+    count = len(_INSTANTS)
     piece = np.repeat(np.arange(a, b), count)
     seconds = np.diff(motion.start_s[a : b + 1])
-    u = (seconds[:, None] * _PLACES).ravel()
+    u = (seconds[:, None] * _INSTANTS).ravel()
     position, velocity, acceleration, jerk = motion.of(piece, u)
     line = motion.line[piece]
-    place = np.minimum(np.searchsorted(feed[0], line), len(feed[0]) - 1)
+    row = np.minimum(np.searchsorted(feed[0], line), len(feed[0]) - 1)
     speed = np.sqrt((velocity * velocity).sum(axis=1))
     time = begin + motion.start_s[piece] - motion.start_s[0] + u
-    columns = (time, line, speed, feed[1][place])
+    columns = (time, line, speed, feed[1][row])
     return np.column_stack((*columns, position, velocity, acceleration, jerk))
 
 

@@ -1,4 +1,4 @@
-"""The layers of a review in a meshcat visualizer of one's own, for notebooks and scripts."""
+"""The layers of a review in a meshcat visualizer, for notebooks and scripts."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from olp.core.errors import UsageError
 from olp.review.job import Review
 from olp.review.manifest import LAYERS, MEASURED
 
-#: meshcat's camera and lights are made for metres
+#: Metres per mm: meshcat's camera and lights are made for metres.
 _METRE = 1e-3
-#: samples of a layer; of longer paths every k-th is drawn, for a layer is one message to the browser
+#: Most samples of a layer, as it is one message to the browser; of longer paths every k-th is drawn.
 _MOST = 200_000
 
 
 def add_layers(visualizer: Any, review: Review, *, exaggeration: float = 1000.0, under: str = "olp") -> None:
     """Add paths and bodies of a review to a `meshcat.Visualizer`, below the node `under`.
 
-    Each layer is a node of its own (`olp/nominal`, `olp/result` ...), drawn where its deviations, times
-    `exaggeration`, lead to, in metres. Raises UsageError for an exaggeration that is no number of 0 or above.
+    Each layer is a separate node (`olp/nominal`, `olp/result` ...) in metres, at the nominal path plus its
+    deviations times `exaggeration`. Raises UsageError for an exaggeration that is not a number of 0 or above.
     """
     if not (np.isfinite(exaggeration) and exaggeration >= 0.0):
         raise UsageError(f"the exaggeration is {exaggeration}; expected a number of 0 or above")
@@ -52,7 +52,7 @@ def add_layers(visualizer: Any, review: Review, *, exaggeration: float = 1000.0,
 
 
 def _segments(points: Array, joined: Mask) -> Array:
-    """(3, 2 m) starts and ends of segments along samples, in metres; gaps stay open."""
+    """(3, 2 m) starts and ends of segments along samples, in metres; gaps are not bridged."""
     every = -(-len(points) // _MOST)
     begins = ~joined
     keep = (np.arange(len(points)) % every == 0) | begins | np.append(begins[1:], True)

@@ -1,7 +1,7 @@
-"""Arrays and texts as the page takes them: quantised, differenced, in byte planes, deflated, base64.
+"""Arrays and texts in the encoding of the page: quantised, differenced, in byte planes, deflated, base64.
 
-Positions are exact to half of 0.1 um and deviations to half of 1 nm, wherever on the axis they are: integers
-are summed, never floats.
+Positions are exact to half of 0.1 um and deviations to half of 1 nm everywhere on the axis, as integers are
+summed, not floats.
 """
 
 from __future__ import annotations
@@ -18,19 +18,27 @@ import numpy.typing as npt
 
 from olp.core.errors import CannotCompute
 
-#: steps of what is stored, in mm and s
-POSITION_MM, DEVIATION_MM, TIME_S, WAY_MM = 1e-4, 1e-6, 1e-6, 1e-3
+#: Step of stored positions in mm.
+POSITION_MM = 1e-4
+#: Step of stored deviations in mm.
+DEVIATION_MM = 1e-6
+#: Step of stored times in s.
+TIME_S = 1e-6
+#: Step of stored arc lengths and of axis positions over time in mm.
+ARC_MM = 1e-3
 
+#: Bytes to which each array is aligned.
 _ALIGN = 8
+#: Types of arrays that are stored as they are.
 _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
-#: what one thread deflates at a time; matches do not reach back across
+#: Bytes that one thread deflates at a time, without matches in earlier ones.
 _CHUNK = 1 << 22
-#: half the time of zlib's default, and 7 % more bytes
+#: Level of zlib: half the time of its default, and 7 % more bytes.
 _LEVEL = 5
 
 
 class Arrays:
-    """Named arrays on their way into a page. `specs` says of each how and where it is stored."""
+    """Named arrays for a page. `specs` states for each how and where it is stored."""
 
     def __init__(self) -> None:
         self.specs: dict[str, dict[str, Any]] = {}
@@ -41,8 +49,8 @@ class Arrays:
     def quantised(
         self, name: str, values: npt.ArrayLike, step: float, *, plus: Sequence[str] = (), keep: bool = False
     ) -> str:
-        """Store (n,) or (n, c) finite values in whole steps (a power of ten), less what the arrays `plus`
-        have there. `keep` allows for an array to be named in a later `plus`. Returns the name.
+        """Store (n,) or (n, c) finite values in integer steps (a power of ten), minus the values of the
+        arrays `plus`. With `keep` the array can be named in a later `plus`. Returns the name.
 
         Raises CannotCompute where neighbours are so far apart that their difference does not fit.
         """
@@ -64,7 +72,7 @@ class Arrays:
         return name
 
     def raw(self, name: str, values: npt.ArrayLike, dtype: str) -> str:
-        """Store (n,) or (n, c) values as they are."""
+        """Store (n,) or (n, c) values unchanged."""
         rows = _rows(np.asarray(values))
         data = np.ascontiguousarray(rows, _TYPES[dtype]).tobytes()
         self._put(name, {"enc": "raw", "dtype": dtype, "n": len(rows), "c": rows.shape[1]}, data)
@@ -77,7 +85,7 @@ class Arrays:
         return name
 
     def patch(self, name: str, text: str, of: str, original: str, line: npt.NDArray[np.int64]) -> str:
-        """Store a text as what differs from the text `original`, stored as `of`; (n,) `line` is the line
+        """Store a text as its differences from the text `original`, stored as `of`; (n,) `line` is the line
         there, counted from 0, that each of its lines resembles, -1 for none."""
         lines, others = text.split("\n"), original.split("\n")
         old = ["" if i < 0 else others[i] for i in line.tolist()]
@@ -127,7 +135,7 @@ def _rows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def _in_common(lines: list[str], others: list[str]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n,) characters that pairs of lines share in front, and behind that at the end."""
+    """(n,) numbers of characters that pairs of lines share at the beginning, and at the end without those."""
     a, b = _Table.of(lines), _Table.of(others)
     most = np.minimum(a.length, b.length)
     prefix = np.zeros(len(lines), np.int64)
@@ -165,13 +173,13 @@ class _Table:
     def at(
         self, rows: npt.NDArray[np.int64], k: int, *, backwards: bool
     ) -> npt.NDArray[np.unsignedinteger[Any]]:
-        """(n,) code points number k of lines, from their front or from their end."""
+        """(n,) code points number k of lines, from their beginning or from their end."""
         return np.asarray(self.code[self.start[rows] + (self.length[rows] - 1 - k if backwards else k)])
 
 
 def resolution(peak: float, finest: float, levels: int) -> float:
-    """The power of ten that shows a range up to `peak` in no fewer than so many levels: 1 at most, and not
-    below `finest`."""
+    """The power of ten that shows a range up to `peak` in at least `levels` steps: at most 1, and not below
+    `finest`."""
     step = peak / levels
     if not step > finest:
         return finest

@@ -1,5 +1,4 @@
-"""The page: our template with the packed data and meshcat's bundle in it, one file that needs nothing
-else."""
+"""The page: the template with the packed data and meshcat's bundle in it, one file that needs no other."""
 
 from __future__ import annotations
 
@@ -15,14 +14,15 @@ from typing import Any
 from olp.core.errors import CannotCompute
 from olp.files.write import read_bytes
 
+#: A mark of the template.
 _MARK = re.compile(r"@@([A-Z]+)@@")
-#: what would end a script element, or change how the rest of it is read
+#: Text that would end a script element, or change how the rest of it is read.
 _BREAKS_OUT = re.compile(r"</script|<!--", re.IGNORECASE)
 
 
 def page(manifest: Mapping[str, Any], data: bytes, *, live: bool = False) -> Iterator[bytes]:
-    """The page in parts. `data` is the base64 of the arrays, `live` lets it ask its own server, and nothing
-    else, for changes."""
+    """The page in parts. `data` is the base64 of the arrays; with `live` the page may ask its own server, and
+    no other, for changes."""
     values: dict[str, bytes] = {
         "TITLE": html.escape(str(manifest["title"])).encode(),
         "CONNECT": b"'self'" if live else b"'none'",
@@ -33,18 +33,18 @@ def page(manifest: Mapping[str, Any], data: bytes, *, live: bool = False) -> Ite
         "DATA": data,
         "MODULES": b"\n".join(_modules()),
     }
-    # the values are never searched for marks: a program may hold what looks like one
-    at = 0
+    # the values are not searched for marks, as a program may contain the text of one
+    copied = 0
     template = _asset("review.html")
     for mark in _MARK.finditer(template):
-        yield template[at : mark.start()].encode()
+        yield template[copied : mark.start()].encode()
         yield values[mark[1]]
-        at = mark.end()
-    yield template[at:].encode()
+        copied = mark.end()
+    yield template[copied:].encode()
 
 
 def as_json(value: Mapping[str, Any]) -> bytes:
-    """JSON that can stand in a script element: no `<` in it, so nothing in a text can end the element."""
+    """JSON for a script element: it has no `<`, so that no text can end the element."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").encode()
 
@@ -57,7 +57,7 @@ def _modules() -> Iterator[bytes]:
 def _script(text: str, name: str) -> bytes:
     if _BREAKS_OUT.search(text):
         raise CannotCompute(
-            "holds what would end its script element, so it cannot be put into a page", file=name
+            "contains the end of a script element, so it cannot be put into a page", file=name
         )
     return text.encode()
 
@@ -72,22 +72,22 @@ def _asset(name: str) -> str:
 
 
 def _bundle() -> tuple[str, str]:
-    """meshcat's viewer, and its path. The package is found and not imported: that would load a server."""
-    found = importlib.util.find_spec("meshcat")
-    if found is None or not found.submodule_search_locations:
+    """meshcat's viewer, and its path. The package is not imported, as that would load a server."""
+    spec = importlib.util.find_spec("meshcat")
+    if spec is None or not spec.submodule_search_locations:
         raise CannotCompute(
             "the page needs meshcat, which is not installed; install it with pip install meshcat"
         )
-    path = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
+    path = Path(spec.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
     return read_bytes(path).decode("utf-8"), str(path)
 
 
 def _licence() -> str:
-    """The terms of what is in the bundle."""
+    """The licences of the code in the bundle."""
     try:
         listed = files("meshcat") or []
     except PackageNotFoundError:
         listed = []
     wanted = (".dist-info/LICENSE", "viewer/dist/main.min.js.LICENSE.txt", ".dist-info/licenses")
-    found = [Path(str(f.locate())) for f in listed if any(part in f.as_posix() for part in wanted)]
-    return "\n\n".join(read_bytes(path).decode("utf-8", "replace").strip() for path in found)
+    terms = [Path(str(f.locate())) for f in listed if any(part in f.as_posix() for part in wanted)]
+    return "\n\n".join(read_bytes(path).decode("utf-8", "replace").strip() for path in terms)

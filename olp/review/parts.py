@@ -1,4 +1,4 @@
-"""How the moves of a corrected program lie along those of the nominal one, and where the tip is on them."""
+"""The moves of a corrected program along those of the nominal one, and the positions of the tip on them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from olp.errormodel.reversal import plays
 from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
 
+#: Kinds of straight moves.
 _STRAIGHT = (Kind.RAPID, Kind.LINE, Kind.PROBE)
-#: samples that are evaluated at once: their temporaries fit the cache
+#: Samples that are evaluated at once, so that their temporaries fit the cache.
 BLOCK = 1 << 16
 
 
@@ -35,29 +36,29 @@ class Ends:
         return Ends(path, path.starts_mm(), arc, lengths_mm(path))
 
     def at(self, move: Index, share: Array) -> Array:
-        """(m, 3) axis positions at shares of moves; at a share of 1 that is the end, also of unknown
-        starts."""
+        """(m, 3) axis positions at shares of moves; a share of 1 is the end, also with an unknown start."""
         end = self.path.end_mm[move]
         start = self.start[move]
-        out = start + share[:, None] * (end - start)
+        position = start + share[:, None] * (end - start)
         curved = np.flatnonzero((self.arc[move] >= 0) & (share < 1.0))
         if curved.size:
             arcs, which = self.path.arcs, self.arc[move[curved]]
-            out[curved] = arc_points(
+            position[curved] = arc_points(
                 start[curved], end[curved], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which],
                 share[curved],
             )  # fmt: skip
         whole = share == 1.0
-        out[whole] = end[whole]
-        return out
+        position[whole] = end[whole]
+        return position
 
     def directions(self, move: Index, share: Array) -> Array:
         """(m, 3) unit tangents at shares of moves."""
         step = 1e-6
         first = np.minimum(share, 1.0 - step)
-        out = self.at(move, first + step) - self.at(move, first)
+        step_mm = self.at(move, first + step) - self.at(move, first)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(np.nan_to_num(out / np.sqrt(np.einsum("ij,ij->i", out, out))[:, None]))
+            size_mm = np.sqrt(np.einsum("ij,ij->i", step_mm, step_mm))
+            return np.asarray(np.nan_to_num(step_mm / size_mm[:, None]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +80,7 @@ class Parts:
 
 
 def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, model: ErrorModel) -> Array:
-    """(m,) the share of its nominal move that is done where each corrected move ends."""
+    """(m,) the share of its nominal move that is done at the end of each corrected move."""
     nominal, corrected = ends.path, other.path
     cut = np.ones(len(corrected))
     inner = np.ones(len(corrected), bool)
@@ -110,14 +111,14 @@ def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, mo
     share = np.clip(np.nan_to_num(share, nan=1.0), 0.0, 1.0)
     cut[rows] = share
     if (np.diff(cut) < 0.0)[np.diff(owner) == 0].any():
-        # a step back is one that only takes up lost motion: the tip stands still
+        # a step back only takes up backlash: the tip does not move
         rank = 2.0 * (np.cumsum(np.diff(move, prepend=-1) != 0) - 1)
         cut[rows] = np.clip(np.maximum.accumulate(share + rank) - rank, 0.0, 1.0)
     return cut
 
 
 def _arc_share(ends: Ends, move: Index, tip: Array, guess: Array) -> Array:
-    """Shares of arcs by the angle of points near them; `guess` says on which turn."""
+    """Shares of arcs by the angle of points near them; `guess` gives the turn."""
     arcs, which = ends.path.arcs, ends.arc[move]
     rows = np.arange(len(move))
     axes = np.array(PLANES)[arcs.plane[which]]
@@ -138,8 +139,8 @@ def set_beside(
 ) -> None:  # fmt: skip
     """Shift commands (n, 3) along their moves, and `within` with them, until the tip is beside its sample.
 
-    Equal shares of a move and of what it became are not reached at one place: deviations `result` (n, 3) go
-    evenly from the beginning of a part to its end, and what they differ from that along the path is no
+    Equal shares of a move and of its corrected parts are not at the same position. Deviations `result` (n, 3)
+    change evenly from the beginning of a part to its end; a difference from that along the path is not a
     deviation of the path.
     """
     rows = np.flatnonzero((within < 1.0) & (within > 0.0) & np.isfinite(other.length[part]))
@@ -159,8 +160,8 @@ def set_beside(
 
 
 def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array, command: Array) -> None:
-    """Strokes of canned cycles: a hole may take one peck more or less than before, so pecks have no partners;
-    what stands for a place of the stroke is the same place of the corrected hole."""
+    """Strokes of canned cycles: a corrected hole may need one peck more or less, so pecks have no partners;
+    the partner of a point of the stroke is the same point of the corrected hole."""
     holes = nominal.holes
     if not holes or len(holes) != len(corrected.holes):
         return
@@ -189,8 +190,8 @@ def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array,
 
 
 def held_mm(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:
-    """(m, 3) where the part lies from where the offsets say, at shares of moves: a line that begins in one
-    frame and ends in another goes from the one to the other, an arc is all of its own."""
+    """(m, 3) the shift of the part from its offsets, at shares of moves: along a line that begins in one
+    frame and ends in another it changes from the one to the other; an arc has that of its own frame."""
     own = path.frame[move]
     before = np.where(
         (move > 0) & np.isin(path.kind[move], _STRAIGHT), path.frame[np.maximum(move - 1, 0)], own
@@ -199,10 +200,10 @@ def held_mm(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:
 
 
 def error_mm(model: ErrorModel, points: Array, tool: Array, move: Index, play: Array | None) -> Array:
-    """(n, 3) error of the tip, a block at a time: the temporaries of all at once would not fit the cache."""
-    out = np.empty_like(points)
+    """(n, 3) error of the tip, in blocks whose temporaries fit the cache."""
+    error = np.empty_like(points)
     for a in range(0, len(points), BLOCK):
         rows = slice(a, a + BLOCK)
         tool_vector = tool if tool.ndim == 1 else tool[move[rows]]
-        out[rows] = model.error(points[rows], tool_vector, None if play is None else play[rows])
-    return out
+        error[rows] = model.error(points[rows], tool_vector, None if play is None else play[rows])
+    return error

@@ -1,7 +1,7 @@
-"""The nominal path in samples, and beside each what the machine would do with either program.
+"""The nominal path in samples, and the deviation of the tip at each with either program.
 
-A sample lies at a share of a nominal move. The moves of the corrected program that stand for it are cut where
-the tip is at that place, so that a deviation is the distance from the place that the tip should be at.
+A sample is at a share of a nominal move. The moves of the corrected program are cut where the tip is at that
+point, so that a deviation is the distance from the nominal point.
 """
 
 from __future__ import annotations
@@ -23,13 +23,19 @@ from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
 from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes
 
-#: samples that a path is given unless its length asks for fewer, and the shortest and longest step between
-#: them
-SAMPLES, FINEST_MM, COARSEST_MM = 100_000, 0.5, 10.0
-#: between two samples of a feed move the error bends by less than this
+#: Number of samples of a path, about, within the steps below.
+SAMPLES = 100_000
+#: Shortest step between samples in mm.
+FINEST_MM = 0.5
+#: Longest step between samples in mm.
+COARSEST_MM = 10.0
+#: Between two samples of a feed move the error bends by less than this, in mm.
 BEND_MM = 1e-4
-#: chords of arcs turn by no more than this, and leave the arc by no more than that
-_TURN, _SAGITTA_MM = np.pi / 36, 0.01
+#: Largest angle of a chord of an arc in rad.
+_TURN = np.pi / 36
+#: Largest distance of a chord from its arc in mm.
+_SAGITTA_MM = 0.01
+#: Most steps of a move.
 _MOST_STEPS = 1 << 12
 
 
@@ -37,9 +43,9 @@ _MOST_STEPS = 1 << 12
 class Samples:
     """Of n samples in program order: (n,) nominal `move` and `share` of it; (n,) `part`, the move of the
     corrected program, and the share of it as `within`; (n, 3) `axis_mm` and `command_mm`, nominal and
-    corrected axis positions; (n, 3) deviations of the tip from its nominal place in mm, `uncorrected` and
-    `result`; (n,) `joined`, whether the path leads here from the sample before; (n,) `way_mm` along the path.
-    `play` (n, 3) is that of the nominal commands, None where no axis has lost motion."""
+    corrected axis positions; (n, 3) deviations of the tip from its nominal point in mm, `uncorrected` and
+    `result`; (n,) `joined`, whether the path leads here from the sample before; (n,) `arc_mm` along the path.
+    `play` (n, 3) is that of the nominal commands, None where no axis has backlash."""
 
     move: Index
     share: Array
@@ -50,34 +56,34 @@ class Samples:
     uncorrected: Array
     result: Array
     joined: Mask
-    way_mm: Array
+    arc_mm: Array
     play: Array | None
 
     def __len__(self) -> int:
         return len(self.move)
 
     def take(self, which: Index) -> Samples:
-        """Some of them, one or several times."""
+        """Some of the samples, each once or several times."""
         return Samples(
             self.move[which], self.share[which], self.part[which], self.within[which], self.axis_mm[which],
             self.command_mm[which], self.uncorrected[which], self.result[which], self.joined[which],
-            self.way_mm[which], None if self.play is None else self.play[which],
+            self.arc_mm[which], None if self.play is None else self.play[which],
         )  # fmt: skip
 
     @property
     def correction(self) -> Array:
-        """(n, 3) command written less nominal command."""
+        """(n, 3) corrected command minus nominal command."""
         return self.command_mm - self.axis_mm
 
 
 def sample(
     nominal: Program, corrected: Program, groups: Index, model: ErrorModel, step_mm: float | None = None
 ) -> Samples:
-    """Samples every `step_mm`, or finer where the error asks for it.
+    """Samples every `step_mm`, or finer where the error requires it.
 
-    `groups` (n,) is the last corrected move of each nominal move. Between way-points the tip of the corrected
-    program is taken where it is beside the sample, at way-points where it ends up. Raises CannotCompute for a
-    path without any known position.
+    `groups` (n,) is the last corrected move of each nominal move. Between waypoints the tip of the corrected
+    program is the one beside the sample, at waypoints the one at the end of the move. Raises CannotCompute
+    for a path without any known position.
     """
     path, written = nominal.toolpath, corrected.toolpath
     shift = zero_shifts(path.frames, model) if path.frames else np.zeros((1, 3))
@@ -96,21 +102,20 @@ def sample(
     set_beside(ends, other, parts, move, share, part, within, command, result)
     set_in_holes(nominal, corrected, move, axis, command)
     result = error_mm(model, command, tool, move, play_there) - held + (command - axis)
-    # of several samples at one place the last stands for all: what came before took up lost motion
+    # of several samples at one point the last is used: the moves before it took up backlash
     keep = np.ones(len(move), bool)
     keep[:-1] = (np.diff(move) != 0) | (np.diff(share) > 1e-12)
     keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(result).all(axis=1)
     if not keep.any():
         raise CannotCompute(
-            "the program brings the tip to no known position, so there is nothing to show; give start_mm in "
-            "the job file, or command X, Y and Z first"
+            "no position of the program is known, so there is nothing to show; give start_mm in the job "
+            "file, or command X, Y and Z first"
         )
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)
-    way = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
-    every = Samples(move, share, part, within, axis, command, uncorrected, result, started, way, play).take(
-        np.flatnonzero(keep)
-    )
+    arc_mm = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
+    every = Samples(move, share, part, within, axis, command, uncorrected, result, started, arc_mm, play)
+    every = every.take(np.flatnonzero(keep))
     every.joined[0] = False
     return every
 
@@ -118,27 +123,26 @@ def sample(
 def by_source(
     path: Toolpath, samples: Samples, model: ErrorModel
 ) -> Iterator[tuple[str, npt.NDArray[np.float32]]]:
-    """(name, (n,) mm) of each source of error: the size of what it alone does to the tip of the nominal
-    program."""
+    """(name, (n,) mm) of each source of error: the size of its part of the error of the nominal program."""
     tool = path.tool_mm()
-    found: dict[str, npt.NDArray[np.float32]] = {}
+    sizes: dict[str, npt.NDArray[np.float32]] = {}
     for a in range(0, len(samples), BLOCK):
         rows = slice(a, a + BLOCK)
         tool_vector = tool if tool.ndim == 1 else tool[samples.move[rows]]
         play = None if samples.play is None else samples.play[rows]
         for name, value in model.contributions(samples.axis_mm[rows], tool_vector, play):
-            size = found.setdefault(name, np.zeros(len(samples), np.float32))
+            size = sizes.setdefault(name, np.zeros(len(samples), np.float32))
             size[rows] = np.sqrt(np.einsum("ij,ij->i", value, value))
-    yield from sorted(found.items(), key=lambda item: -float(item[1].max(initial=0.0)))
+    yield from sorted(sizes.items(), key=lambda item: -float(item[1].max(initial=0.0)))
 
 
 def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:
-    """(n,) into how many equal steps each move goes."""
+    """(n,) the number of equal steps of each move."""
     length = lengths_mm(path)
     known = np.isfinite(length)
     length[~known] = 0.0
     if step_mm is None:
-        # every move has a sample at its end; what is left goes to the long ones
+        # every move has a sample at its end; the others are for long moves
         spare = max(SAMPLES - len(path), SAMPLES // 10)
         step_mm = float(np.clip(length.sum() / spare, FINEST_MM, COARSEST_MM))
     steps = np.maximum(np.ceil(length / step_mm - 1e-9), 1).astype(np.int64)
@@ -171,16 +175,16 @@ def _merged(steps: Index, parts: Parts, *, start: bool) -> tuple[Index, Array, I
     if start and len(steps):
         move, share = np.concatenate(([0], move)), np.concatenate(([0.0], share))
     both = np.concatenate((move, parts.owner))
-    at = np.concatenate((share, parts.cut))
+    done = np.concatenate((share, parts.cut))
     ends_part = np.zeros(len(both), bool)
     ends_part[len(move) :] = True
-    # equal keys stay in the order of the corrected program
-    order = np.lexsort((ends_part, at, both))
-    both, at, ends_part = both[order], at[order], ends_part[order]
+    # equal keys keep the order of the corrected program
+    order = np.lexsort((ends_part, done, both))
+    both, done, ends_part = both[order], done[order], ends_part[order]
     part = np.minimum(np.cumsum(ends_part) - ends_part, len(parts.owner) - 1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        within = (at - parts.begin[part]) / (parts.cut - parts.begin)[part]
+        within = (done - parts.begin[part]) / (parts.cut - parts.begin)[part]
     within = np.clip(np.where(ends_part | ~np.isfinite(within), 1.0, within), 0.0, 1.0)
     if start and len(steps):
         within[0] = 0.0
-    return both, at, part, within
+    return both, done, part, within

@@ -1,4 +1,4 @@
-"""A job as pure data: all that its page shows, nothing packed yet."""
+"""A job as plain data: all that its page shows, not packed yet."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ Single = npt.NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What positions are shown in: `label` for people, `offset` the work offset or "machine", `origin_mm`
-    where that is on the machine, no tool length active."""
+    """The frame of shown positions: `label` for people, `offset` the work offset or "machine", `origin_mm`
+    its zero on the machine, without tool length."""
 
     label: str
     offset: str
@@ -33,13 +33,13 @@ class Frame:
 
     @staticmethod
     def of(path: Toolpath) -> Frame:
-        """The work offset of a program that has one all through, and not turned, else the machine."""
+        """The work offset of a program with only one, unrotated, else the machine."""
         used = [path.frames[k] for k in np.unique(path.frame).tolist()]
-        places = {(f.work_offset, *np.round(f.origin_mm(), 9).tolist()) for f in used}
-        if len(places) == 1 and all(f.turn is None for f in used):
-            name, x, y, z = places.pop()
+        origins = {(f.work_offset, *np.round(f.origin_mm(), 9).tolist()) for f in used}
+        if len(origins) == 1 and all(f.turn is None for f in used):
+            name, x, y, z = origins.pop()
             return Frame(f"{name}, as programmed", str(name), (x, y, z))
-        return Frame("machine, less tool lengths", "machine", (0.0, 0.0, 0.0))
+        return Frame("machine, without tool lengths", "machine", (0.0, 0.0, 0.0))
 
     def positions(self, path: Toolpath, move: npt.NDArray[np.int64], axis_mm: Array) -> Array:
         """(n, 3) the tip at axis positions (n, 3), reached in moves (n,)."""
@@ -49,9 +49,9 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sureness:
-    """How sure the samples are: (n,) `band_mm`, expanded uncertainty (k = 2) in the worst direction, and by
-    layer the probability (n,) that the tip is farther than `within_mm` from its place."""
+class TipUncertainty:
+    """Uncertainty of samples: (n,) `band_mm`, expanded uncertainty (k = 2) in the worst direction, and by
+    layer the probability (n,) that the tip is farther than `within_mm` from its nominal point."""
 
     within_mm: float
     band_mm: Single
@@ -60,10 +60,9 @@ class Sureness:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) when they are passed, by the re-timed
-    motion where there is one and else by the feed. `sources` are (name, (n,) mm) by size; `report` is that of
-    the correction or verification ("olp-report-1"); `sureness` is None where the
-    calibration states no uncertainty."""
+    """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
+    where there is one, else at the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
+    correction or verification ("olp-report-1"); `uncertainty` is None where the calibration states none."""
 
     name: str
     corrected_name: str
@@ -83,4 +82,4 @@ class Scene:
     report: Mapping[str, Any]
     tolerance_um: float
     tool_radius_mm: float
-    sureness: Sureness | None = None
+    uncertainty: TipUncertainty | None = None

@@ -1,1 +1,1 @@
-"""Re-timing: a route of way-points to a motion in time that keeps every axis inside its limits."""
+"""Re-timing: a route of waypoints to a motion in time that keeps every axis within its limits."""

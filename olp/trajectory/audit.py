@@ -1,9 +1,9 @@
 """What a motion really asks of the axes: its largest velocity, acceleration, jerk and feed against limits.
 
 Where the axes are cubics of time (a straight path, or a path driven at constant rate) the extremes are
-those of quadratics and lines, taken in closed form. Elsewhere the polynomials are of degree nine and more:
-there the extremes of the path's derivatives, times those of the parameter's, bound the axes; where that
-bound is above a limit, the largest values are found by branch and bound.
+those of quadratics and lines, in closed form. Elsewhere the polynomials are of degree nine and more. There
+the extremes of the path's derivatives, times those of the parameter's, bound the axes. Where that bound is
+above a limit, branch and bound finds the largest values.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.pieces import Pieces, bernstein, blocks, dot
 from olp.trajectory.route import AxisLimits
 
-#: places looked at for the speed along the path, ends included
-_SPEED_PLACES = 5
-#: a bound above a limit by this is rounding
+#: points per piece at which the speed along the path is evaluated, ends included
+_SPEED_POINTS = 5
+#: a bound above a limit by this share of it is rounding
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ratios:
     """Largest ratios to the limits: `velocity`, `acceleration`, `jerk` (3,) per axis, and `feed` along the
-    path (0 if none was given). What is no more than 1 may be a bound, and what the motion does less."""
+    path (0 without feeds). A value up to 1 may be a bound that the motion does not reach."""
 
     velocity: Array
     acceleration: Array
@@ -37,13 +37,13 @@ class Ratios:
     feed: float
 
     def slowed(self, factor: float) -> Ratios:
-        """Those of the motion in `factor` times the time."""
+        """The ratios of the same motion in `factor` times the time."""
         return Ratios(
             self.velocity / factor, self.acceleration / factor**2, self.jerk / factor**3, self.feed / factor
         )
 
     def with_those(self, other: Ratios) -> Ratios:
-        """Those of two motions, one after the other."""
+        """The ratios of two motions, one after the other."""
         return Ratios(
             np.maximum(self.velocity, other.velocity),
             np.maximum(self.acceleration, other.acceleration),
@@ -55,8 +55,8 @@ class Ratios:
 @dataclass(frozen=True, slots=True, eq=False)
 class Audit(Ratios):
     """Ratios, and the largest jumps where pieces join: `position_jump_mm`, `velocity_jump_mm_s`,
-    `acceleration_jump_mm_s2`. Times are floats: at t seconds a jump of position of the speed times t / 2^53
-    is none of the motion's. Neither ends of the motion count as joins."""
+    `acceleration_jump_mm_s2`. Times are floats: at t seconds a position jump of the speed times t / 2^53 is
+    rounding. The ends of the motion are not joins."""
 
     position_jump_mm: float
     velocity_jump_mm_s: float
@@ -72,7 +72,7 @@ def audit(motion: Motion, limits: AxisLimits, feed_mm_s_by_piece: Array | None =
 
 
 def ratios(motion: Motion, limits: AxisLimits, feed_mm_s_by_piece: Array | None = None) -> Ratios:
-    """The ratios alone. Raises as `audit`."""
+    """The ratios without the jumps. Raises as `audit`."""
     if feed_mm_s_by_piece is not None and feed_mm_s_by_piece.shape != (len(motion),):
         raise UsageError(f"feeds have shape {feed_mm_s_by_piece.shape}; expected ({len(motion)},)")
     most = np.stack((limits.velocity, limits.acceleration, limits.jerk))
@@ -85,7 +85,7 @@ def ratios(motion: Motion, limits: AxisLimits, feed_mm_s_by_piece: Array | None 
 
 
 def slowing(result: Ratios) -> float:
-    """The factor, 1 or more, by which the motion's time has to be stretched to keep every limit."""
+    """The factor, 1 or more, by which the motion has to take longer to keep every limit."""
     return max(
         1.0,
         float(result.velocity.max()),
@@ -95,7 +95,7 @@ def slowing(result: Ratios) -> float:
     )
 
 
-def with_jumps(motion: Motion, found: Ratios) -> Audit:
+def with_jumps(motion: Motion, known: Ratios) -> Audit:
     """The audit of a motion whose ratios are known."""
     jumps = np.zeros(3)
     last: list[Array] = []
@@ -108,7 +108,7 @@ def with_jumps(motion: Motion, found: Ratios) -> Audit:
                 jumps[i] = max(jumps[i], np.abs(a[:, 0] - last[i]).max())
         last = [e[:, -1] for e in end]
     position, velocity, acceleration = jumps.tolist()
-    return Audit(found.velocity, found.acceleration, found.jerk, found.feed, position, velocity, acceleration)
+    return Audit(known.velocity, known.acceleration, known.jerk, known.feed, position, velocity, acceleration)
 
 
 def _states(pieces: Pieces, s: Array, s1: Array, s2: Array) -> tuple[Array, Array, Array]:
@@ -118,7 +118,7 @@ def _states(pieces: Pieces, s: Array, s1: Array, s2: Array) -> tuple[Array, Arra
 
 
 def _of(pieces: Pieces, most: Array, feed: Array | None, before: tuple[Array, float]) -> tuple[Array, float]:
-    """(3, 3) largest ratios to `most`, and of the speed to the feed, where those `before` are no larger."""
+    """(3, 3) largest ratios to `most`, and of the speed to the feed; never below those `before`."""
     value, speed, exact, even = _bounds(pieces)
     ratio = value / most[:, :, None]
     share = np.zeros_like(speed) if feed is None else speed / feed
@@ -131,7 +131,7 @@ def _of(pieces: Pieces, most: Array, feed: Array | None, before: tuple[Array, fl
         largest, fastest = _exactly(
             pieces.take(rows), most, None if feed is None else feed[rows], largest, fastest
         )
-    # a bound that is no larger than what is reached elsewhere needs no closer look
+    # a bound below a value reached elsewhere needs no exact value
     rows = np.flatnonzero(exact & ~even & (share > fastest))
     if feed is not None and rows.size:
         fastest = max(fastest, float((_fastest(pieces.take(rows)) / feed[rows]).max()))
@@ -141,7 +141,7 @@ def _of(pieces: Pieces, most: Array, feed: Array | None, before: tuple[Array, fl
 def _exactly(
     pieces: Pieces, most: Array, feed: Array | None, largest: Array, fastest: float
 ) -> tuple[Array, float]:
-    """The same of pieces of any degree, by branch and bound; below 1 nothing is told apart."""
+    """The same of pieces of any degree, by branch and bound; below 1 values are bounds."""
     degree = 3 * (len(pieces.time) - 1) - 1
     third = 6.0 * pieces.path[3]
     values = np.empty((degree + 1, 3, *pieces.path.shape[1:]))
@@ -154,22 +154,23 @@ def _exactly(
     if feed is not None:
         fastest = max(fastest, extreme(values[:, 0] / feed, max(fastest, 1.0)))
     values /= most[:, :, None]
-    found = np.array([
+    extremes = np.array([
         [extreme(values[:, i, axis, None], max(1.0, largest[i, axis])) for axis in range(3)] for i in range(3)
     ])  # fmt: skip
-    return np.maximum(largest, found), fastest
+    return np.maximum(largest, extremes), fastest
 
 
 def _bounds(pieces: Pieces) -> tuple[Array, Array, Mask, Mask]:
-    """(3, 3, n) bounds of velocity, acceleration and jerk of each axis, (n,) of the speed along the path;
-    where the former are exact, and where the latter is."""
+    """(3, 3, n) bounds of velocity, acceleration and jerk of each axis, and (n,) of the speed along the path.
+
+    The masks (n,) mark where the axes' bounds are exact, and where the speed's is."""
     rate, cubic = _rates(pieces)
     low, high = pieces.reach()
     first, last = pieces.slopes(low), pieces.slopes(high)
     bend, bend_last = pieces.bends(low), pieces.bends(high)
     third = 6.0 * pieces.path[3]
     with np.errstate(all="ignore"):
-        # the slope is a parabola: it is largest at an end, or where its own slope is nil
+        # the slope is a parabola: it is largest at an end, or where its own slope is zero
         turn = -bend / third
         turn = np.where((turn > 0.0) & (turn < high - low), turn, 0.0)
     inside = first + turn * (bend + 0.5 * turn * third)
@@ -189,8 +190,8 @@ def _bounds(pieces: Pieces) -> tuple[Array, Array, Mask, Mask]:
 
 
 def _rates(pieces: Pieces) -> tuple[Array, Mask]:
-    """(3, n) largest absolute derivatives of the parameter, and where that is exact: bounds where the
-    polynomial is no cubic."""
+    """(3, n) largest absolute derivatives of the parameter, and where they are exact (cubics); elsewhere
+    they are bounds."""
     u = pieces.seconds
     _, b, c, d = pieces.time[:4]
     cubic: Mask = np.asarray(~pieces.time[4:].any(axis=0))
@@ -222,20 +223,20 @@ def _fastest(pieces: Pieces) -> Array:
     rate, seconds = np.abs(pieces.time[1]), pieces.seconds
     start, step = pieces.time[0], pieces.time[1]
     third = 6.0 * pieces.path[3]
-    best, at = np.full(len(seconds), -1.0), np.zeros(len(seconds))
-    for share in np.linspace(0.0, 1.0, _SPEED_PLACES):
+    best, time_s = np.full(len(seconds), -1.0), np.zeros(len(seconds))
+    for share in np.linspace(0.0, 1.0, _SPEED_POINTS):
         value = _square(pieces.slopes(start + share * seconds * step))
-        at = np.where(value > best, share * seconds, at)
+        time_s = np.where(value > best, share * seconds, time_s)
         best = np.maximum(value, best)
-    # from the best of the places to the top, where slope and bend are at right angles, by Newton
+    # from the best of these points to the maximum, where slope and bend are at right angles, by Newton
     for _ in range(4):
-        s = start + at * step
+        s = start + time_s * step
         slope, bend = pieces.slopes(s), pieces.bends(s)
         climb, curve = dot(slope, bend), _square(bend) + dot(slope, third)
         with np.errstate(all="ignore"):
-            trial = np.where(curve < 0.0, at - climb / (curve * step), at)
+            trial = np.where(curve < 0.0, time_s - climb / (curve * step), time_s)
         trial = np.clip(np.nan_to_num(trial), 0.0, seconds)
         value = _square(pieces.slopes(start + trial * step))
-        at = np.where(value > best, trial, at)
+        time_s = np.where(value > best, trial, time_s)
         best = np.maximum(value, best)
     return np.asarray(np.sqrt(best) * rate)

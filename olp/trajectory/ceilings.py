@@ -1,11 +1,11 @@
 """What each piece of a smooth path allows along it.
 
-With q', q'', q''' by the way, the axes have
+With q', q'', q''' the derivatives by the arc length, the axes have
 
     velocity q' v,  acceleration q' a + q'' v^2,  jerk q' j + 3 q'' v a + q''' v^3,
 
-so that speed V, acceleration A and jerk J along a piece can be chosen such that any motion inside them is
-inside every axis limit.
+so that speed V, acceleration A and jerk J along a piece can be chosen such that every motion within them is
+within every axis limit.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from olp.core.arrays import Array
 from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 
-#: share of the jerk left that 3 q'' v a may use up
+#: share that 3 q'' v a may use of the jerk that q''' v^3 leaves
 _BY_CROSS = 0.5
+#: against division by zero
 _TINY = 1e-300
-#: pieces worked on at a time
+#: pieces per block
 _BLOCK = 1 << 14
 
 
 def ceilings(path: SmoothPath, limits: AxisLimits, share: Array) -> tuple[Array, Array, Array]:
     """(k,) speed, acceleration and jerk along each piece, within which all axis limits and the feed hold,
-    when curvature may use up the `share` (k,) of acceleration and jerk at full speed."""
+    when curvature may use the `share` (k,) of acceleration and jerk at full speed."""
     n = len(path)
     result = np.empty((3, n))
     for lo in range(0, n, _BLOCK):
@@ -38,7 +39,7 @@ def ceilings(path: SmoothPath, limits: AxisLimits, share: Array) -> tuple[Array,
 def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits, share: Array) -> Array:
     h = length[:, None]
     first, second, third = shape[:, 1], 2.0 * shape[:, 2], 6.0 * shape[:, 3]
-    # q' is a parabola, inside the hull of its three control points; q'' is linear
+    # q' is a parabola in the hull of its three control points; q'' is linear
     middle, last = first + 0.5 * h * second, first + h * (second + 0.5 * h * third)
     m1 = np.maximum(np.maximum(np.abs(first), np.abs(last)), np.abs(middle))
     m2 = np.maximum(np.abs(second), np.abs(second + h * third))
@@ -50,8 +51,8 @@ def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits, shar
         v = np.minimum(v, np.sqrt(share * (limits.acceleration / m2).min(axis=1)))
         v = np.minimum(v, np.cbrt(share * (limits.jerk / m3).min(axis=1)))
         cross = 3.0 * m2 * v[:, None]
-        left = limits.jerk - m3 * (v**3)[:, None]
+        spare_jerk = limits.jerk - m3 * (v**3)[:, None]
         a = ((limits.acceleration - m2 * (v**2)[:, None]) / m1).min(axis=1)
-        a = np.minimum(a, (_BY_CROSS * left / np.maximum(cross, _TINY)).min(axis=1))
-        j = ((left - cross * a[:, None]) / m1).min(axis=1)
+        a = np.minimum(a, (_BY_CROSS * spare_jerk / np.maximum(cross, _TINY)).min(axis=1))
+        j = ((spare_jerk - cross * a[:, None]) / m1).min(axis=1)
     return np.stack((v, a, j))

@@ -1,6 +1,6 @@
-"""Which solver drives a run fastest, audited: inside every limit, the feed, and near enough to the polyline.
+"""Which solver drives a run fastest, audited: within every limit, the feed, and the path tolerance.
 
-A candidate that exceeds a limit is slowed down as a whole, one that strays or fails is left out.
+A candidate that exceeds a limit is slowed down as a whole. One that leaves the tolerance or fails is dropped.
 """
 
 from __future__ import annotations
@@ -22,17 +22,19 @@ from olp.trajectory.route import Route
 from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, Candidate, Run, Solver
 from olp.trajectory.speedgrid import bound_s
 
-#: a limit may be touched; so much above it is rounding
+#: a limit may be reached; this share above it is rounding
 _ROUNDING = 1e-9
-#: share of the time that has to be gained, and of what jerk costs in closed form that optimising leaves
-_GAIN, _LEFT = 0.003, 0.1
-#: what a solver that fails may raise
+#: share of the time that optimising has to gain
+_GAIN = 0.003
+#: share of the time that jerk costs in closed form which optimising does not recover
+_JERK_COST = 0.1
+#: exceptions of a solver that fails
 _FAILURES = (ArithmeticError, ValueError, IndexError, CannotCompute)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """A valid motion, slowed down by `factor` where it has to be, and what it uses of the limits."""
+class Solution:
+    """A valid motion, the `factor` by which it is slowed down (1: not), and its ratios to the limits."""
 
     motion: Motion
     solver: str
@@ -48,10 +50,10 @@ class Found:
         return self.motion if self.factor == 1.0 else self.motion.slowed(self.factor)
 
 
-def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Found | None:
-    """The fastest of what the solvers find; those that were given no chance are asked when all else fails,
-    and the last one then: stops everywhere are never the fastest."""
-    best: Found | None = None
+def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solution | None:
+    """The fastest solution of the candidates. Where all fail, the other solvers are tried in order; exact
+    stops come last, as they are never the fastest."""
+    best: Solution | None = None
     for candidate in candidates:
         if best is None or candidate.least_s < best.duration_s:
             best = _better(run, candidate.solver, best)
@@ -64,44 +66,44 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Foun
     return best
 
 
-def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Found]]:
-    """First and last way-point of runs that one solver drives best, one after the other; none where a solver
-    fails, or has to be slowed down because of one run."""
-    all_found = [_better(run, candidate.solver, None) for candidate in candidates]
-    whole = [found for found in all_found if found is not None and found.factor == 1.0]
+def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Solution]]:
+    """First and last waypoint of consecutive runs, and the solver that is fastest there. Empty where a solver
+    fails, or where its motion has to be slowed down."""
+    solutions = [_better(run, candidate.solver, None) for candidate in candidates]
+    whole = [solution for solution in solutions if solution is not None and solution.factor == 1.0]
     if len(whole) < len(candidates):
         return []
     stops = stops_of(run.route)
-    of_run = [np.searchsorted(stops, found.motion.line, side="right") - 1 for found in whole]
+    of_run = [np.searchsorted(stops, solution.motion.line, side="right") - 1 for solution in whole]
     seconds = np.stack([
-        np.bincount(of, np.diff(found.motion.start_s), minlength=len(stops) - 1)
-        for of, found in zip(of_run, whole, strict=True)
+        np.bincount(of, np.diff(solution.motion.start_s), minlength=len(stops) - 1)
+        for of, solution in zip(of_run, whole, strict=True)
     ])  # fmt: skip
     winner = np.argmin(seconds, axis=0)
     edges = np.concatenate(([0], 1 + np.flatnonzero(np.diff(winner)), [len(winner)]))
-    out = []
+    winners = []
     for a, b in pairwise(edges.tolist()):
-        found, of = whole[winner[a]], of_run[winner[a]]
+        solution, of = whole[winner[a]], of_run[winner[a]]
         pieces = slice(int(np.searchsorted(of, a)), int(np.searchsorted(of, b)))
-        out.append((int(stops[a]), int(stops[b]), replace(found, motion=found.motion.part(pieces))))
-    return out
+        winners.append((int(stops[a]), int(stops[b]), replace(solution, motion=solution.motion.part(pieces))))
+    return winners
 
 
-def _optimised(run: Run, best: Found) -> Found:
-    """The motion of optimised speed where it may be faster."""
+def _optimised(run: Run, best: Solution) -> Solution:
+    """The motion of optimised speed, where it is faster."""
     try:
         path, profile = run.path(), run.profile()
     except _FAILURES:
         return best
     bound, closed = bound_s(path, run.limits), seconds(path, profile)
-    if bound + _LEFT * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
+    if bound + _JERK_COST * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
         return best
     solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), LAST.least_s, bends=True)
     return _better(run, solver, best) or best
 
 
-def _better(run: Run, solver: Solver, best: Found | None) -> Found | None:
-    """What the solver finds if it is faster than the best so far, and valid; else that."""
+def _better(run: Run, solver: Solver, best: Solution | None) -> Solution | None:
+    """The solver's solution if it is valid and faster than the best so far; else the best so far."""
     motion = _tried(lambda: solver.solve(run))
     if motion is None:
         return best
@@ -114,19 +116,19 @@ def _better(run: Run, solver: Solver, best: Found | None) -> Found | None:
     deviation = deviation_bound(motion, run.route, motion.line, allowed)
     if not (deviation <= allowed).all():
         return best
-    return Found(motion, solver.name, factor, used.slowed(factor), float(deviation.max(initial=0.0)))
+    return Solution(motion, solver.name, factor, used.slowed(factor), float(deviation.max(initial=0.0)))
 
 
 def _allowed(run: Route) -> Array:
-    """(n - 1,) how far the path may be from the polyline along each segment: what the way-points near it
-    allow, and rounding."""
+    """(n - 1,) how far the path may be from the polyline along each segment: the tolerances of the waypoints
+    around it, and rounding."""
     tolerance = np.concatenate((np.zeros(2), run.tolerance_mm, np.zeros(2)))
     near = [tolerance[i : len(run) - 1 + i] for i in range(6)]
     return np.asarray(np.max(near, axis=0) * (1.0 + 1e-6) + 1e-9)
 
 
 def _tried(solve: Callable[[], Motion]) -> Motion | None:
-    """A solver that fails leaves the field to the others."""
+    """The motion, or None where the solver fails."""
     try:
         motion = solve()
     except _FAILURES:
@@ -136,5 +138,5 @@ def _tried(solve: Callable[[], Motion]) -> Motion | None:
 
 
 def stops_of(route: Route) -> Index:
-    """Way-points at rest."""
+    """Indices of the waypoints at rest."""
     return np.flatnonzero((route.tolerance_mm == 0.0) | (route.dwell_s > 0.0))

@@ -1,10 +1,10 @@
-"""Speed along a smooth path, in closed form: ramps between the places that bind.
+"""Speed along a smooth path, in closed form: ramps between critical points.
 
 Every piece has ceilings of the speed, acceleration and jerk along it (olp.trajectory.ceilings). The profile
-runs from node to node, where its acceleration is nil, by a ramp up, a stretch at one speed and a ramp down.
-Nodes are the rests, and the dips of the speed's ceiling that bind even where jerk is free; a profile that is
-too fast somewhere gets a node at the worst place, until none is (bidirectional scan with jerk: Dong,
-Ferreira, Stori 2007; pruned to the critical points as VPOp does).
+runs from node to node, where its acceleration is zero, by a ramp up, a stretch at one speed and a ramp down.
+Nodes are the rests, and the dips of the speed's ceiling that bind even where jerk is free. Where a profile is
+too fast, the worst piece becomes a node; this is repeated until none is too fast.
+Source: bidirectional scan with jerk, Dong, Ferreira, Stori 2007; pruned to the critical points as in VPOp.
 """
 
 from __future__ import annotations
@@ -21,15 +21,28 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 
-#: share of each limit that curvature may use up at full speed: in general, where the first profile holds its
-#: speed, and in a bend between straights, where nothing is left to do but to pass
-_BY_SPEED, _BY_DIP, BY_BEND = 0.6, 0.8, 0.97
+#: share of each limit that curvature may use at full speed, in general
+_BY_SPEED = 0.6
+#: the same where the first profile holds its speed over a whole piece
+_BY_DIP = 0.8
+#: the same in a bend between straights, where there is no reason to accelerate
+BY_BEND = 0.97
+#: a peak below this factor times the speeds at its nodes counts as one speed
 _LEVEL = 1.02
-_BINDS, _TOO_FAST, _PATIENT = 1e-6, 1e-8, 40
-#: pieces of the path, and spans of a profile, worked on at a time
-_BLOCK, _SPANS = 1 << 17, 1 << 15
-#: chains of nodes that are followed one by one rather than all at once
-_ALONE, _TINY = 24, 1e-300
+#: share below a ceiling within which a speed reaches it
+_BINDS = 1e-6
+#: share above a ceiling beyond which a profile is too fast; less is rounding
+_TOO_FAST = 1e-8
+#: turns after which every piece that is too fast becomes a node, not only the worst ones
+_PATIENT = 40
+#: pieces of the path per block
+_BLOCK = 1 << 17
+#: spans of a profile per block
+_SPANS = 1 << 15
+#: fewer chains of nodes than this are followed one by one, not all at once
+_ALONE = 24
+#: against division by zero
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +57,7 @@ class Profile:
     jerk: Array
 
 
-def profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
+def speed_profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
     """The speed profile from rest to rest, within the ceilings of every piece for `share` (k,)."""
     top, most_a, most_j = ceilings(path, limits, share)
     x = path.break_mm
@@ -53,25 +66,26 @@ def profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
     node = _dips(x, top, ceiling, most_a)
     turn = 0
     while True:
-        at = np.flatnonzero(node)
-        begin = at[:-1]
-        way = np.diff(x[at])
+        index = np.flatnonzero(node)
+        begin = index[:-1]
+        length = np.diff(x[index])
         a, j = np.minimum.reduceat(most_a, begin), np.minimum.reduceat(most_j, begin)
-        speed = _reachable(ceiling[at], way, a, j)
-        peak = ramps.peak(speed[:-1], speed[1:], way, np.maximum.reduceat(top, begin), a, j)
-        found = Profile(at, speed, peak, a, j)
-        worst = _too_fast(x, top, found, everywhere=turn >= _PATIENT)
+        speed = _reachable(ceiling[index], length, a, j)
+        peak = ramps.peak(speed[:-1], speed[1:], length, np.maximum.reduceat(top, begin), a, j)
+        profile = Profile(index, speed, peak, a, j)
+        worst = _too_fast(x, top, profile, everywhere=turn >= _PATIENT)
         if not worst.size:
-            return found
+            return profile
         node[worst] = True
         node[worst + 1] = True
         turn += 1
 
 
 def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
-    """(k + 1,) where it rests, and both ends of the pieces whose ceiling is lower than that of a neighbour,
-    higher than that of none, and reached where only acceleration is bounded (no jerk-bounded profile is
-    faster)."""
+    """(k + 1,) the rests, and both ends of the pieces whose ceiling is a dip that binds.
+
+    A dip is lower than a neighbour and higher than none. It binds where a profile without a jerk limit
+    reaches it; no jerk-bounded profile is faster than that."""
     node = np.zeros(len(x), bool)
     node[ceiling == 0.0] = True
     free = free_speeds(x, ceiling, acceleration)
@@ -85,7 +99,7 @@ def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
 
 
 def free_speeds(x: Array, ceiling: Array, acceleration: Array) -> Array:
-    """(k + 1,) the most speeds at the breaks, below their ceilings, where jerk is free."""
+    """(k + 1,) largest speeds at the breaks, up to their ceilings, without a jerk limit."""
     square = ceiling * ceiling
     rise = np.minimum(2.0 * acceleration * np.diff(x), float(square.max(initial=0.0)))
     total = np.concatenate(([0.0], np.cumsum(rise)))
@@ -96,92 +110,92 @@ def free_speeds(x: Array, ceiling: Array, acceleration: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
-def _reachable(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
-    """(m + 1,) the most speeds at the nodes that ramps can join, both ways."""
-    forward = _scan(ceiling, way, a, j)
-    return _scan(forward[::-1].copy(), way[::-1], a[::-1], j[::-1])[::-1].copy()
+def _reachable(ceiling: Array, length: Array, a: Array, j: Array) -> Array:
+    """(m + 1,) largest speeds at the nodes that ramps can join in both directions."""
+    forward = _scan(ceiling, length, a, j)
+    return _scan(forward[::-1].copy(), length[::-1], a[::-1], j[::-1])[::-1].copy()
 
 
-def _scan(ceiling: Array, way: Array, a: Array, j: Array) -> Array:
-    """Speeds such that every rise is one a ramp can make: waves of all nodes at once that lower the speed
-    behind those lowered before; they die out within a chain of rising nodes."""
+def _scan(ceiling: Array, length: Array, a: Array, j: Array) -> Array:
+    """Speeds that rise no more than a ramp can: all nodes at once lower the speed of the next one, and those
+    lowered go on, until no speed changes."""
     speed = ceiling.copy()
     todo = np.flatnonzero(speed[1:] > speed[:-1])
     while todo.size:
         if todo.size < _ALONE:
-            _follow(speed, todo, way, a, j)
+            _follow(speed, todo, length, a, j)
             break
-        most = ramps.reach(speed[todo], way[todo], a[todo], j[todo])
+        most = ramps.reach(speed[todo], length[todo], a[todo], j[todo])
         lower = most < speed[todo + 1]
         todo = todo[lower] + 1
         speed[todo] = most[lower]
-        todo = todo[todo < len(way)]
+        todo = todo[todo < len(length)]
         todo = todo[speed[todo + 1] > speed[todo]]
     return speed
 
 
-def _follow(speed: Array, starts: Index, way: Array, a: Array, j: Array) -> None:
-    """The scan from few nodes on, each until its chain ends."""
-    last = len(way)
+def _follow(speed: Array, starts: Index, length: Array, a: Array, j: Array) -> None:
+    """The same scan from few nodes, one chain after the other."""
+    last = len(length)
     for k in starts.tolist():
         v = float(speed[k])
         while k < last and speed[k + 1] > v:
-            v = ramps.reach_one(v, float(way[k]), float(a[k]), float(j[k]))
+            v = ramps.reach_one(v, float(length[k]), float(a[k]), float(j[k]))
             if v >= speed[k + 1]:
                 break
             k += 1
             speed[k] = v
 
 
-def _too_fast(x: Array, top: Array, found: Profile, everywhere: bool) -> Index:
-    """The piece of each span that the profile exceeds the most (all of them, if `everywhere`)."""
-    begin, end = found.node[:-1], found.node[1:]
-    slow = np.flatnonzero(np.minimum.reduceat(top, begin) * (1.0 + _TOO_FAST) < found.peak)
+def _too_fast(x: Array, top: Array, profile: Profile, everywhere: bool) -> Index:
+    """The piece of each span whose ceiling the profile exceeds most (all such pieces if `everywhere`)."""
+    begin, end = profile.node[:-1], profile.node[1:]
+    slow = np.flatnonzero(np.minimum.reduceat(top, begin) * (1.0 + _TOO_FAST) < profile.peak)
     chosen: list[Index] = []
-    at = 0
+    done = 0
     count = np.cumsum(end[slow] - begin[slow])
-    while at < len(slow):
-        stop = max(int(np.searchsorted(count, (count[at - 1] if at else 0) + _BLOCK)), at + 1)
-        chosen.append(_too_fast_of(x, top, found, slow[at:stop], everywhere))
-        at = stop
+    while done < len(slow):
+        stop = max(int(np.searchsorted(count, (count[done - 1] if done else 0) + _BLOCK)), done + 1)
+        chosen.append(_too_fast_of(x, top, profile, slow[done:stop], everywhere))
+        done = stop
     return np.concatenate(chosen) if chosen else np.zeros(0, np.int64)
 
 
-def _too_fast_of(x: Array, top: Array, found: Profile, spans: Index, everywhere: bool) -> Index:
-    begin, size = found.node[spans], found.node[spans + 1] - found.node[spans]
+def _too_fast_of(x: Array, top: Array, profile: Profile, spans: Index, everywhere: bool) -> Index:
+    begin, size = profile.node[spans], profile.node[spans + 1] - profile.node[spans]
     first = np.concatenate(([0], np.cumsum(size)[:-1]))
     span = np.repeat(spans, size)
     piece = np.arange(len(span)) - np.repeat(first - begin, size)
     limit = top[piece] * (1.0 + _TOO_FAST)
-    pick = limit < found.peak[span]
+    pick = limit < profile.peak[span]
     span, piece, limit = span[pick], piece[pick], limit[pick]
-    v0, v1, peak = found.speed[span], found.speed[span + 1], found.peak[span]
-    a, j = found.acceleration[span], found.jerk[span]
-    left, whole = x[piece] - x[found.node[span]], x[found.node[span + 1]] - x[found.node[span]]
-    right = x[piece + 1] - x[found.node[span]]
+    v0, v1, peak = profile.speed[span], profile.speed[span + 1], profile.peak[span]
+    a, j = profile.acceleration[span], profile.jerk[span]
+    start, whole = x[piece] - x[profile.node[span]], x[profile.node[span + 1]] - x[profile.node[span]]
+    stop = x[piece + 1] - x[profile.node[span]]
     up = np.where(limit > v0, ramps.passing(np.maximum(limit, v0), v0, peak, a, j), 0.0)
     down = whole - np.where(limit > v1, ramps.passing(np.maximum(limit, v1), v1, peak, a, j), 0.0)
-    over = (left < down) & (right > up)
+    over = (start < down) & (stop > up)
     if not over.any():
         return np.zeros(0, np.int64)
     if everywhere:
-        out: Index = piece[over]
-        return out
+        every: Index = piece[over]
+        return every
     span, piece = span[over], piece[over]
-    v0, v1, peak, a, j, left, right, whole = (e[over] for e in (v0, v1, peak, a, j, left, right, whole))
-    # the speed there, good enough to rank by: on ramps as if the acceleration were constant
+    v0, v1, peak, a, j, start, stop, whole = (e[over] for e in (v0, v1, peak, a, j, start, stop, whole))
+    # the speed there to rank by: on ramps as if the acceleration were constant
     rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(v1, peak, a, j)
     with np.errstate(divide="ignore", invalid="ignore"):
-        rising = np.where(right < rise, v0**2 + (peak**2 - v0**2) * right / rise, peak**2)
-        falling = np.where(whole - left < fall, v1**2 + (peak**2 - v1**2) * (whole - left) / fall, peak**2)
+        rising = np.where(stop < rise, v0**2 + (peak**2 - v0**2) * stop / rise, peak**2)
+        falling = np.where(whole - start < fall, v1**2 + (peak**2 - v1**2) * (whole - start) / fall, peak**2)
     ratio = np.minimum(rising, falling) / top[piece] ** 2
     order = np.lexsort((-ratio, span))
     head = np.concatenate(([True], span[order][1:] != span[order][:-1]))
-    # how far a node at the worst place slows the profile beside it: places farther away need their own
+    # how far a node at the worst piece slows the profile beside it: pieces farther away need nodes as well
     rank = np.cumsum(np.concatenate(([True], span[1:] != span[:-1]))) - 1
     slowest = order[head][rank]
     reach = ramps.distance(np.minimum(top[piece[slowest]], peak), peak, a, j)
-    cell = np.floor(left / np.maximum(2.0 * reach, _TINY))
+    cell = np.floor(start / np.maximum(2.0 * reach, _TINY))
     order = np.lexsort((-ratio, cell, span))
     change = (span[order][1:] != span[order][:-1]) | (cell[order][1:] != cell[order][:-1])
     best = order[np.concatenate(([True], change))]
@@ -195,27 +209,27 @@ def _too_fast_of(x: Array, top: Array, found: Profile, spans: Index, everywhere:
 
 
 def best_profile(path: SmoothPath, limits: AxisLimits) -> Profile:
-    """The fastest profile found along a path of one piece and more."""
+    """The fastest profile along a path of one piece or more."""
     share = _shares(path)
-    first = profile(path, limits, share)
+    first = speed_profile(path, limits, share)
     _give_dips(first, share)
-    second = profile(path, limits, share)
+    second = speed_profile(path, limits, share)
     return _by_run(path, first, second)
 
 
 def _by_run(path: SmoothPath, first: Profile, second: Profile) -> Profile:
     """From one rest to the next the faster of two profiles."""
     both = (first, second)
-    run = [np.searchsorted(path.rest, found.node[:-1], side="right") for found in both]
+    run = [np.searchsorted(path.rest, profile.node[:-1], side="right") for profile in both]
     before, after = (
-        np.bincount(of, _seconds(path, found), minlength=len(path.rest) + 1)
-        for of, found in zip(run, both, strict=True)
+        np.bincount(of, _seconds(path, profile), minlength=len(path.rest) + 1)
+        for of, profile in zip(run, both, strict=True)
     )
     better = after < before
     if better.all() or not better.any():
         return second if better.all() else first
     spans = [np.flatnonzero(mine[of]) for mine, of in zip((~better, better), run, strict=True)]
-    order = np.argsort(np.concatenate([found.node[k] for found, k in zip(both, spans, strict=True)]))
+    order = np.argsort(np.concatenate([profile.node[k] for profile, k in zip(both, spans, strict=True)]))
 
     def merged(one: Array, other: Array) -> Array:
         result: Array = np.concatenate((one[spans[0]], other[spans[1]]))[order]
@@ -232,7 +246,7 @@ def _by_run(path: SmoothPath, first: Profile, second: Profile) -> Profile:
 
 
 def _shares(path: SmoothPath) -> Array:
-    """(k,) share of the limits for curvature, from the look of the path."""
+    """(k,) share of the limits for curvature: larger for pieces that bend between straights."""
     straight = np.ones(len(path) + 4, bool)
     straight[2:-2] = ~path.shape[:, 2:].any(axis=(1, 2))
     lonely = ~straight[2:-2] & (
@@ -241,64 +255,64 @@ def _shares(path: SmoothPath) -> Array:
     return np.where(lonely, BY_BEND, _BY_SPEED)
 
 
-def _give_dips(found: Profile, share: Array) -> None:
-    """Where the profile holds its speed over a whole piece between two nodes, curvature may use up more."""
-    held = np.diff(found.node) == 1
-    held &= found.peak < _LEVEL * np.minimum(found.speed[:-1], found.speed[1:])
-    dips = found.node[:-1][held]
+def _give_dips(profile: Profile, share: Array) -> None:
+    """Where the profile holds its speed over a whole piece between two nodes, curvature may use more."""
+    steady = np.diff(profile.node) == 1
+    steady &= profile.peak < _LEVEL * np.minimum(profile.speed[:-1], profile.speed[1:])
+    dips = profile.node[:-1][steady]
     share[dips] = np.maximum(share[dips], _BY_DIP)
 
 
-def seconds(path: SmoothPath, found: Profile) -> float:
+def seconds(path: SmoothPath, profile: Profile) -> float:
     """Time of a profile."""
-    return float(_seconds(path, found).sum())
+    return float(_seconds(path, profile).sum())
 
 
-def _seconds(path: SmoothPath, found: Profile) -> Array:
-    """(m,) times between its nodes."""
-    way = np.diff(path.break_mm[found.node])
-    total = np.zeros_like(way)
-    for end in (found.speed[:-1], found.speed[1:]):
-        ramp = ramps.seconds(end, found.peak, found.acceleration, found.jerk)
-        way -= 0.5 * (end + found.peak) * ramp
+def _seconds(path: SmoothPath, profile: Profile) -> Array:
+    """(m,) seconds between its nodes."""
+    length = np.diff(path.break_mm[profile.node])
+    total = np.zeros_like(length)
+    for end in (profile.speed[:-1], profile.speed[1:]):
+        ramp = ramps.seconds(end, profile.peak, profile.acceleration, profile.jerk)
+        length -= 0.5 * (end + profile.peak) * ramp
         total += ramp
-    return np.asarray(total + np.maximum(way, 0.0) / found.peak)
+    return np.asarray(total + np.maximum(length, 0.0) / profile.peak)
 
 
-def driven(path: SmoothPath, found: Profile) -> Motion:
+def driven(path: SmoothPath, profile: Profile) -> Motion:
     """The motion of a profile: cut wherever the path or the jerk changes, each piece from its own start."""
     starts, times = Growing(np.zeros(0)), Growing(np.zeros((0, 4)))
-    shapes, at = Growing(np.zeros(0, np.int64)), 0.0
+    shapes, elapsed_s = Growing(np.zeros(0, np.int64)), 0.0
     starts.append(np.zeros(1))
-    for lo in range(0, len(found.peak), _SPANS):
-        hi = min(lo + _SPANS, len(found.peak))
-        some = Profile(found.node[lo : hi + 1], found.speed[lo : hi + 1],
-                       *(e[lo:hi] for e in (found.peak, found.acceleration, found.jerk)))  # fmt: skip
+    for lo in range(0, len(profile.peak), _SPANS):
+        hi = min(lo + _SPANS, len(profile.peak))
+        some = Profile(profile.node[lo : hi + 1], profile.speed[lo : hi + 1],
+                       *(e[lo:hi] for e in (profile.peak, profile.acceleration, profile.jerk)))  # fmt: skip
         end_s, time, shape = _driven(path, some)
-        starts.append(at + end_s)
-        at += float(end_s[-1])
+        starts.append(elapsed_s + end_s)
+        elapsed_s += float(end_s[-1])
         times.append(time)
         shapes.append(shape)
     which = shapes.whole()
     return Motion(starts.whole(), times.whole(), path.shape, which, path.line[which])
 
 
-def _driven(path: SmoothPath, found: Profile) -> tuple[Array, Array, Index]:
+def _driven(path: SmoothPath, profile: Profile) -> tuple[Array, Array, Index]:
     """Of the pieces (p,) of some spans: seconds until each ends, (p, 4) polynomials, piece of the path."""
-    low, high = int(found.node[0]), int(found.node[-1])
+    low, high = int(profile.node[0]), int(profile.node[-1])
     x = path.break_mm[low:high]
-    clock = Timeline.of(path, found)
+    clock = Timeline.of(path, profile)
     # breaks of the path inside a phase; those at the start of one are there already
-    phase = np.searchsorted(clock.way, x, side="right") - 1
-    inside = np.flatnonzero(clock.way[phase] != x)
+    phase = np.searchsorted(clock.arc_mm, x, side="right") - 1
+    inside = np.flatnonzero(clock.arc_mm[phase] != x)
     phase = phase[inside]
     u = clock.when(phase, x[inside])
     v, a, j = clock.speed[phase], clock.acceleration[phase], clock.jerk[phase]
-    order = np.argsort(np.concatenate((clock.way, x[inside])), kind="stable")
+    order = np.argsort(np.concatenate((clock.arc_mm, x[inside])), kind="stable")
     begin = np.concatenate((clock.start_s[:-1], clock.start_s[phase] + u))[order]
-    shape = np.concatenate((np.searchsorted(x, clock.way, side="right") - 1, inside))[order]
+    shape = np.concatenate((np.searchsorted(x, clock.arc_mm, side="right") - 1, inside))[order]
     time = np.empty((len(order), 4))
-    time[:, 0] = np.concatenate((clock.way, x[inside]))[order] - x[shape]
+    time[:, 0] = np.concatenate((clock.arc_mm, x[inside]))[order] - x[shape]
     time[:, 1] = np.concatenate((clock.speed, np.maximum(v + u * (a + 0.5 * u * j), 0.0)))[order]
     time[:, 2] = np.concatenate((clock.acceleration, a + u * j))[order] / 2.0
     time[:, 3] = np.concatenate((clock.jerk, j))[order] / 6.0
@@ -307,11 +321,11 @@ def _driven(path: SmoothPath, found: Profile) -> tuple[Array, Array, Index]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
-    """The phases (p,) of constant jerk of a profile: `start_s` (p + 1,); way, speed, acceleration and jerk at
-    the start of each and how long it `lasts`; `first` (m + 1,) of each span, and their number."""
+    """The phases (p,) of constant jerk of a profile: `start_s` (p + 1,); arc length, speed, acceleration and
+    jerk at the start of each and how long it `lasts`; `first` (m + 1,) of each span, and their number."""
 
     start_s: Array
-    way: Array
+    arc_mm: Array
     speed: Array
     acceleration: Array
     jerk: Array
@@ -319,10 +333,11 @@ class Timeline:
     first: Index
 
     @staticmethod
-    def of(path: SmoothPath, found: Profile) -> Timeline:
-        v0, v1, peak, a, j = found.speed[:-1], found.speed[1:], found.peak, found.acceleration, found.jerk
-        begin = path.break_mm[found.node[:-1]]
-        whole = np.diff(path.break_mm[found.node])
+    def of(path: SmoothPath, profile: Profile) -> Timeline:
+        v0, v1 = profile.speed[:-1], profile.speed[1:]
+        peak, a, j = profile.peak, profile.acceleration, profile.jerk
+        begin = path.break_mm[profile.node[:-1]]
+        whole = np.diff(path.break_mm[profile.node])
         up, up_flat = ramps.phases(v0, peak, a, j)
         down, down_flat = ramps.phases(peak, v1, a, j)
         rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(peak, v1, a, j)
@@ -346,21 +361,21 @@ class Timeline:
         first = np.concatenate(([0], np.cumsum(used.sum(axis=1))))
         return Timeline(start_s, start[used], speed[used], acceleration[used], jerk[used], lasts[used], first)
 
-    def when(self, phase: Index, way: Array) -> Array:
-        """(n,) seconds into phases (n,) at which ways (n,) are reached."""
+    def when(self, phase: Index, arc_mm: Array) -> Array:
+        """(n,) seconds into phases (n,) at which arc lengths (n,) are reached."""
         v, a, j = self.speed[phase], self.acceleration[phase], self.jerk[phase]
-        return ramps.when(np.maximum(way - self.way[phase], 0.0), v, a, j, self.lasts[phase])
+        return ramps.when(np.maximum(arc_mm - self.arc_mm[phase], 0.0), v, a, j, self.lasts[phase])
 
-    def way_at(self, time_s: Array) -> Array:
-        """(n,) ways at times (n,)."""
-        k = np.clip(np.searchsorted(self.start_s, time_s, side="right") - 1, 0, len(self.way) - 1)
+    def arc_at(self, time_s: Array) -> Array:
+        """(n,) arc lengths at times (n,)."""
+        k = np.clip(np.searchsorted(self.start_s, time_s, side="right") - 1, 0, len(self.arc_mm) - 1)
         u = time_s - self.start_s[k]
         return np.asarray(
-            self.way[k] + u * (self.speed[k] + u * (self.acceleration[k] / 2.0 + u * self.jerk[k] / 6.0))
+            self.arc_mm[k] + u * (self.speed[k] + u * (self.acceleration[k] / 2.0 + u * self.jerk[k] / 6.0))
         )
 
-    def at_way(self, way: Array) -> tuple[Array, Array]:
-        """Speed and acceleration (n,) at ways (n,)."""
-        k = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.way) - 1)
-        v, a, j, u = self.speed[k], self.acceleration[k], self.jerk[k], self.when(k, way)
+    def state_at(self, arc_mm: Array) -> tuple[Array, Array]:
+        """Speed and acceleration (n,) at arc lengths (n,)."""
+        k = np.clip(np.searchsorted(self.arc_mm, arc_mm, side="right") - 1, 0, len(self.arc_mm) - 1)
+        v, a, j, u = self.speed[k], self.acceleration[k], self.jerk[k], self.when(k, arc_mm)
         return np.maximum(v + u * (a + 0.5 * u * j), 0.0), a + u * j

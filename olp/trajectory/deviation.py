@@ -1,7 +1,7 @@
 """How far a motion's path is from the polyline that it follows.
 
 A stretch of a cubic stays inside the hull of its four control points, and the distance from a segment is
-convex, so that no place of the stretch is farther than the farthest of the four.
+convex. So no point of the stretch is farther than the farthest of the four.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ from olp.trajectory.pieces import Pieces, blocks, dot
 from olp.trajectory.route import Route
 from olp.trajectory.same import groups_of_same
 
-#: looks at a curved piece: into how many parts it is cut, and the segments around its own that each is held
-#: against; the halves of a cut corner go with the segments on its sides
-_LOOKS: tuple[tuple[int, tuple[int, ...]], ...] = ((2, (0, -1)), (8, (0, -1, 1, -2, 2)))
+#: passes over a curved piece: into how many parts it is cut, and the segments, relative to its own, that each
+#: part is compared with; the halves of a cut corner belong to the segments on its sides
+_PASSES: tuple[tuple[int, tuple[int, ...]], ...] = ((2, (0, -1)), (8, (0, -1, 1, -2, 2)))
+#: against division by zero
 _TINY = float(np.finfo(np.float64).tiny)
 
 
 def deviation_bound(motion: Motion, route: Route, segment: Index, allowed_mm: Array) -> Array:
-    """(k,) distance mm from the polyline that no place of each piece exceeds.
+    """(k,) distance mm from the polyline that no point of each piece exceeds.
 
     `segment` (k,) is the segment of the route that each piece drives: those within two of it, in order, are
-    looked at. Bounds up to `allowed_mm` (k,) are not made any tighter. Raises UsageError for other shapes.
+    compared. Bounds up to `allowed_mm` (k,) are not made tighter. Raises UsageError for other shapes.
     """
     if segment.shape != (len(motion),) or allowed_mm.shape != segment.shape:
         raise UsageError(
@@ -38,11 +39,11 @@ def deviation_bound(motion: Motion, route: Route, segment: Index, allowed_mm: Ar
         own = group[segment[part]]
         away = _bound(pieces, corners, own, 1, (0,))
         rows = np.flatnonzero(~pieces.straight() | (away > allowed_mm[part]))
-        for parts, near in _LOOKS:
+        for parts, near in _PASSES:
             if rows.size:
-                found = _bound(pieces.take(rows), corners, own[rows], parts, near)
-                away[rows] = np.minimum(away[rows], found)
-                rows = rows[found > allowed_mm[part][rows]]
+                bound = _bound(pieces.take(rows), corners, own[rows], parts, near)
+                away[rows] = np.minimum(away[rows], bound)
+                rows = rows[bound > allowed_mm[part][rows]]
         largest[part] = away
     return largest
 
@@ -81,7 +82,7 @@ def _square_to(offset: Array, delta: Array, size: Array) -> Array:
 
 
 def _polyline(route: Route) -> tuple[Index, Array]:
-    """(n,) number of each way-point, and the polyline (m, 3), once those that are the same are one."""
+    """(n,) number of each waypoint, and the polyline (m, 3), with equal neighbours merged."""
     group = groups_of_same(route.point_mm)
     polyline = route.point_mm[np.flatnonzero(np.diff(group, prepend=-1))]
     return group, (np.repeat(polyline, 2, axis=0) if len(polyline) == 1 else polyline)

@@ -1,7 +1,7 @@
 """The largest values of many polynomials at once, by branch and bound.
 
-A polynomial stays inside its control points, which are those of its halves after each cut; where they are no
-larger than what is reached elsewhere, no closer look is needed.
+A polynomial stays inside the hull of its control points; each cut gives the control points of its halves.
+Parts whose control points are below a value that is reached elsewhere are dropped.
 Source: G. Farin, "Curves and Surfaces for CAGD", on subdivision.
 """
 
@@ -14,20 +14,23 @@ import numpy as np
 
 from olp.core.arrays import Array
 
-#: what a bound may exceed the value found by, relative, and the cuts after which the bound is taken
-_CLOSE, _CUTS = 1e-8, 40
+#: share by which a bound may exceed the value that is reached
+_CLOSE = 1e-8
+#: cuts after which the bound is taken
+_CUTS = 40
 
 
 def nodes(degree: int) -> Array:
-    """(degree + 1,) places in [0, 1], ends included, whose values fix a polynomial."""
+    """(degree + 1,) points in [0, 1], ends included, whose values define a polynomial."""
     result: Array = 0.5 - 0.5 * np.cos(np.pi * np.arange(degree + 1) / degree)
     return result
 
 
 def largest(values: Array, enough: float) -> float:
-    """The largest norm on [0, 1] of polynomials given by their values (degree + 1, c, m) at `nodes`, as
-    vectors of c numbers, c = 1 for absolute values: to 1e-8 of itself where it is above `enough`, else a
-    bound up to that."""
+    """The largest norm on [0, 1] of m polynomials, given by their values (degree + 1, c, m) at `nodes`.
+
+    Values are vectors of c numbers (c = 1: absolute values). The result is exact to 1e-8 of itself above
+    `enough`; below, it is a bound."""
     degree, width = len(values) - 1, values.shape[1]
     if not np.isfinite(values).all():
         return np.inf
@@ -64,5 +67,5 @@ def _to_controls(degree: int) -> Array:
 @cache
 def _halves(degree: int) -> Array:
     """(2 degree + 2, degree + 1) from control points to those of both halves."""
-    left = np.array([[comb(i, j) * 0.5**i for j in range(degree + 1)] for i in range(degree + 1)])
-    return np.concatenate((left, left[::-1, ::-1]))
+    first_half = np.array([[comb(i, j) * 0.5**i for j in range(degree + 1)] for i in range(degree + 1)])
+    return np.concatenate((first_half, first_half[::-1, ::-1]))

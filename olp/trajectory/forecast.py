@@ -10,16 +10,17 @@ from olp.trajectory.critical import BY_BEND
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import MOST_WIDTH
 
+#: against division by zero
 _TINY = 1e-300
-#: shares of a direction below this do not limit a move
+#: components of a direction below this do not limit a move
 _STRAIGHT = 1e-12
 
 
 def expected_s(route: Route, limits: AxisLimits) -> Array:
     """(n - 1,) seconds that `critical` will hardly undercut along each segment of a route.
 
-    A kernel that meets no other bends by du / w at its vertex, w as wide as the tolerance allows: so much
-    speed is left in it. Between two such speeds a segment takes as long as with no acceleration at its ends.
+    A kernel apart from all others bends by du / w at its vertex, w as wide as the tolerance allows: that
+    limits its speed. Between two such speeds a segment takes as long as with no acceleration at its ends.
     """
     delta = np.diff(route.point_mm, axis=0).T
     length = np.maximum(np.sqrt((delta * delta).sum(axis=0)), _TINY)
@@ -40,18 +41,18 @@ def expected_s(route: Route, limits: AxisLimits) -> Array:
     # through a kernel the speed is held
     held = np.where(apart & (slow > 0.0), width, 0.0)
     ends = []
-    way = length.copy()
+    between = length.copy()
     total = np.zeros_like(length)
     for side in (0, 1):
         some = np.insert(held, side * len(held), 0.0)
         speed = np.minimum(np.insert(slow, side * len(slow), 0.0), top)
         total += np.where(some > 0.0, some / np.maximum(speed, _TINY), 0.0)
-        way -= some
+        between -= some
         ends.append(speed)
-    way = np.maximum(way, 0.0)
-    # between different speeds half as long as between twice the one and twice the other
+    between = np.maximum(between, 0.0)
+    # between different speeds: the mean of the times with either speed at both ends
     for end in ends:
-        peak = np.minimum(ramps.reach(end, 0.5 * way, *along), top)
+        peak = np.minimum(ramps.reach(end, 0.5 * between, *along), top)
         used = 2.0 * ramps.distance(end, peak, *along)
-        total += ramps.seconds(end, peak, *along) + 0.5 * np.maximum(way - used, 0.0) / peak
+        total += ramps.seconds(end, peak, *along) + 0.5 * np.maximum(between - used, 0.0) / peak
     return np.asarray(total)

@@ -1,4 +1,4 @@
-"""Arrays that grow in place: parts put one after the other, and never held twice."""
+"""Arrays that grow in place: parts are appended without a second copy of all."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Growing(Generic[_Number]):
     """Rows of one type and shape."""
 
     def __init__(self, empty: npt.NDArray[_Number]) -> None:
-        """`empty` (0, ...) tells type and shape."""
+        """`empty` (0, ...) has the type and the shape of the rows."""
         self._rows: npt.NDArray[_Number] = empty.copy()
         self._count = 0
 
@@ -22,16 +22,16 @@ class Growing(Generic[_Number]):
         return self._count
 
     def append(self, rows: npt.NDArray[_Number]) -> None:
-        """`rows` (n, ...) after those there are."""
+        """Append `rows` (n, ...)."""
         need = self._count + len(rows)
         if need > len(self._rows):
-            # large blocks of memory are moved by the system, not copied; what is not written to takes none
+            # the system moves large blocks of memory without a copy; unwritten pages take no memory
             self._rows.resize((max(need, 3 * len(self._rows) // 2), *rows.shape[1:]), refcheck=False)
         self._rows[self._count : need] = rows
         self._count = need
 
     def whole(self) -> npt.NDArray[_Number]:
-        """All rows; nothing can be added afterwards."""
+        """All rows; the object is empty afterwards."""
         rows: npt.NDArray[_Number] = self._rows
         rows.resize((self._count, *rows.shape[1:]), refcheck=False)
         self._rows = rows[:0].copy()

@@ -1,7 +1,7 @@
-"""Inertial deviation: how far the tool stands off its place because the axes are accelerated.
+"""Inertial deviation: how far the tool is off its position because the axes accelerate.
 
 The machine is a spring: acceleration a_k of axis k shifts the tool relative to the workpiece by C_k a_k, and
-the shifts of the axes add. Static compliance alone; vibration at the machine's own frequencies is not in it.
+the shifts of the axes add. This is static compliance only; vibration is not included.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ from olp.trajectory.route import AxisLimits
 
 #: um per m/s^2 in mm per mm/s^2
 _UNIT = 1e-6
-#: places looked at in a piece whose acceleration is no line; odd, for Simpson's rule
-_PLACES = 17
+#: points per piece where the acceleration is not linear in time; odd, for Simpson's rule
+_POINTS = 17
+#: pieces per block
 _BLOCK = 1 << 12
-#: where the tool is slower than this (mm/s), the path has no direction to speak of
+#: mm/s; where the tool is slower, the deviation is not split into along and across the path
 _SLOWEST = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
     """Of a motion: the largest deviation `most_mm`, at `time_s` on `line`, its `rms_mm` over time, and the
-    largest one across the path, `across_mm`: what lies along it is lag and leaves the path as it is."""
+    largest one across the path, `across_mm`. The part along the path is lag and does not change the path."""
 
     most_mm: float
     rms_mm: float
@@ -40,8 +41,8 @@ class Inertial:
     def of(motion: Motion, compliance: Array) -> Inertial:
         """`compliance` (3, 3) in mm per mm/s^2, column k for axis k.
 
-        Exact where axes are cubics of time, their acceleration being a line there; elsewhere by 17 places a
-        piece.
+        Exact where axes are cubics of time, as their acceleration is linear there; elsewhere from 17 points
+        per piece.
         """
         most, square, across, where, line = 0.0, 0.0, 0.0, 0.0, int(motion.line[0]) if len(motion) else 0
         for piece, time, velocity, acceleration in _states(motion):
@@ -63,12 +64,12 @@ class Inertial:
 
 
 def compliance_of(machine: Machine) -> Array:
-    """(3, 3) deviation of the tool in mm per mm/s^2 of each axis, a column an axis."""
+    """(3, 3) deviation of the tool in mm per mm/s^2, one column per axis."""
     return np.array([machine.axes[name].compliance_um_per_m_s2 for name in "XYZ"]).T * _UNIT
 
 
 def worst(limits: AxisLimits, compliance: Array) -> float:
-    """The largest deviation in mm that accelerations within the limits can make."""
+    """The largest deviation in mm that accelerations within the limits can cause."""
     corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) * limits.acceleration
     return float(np.sqrt(((corners @ compliance.T) ** 2).sum(axis=1)).max())
 
@@ -80,9 +81,8 @@ def capped(limits: AxisLimits, compliance: Array, most_mm: float) -> AxisLimits:
         return replace(limits, acceleration=np.minimum(limits.acceleration, most_mm / size))
 
 
-def sure(limits: AxisLimits, compliance: Array, most_mm: float) -> float:
-    """The largest cap of each axis, in mm, with which all of them together keep to `most_mm` whatever they
-    do."""
+def guaranteed_cap(limits: AxisLimits, compliance: Array, most_mm: float) -> float:
+    """The largest cap per axis in mm with which no motion of all axes deviates by more than `most_mm`."""
     low, high = 0.0, most_mm
     if worst(capped(limits, compliance, high), compliance) <= most_mm:
         return high
@@ -94,11 +94,11 @@ def sure(limits: AxisLimits, compliance: Array, most_mm: float) -> float:
 
 
 def _states(motion: Motion) -> Iterator[tuple[Index, Array, Array, Array]]:
-    """Blocks of pieces (n,), and at k places each times (n, k), velocities and accelerations (n, k, 3)."""
+    """Blocks of pieces (n,), and at k points each times (n, k), velocities and accelerations (n, k, 3)."""
     for a in range(0, len(motion), _BLOCK):
         piece = np.arange(a, min(a + _BLOCK, len(motion)))
         simple = _even(motion, piece)
-        for rows, places in ((piece[simple], 3), (piece[~simple], _PLACES)):
+        for rows, places in ((piece[simple], 3), (piece[~simple], _POINTS)):
             if not len(rows):
                 continue
             width = motion.start_s[rows + 1] - motion.start_s[rows]
@@ -111,8 +111,8 @@ def _states(motion: Motion) -> Iterator[tuple[Index, Array, Array, Array]]:
 
 
 def _even(motion: Motion, piece: Index) -> Mask:
-    """Which pieces have axes that are cubics of time: straight ones driven by a cubic, and any driven at a
-    steady rate."""
+    """Which pieces have axes that are cubics of time: straight ones driven by a cubic, and all that are
+    driven at a steady rate."""
     time, path = motion.time[piece], motion.path[motion.shape[piece]]
     straight = ~path[:, 2:].any(axis=(1, 2)) & ~time[:, 4:].any(axis=1)
     return np.asarray(straight | ~time[:, 2:].any(axis=1))

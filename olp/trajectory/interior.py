@@ -1,13 +1,13 @@
 """Least time along one window of a smooth path: an interior-point method on the square of the speed.
 
-Unknown is b = (dl/dt)^2 over the way l, a quadratic B-spline with simple knots (b and b' continuous); with
-l'' = b'/2 and l''' = b''/2 sqrt(b) the axes ask for
+The unknown is b = (dl/dt)^2 over the arc length l, a quadratic B-spline with simple knots (b and b' are
+continuous). With l'' = b'/2 and l''' = b''/2 sqrt(b) the axes have
 
     velocity |q'| sqrt(b),   acceleration q' b'/2 + q'' b,   jerk (q' b''/2 + 3/2 q'' b' + q''' b) sqrt(b),
 
 the first two linear in b, the third linear over 1/sqrt(b). The time, the integral of 1/sqrt(b), is convex.
-Every row holds three neighbours of the spline's coefficients, so Newton's matrix is pentadiagonal.
-Multipliers follow the primal-dual method (Boyd and Vandenberghe, Convex Optimization, 11.7); of the rows of
+Every row involves three neighbouring coefficients of the spline, so Newton's matrix is pentadiagonal.
+Multipliers follow the primal-dual method (Boyd and Vandenberghe, Convex Optimization, 11.7). Of the rows of
 jerk only the part that keeps the matrix positive enters it.
 """
 
@@ -23,26 +23,43 @@ from olp.trajectory.route import AxisLimits
 
 #: three-point Gauss rule on [0, 1] for the time of a cell
 _GAUSS = 0.5 + 0.5 * np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
+#: its weights
 _WEIGHT = np.array([5.0, 8.0, 5.0]) / 18.0
+#: 1, t, t^2 at its points
 _POWERS = np.stack((np.ones(3), _GAUSS, _GAUSS**2))
 #: coefficients of 1, t, t^2 from the Bernstein ones of a cell
 _MONOMIAL = np.array([[1.0, 0.0, 0.0], [-2.0, 2.0, 0.0], [1.0, -2.0, 1.0]])
-#: share of the way to the boundary that one step goes, slack that it leaves, and how it shrinks
-_NEAR, _LEAVE, _BACK, _TRIES = 0.98, 0.03, 0.7, 30
-#: first barrier over the mean gain of a row, and how it falls with the length of the steps made
-_FIRST, _LEAST = 0.1, 1e-9
+#: share of the distance to the boundary that one step may take
+_NEAR = 0.98
+#: share of its slack that a step leaves to every row
+_LEAVE = 0.03
+#: factor by which a step that leaves less is shortened
+_BACK = 0.7
+#: times that a step is shortened at most
+_TRIES = 30
+#: first barrier, over the mean time per row
+_FIRST = 0.1
+#: least barrier, over the mean time per row
+_LEAST = 1e-9
+#: (length, factor): the factor by which the barrier falls after a step longer than that
 _FALL = ((0.8, 0.1), (0.5, 0.35), (0.2, 0.7), (-1.0, 1.0))
-_DONE, _GAP = 1e-4, 3e-2
-#: steps of Newton at the most
+#: change of the time, relative, below which it counts as still
+_DONE = 1e-4
+#: gap that the barrier leaves, relative to the time, below which the search may end
+_GAP = 3e-2
+#: Newton steps at most
 _STEPS = 80
+#: additions to the unit diagonal that are tried where the matrix cannot be factored
 _RIDGES = (1e-13, 1e-9, 1e-6, 1e-3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """What bounds b at p places of m cells, in order: `cell` (p,), `t` (p,) the place in it from 0 to 1,
-    `most` (p,) the square of the speed allowed; `acceleration` and `jerk` (3, d, p), the row of each of d
-    axes over the coefficients of 1, t, t^2 of its cell, over the limit."""
+    """What bounds b at p points of m cells, in order.
+
+    `cell` (p,), `t` (p,) the position in it from 0 to 1, `most` (p,) the square of the allowed speed.
+    `acceleration` and `jerk` (3, d, p): the row of each of d axes over the coefficients of 1, t, t^2 of its
+    cell, over the limit."""
 
     knot: Array
     cell: Index
@@ -57,9 +74,10 @@ class Rows:
         knot: Array, cell: Index, place: Array, derivatives: tuple[Array, Array, Array], cap: Array,
         limits: AxisLimits, share: Array,
     ) -> Rows:  # fmt: skip
-        """Rows at ways `place` (p,) in cells `cell` (p,) between the `knot`s (m + 1,), where the path has
-        `derivatives` q', q'', q''' (p, 3) and the speed is at most `cap` (p,), for `share` (p,) of the
-        limits."""
+        """Rows at arc lengths `place` (p,) in cells `cell` (p,) between the `knot`s (m + 1,).
+
+        The path has the `derivatives` q', q'', q''' (p, 3) there, the speed is at most `cap` (p,), and
+        `share` (p,) of the limits may be used."""
         h = np.diff(knot)[cell]
         t = (place - knot[cell]) / h
         moves = np.flatnonzero(np.any([np.any(q, axis=0) for q in derivatives], axis=0))
@@ -90,7 +108,7 @@ class Rows:
 
 
 class Spline:
-    """Coefficients (m + 2,) of a quadratic B-spline over m cells, and what cells make of them."""
+    """A quadratic B-spline over m cells with m + 2 coefficients, and its polynomials per cell."""
 
     def __init__(self, knot: Array) -> None:
         self.h = np.diff(knot)
@@ -109,8 +127,8 @@ class Spline:
         return np.asarray(sum(self.map[:, k] * beta[k : m + k] for k in range(3)))
 
     def fitted(self, b: Array, slope: Array) -> Array:
-        """(m + 2,) coefficients near values b and slopes db/dl (m + 1,) at the knots, and equal to them at
-        both ends."""
+        """(m + 2,) coefficients that approximate values b and slopes db/dl (m + 1,) at the knots; both ends
+        are exact."""
         h = self.h
         beta = np.empty(len(h) + 2)
         beta[1:-1] = 0.5 * (b[:-1] + b[1:] + 0.5 * h * (slope[:-1] - slope[1:]))
@@ -137,8 +155,8 @@ class Spline:
 
 
 class _State:
-    """Values of all rows at some coefficients: b, accelerations `a`, jerks over sqrt(b) `j`, and of those the
-    slacks: `u` is the jerk."""
+    """Values of all rows at some coefficients: b, its root, accelerations `a`, jerks over sqrt(b) `j`, jerks
+    `u`, and the slack `v` of the speed."""
 
     __slots__ = ("a", "b", "j", "root", "u", "v")
 
@@ -157,8 +175,8 @@ class _State:
         )
 
     def toward(self, rows: Rows, change: tuple[Array, Array, Array], most: float) -> tuple[_State, float]:
-        """The state a step on, `most` times `change` at the most, that leaves every row a part of its slack;
-        and its length, 0 if there is none."""
+        """The state after a step of at most `most` times `change` that leaves every row part of its slack,
+        and the length of the step, 0 if there is none."""
         db, da, dj = change
         fall = max(
             float((-db / self.b).max()),
@@ -177,12 +195,13 @@ class _State:
 
 
 def fits(rows: Rows, spline: Spline, beta: Array) -> bool:
-    """Whether the coefficients are strictly inside every bound."""
+    """Whether the coefficients are strictly within every bound."""
     return bool((beta[2:-2] > 0.0).all() and _State(rows, *rows.spread(spline.cells(beta))).inside())
 
 
 def least_time(rows: Rows, spline: Spline, beta: Array) -> Array:
-    """The coefficients of least time, from ones strictly inside every bound; the first and last two stay.
+    """The coefficients of least time, from ones strictly within every bound; the first two and the last two
+    are kept.
 
     Raises LinAlgError where Newton's matrix cannot be factored.
     """
@@ -230,7 +249,7 @@ class _Dual:
         self, rows: Rows, here: _State, change: tuple[Array, Array, Array], beta: Array, step: Array,
         mu: float,
     ) -> float:  # fmt: skip
-        """Moves along Newton's direction for the rows' `change`, as far as all stay positive."""
+        """Step along Newton's direction for the rows' `change` while all multipliers remain positive."""
         db, da, dj = change
         of_root = -0.5 * db / here.b
         du = here.root * dj
@@ -253,6 +272,7 @@ class _Dual:
         return length
 
 
+#: entries of a symmetric 3 x 3 matrix
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
@@ -294,7 +314,7 @@ def _newton(
 def _banded(
     rows: Rows, spline: Spline, gradient: Array, hessian: Array, dual: _Dual, beta: Array, mu: float
 ) -> tuple[Array, Array]:
-    """Rows gathered by cell, then by coefficient, with the objective and the rows beta > 0."""
+    """Sums of the rows by cell, then by coefficient, with the objective and the rows beta > 0."""
     m = len(spline.h)
     of_cell = np.add.reduceat(gradient, rows.first, axis=1)
     by_cell = np.add.reduceat(hessian, rows.first, axis=1)
@@ -318,7 +338,7 @@ def _banded(
 
 
 def _solved(band: Array, gradient: Array) -> Array:
-    """Newton's step, by rows and columns scaled to a unit diagonal."""
+    """Newton's step, from the matrix scaled to a unit diagonal."""
     if not (band[2] > 0.0).all():
         raise LinAlgError("the matrix of a window is not positive")
     scale = 1.0 / np.sqrt(band[2])

@@ -1,9 +1,9 @@
 """Sums of overlapping cubic kernels over sorted breaks, without cancellation.
 
-Prefix sums would carry the rounding of the narrowest kernel (third derivative du/w^2) over the whole path.
-Here each half of a kernel, one cubic over a range of pieces, is laid on the O(log) nodes of a binary tree
-that make up its range, as its Taylor polynomial at the start of the node; the sums are then handed down to
-the pieces. Only values of kernels that are really there are added.
+Prefix sums would spread the rounding of the narrowest kernel (third derivative du/w^2) over the whole path.
+Each half of a kernel is one cubic over a range of pieces. It is added to the O(log) nodes of a binary tree
+that make up this range, as its Taylor polynomial at the start of the node. The sums then go down the tree to
+the pieces. So a piece adds only the kernels that reach it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ def deviations(
 ) -> Array:
     """(k, 4, 3) sum of kernels and its first three derivatives at the start of each piece, valid over it.
 
-    `x` (k + 1,) rising breaks; kernel i is bend_i w g((x - centre_i) / w), g(z) = (1 - |z|)^3 / 6, its left
-    half over the pieces begin..middle, its right over middle..end (half open, cut to the breaks given).
+    `x` (k + 1,) rising breaks; kernel i is bend_i w g((x - centre_i) / w), g(z) = (1 - |z|)^3 / 6. Its first
+    half covers the pieces begin..middle, the second middle..end (half open, cut to the breaks given).
     """
     k = len(x) - 1
     depth = max(k - 1, 0).bit_length()
@@ -35,16 +35,16 @@ def deviations(
     for level in range(top, depth):
         base = 1 << level
         parent = tree[:, base : 2 * base].reshape(4, 3, base)
-        left = tree[:, 2 * base : 4 * base : 2].reshape(4, 3, base)
-        right = tree[:, 2 * base + 1 : 4 * base : 2].reshape(4, 3, base)
+        first_child = tree[:, 2 * base : 4 * base : 2].reshape(4, 3, base)
+        second_child = tree[:, 2 * base + 1 : 4 * base : 2].reshape(4, 3, base)
         span = size >> (level + 1)
         d = start[span :: 2 * span] - start[:: 2 * span]
         f, f1, f2, f3 = parent
-        tree[:, 2 * base : 4 * base : 2] = (left + parent).reshape(12, base)
+        tree[:, 2 * base : 4 * base : 2] = (first_child + parent).reshape(12, base)
         shifted = np.stack(
             (f + d * (f1 + d * (f2 / 2.0 + d * (f3 / 6.0))), f1 + d * (f2 + d * (f3 / 2.0)), f2 + d * f3, f3)
         )
-        tree[:, 2 * base + 1 : 4 * base : 2] = (right + shifted).reshape(12, base)
+        tree[:, 2 * base + 1 : 4 * base : 2] = (second_child + shifted).reshape(12, base)
     return np.ascontiguousarray(tree[:, size : size + k].T).reshape(k, 4, 3)
 
 
@@ -52,20 +52,20 @@ def _lay(
     tree: Array, size: int, start: Array, begin: Index, end: Index, edge: Array, sign: float, third: Array,
     bend: Array,
 ) -> int:  # fmt: skip
-    """Lays sign * bend * third * (x - edge)^3 / 6 on the nodes of begin..end; the highest level used."""
+    """Add sign * bend * third * (x - edge)^3 / 6 to the nodes of begin..end; the highest level used."""
     lo, hi = begin + size, end + size
     shift = 0
     level = size.bit_length() - 1
     top = level
-    who = np.flatnonzero(lo < hi)
-    lo, hi = lo[who], hi[who]
-    while who.size:
+    kernel = np.flatnonzero(lo < hi)
+    lo, hi = lo[kernel], hi[kernel]
+    while kernel.size:
         base = size >> shift
         odd_low, odd_high = (lo & 1).astype(bool), (hi & 1).astype(bool)
         node = np.concatenate((lo[odd_low], hi[odd_high] - 1))
         if node.size:
             top = level - shift
-            i = np.concatenate((who[odd_low], who[odd_high]))
+            i = np.concatenate((kernel[odd_low], kernel[odd_high]))
             y = start[(node << shift) - size] - edge[i]
             f3 = sign * third[i]
             f2 = f3 * y
@@ -79,7 +79,7 @@ def _lay(
         lo, hi = (lo + 1) >> 1, hi >> 1
         shift += 1
         on = lo < hi
-        who, lo, hi = who[on], lo[on], hi[on]
+        kernel, lo, hi = kernel[on], lo[on], hi[on]
     return top
 
 

@@ -1,4 +1,4 @@
-"""A motion in time, in pieces: positions and their derivatives at any time, exact to the pieces."""
+"""A motion in time, in pieces: positions and their derivatives at any time."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from olp.trajectory.growing import Growing
 class Motion:
     """Pieces of a path, each driven by a polynomial in time.
 
-    Piece k holds from `start_s[k]` to `start_s[k + 1]`; with u = t - start_s[k] the parameter is
-    s = sum_i `time`[k, i] u^i, and the axis positions are sum_i `path`[`shape`[k], i] s^i in mm: `time`
-    (k, 4) for cubics, (k, 6) where a solver needs quintics, `path` (m, 4, 3), `shape` (k,). Where axes move
-    as cubics of time themselves, s = u. `line` (k,) is the program line of each piece.
+    Piece k lasts from `start_s[k]` to `start_s[k + 1]`. With u = t - start_s[k] the parameter is
+    s = sum_i `time`[k, i] u^i, and the axis positions are sum_i `path`[`shape`[k], i] s^i in mm. `time` is
+    (k, 4) for cubics, (k, 6) where a solver needs quintics; `path` (m, 4, 3), `shape` (k,). Where axes are
+    cubics of time themselves, s = u. `line` (k,) is the program line of each piece.
     """
 
     start_s: Array
@@ -35,9 +35,9 @@ class Motion:
         return len(self.time)
 
     def piece_at(self, time_s: Array) -> Index:
-        """(n,) index of the piece at each time; a time where two join belongs to the later one."""
-        found = np.searchsorted(self.start_s, time_s, side="right") - 1
-        return np.clip(found, 0, max(len(self) - 1, 0))
+        """(n,) index of the piece at each time; at a joint, of the later one."""
+        index = np.searchsorted(self.start_s, time_s, side="right") - 1
+        return np.clip(index, 0, max(len(self) - 1, 0))
 
     def at(self, time_s: Array) -> tuple[Array, Array, Array, Array]:
         """Position mm, velocity mm/s, acceleration mm/s^2 and jerk mm/s^3, (n, 3) each, at times (n,) s."""
@@ -69,7 +69,7 @@ class Motion:
         )
 
     def part(self, pieces: slice) -> Motion:
-        """Some pieces, one after the other, and the paths between the first and the last that they drive."""
+        """Consecutive pieces, with the paths from the first to the last that they drive."""
         shape = self.shape[pieces]
         low, high = (int(shape.min()), int(shape.max()) + 1) if len(shape) else (0, 0)
         start = self.start_s[pieces.start : pieces.stop + 1]
@@ -80,7 +80,7 @@ class Motion:
 
     @staticmethod
     def rest(at_mm: Array, seconds: float, line: int) -> Motion:
-        """Standing still."""
+        """A motion that stands still."""
         path = np.zeros((1, 4, 3))
         path[0, 0] = at_mm
         return Motion(
@@ -93,7 +93,7 @@ class Motion:
 
     @staticmethod
     def joined(parts: Iterable[Motion]) -> Motion:
-        """One after the other; each is taken when the one before has been copied. Of one, itself, from 0."""
+        """Motions one after the other, from 0 s; a single one is not copied. `parts` is read one by one."""
         first: Motion | None = None
         whole: _Joined | None = None
         for part in parts:

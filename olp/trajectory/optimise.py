@@ -1,9 +1,9 @@
-"""Speed along a smooth path by optimisation: what closed forms leave, where ceilings vary smoothly.
+"""Speed along a smooth path by optimisation: faster than closed forms where ceilings vary smoothly.
 
-The closed-form profile gives a grid of cells, even in time, and a start inside every bound. The square of the
-speed is optimised on it in windows that end where the profile is slow; pieces that exceed a bound between the
-rows get tighter rows, and the window is solved again. From and to rest the speed grows as (way)^(2/3), which
-no spline of its square follows, so both ends launch and land at constant jerk.
+The closed-form profile gives a grid of cells, even in time, and a start within every bound. The square of the
+speed is optimised on it in windows that end where the profile is slow. Pieces that exceed a bound between the
+rows get tighter rows, and the window is solved again. From rest the speed grows as the arc length to the
+power 2/3, which no spline of its square follows. So windows launch from rest and land at constant jerk.
 """
 
 from __future__ import annotations
@@ -22,99 +22,119 @@ from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 from olp.trajectory.speedgrid import CELL_S, grid, speed_caps
 
-#: cells of a window, and how far from there it may end, in windows
-_WINDOW, _MARGIN = 3000, 0.35
-#: how much slower than the closed form windows begin and end, and their start is; further shares of the
-#: square of the speed that are tried for that; cells of a window that is not split for want of a start
-_SLOWED, _STARTS, _SMALL = 0.85, (1.0, 0.7, 0.35), 100
-#: share of the first phase of jerk that the launch takes, and where its way would not have as many _DIGITS;
-#: share of a cell's time that its neighbour lasts
-_LAUNCH, _LONGEST, _DIGITS, _CLEAR = 0.04, 0.25, 1e8, 0.4
-#: growth of the times of cells after a launch, their most, and the part of a window that they may take
-_GROW, _MOST, _PART = 1.2, 40, 0.4
+#: cells of a window
+_WINDOW = 3000
+#: how far from an even split a window may end, in windows
+_MARGIN = 0.35
+#: share of the closed form's speed at which windows begin and end, and from which the search starts
+_SLOWED = 0.85
+#: shares of the square of that speed that are tried as a start
+_STARTS = (1.0, 0.7, 0.35)
+#: windows with no more cells than this are not split where no start is within the bounds
+_SMALL = 100
+#: share of the first jerk phase that the launch takes
+_LAUNCH = 0.04
+#: the same where the length of the launch would have fewer than _DIGITS
+_LONGEST = 0.25
+#: length of a launch over the rounding of the arc length, at least
+_DIGITS = 1e8
+#: share of a cell's time that the cell beside an end lasts at least
+_CLEAR = 0.4
+#: growth of the times of cells after a launch
+_GROW = 1.2
+#: cells that grow, at most
+_MOST = 40
+#: share of a window that they may take
+_PART = 0.4
 #: fewest cells of a window
 _FEW = 8
-#: places of a piece between breaks: rows, and where usage is looked at
-_ROWS, _LOOKED = 3, 9
-#: points of the rule by which cells are timed
+#: points per piece between breaks at which there are rows
+_ROWS = 3
+#: points per piece between breaks at which the usage is checked
+_CHECKED = 9
+#: points of the rule that times cells
 _GAUSS = 12
-#: b may change by this in one quintic, or its cell is halved, so often at most
-_STEEP, _HALVES = 1.5, 8
-#: usage that is let be in each turn of tightening rows, and the starts that are tried then
-_LET_BE, _AGAIN = (1.002, 1.002, 1.01, 1.01), (0.95, 0.85, 0.7, 0.5)
+#: factor by which b may change in one quintic; otherwise its cell is halved
+_STEEP = 1.5
+#: times that a cell is halved at most
+_HALVES = 8
+#: usage that is accepted in each turn of tightening rows
+_ACCEPTED = (1.002, 1.002, 1.01, 1.01)
+#: factors of b that are tried as a start of each turn
+_AGAIN = (0.95, 0.85, 0.7, 0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Driven:
-    """A stretch from `way` to way (m + 1,), and how it is gone in `seconds` (m,): the coefficients (m, 6) of
-    time of each step of it."""
+    """A stretch between arc lengths `arc_mm` (m + 1,): the `seconds` (m,) of each step and its polynomial
+    `time` (m, 6)."""
 
-    way: Array
+    arc_mm: Array
     seconds: Array
     time: Array
 
 
-def optimised(path: SmoothPath, limits: AxisLimits, found: Profile) -> Motion:
-    """A motion along `path` from rest to rest that starts its search from the closed-form profile `found`.
+def optimised(path: SmoothPath, limits: AxisLimits, profile: Profile) -> Motion:
+    """A motion along `path` from rest to rest, searched for from the closed-form `profile`.
 
-    Bounds are kept at the rows of the search; between them they may be exceeded slightly: audit it.
+    Bounds hold at the rows of the search. Between them they may be exceeded slightly, so audit the motion.
     """
-    clock = Timeline.of(path, found)
+    clock = Timeline.of(path, profile)
     cap = speed_caps(path, limits)
-    knots = grid(path, limits, found, cap, clock)
-    todo = list(pairwise(_edges(path, found, knots)))[::-1]
+    knots = grid(path, limits, profile, cap, clock)
+    todo = list(pairwise(_edges(path, profile, knots)))[::-1]
     parts = []
     while todo:
         first, last = todo.pop()
-        window = _Window.of(path, limits, found, clock, cap, knots, first, last)
+        window = _Window.of(path, limits, profile, clock, cap, knots, first, last)
         driven = window.solved()
         if driven is None and len(window.spline.h) > _SMALL and last - first > 1:
-            middle = _middle(found, first, last)
+            middle = _middle(profile, first, last)
             todo += [(middle, last), (first, middle)]
             continue
-        parts.append(driven or _as_found(path, found, clock, first, last))
+        parts.append(driven or _closed_form(path, profile, clock, first, last))
     return _motion(path, parts)
 
 
-def _as_found(path: SmoothPath, found: Profile, clock: Timeline, first: int, last: int) -> _Driven:
-    """The closed form between two of its nodes, slowed to meet its neighbours."""
+def _closed_form(path: SmoothPath, profile: Profile, clock: Timeline, first: int, last: int) -> _Driven:
+    """The closed form between two of its nodes, slowed down to join its neighbours."""
     part = slice(int(clock.first[first]), int(clock.first[last]))
-    way = np.append(clock.way[part], path.break_mm[found.node[last]])
+    arc_mm = np.append(clock.arc_mm[part], path.break_mm[profile.node[last]])
     powers = _SLOWED ** np.arange(6.0)
-    time = np.zeros((len(way) - 1, 6))
+    time = np.zeros((len(arc_mm) - 1, 6))
     time[:, 1], time[:, 2], time[:, 3] = (
         clock.speed[part], clock.acceleration[part] / 2.0, clock.jerk[part] / 6.0,
     )  # fmt: skip
-    return _Driven(way, clock.lasts[part] / _SLOWED, time * powers)
+    return _Driven(arc_mm, clock.lasts[part] / _SLOWED, time * powers)
 
 
-def _middle(found: Profile, first: int, last: int) -> int:
-    """The slowest node of the middle half between two."""
+def _middle(profile: Profile, first: int, last: int) -> int:
+    """The slowest node in the middle half between two nodes."""
     quarter = (last - first) // 4
     lo, hi = max(first + quarter, first + 1), max(last - quarter, first + 2)
-    return lo + int(np.argmin(found.speed[lo:hi]))
+    return lo + int(np.argmin(profile.speed[lo:hi]))
 
 
-def _edges(path: SmoothPath, found: Profile, knots: Array) -> list[int]:
+def _edges(path: SmoothPath, profile: Profile, knots: Array) -> list[int]:
     """The nodes at which windows begin and end: the slowest within reach of an even split."""
-    place = np.searchsorted(knots, path.break_mm[found.node])
+    place = np.searchsorted(knots, path.break_mm[profile.node])
     count = max(round(len(knots) / _WINDOW), 1)
     edges = [0]
     for i in range(1, count):
         about = np.array([i - _MARGIN, i + _MARGIN]) * len(knots) / count
         lo, hi = np.searchsorted(place, about)
         if hi > lo > edges[-1]:
-            edges.append(int(lo + np.argmin(found.speed[lo:hi])))
-    return [*edges, len(found.node) - 1]
+            edges.append(int(lo + np.argmin(profile.speed[lo:hi])))
+    return [*edges, len(profile.node) - 1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _End:
-    """A window's end: `way` where its cells end, `speed` and `acceleration` there over the slow-down; the
-    `seconds` times the slow-down of the launch or landing beyond (0: none), the way `rest` where that ends,
-    the `knots` beside it, and the way `clear` of them where others may be."""
+    """A window's end: the arc length `arc_mm` where its cells end, `speed` and `acceleration` there, and the
+    `seconds` of the launch or landing beyond (0: none), all without the slow-down. `rest` is the arc length
+    where that launch ends, `knots` are beside it, and beyond `clear` other knots may follow."""
 
-    way: float
+    arc_mm: float
     speed: float
     acceleration: float
     seconds: float
@@ -123,13 +143,13 @@ class _End:
     clear: float
 
     @staticmethod
-    def of(found: Profile, clock: Timeline, x: Array, node: int, span: int, most_s: float) -> _End:
+    def of(profile: Profile, clock: Timeline, x: Array, node: int, span: int, most_s: float) -> _End:
         """The end at a node beside a span of the profile, with knots for `most_s` seconds from there, which
         are negative before an end."""
-        way, speed, sign = float(x[found.node[node]]), float(found.speed[node]), float(np.sign(most_s))
+        arc_mm, speed, sign = float(x[profile.node[node]]), float(profile.speed[node]), float(np.sign(most_s))
         if speed > 0.0:
-            return _End(way, speed, 0.0, 0.0, way, np.zeros(0), way + sign * _CLEAR * CELL_S * speed)
-        a, j, peak = (float(e[span]) for e in (found.acceleration, found.jerk, found.peak))
+            return _End(arc_mm, speed, 0.0, 0.0, arc_mm, np.zeros(0), arc_mm + sign * _CLEAR * CELL_S * speed)
+        a, j, peak = (float(e[span]) for e in (profile.acceleration, profile.jerk, profile.peak))
         phase = min(a / j, float(np.sqrt(peak / j)))
         fine = j * (_LAUNCH * phase) ** 3 > _DIGITS * np.spacing(x[-1])
         seconds = (_LAUNCH if fine else _LONGEST) * phase
@@ -137,17 +157,17 @@ class _End:
         # cells that grow in time until they are as long as all others
         times = seconds * _GROW ** np.arange(1.0, _MOST)
         times = times[fine & (times * (1.0 - 1.0 / _GROW) < CELL_S) & (times < abs(most_s))]
-        knots = clock.way_at(clock.start_s[clock.first[node]] + sign * times)
-        begin = way + sign * gone
-        last = np.concatenate(([way, begin], knots))[-2:]
+        knots = clock.arc_at(clock.start_s[clock.first[node]] + sign * times)
+        begin = arc_mm + sign * gone
+        last = np.concatenate(([arc_mm, begin], knots))[-2:]
         clear = float(last[1] + _CLEAR * (last[1] - last[0]))
-        return _End(begin, 0.5 * j * seconds**2, sign * j * seconds, seconds, way, knots, clear)
+        return _End(begin, 0.5 * j * seconds**2, sign * j * seconds, seconds, arc_mm, knots, clear)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Window:
-    """A stretch between two nodes of the profile: its ends, rows, and the `start` of the search, times the
-    square of a slow-down."""
+    """A stretch between two nodes of the profile: its ends, rows, and the `start` of the search, without the
+    slow-down."""
 
     begin: _End
     end: _End
@@ -157,18 +177,18 @@ class _Window:
 
     @staticmethod
     def of(
-        path: SmoothPath, limits: AxisLimits, found: Profile, clock: Timeline, cap: Array, knots: Array,
+        path: SmoothPath, limits: AxisLimits, profile: Profile, clock: Timeline, cap: Array, knots: Array,
         first: int, last: int,
     ) -> _Window:  # fmt: skip
         x = path.break_mm
         lasts = float(clock.start_s[clock.first[last]] - clock.start_s[clock.first[first]])
-        begin = _End.of(found, clock, x, first, first, _PART * lasts)
-        end = _End.of(found, clock, x, last, last - 1, -_PART * lasts)
+        begin = _End.of(profile, clock, x, first, first, _PART * lasts)
+        end = _End.of(profile, clock, x, last, last - 1, -_PART * lasts)
         inner = knots[np.searchsorted(knots, begin.clear) : np.searchsorted(knots, end.clear)]
-        z = np.concatenate(([begin.way], begin.knots, inner, end.knots[::-1], [end.way]))
+        z = np.concatenate(([begin.arc_mm], begin.knots, inner, end.knots[::-1], [end.arc_mm]))
         if len(z) <= _FEW:
-            z = np.linspace(begin.way, end.way, _FEW + 1)
-        speed, acceleration = clock.at_way(z)
+            z = np.linspace(begin.arc_mm, end.arc_mm, _FEW + 1)
+        speed, acceleration = clock.state_at(z)
         speed[0], speed[-1] = begin.speed, end.speed
         acceleration[0], acceleration[-1] = begin.acceleration, end.acceleration
         spline = Spline(z)
@@ -176,7 +196,7 @@ class _Window:
         return _Window(begin, end, _Rows.of(path, limits, cap, z), spline, start)
 
     def solved(self) -> _Driven | None:
-        """The stretch in least time; None where no start is inside the bounds."""
+        """The stretch in least time; None where no start is within the bounds."""
         rows = self.rows.rows()
         for share in _STARTS:
             start = _SLOWED**2 * self.start
@@ -189,26 +209,27 @@ class _Window:
             c = self.spline.cells(_tightened(self.rows, rows, self.spline, start))
         except LinAlgError:
             return None
-        way, speed, acceleration, seconds = _states(self.rows.knot, self.spline.h, c)
+        arc_mm, speed, acceleration, seconds = _states(self.rows.knot, self.spline.h, c)
         if self.begin.seconds:
-            way, speed, acceleration = (
-                np.append(e, rest) for e, rest in ((self.begin.rest, way), (0.0, speed), (0.0, acceleration))
+            arc_mm, speed, acceleration = (
+                np.append(e, rest)
+                for e, rest in ((self.begin.rest, arc_mm), (0.0, speed), (0.0, acceleration))
             )
             seconds = np.append(self.begin.seconds / _SLOWED, seconds)
         if self.end.seconds:
-            way, speed, acceleration = (
-                np.append(rest, e) for e, rest in ((self.end.rest, way), (0.0, speed), (0.0, acceleration))
+            arc_mm, speed, acceleration = (
+                np.append(rest, e) for e, rest in ((self.end.rest, arc_mm), (0.0, speed), (0.0, acceleration))
             )
             seconds = np.append(seconds, self.end.seconds / _SLOWED)
-        return _Driven(way, seconds, _quintics(way, speed, acceleration, seconds))
+        return _Driven(arc_mm, seconds, _quintics(arc_mm, speed, acceleration, seconds))
 
 
 def _tightened(rows_at: _Rows, rows: Rows, spline: Spline, start: Array) -> Array:
-    """The coefficients of least time, with rows tightened beside places that exceed a bound."""
+    """The coefficients of least time, with tighter rows in pieces that exceed a bound."""
     beta = least_time(rows, spline, start)
-    for let_be in _LET_BE:
+    for accepted in _ACCEPTED:
         worst = rows_at.worst(spline.cells(beta))
-        over = worst > let_be
+        over = worst > accepted
         if not over.any():
             break
         rows_at.share[over] /= worst[over]
@@ -265,12 +286,12 @@ class _Rows:
     def worst(self, c: Array) -> Array:
         """(n,) largest usage of each piece."""
         whole = replace(self, share=np.ones(len(self.share)))
-        return np.asarray(whole._at(_LOOKED).usage(c).reshape(-1, _LOOKED).max(axis=1))
+        return np.asarray(whole._at(_CHECKED).usage(c).reshape(-1, _CHECKED).max(axis=1))
 
 
 def _states(knot: Array, h: Array, c: Array) -> tuple[Array, Array, Array, Array]:
-    """Way, speed and acceleration (k + 1,) at the knots and at halves of cells in which b changes much, and
-    the seconds (k,) between. A quintic through such states is the motion all but to rounding."""
+    """Arc length, speed and acceleration (k + 1,) at the knots, and between halves of cells in which b
+    changes much; the seconds (k,) between. A quintic through such states is the motion up to rounding."""
     cell, low, high = np.arange(len(h)), np.zeros(len(h)), np.ones(len(h))
 
     def square(i: Index, t: Array) -> Array:
@@ -297,23 +318,23 @@ def _states(knot: Array, h: Array, c: Array) -> tuple[Array, Array, Array, Array
     t = low + 0.5 * (high - low) * (node[:, None] + 1.0)
     seconds = (high - low) * h[cell] * (0.5 * weight @ (1.0 / np.sqrt(square(cell, t))))
     cell, t = np.append(cell, cell[-1]), np.append(low, 1.0)
-    way = np.append(knot[cell[:-1]] + low * h[cell[:-1]], knot[-1])
-    return way, np.sqrt(square(cell, t)), 0.5 * (c[1, cell] + 2.0 * t * c[2, cell]) / h[cell], seconds
+    arc_mm = np.append(knot[cell[:-1]] + low * h[cell[:-1]], knot[-1])
+    return arc_mm, np.sqrt(square(cell, t)), 0.5 * (c[1, cell] + 2.0 * t * c[2, cell]) / h[cell], seconds
 
 
 def _motion(path: SmoothPath, parts: list[_Driven]) -> Motion:
-    """Quintics from knot to knot through the states there, cut where the path changes."""
-    way = np.concatenate([parts[0].way[:1], *(p.way[1:] for p in parts)])
+    """Quintics from knot to knot through the states there, cut at the breaks of the path."""
+    arc_mm = np.concatenate([parts[0].arc_mm[:1], *(p.arc_mm[1:] for p in parts)])
     lasts = np.concatenate([p.seconds for p in parts])
     quintic = np.concatenate([p.time for p in parts])
     x = path.break_mm
-    cell = np.searchsorted(way, x[:-1], side="right") - 1
-    inside = np.flatnonzero(way[cell] != x[:-1])
-    u = _when(quintic[cell[inside]], x[inside] - way[cell[inside]], lasts[cell[inside]])
+    cell = np.searchsorted(arc_mm, x[:-1], side="right") - 1
+    inside = np.flatnonzero(arc_mm[cell] != x[:-1])
+    u = _when(quintic[cell[inside]], x[inside] - arc_mm[cell[inside]], lasts[cell[inside]])
     start_s = np.concatenate(([0.0], np.cumsum(lasts)))
     begin = np.concatenate((start_s[:-1], start_s[cell[inside]] + u))
-    order = np.argsort(np.concatenate((way[:-1], x[inside])), kind="stable")
-    place = np.concatenate((way[:-1], x[inside]))[order]
+    order = np.argsort(np.concatenate((arc_mm[:-1], x[inside])), kind="stable")
+    place = np.concatenate((arc_mm[:-1], x[inside]))[order]
     owner = np.concatenate((np.arange(len(lasts)), cell[inside]))[order]
     shape = np.clip(np.searchsorted(x, place, side="right") - 1, 0, len(path) - 1)
     time = _moved(quintic[owner], np.concatenate((np.zeros(len(lasts)), u))[order])
@@ -321,11 +342,11 @@ def _motion(path: SmoothPath, parts: list[_Driven]) -> Motion:
     return Motion(np.append(begin[order], start_s[-1]), time, path.shape, shape, path.line[shape])
 
 
-def _quintics(way: Array, v: Array, a: Array, t: Array) -> Array:
-    """(m, 6) coefficients of the way after each knot that joins the states at its ends."""
+def _quintics(arc_mm: Array, v: Array, a: Array, t: Array) -> Array:
+    """(m, 6) coefficients of the arc length after each knot that join the states at both ends."""
     c = np.zeros((len(t), 6))
     c[:, 1], c[:, 2] = v[:-1], 0.5 * a[:-1]
-    d = np.diff(way) - t * (c[:, 1] + t * c[:, 2])
+    d = np.diff(arc_mm) - t * (c[:, 1] + t * c[:, 2])
     d1 = (v[1:] - v[:-1] - t * a[:-1]) * t
     d2 = (a[1:] - a[:-1]) * t * t
     c[:, 3] = (10.0 * d - 4.0 * d1 + 0.5 * d2) / t**3
@@ -334,12 +355,12 @@ def _quintics(way: Array, v: Array, a: Array, t: Array) -> Array:
     return c
 
 
-def _when(c: Array, way: Array, most: Array) -> Array:
-    """(n,) seconds after which quintics (n, 6) have gone `way`: bracketed Newton."""
-    lo, hi = np.zeros_like(way), most.copy()
+def _when(c: Array, distance: Array, most: Array) -> Array:
+    """(n,) seconds after which quintics (n, 6) reach `distance`: bracketed Newton."""
+    lo, hi = np.zeros_like(distance), most.copy()
     t = 0.5 * most
     for _ in range(60):
-        f = t * (c[:, 1] + t * (c[:, 2] + t * (c[:, 3] + t * (c[:, 4] + t * c[:, 5])))) - way
+        f = t * (c[:, 1] + t * (c[:, 2] + t * (c[:, 3] + t * (c[:, 4] + t * c[:, 5])))) - distance
         slope = c[:, 1] + t * (2 * c[:, 2] + t * (3 * c[:, 3] + t * (4 * c[:, 4] + t * 5 * c[:, 5])))
         lo, hi = np.where(f <= 0.0, t, lo), np.where(f >= 0.0, t, hi)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,11 +1,11 @@
-"""Sharp corners: straight moves from rest to rest that overlap in time, so that corners are cut by no more
-than the tolerance.
+"""Sharp corners: straight moves from rest to rest overlap in time, which cuts corners within the tolerance.
 
 The last `tau` seconds of a move and the first of the next add up. Both have constant jerk there, J1 and J2
 times g, so that with the corner at 0 the path is the cubic
-    -u1 g J1 (tau - t)^3 / 6 + u2 g J2 t^3 / 6,    0 <= t <= tau,
-at t = tau / 2 the corner is g tau^3 |u2 J2 - u1 J1| / 48 away, and nowhere is the path farther from the
-polyline than that. The middle of each move, from and to an acceleration, is Ruckig's.
+    -u1 g J1 (tau - t)^3 / 6 + u2 g J2 t^3 / 6,    0 <= t <= tau.
+
+At t = tau / 2 the corner is g tau^3 |u2 J2 - u1 J1| / 48 away. The path is never farther from the polyline.
+Ruckig computes the middle of each move, from and to an acceleration.
 Smoothing in time: S. Tajima, B. Sencer, "Kinematic corner smoothing for high speed machine tools",
 Int. J. Machine Tools and Manufacture 108 (2016).
 """
@@ -25,20 +25,20 @@ from olp.trajectory.ruckig_moves import solve_all
 from olp.trajectory.same import groups_of_same
 from olp.trajectory.scurve import CRUISE, PHASES, rest_to_rest_s, states
 
-#: overlaps end this part of the first jerk phase early, so that the middle has room
+#: share of the first jerk phase that an overlap may take, so that the middle keeps a rest of it
 _ROOM = 0.98
-#: directions below this do not limit a move
+#: components of a direction below this do not limit a move
 _ALONG = 1e-12
-#: moves are planned this far inside the limits, as Ruckig is given 1e-9 more than them
+#: share of the limits to which moves are planned, as Ruckig gets 1e-9 more than that
 _INSIDE = 1.0 - 1e-8
-#: moves in one block: their phases stay in the cache
+#: moves per block, so that their phases fit into the cache
 _BLOCK = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlapped:
-    """`motion`, and the segment of the route that each piece drives (k,). Where two moves overlap the segment
-    is the later."""
+    """`motion`, and the `segment` (k,) of the route that each piece drives; where two moves overlap, the
+    later one."""
 
     motion: Motion
     segment: Index
@@ -46,8 +46,8 @@ class Overlapped:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Moves:
-    """n moves: start, direction (n, 3); length, largest speed, acceleration, jerk, feed (n,); and at their
-    n + 1 ends the time that neighbours overlap and the share g of the jerk used for it."""
+    """n moves: start and direction (n, 3); length, largest speed, acceleration and jerk (n,). At their n + 1
+    ends: the time that neighbours overlap, and the share g of the jerk for it."""
 
     start: Array
     along: Array
@@ -60,16 +60,16 @@ class _Moves:
 
 
 def overlap(route: Route, limits: AxisLimits) -> Motion:
-    """The motion along `route`, resting at way-points with no tolerance; whoever plans adds dwells there.
+    """The motion along `route`, with rests at waypoints of tolerance 0; the caller adds dwells there.
 
-    Raises UsageError where route or limits hold what is no number, or no limit above 0.
+    Raises UsageError where a value of the route or of the limits is not a number or out of range.
     """
     return overlap_parts(route, limits).motion
 
 
 def least_s(route: Route, limits: AxisLimits) -> Array:
-    """(n - 1,) seconds that `overlap` takes along each segment of a route at least: those from rest to rest
-    less the overlap at its end. Raises as `overlap`."""
+    """(n - 1,) seconds that `overlap` takes at least along each segment of a route: from rest to rest, less
+    the overlap at its end. Raises as `overlap`."""
     _check(route, limits)
     result = np.zeros(max(len(route) - 1, 0))
     if len(route) > 1:
@@ -80,7 +80,7 @@ def least_s(route: Route, limits: AxisLimits) -> Array:
 
 
 def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
-    """As `overlap`, with what each piece came from."""
+    """As `overlap`, with the segment of each piece."""
     _check(route, limits)
     count = len(route)
     if count == 0:
@@ -109,7 +109,7 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
 
 
 def _merged(route: Route, limits: AxisLimits) -> tuple[Index, _Moves]:
-    """The first way-points of those that are the same (m,), and the m - 1 moves."""
+    """The first waypoint of each group of equal ones (m,), and the m - 1 moves."""
     group = groups_of_same(route.point_mm)
     first = np.flatnonzero(np.diff(group, prepend=-1))
     tolerance = np.minimum.reduceat(route.tolerance_mm, first)
@@ -124,13 +124,13 @@ def _check(route: Route, limits: AxisLimits) -> None:
         if np.shape(values) != (3,) or not bool(np.all(np.isfinite(values) & (values > 0.0))):
             raise UsageError(f"the axis limits of {name} are {values}; expected three numbers above 0")
     if route.point_mm.ndim != 2 or route.point_mm.shape[1] != 3:
-        raise UsageError(f"way-points have shape {route.point_mm.shape}; expected (n, 3)")
+        raise UsageError(f"waypoints have shape {route.point_mm.shape}; expected (n, 3)")
     if not bool(np.isfinite(route.point_mm).all()):
-        raise UsageError("a way-point is not finite")
+        raise UsageError("a waypoint is not finite")
     if not bool(np.all(route.feed_mm_s > 0.0)):
         raise UsageError("a feed is not above 0")
     if not bool(np.all(np.isfinite(route.tolerance_mm) & (route.tolerance_mm >= 0.0))):
-        raise UsageError("a tolerance is not a number from 0 up")
+        raise UsageError("a tolerance is not a number of 0 or more")
 
 
 def _moves(point: Array, feed: Array, tolerance: Array, limits: AxisLimits) -> _Moves:
@@ -147,12 +147,12 @@ def _moves(point: Array, feed: Array, tolerance: Array, limits: AxisLimits) -> _
     share = np.minimum(1.0, summed * _INSIDE)
     turn = np.sqrt(((after - before) ** 2).sum(axis=1))
     inner = tolerance[1:-1]
-    # way-point no farther away than the tolerance
+    # the waypoint is no farther from the path than the tolerance
     tau = np.cbrt(48.0 * inner / np.maximum(share * turn, 1e-30))
-    # both inside the first jerk phase of a time-optimal move from rest to rest
+    # both within the first jerk phase of a time-optimal move from rest to rest
     phase = np.minimum(np.minimum(acceleration / jerk, np.sqrt(speed / jerk)), np.cbrt(length / (2.0 * jerk)))
     tau = np.minimum(tau, _ROOM * np.minimum(phase[:-1], phase[1:]) / np.sqrt(share))
-    # the summed speed is convex in time: no faster at either end than the slower of both feeds
+    # the summed speed is convex in time: at both ends it is no faster than the slower feed
     slow = np.minimum(feed[:-1], feed[1:])
     tau = np.minimum(tau, np.sqrt(2.0 * slow / (share * np.maximum(jerk[:-1], jerk[1:]))))
     tau = np.where(inner > 0.0, tau, 0.0)
@@ -173,7 +173,7 @@ class _Pieces:
 
 
 def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
-    """Pieces of moves a to b - 1, each with the overlap that it begins with."""
+    """Pieces of moves a to b - 1, each with the overlap at its start."""
     pick = slice(a, b)
     count = b - a
     length, jerk = moves.length[pick], moves.jerk[pick]
@@ -205,13 +205,19 @@ def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
     return _Pieces(seconds[used], time[used], path, shape[used], owner[used])
 
 
-def _corner(moves: _Moves, point: Array, at: Index) -> Array:
-    """(m, 4, 3) cubics of time where the moves that end and begin at way-points `at` (m,) overlap."""
-    tau = moves.overlap_s[at][:, None]
-    out = moves.along[at - 1] * (moves.share[at] * moves.jerk[at - 1])[:, None]
-    into = moves.along[at] * (moves.share[at] * moves.jerk[at])[:, None]
+def _corner(moves: _Moves, point: Array, waypoint: Index) -> Array:
+    """(m, 4, 3) cubics of time where the moves before and after each `waypoint` (m,) overlap."""
+    tau = moves.overlap_s[waypoint][:, None]
+    leaving = moves.along[waypoint - 1] * (moves.share[waypoint] * moves.jerk[waypoint - 1])[:, None]
+    entering = moves.along[waypoint] * (moves.share[waypoint] * moves.jerk[waypoint])[:, None]
     return np.stack(
-        (point[at] - out * tau**3 / 6.0, out * tau * tau / 2.0, -out * tau / 2.0, (out + into) / 6.0), axis=1
+        (
+            point[waypoint] - leaving * tau**3 / 6.0,
+            leaving * tau * tau / 2.0,
+            -leaving * tau / 2.0,
+            (leaving + entering) / 6.0,
+        ),
+        axis=1,
     )
 
 

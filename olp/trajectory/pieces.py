@@ -1,4 +1,4 @@
-"""Blocks of pieces of a motion as columns: what is done to all pieces at once runs along memory."""
+"""Blocks of pieces of a motion as columns, so that operations on all pieces run along memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.trajectory.motion import Motion, derivatives
 
-#: pieces in one block: its columns stay in the cache
+#: pieces per block, so that its columns fit into the cache
 _BLOCK = 1 << 12
 
 
@@ -28,7 +28,7 @@ class Pieces:
         return Pieces(self.seconds[which], self.time[:, which], self.path[:, :, which])
 
     def straight(self) -> Mask:
-        """(n,) where the path is a line."""
+        """(n,) whether the path is a line."""
         return np.asarray(~self.path[2:].any(axis=(0, 1)))
 
     def parameters(self, u: Array) -> tuple[Array, Array, Array, Array]:
@@ -36,7 +36,7 @@ class Pieces:
         return derivatives(self.time.T, u)
 
     def reach(self) -> tuple[Array, Array]:
-        """(n,) bounds of the parameter: a polynomial stays inside its control points."""
+        """(n,) bounds of the parameter: a polynomial stays within its control points."""
         controls = bernstein(self.time, self.seconds)
         return controls.min(axis=0), controls.max(axis=0)
 

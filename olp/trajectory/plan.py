@@ -1,9 +1,9 @@
 """From a route to the fastest audited motion that any solver finds for each of its runs.
 
-A run goes from one way-point at rest to the next. What each solver will take for it is told beforehand, by a
-bound or nearly one, and those that cannot win are not asked. Every candidate is audited, and slowed down as a
-whole where it would exceed a limit, so a solver can make a run slow but never wrong; one that fails is left
-out, and the exact stop at every way-point always remains.
+A run goes from one waypoint at rest to the next. A forecast (about a lower bound) of each solver's time
+selects the solvers that can win. Every candidate is audited, and slowed down as a whole where it would exceed
+a limit: a solver can make a run slow but never wrong. A solver that fails is dropped; exact stops at every
+waypoint are always possible.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from olp.trajectory.stretches import Stretch, least_to_optimise, runs_of, togeth
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leg:
-    """A stretch of a route that one solver drove: way-points `first` to `last`, in `duration_s`, never
-    farther than `deviation_mm` from the polyline; `factor` is what the audit slowed it down by."""
+    """A stretch of a route that one solver drove: waypoints `first` to `last`, in `duration_s`, never
+    farther than `deviation_mm` from the polyline; `factor` is by how much the audit slowed it down."""
 
     first: int
     last: int
@@ -41,7 +41,7 @@ class Leg:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """The motion of a whole program within `limits`, the legs that it was planned in, and its audit."""
+    """The motion of a whole program within `limits`, the legs in which it was planned, and its audit."""
 
     motion: Motion
     limits: AxisLimits
@@ -69,7 +69,7 @@ def plan(
 ) -> Trajectory:
     """The motion of a route that begins and ends at rest.
 
-    `optimise` tells whether speeds along dense curves are optimised; None: unless that would take minutes.
+    `optimise`: whether speeds along dense curves are optimised; None: unless that would take minutes.
     Raises CannotCompute for a route that is not finite.
     """
     _check(route, limits)
@@ -114,7 +114,7 @@ def _check(route: Route, limits: AxisLimits) -> None:
 
 
 def _with_stops(route: Route) -> Route:
-    """The ends at rest, and the way-points where the path turns back on itself."""
+    """The route with rests at its ends, at dwells, and at waypoints where the path turns back on itself."""
     tolerance = route.tolerance_mm.copy()
     tolerance[:1] = tolerance[-1:] = 0.0
     tolerance[route.dwell_s > 0.0] = 0.0
@@ -125,10 +125,10 @@ def _with_stops(route: Route) -> Route:
 def _legs(
     route: Route, limits: AxisLimits, stretch: Stretch, least: int
 ) -> Iterator[tuple[Motion, list[Leg], Ratios]]:
-    """The motion of a stretch and the legs it is made of; run by run where a solver fails on the whole."""
+    """The motion of a stretch, its legs and its ratios; run by run where all solvers fail on the whole."""
     first, last = stretch.first, stretch.last
     inner = slice(first, last + 1)
-    # pieces are named by their segment while feeds are audited, by their line afterwards
+    # pieces carry their segment while feeds are audited, their line afterwards
     run = Run(
         Route(
             route.point_mm[inner], route.feed_mm_s[first:last], np.arange(last - first),
@@ -137,19 +137,26 @@ def _legs(
         limits,
     )  # fmt: skip
     if stretch.runs == 1 or len(stretch.candidates) == 1:
-        found = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
-        chosen = [] if found is None else [(0, last - first, found)]
+        solution = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
+        chosen = [] if solution is None else [(0, last - first, solution)]
     else:
         chosen = contest(run, stretch.candidates)
     if chosen:
-        motion = Motion.joined(found.driven() for _, _, found in chosen)
+        motion = Motion.joined(solution.driven() for _, _, solution in chosen)
         legs = [
-            Leg(first + a, first + b, found.solver, found.duration_s, found.factor, found.deviation_mm)
-            for a, b, found in chosen
+            Leg(
+                first + a,
+                first + b,
+                solution.solver,
+                solution.duration_s,
+                solution.factor,
+                solution.deviation_mm,
+            )
+            for a, b, solution in chosen
         ]
         used = chosen[0][2].ratios
-        for _, _, found in chosen[1:]:
-            used = used.with_those(found.ratios)
+        for _, _, solution in chosen[1:]:
+            used = used.with_those(solution.ratios)
         yield _with_dwells(route, first, last, motion), _waiting(route, legs), used
         return
     stops = first + stops_of(run.route)
@@ -160,34 +167,34 @@ def _legs(
 
 
 def _with_dwells(route: Route, first: int, last: int, motion: Motion) -> Motion:
-    """The motion of a stretch with its rests, and the lines of the program."""
+    """The motion of a stretch with its dwells and the lines of the program."""
     line = route.line[first:last][motion.line]
     waits = _dwells(route, first, last)
     if not waits.size:
         return replace(motion, line=line)
     seconds = route.dwell_s[waits]
-    at = np.searchsorted(motion.line, waits - first)
+    index = np.searchsorted(motion.line, waits - first)
     still = np.zeros((len(waits), 4, 3))
     still[:, 0] = route.point_mm[waits]
-    lasts = np.insert(np.diff(motion.start_s), at, seconds)
+    lasts = np.insert(np.diff(motion.start_s), index, seconds)
     return Motion(
         np.concatenate(([0.0], np.cumsum(lasts))),
-        np.insert(motion.time, at, 0.0, axis=0),
+        np.insert(motion.time, index, 0.0, axis=0),
         np.concatenate((motion.path, still)),
-        np.insert(motion.shape, at, len(motion.path) + np.arange(len(waits))),
-        # a dwell belongs to the line that ends there; the one before the first move, to the first
-        np.insert(line, at, route.line[np.maximum(waits - 1, 0)]),
+        np.insert(motion.shape, index, len(motion.path) + np.arange(len(waits))),
+        # a dwell belongs to the line that ends there; a dwell before the first move, to the first line
+        np.insert(line, index, route.line[np.maximum(waits - 1, 0)]),
     )
 
 
 def _dwells(route: Route, first: int, last: int) -> Index:
-    """Way-points with a dwell of a stretch: that at its start belongs to the one before."""
+    """Waypoints of a stretch with a dwell; a dwell at its start belongs to the stretch before."""
     begin = first if first == 0 else first + 1
     return np.asarray(begin + np.flatnonzero(route.dwell_s[begin : last + 1] > 0.0))
 
 
 def _waiting(route: Route, legs: list[Leg]) -> list[Leg]:
-    """The legs with the time that they wait."""
+    """The legs, with their dwells in their durations."""
     waits = [float(route.dwell_s[_dwells(route, leg.first, leg.last)].sum()) for leg in legs]
     return [
         replace(leg, duration_s=leg.duration_s + wait) if wait else leg

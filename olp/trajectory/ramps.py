@@ -1,8 +1,8 @@
-"""Closed forms of one ramp: from a speed to another with no acceleration at both ends, least time.
+"""Closed forms of one ramp: from one speed to another in least time, without acceleration at both ends.
 
-A ramp from v0 to v1 holds |jerk| <= J and |acceleration| <= A: jerk up, perhaps a stretch at A, jerk down.
-With D = |v1 - v0| it takes 2 sqrt(D/J) where A is not reached (D J <= A^2) and D/A + A/J where it is, and
-being point-symmetric covers (v0 + v1)/2 of that. All functions take and give arrays (n,), mm and s.
+A ramp from v0 to v1 keeps |jerk| <= J and |acceleration| <= A: jerk up, perhaps a stretch at A, jerk down.
+With D = |v1 - v0| it takes 2 sqrt(D/J) where A is not reached (D J <= A^2), else D/A + A/J. As it is
+point-symmetric, its length is (v0 + v1)/2 times that. All functions take and return arrays (n,), mm and s.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ import numpy as np
 
 from olp.core.arrays import Array, Index
 
-#: below this share of the speed a change of speed is rounding, and is not made
+#: share of the speed below which a change of speed is rounding, and is not made
 _NO_CHANGE = 1e-10
+#: half the Newton steps at most
 _FEW = 24
 
 
 def phases(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> tuple[Array, Array]:
-    """Seconds of each of the two jerk phases, and of the stretch at `acceleration` between."""
+    """Seconds of each of the two jerk phases, and of the stretch at `acceleration` between them."""
     change = np.abs(v1 - v0)
     full = acceleration / jerk
     steep = change > acceleration * full
@@ -33,41 +34,41 @@ def seconds(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> Array:
 
 
 def distance(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> Array:
-    """Way of the ramp, mm."""
+    """Length of the ramp, mm."""
     return 0.5 * (v0 + v1) * seconds(v0, v1, acceleration, jerk)
 
 
-def reach(v0: Array, way: Array, acceleration: Array, jerk: Array) -> Array:
-    """The most speed a ramp from `v0` attains in `way` mm.
+def reach(v0: Array, length: Array, acceleration: Array, jerk: Array) -> Array:
+    """The largest speed that a ramp from `v0` reaches in `length` mm.
 
-    With A: v1^2 + v1 A^2/J + v0 A^2/J - v0^2 - 2 A way = 0. Without: y = sqrt(v1 - v0) solves
-    y^3 + 2 v0 y = way sqrt(J), which has one root, in closed form by the hyperbolic sine.
+    With A: v1^2 + v1 A^2/J + v0 A^2/J - v0^2 - 2 A length = 0. Without: y = sqrt(v1 - v0) solves
+    y^3 + 2 v0 y = length sqrt(J), which has one root, in closed form by the hyperbolic sine.
     """
     full = acceleration * acceleration / jerk
-    steep = way >= (v0 + 0.5 * full) * 2.0 * acceleration / jerk
+    steep = length >= (v0 + 0.5 * full) * 2.0 * acceleration / jerk
     v1 = np.empty_like(v0)
-    v, f, d = v0[steep], full[steep], way[steep]
+    v, f, d = v0[steep], full[steep], length[steep]
     c = 2.0 * acceleration[steep] * d + v * v - v * f
     v1[steep] = 2.0 * c / (f + np.sqrt(f * f + 4.0 * c))
     rest = ~steep
-    v, d = v0[rest], way[rest] * np.sqrt(jerk[rest])
+    v, d = v0[rest], length[rest] * np.sqrt(jerk[rest])
     k = np.sqrt(v / 1.5)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         z = 1.5 * d / (2.0 * v * k)
         y = np.where(z < 1e100, 2.0 * k * np.sinh(np.arcsinh(z) / 3.0), np.cbrt(d))
     v1[rest] = v + y * y
-    # a change near the rounding of the speed has no digits left to time it by
+    # a change near the rounding of the speed has no digits to compute its time from
     return np.where(v1 - v0 < _NO_CHANGE * v0, v0, v0 + (v1 - v0) * (1.0 - 1e-12))
 
 
-def reach_one(v0: float, way: float, acceleration: float, jerk: float) -> float:
+def reach_one(v0: float, length: float, acceleration: float, jerk: float) -> float:
     """`reach` of one ramp, without the cost of arrays."""
     full = acceleration * acceleration / jerk
-    if way >= (v0 + 0.5 * full) * 2.0 * acceleration / jerk:
-        c = 2.0 * acceleration * way + v0 * v0 - v0 * full
+    if length >= (v0 + 0.5 * full) * 2.0 * acceleration / jerk:
+        c = 2.0 * acceleration * length + v0 * v0 - v0 * full
         v1 = 2.0 * c / (full + math.sqrt(full * full + 4.0 * c))
     else:
-        d = way * math.sqrt(jerk)
+        d = length * math.sqrt(jerk)
         k = math.sqrt(v0 / 1.5)
         z = 1.5 * d / (2.0 * v0 * k) if v0 > 0.0 and v0 * k > 0.0 else math.inf
         y = 2.0 * k * math.sinh(math.asinh(z) / 3.0) if z < 1e100 else math.cbrt(d)
@@ -75,8 +76,8 @@ def reach_one(v0: float, way: float, acceleration: float, jerk: float) -> float:
     return v0 if v1 - v0 < _NO_CHANGE * v0 else v0 + (v1 - v0) * (1.0 - 1e-12)
 
 
-def peak(v0: Array, v1: Array, way: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
-    """The most speed <= `top` from which both ramps, to v0 before and to v1 behind, fit into `way`.
+def peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
+    """The largest speed <= `top` at which both ramps, from v0 and to v1, fit into `length`.
 
     Bracketed Newton; the lower bracket is returned, so the ramps always fit.
     """
@@ -85,8 +86,8 @@ def peak(v0: Array, v1: Array, way: Array, top: Array, acceleration: Array, jerk
 
     def excess(i: Index, p: Array) -> Array:
         a, j = acceleration[i], jerk[i]
-        out: Array = distance(v0[i], p, a, j) + distance(v1[i], p, a, j) - way[i]
-        return out
+        gap: Array = distance(v0[i], p, a, j) + distance(v1[i], p, a, j) - length[i]
+        return gap
 
     every = np.arange(len(v0))
     todo = np.flatnonzero(excess(every, high) > 0.0)
@@ -100,7 +101,7 @@ def peak(v0: Array, v1: Array, way: Array, top: Array, acceleration: Array, jerk
         a, j = acceleration[todo], jerk[todo]
         b, c = v0[todo], v1[todo]
         t0, t1 = seconds(b, trial, a, j), seconds(c, trial, a, j)
-        f = 0.5 * ((b + trial) * t0 + (c + trial) * t1) - way[todo]
+        f = 0.5 * ((b + trial) * t0 + (c + trial) * t1) - length[todo]
         fits = f <= 0.0
         lo = np.where(fits, trial, lo)
         hi = np.where(fits, hi, trial)
@@ -109,44 +110,44 @@ def peak(v0: Array, v1: Array, way: Array, top: Array, acceleration: Array, jerk
             s0 = np.where((trial - b) * j <= a * a, 1.0 / np.sqrt(np.maximum(trial - b, 0.0) * j), 1.0 / a)
             s1 = np.where((trial - c) * j <= a * a, 1.0 / np.sqrt(np.maximum(trial - c, 0.0) * j), 1.0 / a)
             slope = 0.5 * (t0 + t1 + (b + trial) * s0 + (c + trial) * s1)
-            # a hair below the root, that the bracket closes from the side that fits
+            # slightly below the root, so that the bracket closes from the side that fits
             newton = trial - f / slope - 1e-12 * trial
         good = (newton > lo) & (newton < hi) & (step % 4 != 3)
         trial = np.where(good, newton, 0.5 * (lo + hi))
-        on = (hi - lo > 1e-11 * hi) & ~(fits & (f > -1e-10 * way[todo]))
+        on = (hi - lo > 1e-11 * hi) & ~(fits & (f > -1e-10 * length[todo]))
         todo, lo, hi, trial = todo[on], lo[on], hi[on], trial[on]
     return result
 
 
 def passing(speed: Array, v0: Array, v1: Array, acceleration: Array, jerk: Array) -> Array:
-    """Way from the start of a rising ramp to where it passes `speed` (v0 <= speed <= v1)."""
+    """Length from the start of a rising ramp to where it reaches `speed` (v0 <= speed <= v1)."""
     bend, flat = phases(v0, v1, acceleration, jerk)
     gain = 0.5 * jerk * bend * bend
     done = speed - v0
     first = np.minimum(np.sqrt(2.0 * done / jerk), bend)
-    way = first * (v0 + jerk * first * first / 6.0)
+    length = first * (v0 + jerk * first * first / 6.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         second = np.where(flat > 0.0, np.clip((done - gain) / (jerk * bend), 0.0, flat), 0.0)
-    way += second * (v0 + gain + 0.5 * jerk * bend * second)
-    left = np.sqrt(2.0 * np.maximum(v1 - speed, 0.0) / jerk)
-    back = 0.5 * (v0 + v1) * (2.0 * bend + flat) - left * (v1 - jerk * left * left / 6.0)
-    return np.where(done <= np.maximum(gain, (v1 - v0) - gain), way, back)
+    length += second * (v0 + gain + 0.5 * jerk * bend * second)
+    rest_s = np.sqrt(2.0 * np.maximum(v1 - speed, 0.0) / jerk)
+    back = 0.5 * (v0 + v1) * (2.0 * bend + flat) - rest_s * (v1 - jerk * rest_s * rest_s / 6.0)
+    return np.where(done <= np.maximum(gain, (v1 - v0) - gain), length, back)
 
 
-def when(way: Array, speed: Array, acceleration: Array, jerk: Array, most: Array) -> Array:
-    """Seconds, 0 to `most`, after which speed t + acceleration t^2/2 + jerk t^3/6 equals `way`; the cubic
+def when(length: Array, speed: Array, acceleration: Array, jerk: Array, most: Array) -> Array:
+    """Seconds, 0 to `most`, after which speed t + acceleration t^2/2 + jerk t^3/6 equals `length`; the cubic
     rises over that time. Bracketed Newton to rounding."""
     half, sixth = 0.5 * acceleration, jerk / 6.0
     whole = most * (speed + most * (half + most * sixth))
     with np.errstate(divide="ignore", invalid="ignore"):
-        result = np.clip(np.where(whole > 0.0, most * (way / whole), 0.0), 0.0, most)
-    todo = np.arange(len(way))
-    lo, hi, t = np.zeros_like(way), most.copy(), result.copy()
+        result = np.clip(np.where(whole > 0.0, most * (length / whole), 0.0), 0.0, most)
+    todo = np.arange(len(length))
+    lo, hi, t = np.zeros_like(length), most.copy(), result.copy()
     for step in range(80):
         if not todo.size:
             break
         v, h, s = speed[todo], half[todo], sixth[todo]
-        f = t * (v + t * (h + t * s)) - way[todo]
+        f = t * (v + t * (h + t * s)) - length[todo]
         slope = v + t * (2.0 * h + 3.0 * t * s)
         lo = np.where(f <= 0.0, t, lo)
         hi = np.where(f >= 0.0, t, hi)

@@ -1,4 +1,4 @@
-"""What is to be driven: way-points with feeds, how near to pass them, and where to wait."""
+"""Routes: waypoints with feeds, path tolerances and dwells."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from olp.core.arrays import Array, Index
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisLimits:
-    """(3,) most velocity mm/s, acceleration mm/s^2 and jerk mm/s^3 of each axis."""
+    """(3,) largest velocity mm/s, acceleration mm/s^2 and jerk mm/s^3 of each axis."""
 
     velocity: Array
     acceleration: Array
@@ -20,9 +20,9 @@ class AxisLimits:
 class Route:
     """A polyline of commanded axis positions.
 
-    `point_mm` (n, 3); `feed_mm_s` (n - 1,) most speed along each segment, inf for rapids; `line` (n - 1,)
-    the line of the program that each segment comes from; `tolerance_mm` (n,) how far from each way-point the
-    path may pass, 0 where it has to be met at rest (both ends are); `dwell_s` (n,) time at rest there.
+    `point_mm` (n, 3); `feed_mm_s` (n - 1,) largest speed along each segment, inf for rapids; `line` (n - 1,)
+    the line of the program that each segment comes from; `tolerance_mm` (n,) how far from each waypoint the
+    path may pass, 0 for a stop on it (as at both ends); `dwell_s` (n,) time at rest there.
     """
 
     point_mm: Array

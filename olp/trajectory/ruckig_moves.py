@@ -1,9 +1,9 @@
 """Jerk-limited moves of one axis by Ruckig: millimetres outside, metres inside.
 
-The only module that imports ruckig, and it never sets `intermediate_positions`: with way-points the
-community version sends the path to a server. Every result is integrated and checked (Ruckig can drive
-backwards to reach a state that it misses by rounding, or end 1e-8 m off its target); where it fails, the
-closed form of `olp.trajectory.scurve` takes its place.
+This is the only module that imports ruckig. It never sets `intermediate_positions`: with waypoints the
+community version sends the path to a server. Every result is integrated and checked, as Ruckig can drive
+backwards to reach a state that it misses by rounding, or end 1e-8 m off its target. Where a result fails, the
+closed form of `olp.trajectory.scurve` replaces it.
 Source: L. Berscheid, T. Kroeger, "Jerk-limited Real-time Trajectory Generation with Arbitrary Target
 States", RSS 2021.
 """
@@ -19,20 +19,20 @@ from olp.core.arrays import Array, Mask
 from olp.core.errors import CannotCompute, UsageError
 from olp.trajectory.scurve import PHASES, rest_to_rest_s, states, through_peak
 
-#: states that touch a limit exactly fail in up to 9 % of the cases unless the limit is a little wider
+#: factor on limits: without it, Ruckig fails in up to 9 % of the cases where a state is on a limit
 _WIDER = 1.0 + 1e-9
-#: results this much slower than the closed form are wrong turns
+#: results slower than the closed form by more than this factor are rejected
 _SLOWER = 1.0 + 1e-3
-#: (mm) how far from its target a result may end
+#: mm; how far from its target a result may end
 _CLOSE_MM = 1e-10
-#: what the closed form may add to limits where a target is out of reach by rounding alone
+#: factor on limits for the closed form where a target is out of reach only by rounding
 _REACH = 1.0 + 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moves:
     """Phases of m moves: `duration_s` and `jerk` (mm/s^3), (m, 10) each, unused phases of 0 s; `replaced`
-    (m,) marks where the closed form stands in for Ruckig."""
+    (m,) marks the moves from the closed form."""
 
     duration_s: Array
     jerk: Array
@@ -43,9 +43,9 @@ def solve(
     length: float, v0: float, a0: float, v1: float, a1: float, V: float, A: float, J: float
 ) -> tuple[Array, Array]:
     """Durations s and jerks mm/s^3, (p,) each, of the fastest move over `length` mm from speed `v0` and
-    acceleration `a0` to `v1` and `a1`, inside speed `V`, acceleration `A` and jerk `J` (mm, s).
+    acceleration `a0` to `v1` and `a1`, within speed `V`, acceleration `A` and jerk `J` (mm, s).
 
-    Raises UsageError for values that are no move, CannotCompute if there is none inside the limits.
+    Raises UsageError for values out of range, CannotCompute if no move is within the limits.
     """
     moves = solve_all(*(np.array([value], np.float64) for value in (length, v0, a0, v1, a1, V, A, J)))
     used = moves.duration_s[0] > 0.0
@@ -71,7 +71,7 @@ def solve_all(
         if not (better | usable).all():
             k = int(suspect[~(better | usable)][0])
             raise CannotCompute(
-                f"no move over {given[0][k]:g} mm from speed {given[1][k]:g} to {given[3][k]:g} mm/s inside "
+                f"no move over {given[0][k]:g} mm from speed {given[1][k]:g} to {given[3][k]:g} mm/s within "
                 f"{given[5][k]:g} mm/s, {given[6][k]:g} mm/s^2, {given[7][k]:g} mm/s^3"
             )
         rows = suspect[better]
@@ -89,16 +89,16 @@ def _check(length: Array, v0: Array, a0: Array, v1: Array, a1: Array, V: Array, 
             raise UsageError(f"{name} of a move is not between 0 and its limit")
     for name, values in (("start acceleration", a0), ("end acceleration", a1)):
         if not bool(np.all(np.abs(values) <= A * _WIDER)):
-            raise UsageError(f"{name} of a move is not inside its limit")
+            raise UsageError(f"{name} of a move is not within its limit")
 
 
 def _by_ruckig(
     length: Array, v0: Array, a0: Array, v1: Array, a1: Array, V: Array, A: Array, J: Array
 ) -> tuple[Array, Array, Mask]:
-    """Durations and jerks (m, 10) in mm, and where Ruckig gave any."""
+    """Durations and jerks (m, 10) in mm, and which moves Ruckig solved."""
     solver = ruckig.Ruckig(1)
     ask = ruckig.InputParameter(1)
-    found = ruckig.Trajectory(1)
+    trajectory = ruckig.Trajectory(1)
     calculate = solver.calculate
     ask.current_position = [0.0]
     times: list[float] = []
@@ -119,9 +119,9 @@ def _by_ruckig(
         ask.max_acceleration = [a]
         ask.max_jerk = [j]
         try:
-            if calculate(ask, found) not in working:
+            if calculate(ask, trajectory) not in working:
                 raise ValueError("no trajectory")
-            profile = found.profiles[0][0]
+            profile = trajectory.profiles[0][0]
             brake = profile.brake
             t, s = profile.t, profile.j
             first, rates = (brake.t, brake.j) if brake.duration > 0.0 else (nothing[:2], nothing[:2])
@@ -145,7 +145,7 @@ def _good(
     duration: Array, jerk: Array, solved: Mask,
     length: Array, v0: Array, a0: Array, v1: Array, a1: Array, V: Array, A: Array, J: Array,
 ) -> Mask:  # fmt: skip
-    """Where a result reaches its target, and no later than a move from rest to rest would."""
+    """Which results reach their target, no later than a move from rest to rest would."""
     given = (length, v0, a0, v1, a1, V, A, J)
     in_time = duration.sum(axis=1) <= _SLOWER * rest_to_rest_s(length, V, A, J)
     result: Mask = solved & in_time & _reaches(duration, jerk, *given)
@@ -156,14 +156,14 @@ def _reaches(
     duration: Array, jerk: Array,
     length: Array, v0: Array, a0: Array, v1: Array, a1: Array, V: Array, A: Array, J: Array,
 ) -> Mask:  # fmt: skip
-    """Where the phases end at the target, never turn back, and stay inside the limits."""
+    """Which phases end at the target, never turn back, and stay within the limits."""
     with np.errstate(all="ignore"):
         state = states(duration, jerk, length, v0, a0, v1, a1)
         used = duration > 0.0
         v = np.where(used, state.velocity, 0.0)
         start = np.where(used, state.acceleration, 0.0)
         end = start + duration * jerk
-        # inside a phase the speed is least where the acceleration passes zero upwards
+        # within a phase the speed is least where the acceleration rises through zero
         dip = np.where((start < 0.0) & (end > 0.0), start * start / (2.0 * jerk), 0.0)
         least = (v - dip).min(axis=1)
         top = np.maximum(v.max(axis=1), v1)
@@ -188,6 +188,6 @@ def _closed_form(
     if again.size:
         few = [x[again] for x in (length, v0, a0, v1, a1, V, A, J)]
         wide = [*few[:6], few[6] * _REACH, few[7] * _REACH]
-        duration[again], jerk[again], found = through_peak(*wide)
-        exists[again] = found & _reaches(duration[again], jerk[again], *wide)
+        duration[again], jerk[again], solved = through_peak(*wide)
+        exists[again] = solved & _reaches(duration[again], jerk[again], *wide)
     return duration, jerk, exists

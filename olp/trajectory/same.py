@@ -1,4 +1,4 @@
-"""Way-points that are one."""
+"""Equal neighbours among waypoints."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ import numpy as np
 
 from olp.core.arrays import Array, Index
 
-#: (mm) way-points nearer to the one before are the same
+#: mm; waypoints nearer than this to the first of a group belong to it
 SAME_MM = 1e-9
 
 
 def groups_of_same(point_mm: Array) -> Index:
-    """(n,) number of each way-point once those within 1e-9 mm of the first of their group are taken as
-    one."""
+    """(n,) number of the group of each waypoint; a group lies within 1e-9 mm of its first waypoint."""
     step = np.sqrt((np.diff(point_mm, axis=0) ** 2).sum(axis=1))
     begins = np.concatenate(([True], step > SAME_MM))
     kept = -1
-    # way-points that creep: each within reach of the one before, the whole not
+    # chains of waypoints, each near the one before, that lead away from the first
     for k in np.flatnonzero(~begins).tolist():
         if begins[k - 1]:
             kept = k - 1

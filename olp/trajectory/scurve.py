@@ -1,10 +1,10 @@
 """Jerk-limited moves of one axis in closed form: speed rises to one peak, holds, and falls.
 
-Used to judge what Ruckig returns and in its place where that is no good. Between two speeds with an
-acceleration at the start the fastest change has at most three phases (jerk +J, 0, -J) [Biagiotti,
-Melchiorri, "Trajectory Planning for Automatic Machines and Robots", 3.4]; the peak speed follows by
-bisection, as the distance grows with it, and what is left of the length is driven at the peak.
-All arrays are (m,), in any one unit of length and time.
+It judges the results of Ruckig, and replaces those that fail. Between two speeds with an acceleration at the
+start the fastest change has at most three phases (jerk +J, 0, -J). The peak speed follows by bisection, as
+the distance grows with it; the rest of the length is driven at the peak. All arrays are (m,), in any one unit
+of length and time.
+Source: Biagiotti, Melchiorri, "Trajectory Planning for Automatic Machines and Robots", 3.4.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from olp.core.arrays import Array, Mask
 
 #: columns of a move: 2 to reach an allowed state, 3 up, the cruise, 3 down, 1 to leave with acceleration
 PHASES = 10
+#: the column of the cruise
 CRUISE = 5
+#: bisections of the peak speed: all digits of a float
 _HALVINGS = 64
+#: against division by zero
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -36,9 +39,10 @@ def rest_to_rest_s(length: Array, velocity: Array, acceleration: Array, jerk: Ar
 
 @dataclass(frozen=True, slots=True, eq=False)
 class States:
-    """Where phases begin: position from 0, velocity, acceleration (m, 10); and what is missing at the
-    cruise between the phases before it, counted from the start, and those after it, counted from the end:
-    `missing` (3, m), positive."""
+    """States at the start of phases (m, 10): position from 0, velocity, acceleration.
+
+    `missing` (3, m) is the absolute gap of each at the cruise, between the phases before it, integrated from
+    the start, and those after it, integrated from the end."""
 
     position: Array
     velocity: Array
@@ -49,8 +53,9 @@ class States:
 def states(
     durations: Array, jerks: Array, length: Array, v0: Array, a0: Array, v1: Array, a1: Array
 ) -> States:
-    """States of phases (m, 10). Counted from both ends, nothing adds up over a long cruise, and start and
-    target are met exactly; the cruise itself is driven at the speed that joins both halves."""
+    """States of phases (m, 10), integrated from both ends, so that rounding does not add up over the cruise.
+
+    Start and target are met exactly; the cruise has the speed that joins both halves."""
     count = len(durations)
     p, v, a = (np.zeros((count, PHASES)) for _ in range(3))
     x, w, b = np.zeros(count), v0, a0
@@ -67,7 +72,7 @@ def states(
     held = np.where(joins, w + gap / np.maximum(time, _TINY), w)
     missing = np.stack([np.where(joins, 0.0, gap), z - w, c - b])
     p[:, CRUISE], v[:, CRUISE] = x, held
-    # without a cruise the acceleration passes on; its column is not driven then
+    # without a cruise the acceleration continues; the column of the cruise is not driven then
     a[:, CRUISE] = 0.0
     missing[2] = np.where(time > 0.0, np.maximum(np.abs(b), np.abs(c)), missing[2])
     return States(p, v, a, np.abs(missing))
@@ -82,8 +87,10 @@ def through_peak(
     velocity: Array, acceleration: Array, jerk: Array,
 ) -> tuple[Array, Array, Mask]:  # fmt: skip
     """Durations and jerks (m, 10) of moves over `length` from speed `v0`, acceleration `a0` to `v1`, `a1`,
-    and whether such a move exists: speeds are >= 0 throughout, and it is the fastest of all where
-    a0 >= 0 >= a1. The acceleration of a braking start, or of a rising end, is first taken to zero."""
+    and whether such a move exists with speeds >= 0.
+
+    Where a0 >= 0 >= a1 it is the fastest of all. The acceleration of a braking start, or of a rising end, is
+    first taken to zero."""
     head, tail = np.minimum(a0, 0.0), np.maximum(a1, 0.0)
     ramp_in, ramp_out = -head / jerk, tail / jerk
     low0 = v0 + head * ramp_in / 2.0
@@ -93,7 +100,7 @@ def through_peak(
         low1 + jerk * ramp_out * ramp_out / 6.0
     )
     rise, fall = np.maximum(a0, 0.0), np.maximum(-a1, 0.0)
-    left = length - ends
+    inner = length - ends
 
     def phases(peak: Array) -> tuple[Array, Array]:
         up = _change(low0, rise, peak, acceleration, jerk)
@@ -106,19 +113,19 @@ def through_peak(
         return up + down
 
     low = np.maximum(low0 + rise * rise / (2.0 * jerk), low1 + fall * fall / (2.0 * jerk))
-    # the least peak can be the exact answer: what rounding puts beyond the length is no failure
-    short = left - distance(low)
+    # the least peak can be the exact answer: a distance beyond the length by rounding is no failure
+    short = inner - distance(low)
     exists = (low0 >= -1e-12 * velocity) & (low1 >= -1e-12 * velocity) & (low <= velocity * (1.0 + 1e-9))
     exists &= short >= -1e-13 * length
     high = np.maximum(velocity, low)
-    fits = distance(high) <= left
+    fits = distance(high) <= inner
     low = np.where(fits, high, low)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
-        fits = distance(middle) <= left
+        fits = distance(middle) <= inner
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
     up, down = phases(low)
-    cruise = np.maximum(left - distance(low), 0.0) / np.maximum(low, _TINY)
+    cruise = np.maximum(inner - distance(low), 0.0) / np.maximum(low, _TINY)
     zero = np.zeros(len(jerk))
     times = np.stack([ramp_in, zero, *up, cruise, *down[::-1], ramp_out], axis=1)
     signs = np.stack([jerk, zero, jerk, zero, -jerk, zero, -jerk, zero, jerk, jerk], axis=1)
@@ -129,8 +136,8 @@ def through_peak(
 def _change(
     v0: Array, a0: Array, v1: Array, acceleration: Array, jerk: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Times of the three phases, and the distance, from speed v0 with acceleration a0 >= 0 up to v1 with
-    none."""
+    """Times of the three phases, and the distance, from speed v0 with acceleration a0 >= 0 up to v1 without
+    acceleration."""
     free = np.sqrt(np.maximum(jerk * (v1 - v0) + a0 * a0 / 2.0, 0.0))
     top = np.maximum(np.minimum(free, acceleration), a0)
     t1, t3 = (top - a0) / jerk, top / jerk

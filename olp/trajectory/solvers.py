@@ -1,4 +1,4 @@
-"""The ways that the planner knows to drive a run, and what each takes at least."""
+"""The solvers of the planner, and a forecast of the time that each takes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from olp.trajectory.overlap import least_s, overlap
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import SmoothPath, smooth
 
-#: how they are named in a report
-OVERLAP, CRITICAL, EXACT_STOP = "overlapped moves", "critical points", "exact stops"
+#: names of the solvers in a report
+OVERLAP = "overlapped moves"
+CRITICAL = "critical points"
+EXACT_STOP = "exact stops"
 OPTIMISED = "optimised speed"
-#: critical points take no less than this share of what they are expected to
+#: share of the expected time that critical points take at least
 _AT_BEST = 0.9
 
 
 class Run:
-    """A route from rest to rest and its limits, and what several solvers make of it: its smooth path."""
+    """A route from rest to rest, its limits, and what several solvers share: its smooth path and profile."""
 
     def __init__(self, route: Route, limits: AxisLimits) -> None:
         self.route = route
@@ -32,13 +34,13 @@ class Run:
         self._profile: Profile | None = None
 
     def path(self) -> SmoothPath:
-        """Raises CannotCompute as `smooth`."""
+        """The smooth path. Raises CannotCompute as `smooth`."""
         if self._path is None:
             self._path = smooth(self.route, self.limits)
         return self._path
 
     def profile(self) -> Profile:
-        """Speeds in closed form along the path; raises as that."""
+        """Speeds in closed form along the path. Raises as `path`."""
         if self._profile is None:
             self._profile = best_profile(self.path(), self.limits)
         return self._profile
@@ -46,9 +48,10 @@ class Run:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solver:
-    """A way to drive a run, which may fail; `least_s` tells the seconds (n - 1,) that it takes along each
-    segment at least, or nearly so. One that `bends` the path is of no use to straight moves, and its forecast
-    leaves out what neighbouring corners do to each other."""
+    """A method to drive a run, which may fail.
+
+    `least_s` gives about the least seconds (n - 1,) along each segment. A solver that `bends` the path is of
+    no use for straight moves, and its forecast ignores the effect of corners on their neighbours."""
 
     name: str
     solve: Callable[[Run], Motion]
@@ -58,7 +61,7 @@ class Solver:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A solver, and the seconds that it is expected to take at least."""
+    """A solver, and the least seconds that it is expected to take."""
 
     solver: Solver
     least_s: float
@@ -78,7 +81,7 @@ SOLVERS = (
         bends=True,
     ),
 )
-#: stops everywhere: what is left where the others fail
+#: exact stops, for where the others fail
 LAST = Solver(
     EXACT_STOP,
     lambda run: overlap(replace(run.route, tolerance_mm=np.zeros(len(run.route))), run.limits),

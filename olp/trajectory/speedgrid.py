@@ -1,4 +1,4 @@
-"""The grid of cells that the times of a closed-form speed profile make, and what bounds those times."""
+"""The grid of cells from the times of a closed-form speed profile, and a bound of the whole time."""
 
 from __future__ import annotations
 
@@ -11,46 +11,51 @@ from olp.trajectory.critical import Profile, Timeline, free_speeds
 from olp.trajectory.route import AxisLimits
 from olp.trajectory.smooth import SmoothPath
 
-#: time of a cell in the closed-form profile, s; of one at full feed, in cells; least share of one; least
-#: cells of a path
+#: s; time of a cell in the closed-form profile
 CELL_S = 4e-3
-_CRUISE, _LEAST, _OF_PATH = 20.0, 0.4, 60.0
-#: cells of a ramp at the least, if it changes the speed by more than the share _LEVEL
-_OF_RAMP, _LEVEL = 6, 0.02
-#: share of the smaller cell beside it that a knot may move
+#: time of a cell at full feed, in cells
+_CRUISE = 20.0
+#: least time of a cell, as a share of the shortest cells beside it
+_LEAST = 0.4
+#: least number of cells of a path
+_OF_PATH = 60.0
+#: least number of cells of a ramp that changes the speed by more than the share _LEVEL
+_OF_RAMP = 6
+_LEVEL = 0.02
+#: share of the smaller cell beside a knot by which the knot may move
 _MOVE = 0.3
-#: share for curvature that leaves acceleration as on a straight path
+#: share for curvature with which the acceleration is that of a straight path
 _STRAIGHT = 1e-12
 #: a limit that never binds
 _FREE = 1e30
-#: a speed this near to the feed is it
+#: share of the feed above which a speed counts as the feed
 _AT_FEED = 0.999
 
 
 def speed_caps(path: SmoothPath, limits: AxisLimits) -> Array:
-    """(k,) most speed along each piece for the feed and the axes' velocities."""
+    """(k,) largest speed along each piece for the feed and the axes' velocities."""
     free = AxisLimits(limits.velocity, np.full(3, _FREE), np.full(3, _FREE))
     return ceilings(path, free, np.ones(len(path)))[0]
 
 
-def grid(path: SmoothPath, limits: AxisLimits, found: Profile, cap: Array, clock: Timeline) -> Array:
-    """(m + 1,) ways between which b is one parabola: a cell lasts about CELL_S in the profile, more where
-    it drives at the feed."""
-    a, j = found.acceleration, found.jerk
-    rise = ramps.seconds(found.speed[:-1], found.peak, a, j)
-    fall = ramps.seconds(found.speed[1:], found.peak, a, j)
-    ways = sum(ramps.distance(v, found.peak, a, j) for v in (found.speed[:-1], found.speed[1:]))
+def grid(path: SmoothPath, limits: AxisLimits, profile: Profile, cap: Array, clock: Timeline) -> Array:
+    """(m + 1,) arc lengths between which b is one parabola: a cell lasts about CELL_S in the profile, and
+    longer at the feed."""
+    a, j = profile.acceleration, profile.jerk
+    rise = ramps.seconds(profile.speed[:-1], profile.peak, a, j)
+    fall = ramps.seconds(profile.speed[1:], profile.peak, a, j)
+    ramp_mm = sum(ramps.distance(v, profile.peak, a, j) for v in (profile.speed[:-1], profile.speed[1:]))
     x = path.break_mm
     with np.errstate(divide="ignore", invalid="ignore"):
-        level = np.nan_to_num(np.maximum(np.diff(x[found.node]) - ways, 0.0) / found.peak)
+        level = np.nan_to_num(np.maximum(np.diff(x[profile.node]) - ramp_mm, 0.0) / profile.peak)
     whole = rise + level + fall
-    begin = found.node[:-1]
+    begin = profile.node[:-1]
     least = np.minimum.reduceat(cap, begin)
     free = np.minimum.reduceat(ceilings(path, limits, np.ones(len(path)))[0], begin)
-    at_feed = (found.peak >= _AT_FEED * least) & (free >= _AT_FEED * least)
+    at_feed = (profile.peak >= _AT_FEED * least) & (free >= _AT_FEED * least)
     cell_s = cell_seconds(float(whole.sum()))
-    up = _of_ramp(rise, found.speed[:-1], found.peak, cell_s)
-    down = _of_ramp(fall, found.speed[1:], found.peak, cell_s)
+    up = _of_ramp(rise, profile.speed[:-1], profile.peak, cell_s)
+    down = _of_ramp(fall, profile.speed[1:], profile.peak, cell_s)
     flat = _count(level, np.where(at_feed, np.maximum(2, np.ceil(level / (_CRUISE * cell_s))),
                                   np.ceil(level / cell_s)))  # fmt: skip
     flat = np.where((level > 0.0) & (level < cell_s), 1, flat)
@@ -68,7 +73,7 @@ def grid(path: SmoothPath, limits: AxisLimits, found: Profile, cap: Array, clock
     cells = [np.where(count > 1, t / np.maximum(count, 1), np.inf) for t, count in ((rise, up), (fall, down))]
     gap = _LEAST * np.minimum(np.minimum(*cells), cell_s)
     kept = time[_apart(time, gap[owner])]
-    return _on_breaks(np.unique(np.concatenate((x[:1], clock.way_at(kept), x[-1:]))), x)
+    return _on_breaks(np.unique(np.concatenate((x[:1], clock.arc_at(kept), x[-1:]))), x)
 
 
 def _on_breaks(knot: Array, x: Array) -> Array:
@@ -86,7 +91,7 @@ def cell_seconds(whole: float) -> float:
 
 
 def _of_ramp(lasts: Array, speed: Array, peak: Array, cell_s: float) -> Index:
-    """(m,) cells of ramps: more than their time asks for, where they change the speed much."""
+    """(m,) cells of ramps: at least _OF_RAMP where they change the speed by more than _LEVEL."""
     steep = np.where(peak - speed > _LEVEL * peak, _OF_RAMP, 1)
     return _count(lasts, np.maximum(np.ceil(lasts / cell_s - 1e-9), steep))
 
@@ -96,7 +101,7 @@ def _count(lasts: Array, count: Array) -> Index:
 
 
 def _apart(time: Array, gap: Array) -> Index:
-    """Times no two of which are nearer than the later one's gap, from the first on."""
+    """Indices of times, from the first on, each at least its gap after the one before."""
     kept, last = [], -np.inf
     for i, (t, least) in enumerate(zip(time.tolist(), gap.tolist(), strict=True)):
         if t - last >= least:
@@ -106,7 +111,7 @@ def _apart(time: Array, gap: Array) -> Index:
 
 
 def bound_s(path: SmoothPath, limits: AxisLimits) -> float:
-    """About the least seconds that a motion along the path could take if jerk were free."""
+    """About the least seconds of a motion along the path without a jerk limit."""
     x = path.break_mm
     top = ceilings(path, limits, np.ones(len(path)))[0]
     free = AxisLimits(limits.velocity, limits.acceleration, np.full(3, _FREE))

@@ -13,21 +13,27 @@ from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import SOLVERS, Candidate
 from olp.trajectory.speedgrid import CELL_S
 
-#: runs with no more segments than this between stops are straight moves to the overlapping solver
+#: runs with no more segments than this are planned by the overlapping solver only
 _FEW_SEGMENTS = 2
-#: a solver whose least time is this share of all others' wins without a contest
-_SURE = 0.8
-#: pieces of a way-point, and of all that is optimised unless asked for: about a minute and a half
-_PIECES, _AFFORDED = 3, 1_000_000
-#: short runs have no more segments; optimising one takes at least as long as this many pieces
-_SHORT, _CALL = 64, 500
-#: way-points that are forecast together, and of runs that are planned together: a call costs more than a move
-_BLOCK, _TOGETHER = 1 << 15, 1 << 15
+#: a solver whose least time is below this share of all others' wins without a contest
+_CLEAR_WIN = 0.8
+#: pieces per waypoint
+_PIECES = 3
+#: pieces that are optimised at most unless asked for: about a minute and a half
+_AFFORDED = 1_000_000
+#: segments of a short run, at most
+_SHORT = 64
+#: pieces that take as long as the fixed cost of optimising one run
+_CALL = 500
+#: waypoints that are forecast together
+_BLOCK = 1 << 15
+#: waypoints of runs that are planned together, as a call costs more than a move
+_TOGETHER = 1 << 15
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """What is planned together: way-points `first` to `last`, both at rest, in `runs`, and the solvers that
+    """`runs` that are planned together, from waypoint `first` to `last` (both at rest), and the solvers that
     may win there, the most promising first."""
 
     first: int
@@ -44,7 +50,7 @@ class Stretch:
         return any(candidate.solver.bends for candidate in self.candidates)
 
     def cost(self) -> float:
-        """About how many pieces there are to optimise."""
+        """About the number of pieces to optimise."""
         if not self.bends:
             return 0.0
         seconds = max(candidate.least_s for candidate in self.candidates if candidate.solver.bends)
@@ -52,17 +58,17 @@ class Stretch:
 
 
 def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:
-    """From each stop to the next, and the solvers that may win, the most promising first."""
+    """The runs from each stop to the next, and the solvers that may win, the most promising first."""
     stops = stops_of(route)
     if len(stops) < 2:
         return []
     least_s = _forecast(route, limits, stops)
     order = np.argsort(least_s, axis=0, kind="stable")
     first = np.take_along_axis(least_s, order[:1], axis=0)[0]
-    # moves that stay straight take what is forecast; a path that bends may take far longer
+    # straight moves take the forecast time; a path that bends may take far longer
     bends = np.array([solver.bends for solver in SOLVERS])[order[0]]
-    keep = least_s <= np.where(bends, np.inf, first / _SURE)
-    # there are as many runs as way-points in a program of exact stops
+    keep = least_s <= np.where(bends, np.inf, first / _CLEAR_WIN)
+    # a program of exact stops has as many runs as waypoints
     alone = [(Candidate(solver, 0.0),) for solver in SOLVERS]
     runs = []
     for begin, end, ranks, fits, some in zip(
@@ -78,7 +84,7 @@ def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:
 
 
 def least_to_optimise(runs: list[Stretch]) -> int:
-    """The fewest segments of a run that is worth optimising, within what is afforded in all."""
+    """The fewest segments of a run for optimising, so that all such runs together cost at most _AFFORDED."""
     long = sum(run.cost() for run in runs if run.segments > _SHORT)
     short = sum(run.cost() for run in runs if run.segments <= _SHORT)
     if long + short <= _AFFORDED:
@@ -87,7 +93,7 @@ def least_to_optimise(runs: list[Stretch]) -> int:
 
 
 def together(runs: list[Stretch], least: int) -> Iterator[Stretch]:
-    """The runs, those joined that stay straight or are short and not to be optimised: they may be many."""
+    """The runs; straight ones, and short ones that are not optimised, are joined, as they may be many."""
     short = min(least, _SHORT + 1)
     begin = 0
     group: list[Stretch] = []
@@ -106,12 +112,12 @@ def together(runs: list[Stretch], least: int) -> Iterator[Stretch]:
 
 
 def _forecast(route: Route, limits: AxisLimits, stops: Index) -> Array:
-    """(s, r) seconds that each solver takes at least, or nearly so, for each run."""
+    """(s, r) about the least seconds of each solver for each run."""
     count = len(route) - 1
     each = np.empty((len(SOLVERS), count))
     for a in range(0, count, _BLOCK):
         b = min(a + _BLOCK, count)
-        # what comes before and behind matters to the ends of the block
+        # the segments before and behind matter at the ends of the block
         c, d = max(a - 1, 0), min(b + 1, count)
         some = Route(
             route.point_mm[c : d + 1], route.feed_mm_s[c:d], route.line[c:d], route.tolerance_mm[c : d + 1],

@@ -1,5 +1,4 @@
-"""What people ask of a trajectory, as plain data: how long, where, why so slow, and which axis is at its
-limit."""
+"""Answers about a trajectory as plain data: how long, where, why so slow, and which axis is at its limit."""
 
 from __future__ import annotations
 
@@ -14,10 +13,13 @@ from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
 
-#: lines and places that a report names
+#: lines and slow places that a report lists
 MOST = 10
-#: a step between lines differs between nominal and corrected program by less than this, and this share of it
-_NEAR_MM, _NEAR_SHARE = 0.1, 1e-3
+#: mm; a step between lines differs by less than this between nominal and corrected program
+_NEAR_MM = 0.1
+#: plus this share of the step
+_NEAR_SHARE = 1e-3
+#: waypoints that are compared at once
 _RUN = 512
 
 
@@ -100,9 +102,9 @@ def _slow(parts: Sequence[SlowPlaces]) -> dict[str, Any]:
 def compare(
     nominal: tuple[Sequence[Route], LineUse], corrected: tuple[Sequence[Route], LineUse]
 ) -> list[dict[str, Any]] | None:
-    """Per line of the nominal program its time there, and that of the lines which stand for it in the
-    corrected one, the largest difference first; None where the lines do not correspond."""
-    before, after = nominal[1], corrected[1]
+    """Per line of the nominal program its time, and that of the corresponding lines of the corrected one, the
+    largest difference first; None where the lines do not correspond."""
+    nominal_use, corrected_use = nominal[1], corrected[1]
     if len(nominal[0]) != len(corrected[0]):
         return None
     rows: list[tuple[int, float, float]] = []
@@ -113,55 +115,57 @@ def compare(
             return None
         pair = pair[1:] - 1
         spent = np.zeros(len(other))
-        known = np.isin(other, after.line)
-        spent[known] = (after.seconds + after.dwell_s)[np.searchsorted(after.line, other[known])]
+        known = np.isin(other, corrected_use.line)
+        which = np.searchsorted(corrected_use.line, other[known])
+        spent[known] = (corrected_use.seconds + corrected_use.dwell_s)[which]
         total = np.diff(np.concatenate(([0.0], np.cumsum(spent)))[np.concatenate(([0], pair + 1))])
         own = np.zeros(len(line))
-        known = np.isin(line, before.line)
-        own[known] = (before.seconds + before.dwell_s)[np.searchsorted(before.line, line[known])]
+        known = np.isin(line, nominal_use.line)
+        which = np.searchsorted(nominal_use.line, line[known])
+        own[known] = (nominal_use.seconds + nominal_use.dwell_s)[which]
         rows += zip(line.tolist(), own.tolist(), total.tolist(), strict=True)
     rows.sort(key=lambda row: -abs(row[2] - row[1]))
     return [{"line": n, "nominal_s": a, "corrected_s": b} for n, a, b in rows]
 
 
 def _ends(route: Route) -> tuple[Index, Array]:
-    """(m,) lines of a route in order, and (m + 1, 3) where it begins and each of them ends."""
+    """(m,) lines of a route in order, and (m + 1, 3) the start of the route and the end of each line."""
     last = np.flatnonzero(np.diff(route.line, append=-1))
     return route.line[last], route.point_mm[np.concatenate(([0], last + 1))]
 
 
 def partners(nominal_mm: Array, corrected_mm: Array) -> Index | None:
-    """(n,) for each way-point of a nominal path the one of the corrected path, in order, that stands for it:
-    others were inserted between. None where one is missing.
+    """(n,) the waypoint of the corrected path for each waypoint of the nominal one, in order; others were
+    inserted between. None where one is missing.
 
-    A correction shifts way-points, neighbours by nearly the same, so steps are compared and not places.
+    A correction shifts neighbouring waypoints by nearly the same, so steps are compared, not positions.
     """
     count, spare = len(nominal_mm), len(corrected_mm) - len(nominal_mm)
     if spare < 0:
         return None
-    out = np.zeros(count, np.int64)
+    partner = np.zeros(count, np.int64)
     i = j = 0
-    at = np.zeros(3) if not count else corrected_mm[0] - nominal_mm[0]
+    offset = np.zeros(3) if not count else corrected_mm[0] - nominal_mm[0]
     while i < count:
         span = min(_RUN, count - i, len(corrected_mm) - j)
         away = corrected_mm[j : j + span] - nominal_mm[i : i + span]
-        near = _near(np.diff(away, axis=0, prepend=at[None]), _steps(nominal_mm, i, span))
+        near = _near(np.diff(away, axis=0, prepend=offset[None]), _steps(nominal_mm, i, span))
         run = span if near.all() else int(near.argmin())
         if run:
-            out[i : i + run] = np.arange(j, j + run)
-            at = away[run - 1]
+            partner[i : i + run] = np.arange(j, j + run)
+            offset = away[run - 1]
             i, j = i + run, j + run
         if run == span and span:
             continue
-        ahead = corrected_mm[j : j + spare + 1] - nominal_mm[i] - at
-        found = np.flatnonzero(_near(ahead, _steps(nominal_mm, i, 1)))
-        if not len(found):
+        ahead = corrected_mm[j : j + spare + 1] - nominal_mm[i] - offset
+        matches = np.flatnonzero(_near(ahead, _steps(nominal_mm, i, 1)))
+        if not len(matches):
             return None
-        spare -= int(found[0])
-        j += int(found[0])
-        out[i], at = j, corrected_mm[j] - nominal_mm[i]
+        spare -= int(matches[0])
+        j += int(matches[0])
+        partner[i], offset = j, corrected_mm[j] - nominal_mm[i]
         i, j = i + 1, j + 1
-    return out
+    return partner
 
 
 def _near(change: Array, step: Array) -> npt.NDArray[np.bool_]:

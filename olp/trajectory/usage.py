@@ -1,6 +1,6 @@
-"""How a motion uses its limits: by line of the program, and at the places where it falls below half its feed.
+"""How a motion uses its limits: by line of the program, and where it falls below half its feed.
 
-Each piece is looked at in the middle and at both ends, weighed by the trapezoidal rule.
+Each piece is sampled in the middle and at both ends, weighted by the trapezoidal rule.
 """
 
 from __future__ import annotations
@@ -16,23 +16,28 @@ from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 
-#: what a motion can be limited by, in the order of the columns
+#: the limits of a motion, in the order of the columns
 LIMITS = (*(f"{axis} {what}" for what in ("velocity", "acceleration", "jerk") for axis in "XYZ"), "feed")
-#: a limit is reached where so much of it is used
+#: share of a limit from which it counts as reached
 AT_LIMIT = 0.98
-#: a place is slow where the speed is below this share of the feed
+#: share of the feed below which a motion is slow
 SLOW = 0.5
+#: the samples of a piece, as shares of its time
 _SHARE = np.array([0.0, 0.5, 1.0])
+#: their weights
 _WEIGHT = np.array([0.25, 0.5, 0.25])
+#: pieces per block
 _BLOCK = 1 << 13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineUse:
     """Of the m lines that move: (m,) `line`; `seconds` without dwells, and `dwell_s`; `length_mm` of the
-    polyline. Of their feed moves alone: `feed_seconds`, `feed_length_mm` and `feed_mm_s`, the programmed
-    feed, over the length where there are several (inf where all are rapids). `fastest_mm_s` is the top
-    speed; `at_limit_s` (m, 10) the time at each of `LIMITS`, `most` (m, 10) the largest use of it."""
+    polyline.
+
+    Of their feed moves only: `feed_seconds`, `feed_length_mm` and `feed_mm_s`, the programmed feed, averaged
+    over the length where there are several (inf where all are rapids). `fastest_mm_s` is the top speed,
+    `at_limit_s` (m, 10) the time at each of `LIMITS`, and `most` (m, 10) the largest use of it."""
 
     line: Index
     seconds: Array
@@ -57,17 +62,17 @@ class LineUse:
         )
 
     def lost_s(self) -> Array:
-        """(m,) time beyond what the feed moves would take at their feed."""
+        """(m,) time of the feed moves beyond that at their feed."""
         return np.asarray(self.feed_seconds - _over(self.feed_length_mm, self.feed_mm_s))
 
     def limit(self) -> Index:
-        """(m,) which of `LIMITS` holds the line back: the one it is at for longest, else the one it uses
+        """(m,) which of `LIMITS` slows the line down: the one reached for the longest time, else the one used
         most."""
         return _limit(self.at_limit_s, self.most)
 
     @staticmethod
     def joined(parts: Sequence[LineUse]) -> LineUse:
-        """Lines of several stretches; what they have in common is added."""
+        """Lines of several stretches; lines of the same number are added."""
         if len(parts) == 1:
             return parts[0]
         if not parts:
@@ -75,24 +80,25 @@ class LineUse:
             return LineUse(none.astype(np.int64), none, none, none, none, none, none, none, wide, wide)
         columns = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(LineUse)}
         line, place = np.unique(columns["line"], return_inverse=True)
-        out: dict[str, Array] = {}
+        table: dict[str, Array] = {}
         nominal = _over(columns["feed_length_mm"], columns["feed_mm_s"])
         for name, values in columns.items():
             if name in ("fastest_mm_s", "most"):
-                out[name] = np.zeros((len(line), *values.shape[1:]))
-                np.maximum.at(out[name], place, values)
+                table[name] = np.zeros((len(line), *values.shape[1:]))
+                np.maximum.at(table[name], place, values)
             else:
-                out[name] = np.zeros((len(line), *values.shape[1:]))
-                np.add.at(out[name], place, values)
-        out["feed_mm_s"] = _feed(out["feed_length_mm"], _sums(place, nominal, len(line)))
-        return LineUse(line.astype(np.int64), **{k: v for k, v in out.items() if k != "line"})
+                table[name] = np.zeros((len(line), *values.shape[1:]))
+                np.add.at(table[name], place, values)
+        table["feed_mm_s"] = _feed(table["feed_length_mm"], _sums(place, nominal, len(line)))
+        return LineUse(line.astype(np.int64), **{k: v for k, v in table.items() if k != "line"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlowPlaces:
-    """(k,) places in order where the speed is below half the feed: `start_s` and `seconds`, `lost_s` beyond
-    the time that the way takes at the feed; where it is slowest, `line`, `position_mm` (k, 3),
-    `slowest_mm_s` and `feed_mm_s`; and which of `LIMITS` holds it back, as for lines."""
+    """(k,) places in order where the speed is below half the feed.
+
+    `start_s` and `seconds`; `lost_s` against the feed; where the place is slowest, `line`, `position_mm`
+    (k, 3), `slowest_mm_s` and `feed_mm_s`; and which of `LIMITS` slows it down, as for lines."""
 
     start_s: Array
     seconds: Array
@@ -121,7 +127,7 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
     for a in range(0, len(motion), _BLOCK):
         piece = np.arange(a, min(a + _BLOCK, len(motion)))
         width = motion.start_s[piece + 1] - motion.start_s[piece]
-        # one place of all pieces after the other: sums over few places are then sums of long rows
+        # sample by sample, all pieces each time: sums over the few samples are then sums of long rows
         shape = (len(_SHARE), len(piece), 3)
         states = [
             state.reshape(shape)
@@ -155,29 +161,29 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
             _sums(place, width * cutting, count), feed_length, _feed(feed_length, nominal),
             fastest, at_limit, most,
         ),
-        places.found(),
+        places.gathered(),
     )  # fmt: skip
 
 
 def _lengths(route: Route, line: Index) -> tuple[Array, Array, Array]:
-    """Of each line (m,): the length of its moves, that of its feed moves, and what these take at their feed.
+    """Of each line (m,): the length of its moves, that of its feed moves, and their time at their feed.
 
-    Lines whose moves are too short to have pieces of their own are left out.
+    Lines whose moves are too short for pieces of their own are left out.
     """
     step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
-    at = np.minimum(np.searchsorted(line, route.line), len(line) - 1)
-    own = line[at] == route.line
+    index = np.minimum(np.searchsorted(line, route.line), len(line) - 1)
+    own = line[index] == route.line
     fed = np.where(np.isfinite(route.feed_mm_s), step, 0.0)
     columns = (step, fed, fed / route.feed_mm_s)
-    length, feed_length, nominal = (_sums(at[own], column[own], len(line)) for column in columns)
+    length, feed_length, nominal = (_sums(index[own], column[own], len(line)) for column in columns)
     return length, feed_length, nominal
 
 
 def feeds_of_pieces(motion: Motion, route: Route) -> Array:
     """(n,) the feed of the segment that each piece of the motion drives.
 
-    A line has one feed, or moves of several (canned cycles): those are told apart by how much of the line's
-    way lies before a piece.
+    A line has one feed, or moves with several (canned cycles). Their pieces are assigned by how much of the
+    line's length lies before a piece.
     """
     order = np.argsort(route.line, kind="stable")
     line, first = np.unique(route.line[order], return_index=True)
@@ -185,11 +191,11 @@ def feeds_of_pieces(motion: Motion, route: Route) -> Array:
         return np.full(len(motion), np.inf)
     feed = route.feed_mm_s[order]
     low, high = np.minimum.reduceat(feed, first), np.maximum.reduceat(feed, first)
-    at = np.minimum(np.searchsorted(line, motion.line), len(line) - 1)
-    out = high[at]
+    index = np.minimum(np.searchsorted(line, motion.line), len(line) - 1)
+    piece_feed = high[index]
     mixed = np.flatnonzero(low < high)
     if not len(mixed):
-        return np.asarray(out, float)
+        return np.asarray(piece_feed, float)
     step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))[order]
     stop = np.append(first[1:], len(feed))
     by_line = np.argsort(motion.line, kind="stable")
@@ -201,16 +207,16 @@ def feeds_of_pieces(motion: Motion, route: Route) -> Array:
         piece = by_line[a:b]
         width = motion.start_s[piece + 1] - motion.start_s[piece]
         begin, end = motion.of(piece, np.zeros(len(piece)))[0], motion.of(piece, width)[0]
-        way = np.sqrt(((end - begin) ** 2).sum(axis=1))
-        done = (np.cumsum(way) - 0.5 * way) / max(float(way.sum()), 1e-300)
+        length = np.sqrt(((end - begin) ** 2).sum(axis=1))
+        done = (np.cumsum(length) - 0.5 * length) / max(float(length.sum()), 1e-300)
         own = slice(int(first[k]), int(stop[k]))
         limit = np.cumsum(step[own]) / max(float(step[own].sum()), 1e-300)
-        out[piece] = feed[own][np.minimum(np.searchsorted(limit, done), len(limit) - 1)]
-    return np.asarray(out, float)
+        piece_feed[piece] = feed[own][np.minimum(np.searchsorted(limit, done), len(limit) - 1)]
+    return np.asarray(piece_feed, float)
 
 
 class _Places:
-    """Gathers slow places, which may begin in one block of pieces and end in a later one."""
+    """Collects slow places, which may begin in one block of pieces and end in a later one."""
 
     def __init__(self) -> None:
         self._count = 0
@@ -220,28 +226,28 @@ class _Places:
     def add(
         self, time: Array, speed: Array, feed: Array, line: Index, position: Array, held: Array, use: Array
     ) -> None:
-        """Samples (k, n) at k places of n pieces, positions (k, n, 3), time at limits and use of them
-        (k, n, 10); feed and line (n,) of each piece."""
+        """Add k samples (k, n) of n pieces: positions (k, n, 3), time at limits and use of them (k, n, 10);
+        feed and line (n,) of each piece."""
         flat = ((speed < SLOW * feed) & np.isfinite(feed)).T.ravel()
         if not flat.size:
             return
         begins = flat & ~np.concatenate(([self._slow], flat[:-1]))
         number = self._count + np.cumsum(begins) - 1
         self._count, self._slow = self._count + int(begins.sum()), bool(flat[-1])
-        at = np.flatnonzero(flat)
-        if not len(at):
+        sample = np.flatnonzero(flat)
+        if not len(sample):
             return
-        piece, place = np.divmod(at, len(speed))
+        piece, place = np.divmod(sample, len(speed))
         seconds, lost = _below(time[:, piece], speed[:, piece] / feed[piece], place)
         columns = (
-            number[at].astype(float), time[place, piece], seconds, lost, speed[place, piece], feed[piece],
+            number[sample].astype(float), time[place, piece], seconds, lost, speed[place, piece], feed[piece],
             line[piece].astype(float), *position[place, piece].T, *held[place, piece].T,
             *use[place, piece].T,
         )  # fmt: skip
         # the samples of a block are many, its places few
         self._rows.append(_reduced(columns))
 
-    def found(self) -> SlowPlaces:
+    def gathered(self) -> SlowPlaces:
         empty = tuple(np.zeros(0) for _ in range(10 + 2 * len(LIMITS)))
         rows = self._rows or [empty]
         columns = _reduced(tuple(np.concatenate(c) for c in zip(*rows, strict=True)))
@@ -254,10 +260,11 @@ class _Places:
 
 
 def _below(time: Array, share: Array, place: Index) -> tuple[Array, Array]:
-    """(n,) the time below half the feed around each slow sample, and what of it is lost against the feed.
+    """(n,) the time below half the feed around each slow sample, and how much of it is lost against the feed.
 
-    `time` and `share` of the feed (k, n) at k places of the piece of each sample, which is at `place` (n,).
-    Between two slow places each has half of the time, next to a fast one it has what lies below half.
+    `time` and `share` of the feed (k, n) are those of the k samples of its piece; its own number is `place`
+    (n,). Between two slow samples each has half of the time. Next to a fast one it has the part below half
+    the feed.
     """
     every = np.arange(len(place))
     own = share[place, every]
@@ -270,7 +277,7 @@ def _below(time: Array, share: Array, place: Index) -> tuple[Array, Array]:
         span = np.abs(time[beside, every] - time[place, every])
         slow = other < SLOW
         part = np.where(slow, 0.5, (SLOW - own) / np.where(slow, 1.0, other - own)) * span
-        # the nearer half of the way to a slow neighbour, all of the way to half the feed
+        # mean share: over the nearer half up to a slow neighbour, or over all up to half the feed
         mean = np.where(slow, 0.75 * own + 0.25 * other, 0.5 * (own + SLOW))
         seconds += part
         lost += part * (1.0 - mean)
@@ -278,7 +285,7 @@ def _below(time: Array, share: Array, place: Index) -> tuple[Array, Array]:
 
 
 def _reduced(columns: tuple[Array, ...]) -> tuple[Array, ...]:
-    """One row a place: the earliest time, sums of time, and what holds where the speed is least."""
+    """One row per place: the earliest time, sums of times, and the other values where the speed is least."""
     number, time, weight, lost, speed, *rest = columns
     if not len(number):
         return columns
@@ -294,10 +301,10 @@ def _reduced(columns: tuple[Array, ...]) -> tuple[Array, ...]:
 
 
 def _limit(at_limit_s: Array, most: Array) -> Index:
-    """(n,) the limit (of ten) that is reached for longest; where none is, the one used most."""
+    """(n,) which of `LIMITS` is reached for the longest time; where none is, the one used most."""
     reached = at_limit_s.max(axis=1) > 0.0
-    found = np.where(reached, at_limit_s.argmax(axis=1), most.argmax(axis=1))
-    return np.asarray(found, np.int64)
+    limit = np.where(reached, at_limit_s.argmax(axis=1), most.argmax(axis=1))
+    return np.asarray(limit, np.int64)
 
 
 def _sums(place: npt.NDArray[np.intp], values: Array, count: int) -> Array:
@@ -306,11 +313,11 @@ def _sums(place: npt.NDArray[np.intp], values: Array, count: int) -> Array:
 
 
 def _feed(length: Array, nominal_s: Array) -> Array:
-    """Feed over the length; inf where no move has one."""
+    """Mean feed over the length; inf where no move has one."""
     return np.where(nominal_s > 0.0, length / np.where(nominal_s > 0.0, nominal_s, 1.0), np.inf)
 
 
 def _over(above: Array, below: Array) -> Array:
-    """Quotients, 0 where there is nothing below."""
+    """Quotients, 0 where the divisor is 0."""
     good = below > 0.0
     return np.asarray(np.where(good, above / np.where(good, below, 1.0), 0.0), float)

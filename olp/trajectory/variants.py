@@ -1,5 +1,4 @@
-"""Planning the same program several times: under other tolerances, and under accelerations that keep a
-deviation bounded."""
+"""Plans of the same program under other path tolerances, and under accelerations that bound a deviation."""
 
 from __future__ import annotations
 
@@ -20,23 +19,23 @@ from olp.program.feeds.words import Shared, check_feeds, write_feeds
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
-from olp.trajectory.inertia import Inertial, capped, sure
+from olp.trajectory.inertia import Inertial, capped, guaranteed_cap
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.usage import LineUse, SlowPlaces, usage
 
-#: plans that a bound on the inertial deviation may take before it is made sure of
+#: plans with adapted accelerations before those that guarantee the bound of the inertial deviation
 _TRIALS = 3
-#: share by which a peak of acceleration may pass between the places that are looked at
-_UNOBSERVABLE = 1e-4
-#: lines that a report names
+#: share by which a peak of acceleration between samples may exceed them
+_BETWEEN = 1e-4
+#: lines that a report lists
 _LINES = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A program as it is to be planned: its text read, the path tolerance where it names none, and the
-    stretches that it drives."""
+    """A program to plan: its text as read, the path tolerance where it states none, and the routes that it
+    drives."""
 
     name: str
     setup: Setup
@@ -48,20 +47,20 @@ class Case:
     legs: tuple[Route, ...]
 
     def rewritten(self, data: bytes) -> Case:
-        """Another text in place of this one's, read in the same way. Raises ProgramError."""
+        """The case of another text, read with the same options. Raises ProgramError."""
         options = Options(block_delete=self.block_delete, contour=self.contour)
         program = read(data, self.setup, self.program.dialect, options)
-        # the machine's mode at the start is no word of the text
+        # the machine's mode at the start is not in the text
         modes = (*(m for m in self.program.path_modes if m.line == 0), *program.path_modes)
         return replace(self, program=replace(program, path_modes=modes)).driven()
 
     def driven(self) -> Case:
-        """The same with its stretches."""
+        """The same with its routes."""
         legs = routes(self.program, blend_mm=self.blend_mm, block_delete=self.block_delete)
         return replace(self, legs=legs)
 
     def scaled(self, factor: float) -> Case:
-        """The same with all path tolerances, also those that the program names, times a factor."""
+        """The same with all path tolerances, also those that the program states, times a factor."""
         modes = tuple(
             mode if mode.tolerance_mm is None else replace(mode, tolerance_mm=mode.tolerance_mm * factor)
             for mode in self.program.path_modes
@@ -85,7 +84,7 @@ class Case:
         }
 
     def chords_mm(self) -> float:
-        """What the chords that stand for arcs may leave the arcs by."""
+        """How far the chords of arcs may be from the arcs."""
         if not len(self.program.toolpath.arcs):
             return 0.0
         stated = self.tolerances()
@@ -93,7 +92,7 @@ class Case:
         return CHORD_SHARE * max(widest, EXACT_MM)
 
     def untimed(self) -> dict[str, Any]:
-        """Moves from or to places that only the control knows: how many, and their first lines."""
+        """Moves from or to positions that only the control knows: how many, and their first lines."""
         path = self.program.toolpath
         line = path.line[np.isnan(lengths_mm(path))]
         return {"moves": len(line), "lines": np.unique(line)[:_LINES].tolist()}
@@ -101,7 +100,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """A case planned within limits: a trajectory a stretch, and what they use of the limits."""
+    """A case planned within limits: one trajectory per route, and how they use the limits."""
 
     case: Case
     limits: AxisLimits
@@ -115,16 +114,16 @@ class Plan:
 
     @property
     def blending_mm(self) -> float:
-        """How far the motion is from the chords of the path, at most."""
+        """The largest distance of the motion from the chords of the path."""
         return max((leg.deviation_mm for t in self.trajectories for leg in t.legs), default=0.0)
 
 
 def planned(case: Case, limits: AxisLimits, tell: Progress, what: str = "plan") -> Plan:
-    """Plan every stretch of a case. Raises CannotCompute as `olp.trajectory.plan.plan`."""
+    """Plan every route of a case. Raises CannotCompute as `olp.trajectory.plan.plan`."""
     trajectories = _motions(case.legs, limits, tell, what)
-    found = [usage(t, leg) for t, leg in zip(trajectories, case.legs, strict=True)]
-    lines = LineUse.joined([lines for lines, _ in found])
-    return Plan(case, limits, trajectories, lines, tuple(slow for _, slow in found))
+    used = [usage(t, leg) for t, leg in zip(trajectories, case.legs, strict=True)]
+    lines = LineUse.joined([lines for lines, _ in used])
+    return Plan(case, limits, trajectories, lines, tuple(slow for _, slow in used))
 
 
 def _motions(legs: Sequence[Route], limits: AxisLimits, tell: Progress, what: str) -> tuple[Trajectory, ...]:
@@ -138,40 +137,40 @@ def _motions(legs: Sequence[Route], limits: AxisLimits, tell: Progress, what: st
 def within_inertial(
     case: Case, limits: AxisLimits, compliance: Array, most_mm: float, tell: Progress
 ) -> Plan:
-    """Plan with accelerations so low that the inertial deviation keeps to `most_mm` everywhere.
+    """Plan with accelerations so low that the inertial deviation is nowhere above `most_mm`.
 
-    What each axis alone may shift the tool by is lowered by what the plan before was too large by; where that
-    does not settle, it is set so that no motion at all can exceed the bound. Raises UsageError for a machine
-    without compliance, and a bound that is not above 0.
+    The cap of each axis' own shift of the tool is lowered by the excess of the plan before. Where that does
+    not converge, it is set so that no motion can exceed the bound. Raises UsageError for a machine without
+    compliance, and for a bound that is not above 0.
     """
     if not most_mm > 0.0:
-        raise UsageError(f"the inertial deviation is bounded to {most_mm * 1e3:g} um; expected more than 0")
+        raise UsageError(f"the bound of the inertial deviation is {most_mm * 1e3:g} um; expected more than 0")
     if not compliance.any():
         raise UsageError(
             "the machine file states no compliance, so inertial deviation cannot be bounded; give "
             "compliance_um_per_m_s2 in [axes.X], [axes.Y] or [axes.Z]"
         )
-    certain = sure(limits, compliance, most_mm) * (1.0 - 2.0 * _UNOBSERVABLE)
+    guaranteed = guaranteed_cap(limits, compliance, most_mm) * (1.0 - 2.0 * _BETWEEN)
     size = np.sqrt((compliance * compliance).sum(axis=0))
     cap = float((size * limits.acceleration).max())
     for trial in range(_TRIALS + 1):
-        cap = certain if trial == _TRIALS else max(cap, certain)
-        found = planned(case, capped(limits, compliance, cap), tell, "plan" if trial == 0 else "bound")
-        largest = max((Inertial.of(t.motion, compliance).most_mm for t in found.trajectories), default=0.0)
-        if largest * (1.0 + _UNOBSERVABLE) <= most_mm:
-            return found
-        # a cap above what was reached bound nothing
+        cap = guaranteed if trial == _TRIALS else max(cap, guaranteed)
+        result = planned(case, capped(limits, compliance, cap), tell, "plan" if trial == 0 else "bound")
+        largest = max((Inertial.of(t.motion, compliance).most_mm for t in result.trajectories), default=0.0)
+        if largest * (1.0 + _BETWEEN) <= most_mm:
+            return result
+        # a cap above the largest deviation did not bind
         cap = min(cap, largest) * (most_mm / largest) * (1.0 - 1e-3)
     raise CannotCompute(f"no plan keeps the inertial deviation within {most_mm * 1e3:g} um")
 
 
-def with_feeds(found: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[str, Any]]:
-    """The text with the planned feeds in its F words, read back, and a report of it; `duration_s` is what the
-    text takes, planned once more.
+def with_feeds(base: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[str, Any]]:
+    """The text with the planned feeds in its F words, read back and planned again, and a report of it;
+    `duration_s` is the time of the text with these feeds.
 
     Raises ProgramError for a feed that cannot be written, CannotCompute where it does not read back.
     """
-    case, lines = found.case, found.lines
+    case, lines = base.case, base.lines
     fed = np.flatnonzero((lines.feed_length_mm > 0.0) & (lines.feed_seconds > 0.0))
     planned_s = lines.feed_seconds[fed]
     try:
@@ -183,7 +182,7 @@ def with_feeds(found: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict
         raise (error.in_file(case.name) if case.name else error) from None
     other = case.rewritten(written.data)
     check_feeds(case.program, other.program, block_delete=case.block_delete)
-    again = planned(other, found.limits, tell, "feeds")
+    again = planned(other, base.limits, tell, "feeds")
     return written.data, {
         "words": written.words,
         "changed": written.changed,
@@ -195,14 +194,14 @@ def with_feeds(found: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict
     }
 
 
-def blend_study(case: Case, found: Plan, factors: Sequence[float], tell: Progress) -> list[dict[str, Any]]:
-    """Time and path deviation at multiples of the tolerances in use; `found` is the plan at 1."""
+def blend_study(case: Case, base: Plan, factors: Sequence[float], tell: Progress) -> list[dict[str, Any]]:
+    """Time and path deviation at multiples of the path tolerances in use; `base` is the plan at 1."""
     rows = []
     path = case.tolerances()
     used_um = [v for v in (*path["stated_um"], path["default_um"]) if v]
     for factor in factors:
         other = (
-            found if factor == 1.0 else planned(case.scaled(factor), found.limits, tell, f"blend x{factor:g}")
+            base if factor == 1.0 else planned(case.scaled(factor), base.limits, tell, f"blend x{factor:g}")
         )
         rows.append(
             {

@@ -1,1 +1,1 @@
-"""The session, and one file a verb: files in, result out."""
+"""The session, and one module per verb: files in, result out."""

@@ -1,4 +1,4 @@
-"""`calibrate ballbar`: circles of a ball-bar, from files to what they say."""
+"""`calibrate ballbar`: circles of a ball-bar, from files to fits."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ from olp.workflows.session import PathLike
 
 
 def fit_ballbar(sources: Sequence[PathLike], *, skip_deg: float = SKIP_DEG) -> tuple[CircleFit, ...]:
-    """Squareness, scale and servo mismatch and lost motion from circles, a file each. Raises InputError,
+    """Squareness, scale and servo mismatch and backlash from circles, one per file. Raises InputError,
     ConfigError."""
     return tuple(ballbar.fit(read_circles(source), skip_deg=skip_deg) for source in sources)

@@ -1,4 +1,4 @@
-"""`calibrate diagonals`: face and body diagonals, from files to what they say."""
+"""`calibrate diagonals`: face and body diagonals, from files to a fit."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ from olp.workflows.session import PathLike
 def fit_diagonals(
     sources: Sequence[PathLike], known: Mapping[str, tuple[float, float]] | None = None
 ) -> DiagonalFit:
-    """Squareness and scales from face and body diagonals, a file each; `known` as in
+    """Squareness and scales from face and body diagonals, one per file; `known` as in
     `olp.calibration.iso230.diagonals.fit`. Raises InputError, ConfigError."""
     return diagonals.fit([read_diagonal(source) for source in sources], known)

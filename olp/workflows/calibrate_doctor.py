@@ -1,4 +1,4 @@
-"""Signs, units and places of the curves of a calibration, judged by independent points."""
+"""Signs, units and columns of the curves of a calibration, checked with independent points."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike, Session
 
-#: Rows of points that are named in a finding.
+#: Most rows of points that a finding names.
 _LISTED = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationDiagnosis:
-    """What points say of a calibration: the report ("olp-doctor-1") as a mapping, and findings.
+    """The check of a calibration by points: the report ("olp-doctor-1") as a mapping, and findings.
 
-    `diagnosis` holds verdicts and estimates, `corrected` the calibration with all that is decided put right,
-    `advice` the points that would decide the rest (None where nothing is open), `uncertainty` what is known
-    of the corrected one (None where the old one states nothing, or its curves have changed places).
+    `diagnosis` holds verdicts and estimates, `corrected` the calibration with all decided mistakes corrected,
+    `advice` the points that would decide the rest (None where nothing is undecided). `uncertainty` is that of
+    the corrected calibration: None where the old one states none, or where curves were swapped.
     """
 
     diagnosis: Diagnosis
@@ -69,10 +69,11 @@ def diagnose_calibration(
     sigma_um: float | None = None,
     tool_mm: Vector | None = None,
 ) -> CalibrationDiagnosis:
-    """Judge the sense, unit and place of every curve of a calibration by points that had no part in it.
+    """Check sign, unit and column of every curve of a calibration with points that were not used for it.
 
-    `points` are a file (see `olp.files.measurements.checkpoints`), a plan with points, or Points, which count
-    in the machine's frame with `frame_known`. `sigma_um` and `tool_mm` fill in what the file does not say.
+    `points` are a file (see `olp.files.measurements.checkpoints`), a plan with points, or Points; with
+    `frame_known` these are in the machine's frame. `sigma_um` and `tool_mm` are used where the file states
+    none.
     Raises InputError, ConfigError and CannotCompute.
     """
     session = Session.start(machine)
@@ -82,40 +83,41 @@ def diagnose_calibration(
     else:
         stated = load_calibration(calibration, described, read=session.sources.read)
     if isinstance(points, Points):
-        taken, known = points, frame_known
+        observations, known = points, frame_known
     else:
-        taken, known = load_checkpoints(points, sigma_um=sigma_um, tool_mm=tool_mm)
+        observations, known = load_checkpoints(points, sigma_um=sigma_um, tool_mm=tool_mm)
         known = known or frame_known
     skip = frozenset(described.compensated_by_controller - stated.active_during_measurement)
-    found = diagnose(stated, described.chain, taken, frame_known=known, skip=skip)
+    diagnosis = diagnose(stated, described.chain, observations, frame_known=known, skip=skip)
     tool_vectors = [tool.tool_vector_mm for tool in described.tools.values()]
     tools = list(dict.fromkeys(tool_vector for tool_vector in tool_vectors if tool_vector is not None))
-    advice = advise(found, tools) if found.undecided else None
-    left, words = None, "none is stated"
+    advice = advise(diagnosis, tools) if diagnosis.undecided else None
+    corrected_uncertainty, note = None, "none is stated"
     if not isinstance(calibration, Calibration):
-        left, words = _carried(found, calibration, stated, session.sources)
-    report = _report(found, advice) | {"uncertainty": words}
-    return CalibrationDiagnosis(found, advice, report, tuple(_findings(found, advice)), left)
+        corrected_uncertainty, note = _uncertainty(diagnosis, calibration, stated, session.sources)
+    report = _report(diagnosis, advice) | {"uncertainty": note}
+    findings = tuple(_findings(diagnosis, advice))
+    return CalibrationDiagnosis(diagnosis, advice, report, findings, corrected_uncertainty)
 
 
-def _carried(
-    found: Diagnosis, path: PathLike, stated: Calibration, sources: Sources
+def _uncertainty(
+    diagnosis: Diagnosis, path: PathLike, stated: Calibration, sources: Sources
 ) -> tuple[Uncertainty | None, str]:
-    """The uncertainty of the corrected calibration, and words on what becomes of the stated one."""
+    """The uncertainty of the corrected calibration, and a note on the stated one."""
     try:
         old = load_uncertainty(path, stated, sources.read)
     except ConfigError:
-        # curves that were edited by hand have a covariance of others; their signs can be judged all the same
+        # curves edited by hand have the covariance of other curves; their signs can be checked all the same
         return None, "not carried over: the covariance is that of another calibration"
     if old is None or not old.entries:
         return None, "none is stated"
-    left = found.uncertainty_of(old)
-    return left, "carried over" if left is not None else "not carried over: curves have changed places"
+    uncertainty = diagnosis.uncertainty_of(old)
+    return uncertainty, "carried over" if uncertainty is not None else "not carried over: curves were swapped"
 
 
-def _report(found: Diagnosis, advice: Advice | None) -> dict[str, Any]:
-    points = found.seen.points
-    after = (
+def _report(diagnosis: Diagnosis, advice: Advice | None) -> dict[str, Any]:
+    points = diagnosis.seen.points
+    predicted = (
         []
         if advice is None
         else [
@@ -125,22 +127,22 @@ def _report(found: Diagnosis, advice: Advice | None) -> dict[str, Any]:
     )
     return {
         "schema": "olp-doctor-1",
-        "machine": found.calibration.machine,
-        "chain": found.chain,
+        "machine": diagnosis.calibration.machine,
+        "chain": diagnosis.chain,
         "points": len(points.axis_mm),
-        "frame": "machine" if found.seen.frame_known else "unknown",
+        "frame": "machine" if diagnosis.seen.frame_known else "unknown",
         "sigma_um": points.sigma * UM_PER_MM,
-        "scatter_over_stated": found.factors.inflation,
-        "rms_as_stated_um": found.before_mm * UM_PER_MM,
-        "rms_put_right_um": found.after_mm * UM_PER_MM,
-        "decided": len(found.verdicts) - len(found.undecided),
-        "undecided": len(found.undecided),
-        "sense_of_tables": dict(found.senses),
-        "arrangements": [change.words for change in found.arrangements],
-        "not_told_apart": list(found.doubts),
-        "curves": [_row(v) for v in found.verdicts],
-        "would_decide": [] if advice is None else _places(advice),
-        "after_these_points": after,
+        "scatter_over_stated": diagnosis.factors.inflation,
+        "rms_as_stated_um": diagnosis.before_mm * UM_PER_MM,
+        "rms_put_right_um": diagnosis.after_mm * UM_PER_MM,
+        "decided": len(diagnosis.verdicts) - len(diagnosis.undecided),
+        "undecided": len(diagnosis.undecided),
+        "sense_of_tables": dict(diagnosis.senses),
+        "arrangements": [change.words for change in diagnosis.arrangements],
+        "not_told_apart": list(diagnosis.doubts),
+        "curves": [_row(v) for v in diagnosis.verdicts],
+        "would_decide": [] if advice is None else _points(advice),
+        "after_these_points": predicted,
     }
 
 
@@ -156,7 +158,7 @@ def _row(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def _places(advice: Advice) -> list[dict[str, Any]]:
+def _points(advice: Advice) -> list[dict[str, Any]]:
     return [
         {"name": f"point {k}", "axes_mm": axis, "tool_mm": tool}
         for k, (axis, tool) in enumerate(
@@ -165,34 +167,34 @@ def _places(advice: Advice) -> list[dict[str, Any]]:
     ]
 
 
-def _findings(found: Diagnosis, advice: Advice | None) -> Iterator[Finding]:
-    for verdict in found.verdicts:
+def _findings(diagnosis: Diagnosis, advice: Advice | None) -> Iterator[Finding]:
+    for verdict in diagnosis.verdicts:
         spread = f"factor {verdict.factor:.3g} with a standard uncertainty of {verdict.sigma:.2g}"
         if verdict.sign == "absent":
             yield Finding("OLP836", f"{verdict.name}: {spread}")
         elif verdict.sign == "flipped" or (verdict.sign == "right" and verdict.applied != 1.0):
-            words = [] if verdict.sign == "right" else ["in the other sense"]
+            words = [] if verdict.sign == "right" else ["of the other sign"]
             words += [] if verdict.unit in ("right", "undecided") else [verdict.unit]
             yield Finding("OLP831", f"{verdict.name} {', '.join(words)}: {spread}")
         elif verdict.unit == "no factor explains":
             yield Finding("OLP831", f"{verdict.name} in no known unit: {spread}")
-    for change in found.arrangements:
+    for change in diagnosis.arrangements:
         yield Finding("OLP832", change.words)
-    if found.undecided:
-        names = ", ".join(v.name for v in found.undecided)
-        doubts = f"; not excluded: {'; '.join(found.doubts)}" if found.doubts else ""
+    if diagnosis.undecided:
+        names = ", ".join(v.name for v in diagnosis.undecided)
+        doubts = f"; not excluded: {'; '.join(diagnosis.doubts)}" if diagnosis.doubts else ""
         hint = ""
         if advice is not None and len(advice.axis_mm):
-            hint = f"; {len(advice.axis_mm)} points that would tell more are proposed"
-        yield Finding("OLP833", f"{names}{doubts}{hint}", count=len(found.undecided))
-    if not found.explained:
+            hint = f"; {len(advice.axis_mm)} points that would decide more are proposed"
+        yield Finding("OLP833", f"{names}{doubts}{hint}", count=len(diagnosis.undecided))
+    if not diagnosis.explained:
         yield Finding(
             "OLP834",
-            f"points scatter {found.factors.inflation:.1f} times as much as their stated uncertainty",
+            f"points scatter {diagnosis.factors.inflation:.1f} times as much as their stated uncertainty",
         )
-    if found.outliers:
-        rows = ", ".join(f"row {row} ({off:.0f})" for row, off in found.outliers[:_LISTED])
-        yield Finding("OLP835", f"standard deviations off: {rows}", count=len(found.outliers))
+    if diagnosis.outliers:
+        rows = ", ".join(f"row {row} ({off:.0f})" for row, off in diagnosis.outliers[:_LISTED])
+        yield Finding("OLP835", f"standard deviations off: {rows}", count=len(diagnosis.outliers))
 
 
 __all__ = ["CalibrationDiagnosis", "diagnose_calibration"]

@@ -17,13 +17,13 @@ def evaluate_lines(
 ) -> Evaluated:
     """ISO 230-2 figures, cyclic errors, reversal and squareness of measured lines.
 
-    `sources` are plans, folders and files as `olp calibrate fit` takes them; with a machine, what they say of
-    moving tables is checked against its chain. Raises InputError, ConfigError.
+    `sources` are plans, folders and files as `olp calibrate fit` takes them; with a machine, their
+    statements on moving tables are checked against its chain. Raises InputError, ConfigError.
     """
     chain = None if machine is None else Session.start(machine).setup.machine.chain
-    found = load_measurements(sources, chain)
-    if not found.lines:
+    measurements = load_measurements(sources, chain)
+    if not measurements.lines:
         raise ConfigError(
-            "no lines to evaluate; expected [[lines]] in a plan, or files of readings along axes"
+            "there are no lines to evaluate; expected [[lines]] in a plan, or files of readings along axes"
         )
-    return evaluate_all(found, zone)
+    return evaluate_all(measurements, zone)

@@ -1,4 +1,4 @@
-"""`calibrate export`: a calibration as the compensation table of a control, and what each would leave."""
+"""`calibrate export`: a calibration as the compensation table of a control, and its residual errors."""
 
 from __future__ import annotations
 
@@ -28,15 +28,18 @@ from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.session import Loaded, PathLike, Session
 
-#: Points over the box, and the seed of their places: figures of two calls can be compared.
-POINTS, SEED = 4000, 1
+#: Number of random points over the box.
+POINTS = 4000
+#: Seed of their positions; it is fixed, so that the figures of two calls can be compared.
+SEED = 1
+#: Name of the first file of a table that is only compared.
 _MAIN = Path("table")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TableExport:
-    """The files of a table, findings, and the report as a mapping ("olp-tables-1"): what each way leaves, and
-    `compensated_by_controller` as it has to stand in the machine file once the table is active."""
+    """The files of a table, findings, and the report as a mapping ("olp-tables-1"): the residual errors, and
+    `compensated_by_controller` for the machine file once the table is active."""
 
     files: Mapping[Path, bytes]
     findings: tuple[Finding, ...]
@@ -61,8 +64,8 @@ def export_table(
 ) -> TableExport:
     """Write the calibration of a machine, or a calibration file alone, as the table of a control.
 
-    The report says what the table would leave over the calibrated box and, with `program`, along it; the
-    figures are of the table as it is written, read back. Raises UsageError, InputError.
+    The report states the residual error over the calibrated box and, with `program`, along it. The figures
+    are those of the written table, read back. Raises UsageError, InputError.
     """
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
@@ -87,11 +90,12 @@ def compare_tables(
     most_rows: int | None = None,
     chain: str | None = None,
 ) -> dict[str, Any]:
-    """What each format of tables would leave, next to a corrected program ("olp-tables-1"). Nothing is
-    written; where a sense or a reference has to be stated, the figures are those of the right one."""
+    """The residual error of each format of tables, next to a corrected program ("olp-tables-1"). Nothing is
+    written. Where a format leaves sign convention or reference open, the figures are those of the right one.
+    """
     source = _source(machine, job, calibration, chain)
     controls: dict[str, Control] = {}
-    said: dict[str, list[dict[str, object]]] = {}
+    findings: dict[str, list[dict[str, object]]] = {}
     for key, form in FORMATS.items():
         given = given_of(
             source.machine, chain, form.sense or "error", None, None, None,
@@ -99,10 +103,10 @@ def compare_tables(
         )  # fmt: skip
         written = write_table(source.rest, key, _MAIN.with_suffix(form.ending), given)
         controls[key] = _control(written, key, given, source)
-        said[key] = [f.as_dict() for f in written.findings if f.code not in ("OLP874", "OLP875")]
+        findings[key] = [f.as_dict() for f in written.findings if f.code not in ("OLP874", "OLP875")]
     report = _report(source, controls, program)
     report["formats"] = {
-        key: {"title": form.title, "status": form.status, "holds": form.holds, "findings": said[key]}
+        key: {"title": form.title, "status": form.status, "holds": form.holds, "findings": findings[key]}
         for key, form in FORMATS.items()
     }
     report["findings"] = [finding.as_dict() for finding in source.findings]
@@ -111,7 +115,7 @@ def compare_tables(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Source:
-    """What a table is made of: `rest` is the calibration without what the control corrects already."""
+    """What a table is made from: `rest` is the calibration without the errors that the control corrects."""
 
     sources: Sources
     machine: Machine | None
@@ -147,7 +151,7 @@ def _source(
     skip = described.compensated_by_controller - loaded.calibration.active_during_measurement
     findings = []
     if skip:
-        message = f"{', '.join(sorted(skip))} stand in compensated_by_controller and are not in the new table"
+        message = f"{', '.join(sorted(skip))}: named in compensated_by_controller, not in the new table"
         findings.append(Finding("OLP876", message, count=len(skip)))
     tool_vectors = {
         tool.tool_vector_mm for tool in described.tools.values() if tool.tool_vector_mm is not None
@@ -177,26 +181,26 @@ def _without(calibration: Calibration, skip: frozenset[str]) -> Calibration:
 
 
 def _control(written: Exported, kind: str, given: Given, source: _Source) -> Control:
-    """The control with the table as it stands in the written bytes; values beyond a table's end hold."""
+    """The control with the table of the written bytes; beyond its ends the last values hold."""
     given = replace(given, travel_mm=np.array(source.rest.box_mm))
     main = next(iter(written.files))
     if not written.corrects:
         return format_named(kind).control(Calibration("", source.rest.box_mm), source.chain)
-    found = read_table(main, kind, given, lambda path: written.files[path])
-    return format_named(kind).control(found.calibration, source.chain)
+    imported = read_table(main, kind, given, lambda path: written.files[path])
+    return format_named(kind).control(imported.calibration, source.chain)
 
 
 def _report(
     source: _Source, controls: Mapping[str, Control], program: PathLike | bytes | None
 ) -> dict[str, Any]:
     box = np.asarray(source.model.box_mm, float)
-    places = in_box(box, source.tools_mm, POINTS, SEED)
+    points = in_box(box, source.tools_mm, POINTS, SEED)
     report: dict[str, Any] = {
         "schema": "olp-tables-1",
         "machine": source.rest.machine,
         "box": {
             "points": POINTS, "seed": SEED, "box_mm": box.tolist(), "tools_mm": source.tools_mm.tolist(),
-            "left": _figures(residuals_by(source.model, controls, places, source.increment_mm)),
+            "left": _figures(residuals_by(source.model, controls, points, source.increment_mm)),
         },
     }  # fmt: skip
     if program is not None:
@@ -207,7 +211,7 @@ def _report(
 def _along(
     source: _Source, controls: Mapping[str, Control], program: PathLike | bytes, box: np.ndarray
 ) -> dict[str, Any]:
-    """What is left along a program; what correcting leaves is the proof of a correction really done."""
+    """Residual errors along a program; for correcting, the proof of a correction that is really done."""
     loaded = source.loaded
     if loaded is None:
         raise UsageError("a program is read with its machine; name the machine file with -m")
@@ -216,37 +220,37 @@ def _along(
     with text.errors("<program>"):
         loaded = loaded.reading(text)
         path = read(text.data, loaded.setup, loaded.dialect, words=False).toolpath
-    places = along(path, box, source.chain)
-    if places.counted is None or not places.counted.any():
+    points = along(path, box, source.chain)
+    if points.counted is None or not points.counted.any():
         raise InputError("has no cutting move whose axes are all known", file=text.name or "<program>")
-    out: dict[str, Any] = {
+    report: dict[str, Any] = {
         "name": text.short,
-        "points": int(places.counted.sum()),
-        "left": _figures(residuals_by(source.model, controls, places)),
+        "points": int(points.counted.sum()),
+        "left": _figures(residuals_by(source.model, controls, points)),
         "refused": None,
     }
     try:
         options = CorrectOptions(outside_box="hold")
         run = corrected(source.sources, text, loaded, options, silent)
         after = run.report["deviation"]["after"]["between"]
-        out["left"][CORRECT] = {**after, "rms_in_frame_um": None}
+        report["left"][CORRECT] = {**after, "rms_in_frame_um": None}
     except OlpError as error:
-        out["refused"] = str(error.in_file(text.name or "<program>"))
-        out["left"][CORRECT] = dict.fromkeys(("rms_um", "max_um", "rms_in_frame_um"))
-    return out
+        report["refused"] = str(error.in_file(text.name or "<program>"))
+        report["left"][CORRECT] = dict.fromkeys(("rms_um", "max_um", "rms_in_frame_um"))
+    return report
 
 
-def _figures(found: Mapping[str, Residual]) -> dict[str, Any]:
-    return {name: left.as_dict() for name, left in found.items()}
+def _figures(residuals: Mapping[str, Residual]) -> dict[str, Any]:
+    return {name: residual.as_dict() for name, residual in residuals.items()}
 
 
-def left_lines(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
-    """Rows of a table of figures: way, over the box (rms, max, rms in a frame), along the program (same)."""
+def residual_rows(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
+    """Rows of figures: method, over the box (rms, max, rms in a frame), along the program (same)."""
     rows = []
     for name, box in report["box"]["left"].items():
         row = [name, *(number(box[key]) for key in ("rms_um", "max_um", "rms_in_frame_um"))]
         if "program" in report:
-            left = report["program"]["left"][name]
-            row += [number(left[key]) for key in ("rms_um", "max_um", "rms_in_frame_um")]
+            residual = report["program"]["left"][name]
+            row += [number(residual[key]) for key in ("rms_um", "max_um", "rms_in_frame_um")]
         rows.append(tuple(row))
     return rows

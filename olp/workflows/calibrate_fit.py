@@ -33,8 +33,8 @@ class FittedCalibration:
     """A calibration with what it was made from.
 
     `fit` holds all parameters with their covariance (`fit.sigma(axis_mm, tool_mm)` is the uncertainty of the
-    error of the curves anywhere), `report` what was found as a mapping ("olp-fit-1"), `findings` what to know
-    about it. `nonrigid` is what was looked for beyond rigid bodies where a map was wanted;
+    error of the curves anywhere), `report` the results as a mapping ("olp-fit-1"), `findings` what to know
+    about them. `nonrigid` is the error beyond rigid bodies, where a map was asked for;
     `nonrigid.sigma(axis_mm, tool_mm)` is the uncertainty with the map.
     """
 
@@ -67,8 +67,8 @@ def fit_calibration(
 
     `data` are plans (olp-measurements-1), folders or files of readings that describe themselves, or
     Measurements. Chain, travel and tools come from the machine file; without one the plan states the chain.
-    `datum_mm` is where the curves are zero, by default the place of the calibrated box nearest to zero. `map`
-    asks for a map of what no rigid bodies make, or forbids it; without it the plan says.
+    `datum_mm` is where the curves are zero, by default the position in the calibrated box nearest to zero.
+    `map` asks for a map of errors that rigid bodies cannot make, or forbids it; without it the plan decides.
     Raises InputError, ConfigError with every problem of the files, and CannotCompute.
     """
     described = None if machine is None else Session.start(machine).setup.machine
@@ -80,7 +80,7 @@ def fit_calibration(
     chain = described.chain if described is not None else measurements.chain
     if chain is None:
         raise ConfigError(
-            "the chain is stated nowhere; give the machine file (-m), or the key chain of the plan"
+            "no chain is stated; give the machine file (-m), or the key chain of the plan"
         )
     if described is not None and described.name != measurements.machine:
         raise ConfigError(
@@ -95,14 +95,14 @@ def fit_calibration(
                 "of the machine file; expected each in one of them"
             )
     travel = None if described is None else [described.axes[axis].travel_mm for axis in "XYZ"]
-    found = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
+    fitted = fit(measurements, chain, travel_mm=travel, datum_mm=datum_mm, progress=progress)
     wish = measurements.map if map is None else (map or None)
     beyond = None
     if wish is not None:
         wish = measurements.map or MapWish() if wish is True else wish
-        beyond = nonrigid(found, noise=wish.noise, progress=progress)
-        found = beyond.fit
-    calibration = calibration_of(found, valid_until)
+        beyond = nonrigid(fitted, noise=wish.noise, progress=progress)
+        fitted = beyond.fit
+    calibration = calibration_of(fitted, valid_until)
     mapped = (
         residual_map(beyond, calibration, wish.within_mm) if beyond and wish and beyond.processes else None
     )
@@ -110,11 +110,11 @@ def fit_calibration(
         calibration = dataclasses.replace(calibration, maps=(mapped,))
     tools = [] if described is None else [tool.tool_vector_mm for tool in described.tools.values()]
     tool_vectors = [tool_vector for tool_vector in tools if tool_vector is not None]
-    report, findings = summary(found, calibration, tool_vectors), findings_of(found, tool_vectors, travel)
+    report, findings = summary(fitted, calibration, tool_vectors), findings_of(fitted, tool_vectors, travel)
     if beyond is not None:
         report["map"] = map_summary(beyond, mapped)
         findings = (*findings, *map_findings(beyond, mapped))
-    return FittedCalibration(calibration, found, report, findings, beyond)
+    return FittedCalibration(calibration, fitted, report, findings, beyond)
 
 
 __all__ = ["FittedCalibration", "fit_calibration"]

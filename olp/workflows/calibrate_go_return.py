@@ -18,7 +18,7 @@ def go_return(sources: Sequence[PathLike], machine: PathLike | Setup | None = No
     lines = [line for line in load_measurements(sources, chain).lines if line.quantity == "positioning"]
     if not lines:
         raise ConfigError(
-            "no line of positioning; expected EXX, EYY or EZZ, approached from both sides",
+            "there is no line of positioning; expected EXX, EYY or EZZ, approached from both sides",
             file=str(sources[0]) if sources else None,
         )
     return tuple(reversal_of(line) for line in lines)

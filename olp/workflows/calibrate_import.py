@@ -20,7 +20,7 @@ from olp.workflows.session import PathLike, Session
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TableImport:
-    """A calibration read from a table, the files that hold it, and what was found on the way."""
+    """A calibration read from a table, the files that hold it, findings and notes."""
 
     calibration: Calibration
     files: Mapping[Path, bytes]
@@ -44,20 +44,20 @@ def import_table(
 ) -> TableImport:
     """Read the table of a control as a calibration; `kind` names the format, such as "isg".
 
-    The calibration holds what the table says, actual minus commanded, whatever the sense of the format. Its
-    date is `measured`; tables state none. Raises UsageError for what has to be stated, and InputError with
-    file and line.
+    The calibration holds the errors of the table, actual minus commanded, whatever the sign convention of the
+    format. Its date is `measured`; tables state none. Raises UsageError for what has to be stated, and
+    InputError with file and line.
     """
     described = None if machine is None else Session.start(machine).setup.machine
     given = given_of(described, chain, sense, axis, comp_type, axis_names, reference, None)
     if measured is None:
-        raise UsageError("a table does not say when the machine was measured; give the date with --measured")
+        raise UsageError("a table does not state when the machine was measured; give --measured")
     given = replace(given, measured=measured)
-    found: Imported = read_table(Path(table), kind, given)
+    imported: Imported = read_table(Path(table), kind, given)
     notes = (
         f"Read from {Path(table).name}, a table of the format {format_named(kind).title}.",
         "These are the errors that the table corrects: while it is active, correct only the rest.",
-        *found.notes,
+        *imported.notes,
     )
-    files = calibration_files(found.calibration, Path(target), notes=notes)
-    return TableImport(found.calibration, files, found.findings, found.notes)
+    files = calibration_files(imported.calibration, Path(target), notes=notes)
+    return TableImport(imported.calibration, files, imported.findings, imported.notes)

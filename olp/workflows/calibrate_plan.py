@@ -33,25 +33,30 @@ from olp.workflows.session import PathLike, Session
 
 Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
 INSTRUMENTS: tuple[Instrument, ...] = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
-#: Numbers of points that are tried, fewest first; points beside lines; stations of multilateration.
+#: Numbers of points that are tried, fewest first.
 COUNTS = (30, 60, 120, 250, 500, 1000)
-BESIDE, STATIONS = 40, 6
-#: A coordinate of a tracker in mm where nobody states another.
+#: Points of a tracker measured in addition to lines.
+BESIDE = 40
+#: Stations of multilateration.
+STATIONS = 6
+#: Default standard uncertainty of a tracker's coordinate in mm.
 TRACKER = 8e-3
-#: Minutes to set up a line, an instrument at a place, and another reflector; seconds of a reading.
+#: Minutes to set up a line, an instrument at a station, and another reflector.
 SET_UP_MIN = {"line": 30.0, "station": 45.0, "reflector": 5.0}
+#: Seconds of a reading, by instrument.
 DWELL_S = {"lines": 3.0, "tracker": 3.0, "lines-and-tracker": 3.0, "pods": 5.0, "multilateration": 2.0}
-#: Lines go on beyond their first and last target by this, so that lost motion is taken up.
+#: Lines overrun their first and last target by this, in mm, so that backlash is taken up.
 OVERRUN_MM = 5.0
-#: Programs come back to their places within half a digit of the output, and this.
+#: A program read back must stop at its points within this, in mm: rounding of floating point only.
 _SAME_MM = 1e-9
+#: Seed of random positions.
 _SEED = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Method:
-    """One way to measure: its geometry, what it would know, and its time. `passes` are runs of the machine,
-    `set_up_min` what people need beside it."""
+    """A method to measure: its geometry, its predicted uncertainty, and its time. `passes` are runs of the
+    machine, `set_up_min` is the time that people need in addition."""
 
     instrument: Instrument
     name: str
@@ -70,7 +75,7 @@ class Method:
 class MeasurementPlan:
     """A plan: `chosen` of all `methods` that were compared, the report ("olp-plan-1") as a mapping, findings.
 
-    `files(folder)` are a plan to be filled in (measurements.toml), its CSV files, and programs that go there.
+    `files(folder)` are a plan to be filled in (measurements.toml), its CSV files, and programs of the points.
     """
 
     setup: Setup
@@ -98,14 +103,14 @@ def plan_measurements(
     settle_s: float = 1.0,
     points: int | None = None,
 ) -> MeasurementPlan:
-    """Propose what to measure so that a correction leaves about `uncertainty_um` (rms length, in the frame
-    that fits best).
+    """Propose what to measure so that the residual error of a correction is about `uncertainty_um` (rms
+    length, in the best-fit frame).
 
-    Without `instrument` the quickest method that gets there is chosen; `points` fixes their number. `box_mm`
-    is the volume (default: the travel less a hundredth at each end), `tools` are vectors from the gauge point
-    to the reflector (default: three that are not on one line), `sigma_um` the uncertainty of a tracker's
-    coordinate, `periods_mm` those of screws and scales by axis. Raises UsageError, ConfigError and
-    CannotCompute.
+    Without `instrument` the quickest method that reaches it is chosen; `points` fixes the number of points.
+    `box_mm` is the volume (default: the travel less a hundredth at each end). `tools` are vectors from the
+    gauge point to the reflector (default: three that are not on one line). `sigma_um` is the standard
+    uncertainty of a tracker's coordinate, `periods_mm` the periods of screws and scales by axis. Raises
+    UsageError, ConfigError and CannotCompute.
     """
     setup = Session.start(machine).setup
     described = setup.machine
@@ -123,10 +128,10 @@ def plan_measurements(
     for name in names:
         dwell = DWELL_S[name] if dwell_s is None else dwell_s
         for title, planned in _candidates(name, described.name, box, reflectors, sigma, periods_mm, points):
-            found = predict(planned, described.chain, box, judged)
+            prediction = predict(planned, described.chain, box, judged)
             passes = tuple(_passes(planned, described, dwell + settle_s, box))
             seconds = sum(_seconds(run, described) for run in passes)
-            methods.append(Method(name, title, planned, found, passes, seconds, _set_up(planned)))
+            methods.append(Method(name, title, planned, prediction, passes, seconds, _set_up(planned)))
     good = [m for m in methods if m.prediction.rms_mm <= uncertainty_um * MM_PER_UM]
     chosen = min(good, key=lambda m: m.hours) if good else min(methods, key=lambda m: m.prediction.rms_mm)
     used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
@@ -192,23 +197,22 @@ def _candidates(
 
 
 def _passes(planned: Planned, machine: Machine, wait_s: float, box: Array) -> Iterator[Pass]:
-    """Runs of the machine, each with one instrument at one place and one reflector."""
-    taken = planned.measurements
+    """Runs of the machine, each with one instrument at one station and one reflector."""
+    measurements = planned.measurements
     for axis in AXES:
-        own = [line for line in taken.lines if line.component[2] == axis]
+        own = [line for line in measurements.lines if line.component[2] == axis]
         if own:
             k, line = AXES.index(axis), own[0]
             yield _line_pass(axis, k, line, machine, wait_s, box, len(own))
-    rays = taken.of(Lengths)
-    for cloud in taken.scattered:
+    rays = measurements.of(Lengths)
+    for cloud in measurements.scattered:
         if any(cloud is later for later in rays[1:]):
-            # stations see the same points one after the other
+            # stations measure the same points one after the other
             continue
         vectors = list(dict.fromkeys(map(tuple, cloud.tool_mm.tolist())))
         for number, vector in enumerate(vectors, start=1):
             rows = np.flatnonzero((cloud.tool_mm == np.array(vector)).all(axis=1))
-            places = cloud.axis_mm[rows]
-            rows = rows[order(places, machine.axes)]
+            rows = rows[order(cloud.axis_mm[rows], machine.axes)]
             label = "stations" if rays else cloud.source
             yield Pass(
                 f"{label}-{number}", _approached(cloud.axis_mm[rows], box), _waits(len(rows), wait_s),
@@ -230,18 +234,19 @@ def _line_pass(
         half = len(own) // 2
         stops += [(ends[0], 0.0), *((q, wait_s) for q in own[:half].tolist())]
         stops += [(ends[1], 0.0), *((q, wait_s) for q in own[half:].tolist())]
-    places = np.tile(np.array(line.line_mm, float), (len(stops), 1))
-    places[:, k] = [q for q, _ in stops]
+    points = np.tile(np.array(line.line_mm, float), (len(stops), 1))
+    points[:, k] = [q for q, _ in stops]
     waits = [0.0, *(wait for _, wait in stops)]
-    words = f"lines along {axis}: {len(np.unique(run))} runs there and back, once for each error of {axis}"
-    return Pass(f"line-{axis.lower()}", _approached(places, box), waits, words, f"line {axis}", repeats=lines)
+    runs = len(np.unique(run))
+    words = f"lines along {axis}: {runs} runs in both directions, once for each error of {axis}"
+    return Pass(f"line-{axis.lower()}", _approached(points, box), waits, words, f"line {axis}", repeats=lines)
 
 
-def _approached(places: Array, box: Array) -> Array:
-    """The first place is reached from above."""
-    above = places[:1].copy()
+def _approached(points: Array, box: Array) -> Array:
+    """The points, with a first one above them, from which the program descends."""
+    above = points[:1].copy()
     above[0, 2] = box[2, 1]
-    return np.concatenate([above, places])
+    return np.concatenate([above, points])
 
 
 def _waits(n: int, wait_s: float) -> list[float]:
@@ -254,11 +259,11 @@ def _seconds(run: Pass, machine: Machine) -> float:
 
 
 def _set_up(planned: Planned) -> float:
-    taken = planned.measurements
-    minutes = SET_UP_MIN["line"] * len(taken.lines)
-    minutes += SET_UP_MIN["station"] * (len(taken.of(Points)) + len(taken.of(Lengths)))
-    minutes += sum(SET_UP_MIN["station"] * pods.count for pods in taken.of(Pods))
-    for cloud in taken.scattered:
+    measurements = planned.measurements
+    minutes = SET_UP_MIN["line"] * len(measurements.lines)
+    minutes += SET_UP_MIN["station"] * (len(measurements.of(Points)) + len(measurements.of(Lengths)))
+    minutes += sum(SET_UP_MIN["station"] * pods.count for pods in measurements.of(Pods))
+    for cloud in measurements.scattered:
         minutes += SET_UP_MIN["reflector"] * len(np.unique(cloud.tool_mm, axis=0))
     return minutes
 
@@ -301,9 +306,10 @@ def _report(
 def _findings(chosen: Method, wanted: float) -> Iterator[Finding]:
     rms = chosen.prediction.rms_mm * UM_PER_MM
     if rms > wanted:
-        yield Finding("OLP837", f"{chosen.name} leaves about {rms:.1f} um; wanted were {wanted:g} um")
+        yield Finding("OLP837", f"{chosen.name}: residual about {rms:.1f} um, wanted {wanted:g} um")
     if chosen.prediction.hidden:
-        yield Finding("OLP838", f"{chosen.name} cannot see {', '.join(chosen.prediction.hidden)}")
+        hidden = ", ".join(chosen.prediction.hidden)
+        yield Finding("OLP838", f"{hidden}: not observable with {chosen.name}")
 
 
 def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> Iterator[tuple[Path, bytes]]:
@@ -315,8 +321,8 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
     for run in chosen.passes:
         notes = [
             f"{machine.name}: {run.words}",
-            f"{int(np.count_nonzero(run.wait_s))} stops in machine coordinates. Clear the way first: moves "
-            "are straight or axis by axis, inside "
+            f"{int(np.count_nonzero(run.wait_s))} stops in machine coordinates. Clear the volume first: "
+            "moves are straight or axis by axis, inside "
             + ", ".join(f"{a} {run.places_mm[:, k].min():g}..{run.places_mm[:, k].max():g}"
                         for k, a in enumerate(AXES)),
         ]  # fmt: skip
@@ -326,7 +332,7 @@ def _files(plan: MeasurementPlan, folder: Path, date: datetime.date | None) -> I
 
 
 def _control(setup: Setup) -> Profile:
-    """What the control reads. Raises CannotCompute where no program of positions is written for it."""
+    """The dialect of the control. Raises CannotCompute where no program of positions is written for it."""
     control = Session(setup).control()
     if not isinstance(control, Profile):
         raise CannotCompute(
@@ -337,14 +343,14 @@ def _control(setup: Setup) -> Profile:
 
 
 def _proved(text: bytes, run: Pass, setup: Setup, digits: int) -> None:
-    """Read a program back: it must stop where it is meant to. Its first block moves Z alone."""
+    """Read a program back: it must stop at its points. Its first block moves Z alone."""
     path = read(text, setup, _control(setup)).toolpath
     wanted = np.round(run.places_mm, digits)
     kept = np.concatenate([[True], (np.diff(wanted, axis=0) != 0.0).any(axis=1)])
     wanted = wanted[kept]
-    found = path.end_mm[1:]
-    if found.shape != wanted.shape or not np.abs(found - wanted).max() <= _SAME_MM:
-        raise CannotCompute(f"program {run.name} does not read back as its places; report this")
+    stops_mm = path.end_mm[1:]
+    if stops_mm.shape != wanted.shape or not np.abs(stops_mm - wanted).max() <= _SAME_MM:
+        raise CannotCompute(f"program {run.name} does not read back as its points; report this")
 
 
 __all__ = ["INSTRUMENTS", "MeasurementPlan", "Method", "plan_measurements"]

@@ -15,20 +15,20 @@ from olp.workflows.session import PathLike, Session
 def fit_postures(
     source: PathLike, machine: PathLike | Setup | None = None, *, reference: str | None = None
 ) -> PostureFit:
-    """Errors of tool vectors from a point held in several postures. With a machine its tools give the nominal
-    vectors, and where it has a calibration, the errors at each posture are taken out first. Raises
-    InputError, ConfigError."""
+    """Errors of tool vectors from a point held in several postures. The tools of a machine give the nominal
+    vectors; where it has a calibration, the errors at each posture are removed first. Raises InputError,
+    ConfigError."""
     session = None if machine is None else Session.start(machine)
-    found = read_postures(source, None if session is None else session.setup.machine.tools)
+    held = read_postures(source, None if session is None else session.setup.machine.tools)
     error = None
     if session is not None and session.setup.machine.calibration is not None:
         model = session.loaded("refuse").model
-        outside = ~model.inside(found.axis_mm)
+        outside = ~model.inside(held.axis_mm)
         if outside.any():
             row = int(np.flatnonzero(outside)[0])
             raise ConfigError(
                 f"posture {row + 1} is outside the calibrated box; leave it out, or call without the machine",
                 file=str(source),
             )
-        error = model.error(found.axis_mm, found.tool_vector_mm)
-    return postures.fit(found, error, reference)
+        error = model.error(held.axis_mm, held.tool_vector_mm)
+    return postures.fit(held, error, reference)

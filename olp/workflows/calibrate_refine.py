@@ -33,20 +33,19 @@ from olp.program.registry import read
 from olp.workflows import compare
 from olp.workflows.session import PathLike, Session
 
-#: A run whose chi-square a degree of freedom is beyond this was not foreseen by the covariance.
+#: A run with a reduced chi-square above this does not agree with the covariance.
 MISFIT = 1.5
-#: More points of a path tell no more: they are thinned evenly.
+#: Most points of a path; more are thinned evenly, as they add no information.
 MOST_POINTS = 3000
-#: Changes that are told one by one: those beyond so many old standard deviations.
-TOLD = 1.0
+#: Most rows of points that a finding names.
 _LISTED = 10
-#: Components of a path's tangent below this move no axis.
+#: Steps of a path below this, in mm, have no tangent.
 _MOVES = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RefinedCalibration:
-    """A calibration moved within its covariance by a measured run, and what is left of the covariance.
+    """A calibration updated within its covariance by a measured run, and its new covariance.
 
     `refinement` holds figures in mm and rad, `report` the same as a mapping ("olp-refinement-1").
     """
@@ -81,11 +80,11 @@ def refine_calibration(
     tool_mm: Vector | None = None,
     date: datetime.date | None = None,
 ) -> RefinedCalibration:
-    """Update a calibration by what was measured with it, within its covariance.
+    """Update a calibration by a measured run, within its covariance.
 
-    `measured` are points: commanded axis positions and where an instrument saw the reflector (a file as for
+    `measured` are points: commanded axis positions and measured positions of the reflector (a file as for
     `diagnose_calibration`, or Points). With `program`, the nominal program, they are tip positions along a
-    run of its correction, paired as `compare` pairs them; deviations across the path count. `sigma_um` is the
+    run of its correction, paired as in `compare`; only deviations across the path are used. `sigma_um` is the
     standard uncertainty of a coordinate, `date` the day of the run. Raises InputError, ConfigError where the
     calibration states no uncertainty, and CannotCompute.
     """
@@ -95,8 +94,7 @@ def refine_calibration(
     known = load_uncertainty(calibration, old, session.sources.read)
     if known is None or not known.entries:
         raise ConfigError(
-            "states no uncertainty, within which it could move; expected [covariance] or sigma_ columns, as "
-            "olp calibrate fit writes them",
+            "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
             file=str(calibration),
         )
     skip = frozenset(described.compensated_by_controller - old.active_during_measurement)
@@ -104,7 +102,7 @@ def refine_calibration(
     play: Array | None = None
     if program is not None:
         if sigma_um is None or isinstance(measured, Points):
-            raise ConfigError("points along a program state no uncertainty; expected sigma_um")
+            raise ConfigError("points along a program state no uncertainty; give sigma_um (--sigma-um)")
         run = session.of(dataclasses.replace(session.setup, machine=described))
         nominal = session.sources.source(program)
         points, along, play = _along(old, skip, run, nominal, measured, sigma_um * MM_PER_UM)
@@ -117,11 +115,11 @@ def refine_calibration(
         old, described.chain, known, points, frame_known=frame_known, skip=skip, play=play, along=along
     )
     new = done.calibration if date is None else dataclasses.replace(done.calibration, measured=date)
-    left = done.uncertainty
+    uncertainty = done.uncertainty
     if date is not None:
-        left = dataclasses.replace(left, fingerprint=fingerprint(new))
+        uncertainty = dataclasses.replace(uncertainty, fingerprint=fingerprint(new))
     return RefinedCalibration(
-        new, left, done, _report(new, done, len(points.axis_mm)), tuple(_findings(done))
+        new, uncertainty, done, _report(new, done, len(points.axis_mm)), tuple(_findings(done))
     )
 
 
@@ -133,11 +131,11 @@ def _along(
     measured: PathLike,
     sigma: float,
 ) -> tuple[Points, Array, Array | None]:
-    """Points of a corrected run with the commands that led there, tangents of the path and play of axes."""
+    """Points of a corrected run with their commands, tangents of the path and play of axes."""
     chain = session.setup.machine.chain
     model = build(calibration, chain, outside="hold", skip_components=skip)
-    found = compare.run(session.sources, session, program, [measured], compare.CompareOptions())
-    path, run = found.path, found.runs[0]
+    comparison = compare.run(session.sources, session, program, [measured], compare.CompareOptions())
+    path, run = comparison.path, comparison.runs[0]
     assert path is not None
     setup, dialect = session.reading(program)
     toolpath = read(program.data, setup, dialect).toolpath
@@ -157,12 +155,12 @@ def _along(
     states = plays(model, axes.path.vertex_mm)
     play = None if states is None else states[segment + 1]
     command = target - model.error(target, tool, play)
-    seen = command + tool + model.error(command, tool, play)
-    seen = seen + run.points_mm[use] - run.pairing.foot_mm[use]
-    way = end - begin
-    length = np.linalg.norm(way, axis=1)
-    tangent = np.where(length[:, None] > _MOVES, way / np.maximum(length, _MOVES)[:, None], 0.0)
-    points = Points(command, tool, seen, sigma, source=str(measured), row=use + 1)
+    measured_mm = command + tool + model.error(command, tool, play)
+    measured_mm = measured_mm + run.points_mm[use] - run.pairing.foot_mm[use]
+    step = end - begin
+    length = np.linalg.norm(step, axis=1)
+    tangent = np.where(length[:, None] > _MOVES, step / np.maximum(length, _MOVES)[:, None], 0.0)
+    points = Points(command, tool, measured_mm, sigma, source=str(measured), row=use + 1)
     return points, tangent, play
 
 
@@ -197,8 +195,8 @@ def _findings(done: Refinement) -> Iterator[Finding]:
     if ratio > MISFIT:
         yield Finding(
             "OLP839",
-            f"chi-square is {ratio:.1f} a degree of freedom: {done.before_mm * UM_PER_MM:.1f} um rms were "
-            f"found, {done.expected_mm * UM_PER_MM:.1f} um expected",
+            f"reduced chi-square is {ratio:.1f}: {done.before_mm * UM_PER_MM:.1f} um rms measured, "
+            f"{done.expected_mm * UM_PER_MM:.1f} um expected",
         )
     if done.outliers:
         rows = ", ".join(f"row {row} ({off:.0f})" for row, off in done.outliers[:_LISTED])

@@ -1,5 +1,4 @@
-"""Report files of measured lines and of the calibration made from them: HTML, JSON or Markdown by their
-ending."""
+"""Report files of measured lines and of the calibration made from them: HTML, JSON or Markdown by ending."""
 
 from __future__ import annotations
 
@@ -16,13 +15,13 @@ from olp.reports.report import to_json
 from olp.workflows.calibrate_fit import FittedCalibration
 
 
-def evaluation(found: Evaluated, name: str, date: datetime.date | None) -> bytes:
+def evaluation(evaluated: Evaluated, name: str, date: datetime.date | None) -> bytes:
     """The report of an evaluation in the form that `name` ends in."""
     ending = FilePath(name).suffix.lower()
     if ending == ".json":
-        return to_json(found.as_dict())
-    plots = report_calibration.plots_of(found) if ending == ".html" else {}
-    return in_form(report_calibration.evaluation(found, plots, __version__, date), name)
+        return to_json(evaluated.as_dict())
+    plots = report_calibration.plots_of(evaluated) if ending == ".html" else {}
+    return in_form(report_calibration.evaluation(evaluated, plots, __version__, date), name)
 
 
 def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> bytes:
@@ -33,12 +32,12 @@ def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> byt
         return to_json(report)
     measurements = fitted.fit.measurements
     try:
-        found = evaluate_all(measurements)
+        evaluated = evaluate_all(measurements)
     except ConfigError:
-        # lines of single runs have no ISO 230-2 figures; the fit says what they gave
-        found = Evaluated(measurements, (), (), (), (), (), ())
+        # lines of single runs have no ISO 230-2 figures; the summary of the fit shows them
+        evaluated = Evaluated(measurements, (), (), (), (), (), ())
     summary = FitSummary(fitted.fit, fitted.calibration, report, fitted.findings)
     plots: dict[str, bytes] = {}
     if ending == ".html":
-        plots = report_calibration.fit_plots(summary) | report_calibration.plots_of(found)
-    return in_form(report_calibration.calibration(found, summary, plots, __version__, date), name)
+        plots = report_calibration.fit_plots(summary) | report_calibration.plots_of(evaluated)
+    return in_form(report_calibration.calibration(evaluated, summary, plots, __version__, date), name)

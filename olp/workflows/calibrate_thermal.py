@@ -41,9 +41,9 @@ def fit_thermal(
     """Identify how the structure of a machine distorts with the temperatures of its sensors.
 
     `logs` are CSV files `t_s, NAME_degC ..., EXX@500_um ...`: time, sensors, and readings of drift of a
-    component at an axis position. `reference_degC` is what the sensors say where nothing distorts, by name
-    or one for all; default the temperature of the calibration. `sensors` chooses some. Raises InputError,
-    ConfigError, and CannotCompute where the logs do not tell enough.
+    component at an axis position. `reference_degC` are the readings of the sensors without distortion, by
+    name or one for all; default the temperature of the calibration. `sensors` chooses some. Raises
+    InputError, ConfigError, and CannotCompute where the logs do not determine the structure.
     """
     session = Session.start(machine)
     described = session.setup.machine
@@ -61,7 +61,7 @@ def fit_thermal(
             what = (
                 f"no reference of sensor {missing[0]}"
                 if missing
-                else f"{unknown[0]} is no sensor of the logs"
+                else f"{unknown[0]} is not a sensor of the logs"
             )
             raise ConfigError(f"{what}; expected one temperature in degC for each sensor, or one for all")
     fit = identify(read, np.asarray(calibration.box_mm, float), reference, sensors=sensors)
@@ -69,7 +69,7 @@ def fit_thermal(
     notes = [
         "Thermal structure, identified by olp calibrate thermal from "
         + ", ".join(Path(n).name for n in logs),
-        f"condition of the sensors {fit.condition:.3g}; removed of the drift where it was not fitted "
+        f"condition of the sensors {fit.condition:.3g}; drift removed where it was not fitted "
         f"({fit.held_out}): {fit.removed:.1%}",
         'Name this file in the calibration file: [thermal] structure = "..."',
     ]

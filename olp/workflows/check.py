@@ -1,4 +1,4 @@
-"""The gate before deployment: everything that is known against letting a program run, as findings."""
+"""The gate before deployment: all that speaks against running a program, as findings."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
 
-#: blocks with the least clearance that a report names
+#: Number of blocks with the least clearance in a report.
 _NEAREST = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions(ProofOptions):
-    """What `check` takes; see there."""
+    """The options of `check`."""
 
     outside_box: Outside = "refuse"
     select: tuple[str, ...] = ()
@@ -47,13 +47,13 @@ class CheckOptions(ProofOptions):
 
     @property
     def outside_code(self) -> str:
-        """The code of what lies outside the calibrated box."""
+        """The code of findings outside the calibrated box."""
         return "OLP405" if self.outside_box == "refuse" else "OLP403"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """What a gate found, the report of it ("olp-check-1"), and the clearance of every block where the job has
+    """The findings of a gate, its report ("olp-check-1"), and the clearance of every block where the job has
     meshes."""
 
     findings: tuple[Finding, ...]
@@ -64,8 +64,7 @@ class Check:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
     """The program as it would run; `run` and `proof` where a nominal one is known. Lines of the proof are
-    those of `data`, the text that was given: the nominal program, `corrected_here`, where that was given
-    alone, else the corrected one."""
+    those of `data`, the given text: the corrected program, or the nominal one that is `corrected_here`."""
 
     name: str
     data: bytes
@@ -78,7 +77,7 @@ class _Case:
     corrected_here: bool = False
 
     def worded(self, program: Program) -> Program:
-        """A program with its words, which a correction drops early."""
+        """A program with its words; a correction drops them early."""
         if program.words is not None:
             return program
         return read(program.data, self.loaded.setup, self.loaded.dialect, self.reading)
@@ -93,7 +92,7 @@ def check(
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "refuse",
     contour: bool = False,
-    within_um: float | None = None,
+    part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
     select: Sequence[str] = (),
@@ -102,18 +101,19 @@ def check(
 ) -> Check:
     """May this program run on this machine?
 
-    With `nominal`, `program` is the correction of it, whoever wrote it, and is proved against it. Alone and
-    without the stamp of a correction it is the nominal program: it is corrected here, and what that gives
-    is checked. Alone and with a stamp it is checked as it is, without what needs the nominal one. Lines are
-    those of `program`. `select` and `ignore` are codes or their beginnings (OLP4). Outside the calibrated
-    box nothing is refused here: that is finding OLP405, or OLP403 with `outside_box` "hold".
+    With `nominal`, `program` is the corrected program, from any source, and is proved against it. Alone and
+    without the stamp of a correction it is the nominal program: it is corrected here, and the result is
+    checked. Alone and with a stamp it is checked unchanged, without the checks that need the nominal one.
+    Lines are those of `program`. `select` and `ignore` are codes or their beginnings (OLP4). A path outside
+    the calibrated box is not refused: that is finding OLP405, or OLP403 with `outside_box` "hold".
 
-    Raises UsageError for a code that does not exist, InputError for what cannot be read, or corrected, at all
+    Raises UsageError for a code that does not exist, InputError for input that cannot be read or corrected
     (ProgramError with its line), and CannotCompute.
     """
     options = CheckOptions(
-        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, within_um=within_um,
-        only_sure_components=only_sure_components, date=date, select=tuple(select), ignore=tuple(ignore),
+        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
+        part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components,
+        date=date, select=tuple(select), ignore=tuple(ignore),
     )  # fmt: skip
     chosen(options)
     session = Session.start(machine, job)
@@ -143,13 +143,13 @@ def run(
         loaded = loaded.reading(program)
         case = _case(session.sources, program, nominal, loaded, options, tell)
         tell("check", 0.8)
-        found = _findings(case, options)
+        findings = _findings(case, options)
         around = _clearances(case, codes, session.sources, tell)
     if everything:
-        found.append(finding("OLP410", 'compensated_by_controller is "all"'))
+        findings.append(finding("OLP410", 'compensated_by_controller is "all"'))
     if around is not None:
-        found += around.findings(setup.machine.sanity.clearance_mm)
-    kept = tuple(sorted((f for f in found if f.code in codes), key=lambda f: (f.code, f.line or 0)))
+        findings += around.findings(setup.machine.sanity.clearance_mm)
+    kept = tuple(sorted((f for f in findings if f.code in codes), key=lambda f: (f.code, f.line or 0)))
     report = _report(case, kept, codes, options)
     if around is not None:
         report["clearance"] = list(around.nearest(_NEAREST).rows())
@@ -158,16 +158,16 @@ def run(
 
 def chosen(options: CheckOptions) -> list[str]:
     """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises
-    UsageError for what begins no code."""
+    UsageError for text that begins no code."""
     select, ignore = options.select, options.ignore
     for prefix in (*select, *ignore):
         if not any(code.startswith(prefix.upper()) for code in GATE_CODES):
             raise UsageError(
-                f"{prefix!r} is no code of a finding, nor how one begins; olp explain lists them all"
+                f"{prefix!r} is not the code of a finding or the beginning of one; olp explain lists them all"
             )
     wanted, unwanted = (tuple(prefix.upper() for prefix in prefixes) for prefixes in (select, ignore))
-    found = [code for code in GATE_CODES if not wanted or code.startswith(wanted)]
-    return [code for code in found if not (unwanted and code.startswith(unwanted))]
+    codes = [code for code in GATE_CODES if not wanted or code.startswith(wanted)]
+    return [code for code in codes if not (unwanted and code.startswith(unwanted))]
 
 
 def _case(
@@ -180,13 +180,13 @@ def _case(
     if nominal is None and find_stamp(data) is None:
         correcting = CorrectOptions(**options.proof(), outside_box="hold")
         run = corrected(sources, program, loaded, correcting, tell, options.outside_code)
-        what = "what olp correct makes of the program"
+        what = "the result of olp correct on the program"
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
         return _Case(name, data, run.corrected, run, proof, loaded, reading, what, corrected_here=True)
     written = read(data, loaded.setup, loaded.dialect, reading)
     if nominal is None:
-        what = "the corrected program as it is; what needs the nominal one is left out (--nominal)"
+        what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
         return _Case(name, data, written, None, None, loaded, reading, what)
     nominal.load()
     with nominal.errors("<nominal>"):
@@ -204,67 +204,67 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     loaded, run, proof, date = case.loaded, case.run, case.proof, options.date
     tolerance_mm = options.tolerance_um * MM_PER_UM
     machine, sanity = loaded.setup.machine, loaded.setup.machine.sanity
-    found = [
+    findings = [
         *_stamps(case),
         *state.temperature_findings(loaded.setup.job, loaded.calibration, sanity),
         *state.digit_findings(last_digit_mm(case.written, loaded.setup), tolerance_mm),
     ]
     if date is None:
-        found.append(finding("OLP408", "no date is given"))
+        findings.append(finding("OLP408", "no date is given"))
     path = case.written.toolpath
     if run is not None and proof is not None and case.corrected_here:
-        found += run.findings
+        findings += run.findings
         path = proof.written
     else:
-        found += state.travel_findings(path, machine)
-        found += state.box_findings(path, loaded.model.box_mm, options.outside_code)
-        found += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
-        found += checks.program_findings(case.written, loaded.setup, contour=options.contour)
-        found += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
+        findings += state.travel_findings(path, machine)
+        findings += state.box_findings(path, loaded.model.box_mm, options.outside_code)
+        findings += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
+        findings += checks.program_findings(case.written, loaded.setup, contour=options.contour)
+        findings += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
-            found += checks.proof_findings(proof, run.passed)
-            found += checks.between_findings(run.nominal, proof, loaded.model)
-            found += _confidence(run)
-    found += state.tool_findings(path, loaded.calibration, sanity)
+            findings += checks.proof_findings(proof, run.uncorrected)
+            findings += checks.between_findings(run.nominal, proof, loaded.model)
+            findings += _confidence(run)
+    findings += state.tool_findings(path, loaded.calibration, sanity)
     lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD
-    found += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
-    found += motion.reversal_findings(path, loaded.model)
+    findings += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
+    findings += motion.reversal_findings(path, loaded.model)
     speeds = motion.Feeds.of(case.worded(case.written))
     before = None if run is None else motion.Feeds.of(case.worded(run.nominal))
-    found += (before if before is not None and case.corrected_here else speeds).findings()
+    findings += (before if before is not None and case.corrected_here else speeds).findings()
     if speeds.mm_s is not None:
-        found += motion.demand_findings(path, speeds.mm_s, machine)
+        findings += motion.demand_findings(path, speeds.mm_s, machine)
     if run is not None and proof is not None and before is not None:
         correction = _corrections(run.nominal, case.written, proof)
-        found += state.sanity_findings(proof.nominal, correction, sanity)
-        found += motion.low_findings(proof, loaded.model)
+        findings += state.sanity_findings(proof.nominal, correction, sanity)
+        findings += motion.low_findings(proof, loaded.model)
         if speeds.mm_s is not None and before.mm_s is not None:
-            found += motion.changed_findings(proof, before.mm_s, speeds.mm_s)
+            findings += motion.changed_findings(proof, before.mm_s, speeds.mm_s)
         if not case.corrected_here:
             largest = float(np.sqrt((correction * correction).sum(axis=1)).max(initial=0.0))
-            found += checks.path_mode_findings(case.written, largest)
-    return found
+            findings += checks.path_mode_findings(case.written, largest)
+    return findings
 
 
 def _confidence(run: Run) -> list[Finding]:
-    """What a verification says of uncertainties, with the lines of the corrected program."""
+    """Findings of a verification on uncertainties, with the lines of the corrected program."""
     proof = run.proof
     there = dict(zip(proof.nominal.line.tolist(), proof.written.line[proof.groups].tolist(), strict=True))
     return [
         replace(
-            found,
-            line=None if found.line is None else there[found.line],
-            lines=tuple(there[line] for line in found.lines),
+            finding,
+            line=None if finding.line is None else there[finding.line],
+            lines=tuple(there[line] for line in finding.lines),
         )
-        for found in run.findings
-        if RULES[found.code].topic == "uncertainty"
+        for finding in run.findings
+        if RULES[finding.code].topic == "uncertainty"
     ]
 
 
 def _clearances(
     case: _Case, codes: list[str], sources: Sources, tell: Progress
 ) -> Clearances | None:
-    """None where there are no meshes, or nobody asks."""
+    """Clearances; None where the job has no meshes, or `codes` has none of clearances."""
     setup = case.loaded.setup
     if not setup.job.meshes or not any(RULES[code].topic == "clearance" for code in codes):
         return None
@@ -278,41 +278,41 @@ def _clearances(
 
 
 def _corrections(nominal: Program, written: Program, proof: Proof) -> Array:
-    """(n, 3) how far each way-point was moved, 0 where that is not known; of canned cycles the place and
-    the bottom of each hole, for a corrected depth may take other pecks."""
-    out = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
-    out[(proof.nominal.flag & np.uint8(Flag.CYCLE)) != 0] = 0.0
+    """(n, 3) how far each waypoint was moved, 0 where that is not known; of canned cycles the position and
+    the bottom of each hole, as a corrected depth may need other pecks."""
+    correction = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
+    correction[(proof.nominal.flag & np.uint8(Flag.CYCLE)) != 0] = 0.0
     for mine, other in zip(nominal.holes, written.holes, strict=False):
         moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
-        out[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
-    return np.asarray(out, float)
+        correction[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
+    return np.asarray(correction, float)
 
 
 def _stamps(case: _Case) -> list[Finding]:
-    """Is the program corrected once, and with this calibration?"""
-    out = []
+    """Findings where the program is corrected twice, or with another calibration."""
+    findings = []
     first = find_stamp(case.data)
     if first is not None and find_stamp(case.data[first.end() :]) is not None:
-        out.append(
+        findings.append(
             finding(
-                "OLP311", "the program carries two stamps of a correction", [_line(case.data, first.start())]
+                "OLP311", "the program has two stamps of a correction", [_line(case.data, first.start())]
             )
         )
     if case.run is not None and not case.corrected_here and find_stamp(case.run.nominal.data) is not None:
-        out.append(finding("OLP311", "the program given as nominal carries the stamp of a correction"))
+        findings.append(finding("OLP311", "the program given as nominal has the stamp of a correction"))
     own = case.loaded.digest[:12]
     if first is not None and not first.group().endswith(own.encode()):
-        what = f"the program says `{first.group().decode()}`, the calibration in force is {own}"
-        out.append(finding("OLP312", what, [_line(case.data, first.start())]))
-    return out
+        what = f"the program says `{first.group().decode()}`, the calibration in use is {own}"
+        findings.append(finding("OLP312", what, [_line(case.data, first.start())]))
+    return findings
 
 
-def _line(data: bytes, at: int) -> int:
-    return data.count(b"\n", 0, at) + 1
+def _line(data: bytes, offset: int) -> int:
+    return data.count(b"\n", 0, offset) + 1
 
 
 def _report(
-    case: _Case, found: tuple[Finding, ...], codes: list[str], options: CheckOptions
+    case: _Case, findings: tuple[Finding, ...], codes: list[str], options: CheckOptions
 ) -> dict[str, Any]:
     machine, calibration = case.loaded.setup.machine, case.loaded.calibration
     return {
@@ -332,5 +332,5 @@ def _report(
         "date": options.date,
         "tolerance_um": options.tolerance_um,
         "rules": codes,
-        "findings": [f.as_dict() for f in found],
+        "findings": [f.as_dict() for f in findings],
     }

@@ -35,7 +35,7 @@ from olp.workflows.session import Loaded, PathLike, Session
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CompareOptions:
-    """What `compare` takes beside its files; see there."""
+    """The options of `compare`."""
 
     before: tuple[PathLike, ...] = ()
     poses: bool = False
@@ -43,7 +43,7 @@ class CompareOptions:
     align: runs.Align = "auto"
     order: Order | None = None
     reach_mm: float = 1.0
-    tolerance_um: float | None = None
+    part_tolerance_um: float | None = None
     add_errors: bool = False
     part_frame: str | None = None
     contour: bool = False
@@ -52,7 +52,7 @@ class CompareOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """What a comparison found: the report ("olp-comparison-1") as a mapping and the findings.
+    """The result of a comparison: the report ("olp-comparison-1") as a mapping and the findings.
 
     `path` is the nominal path, `runs` and `before` are the measured runs on it, in the nominal frame; all of
     them are None and empty for poses. `part_frame` is a table for the job file, of poses, where asked for.
@@ -67,7 +67,7 @@ class Comparison:
     part_frame: str | None = None
 
     def to_csv(self) -> Iterator[bytes]:
-        """A row a measured point: run, arc length, line, nominal place, deviations, and whether it counts."""
+        """One row per measured point: run, arc length, line, nominal point, deviations, whether it counts."""
         yield b"run,s_mm,line,X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted\n"
         for run in (*self.before, *self.runs):
             assert self.path is not None
@@ -112,27 +112,28 @@ def compare(
     align: runs.Align = "auto",
     order: Order | None = None,
     reach_mm: float = 1.0,
-    tolerance_um: float | None = None,
+    part_tolerance_um: float | None = None,
     add_errors: bool = False,
     part_frame: str | None = None,
     contour: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Hold measured runs against a nominal path, or measured points against nominal poses.
+    """Compare measured runs with a nominal path, or measured points with nominal poses.
 
     `nominal` is a program, which needs `machine`, or a file of points. Each file of `measured` and of
     `before` is one run (cycle); with `poses` each row is a pose, paired by name or by row. `align` and
-    `order` are as in `olp.comparison.runs.place`; points farther than `reach_mm` from their place are in no
-    figure. With `add_errors` measured axis positions (a control's log) are moved to where the calibrated
-    machine's tip would go. `part_frame` names the work offset that poses, measured in axis positions, are
-    to give. Raises InputError, UsageError and CannotCompute.
+    `order` are as in `olp.comparison.runs.place`; points farther than `reach_mm` from the path are in no
+    figure. With `add_errors` the errors of the calibrated machine are added to measured axis positions (a
+    control's log), which gives tip positions. `part_frame` names the work offset to compute from poses
+    measured in axis positions. Raises InputError, UsageError and CannotCompute.
     """
     sources = Sources()
     session = None if machine is None and job is None else Session.start(machine, job, sources=sources)
     options = CompareOptions(
         before=tuple(before), poses=poses, profile=profile, align=align, order=order, reach_mm=reach_mm,
-        tolerance_um=tolerance_um, add_errors=add_errors, part_frame=part_frame, contour=contour, date=date,
+        part_tolerance_um=part_tolerance_um, add_errors=add_errors, part_frame=part_frame,
+        contour=contour, date=date,
     )  # fmt: skip
     return run(sources, session, sources.source(nominal), measured, options, progress)
 
@@ -160,12 +161,12 @@ def run(
 
 def _poses(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> Comparison:
     if side.points is None:
-        raise UsageError("poses come from a file of points; the nominal one is a program")
-    report, found = poses_report(side.points, *sets, align=options.align, reach_mm=options.reach_mm)
+        raise UsageError("poses need a file of points as NOMINAL, and it is a program")
+    report, findings = poses_report(side.points, *sets, align=options.align, reach_mm=options.reach_mm)
     report = _head(side, sets, options) | report
     name = options.part_frame
     table = None if name is None else poses_frame(side.points, sets[0], name)
-    return Comparison(_with(report, found), tuple(found), sets[0][0].profile, part_frame=table)
+    return Comparison(_with(report, findings), tuple(findings), sets[0][0].profile, part_frame=table)
 
 
 def _paths(
@@ -174,8 +175,8 @@ def _paths(
     axes = _positions(sets) == "axes"
     if options.add_errors and not (axes and side.program):
         raise UsageError(
-            "--add-errors moves axis positions of a control's log by the machine's errors; give a program as "
-            'NOMINAL, -m, and a profile with positions = "axes"'
+            "--add-errors is for axis positions of a control's log; give a program as NOMINAL, -m, and a "
+            'profile with positions = "axes"'
         )
     path, move = _nominal(side, axes)
     _same_frame(side, sets, axes)
@@ -186,12 +187,12 @@ def _paths(
         points = [_with_errors(side, path, move, p, options.order, options.reach_mm) for p in points]
     placed = runs.place(path, names, points, options.align, options.order, options.reach_mm)
     tell("figures", 0.8)
-    found = runs.findings(path, placed)
+    findings = runs.findings(path, placed)
     judged = placed.fitted and all(placed.right) and bool(placed.runs[0].counted.any())
-    taken = _taken(side, path, move, placed, axes) if judged else None
-    if taken is not None:
-        found += runs.absorbed_finding(*taken)
-    report = _head(side, sets, options) | _placed_report(path, placed, taken, axes, options)
+    absorbed = _absorbed(side, path, move, placed, axes) if judged else None
+    if absorbed is not None:
+        findings += runs.absorbed_finding(*absorbed)
+    report = _head(side, sets, options) | _placed_report(path, placed, absorbed, axes, options)
     count = len(sets[0])
     groups = {"after": placed.runs[:count], "before": placed.runs[count:]}
     right = {"after": placed.right[:count], "before": placed.right[count:]}
@@ -201,21 +202,21 @@ def _paths(
     if side.program is not None and all(right["after"]):
         worst = report["after"].get("worst") or []
         report["worst"] = [row | {"text": side.program.text(row["line"])} for row in worst]
-    found += parts.verdict(report, options.tolerance_um)
-    found += parts.cycles(groups)
+    findings += parts.verdict(report, options.part_tolerance_um)
+    findings += parts.cycles(groups)
     if side.loaded is not None:
-        found += calibration_findings(side.loaded, options.date)
+        findings += calibration_findings(side.loaded, options.date)
     after, before = groups["after"], groups["before"]
-    return Comparison(_with(report, found), tuple(found), sets[0][0].profile, path, after, before)
+    return Comparison(_with(report, findings), tuple(findings), sets[0][0].profile, path, after, before)
 
 
 def _placed_report(
-    path: Path, placed: runs.Placed, taken: tuple[float, float, str] | None, axes: bool,
+    path: Path, placed: runs.Placed, absorbed: tuple[float, float, str] | None, axes: bool,
     options: CompareOptions,
 ) -> dict[str, Any]:  # fmt: skip
     frame = parts.frame(placed)
-    if taken is not None:
-        frame |= {"error_rms_um": taken[0], "left_by_fit_rms_um": taken[1], "error_is": taken[2]}
+    if absorbed is not None:
+        frame |= {"error_rms_um": absorbed[0], "left_by_fit_rms_um": absorbed[1], "error_is": absorbed[2]}
     return {
         "frame": frame,
         "path": {
@@ -228,8 +229,8 @@ def _placed_report(
     }
 
 
-def _with(report: dict[str, Any], found: Sequence[Finding]) -> dict[str, Any]:
-    return report | {"findings": [f.as_dict() for f in found]}
+def _with(report: dict[str, Any], findings: Sequence[Finding]) -> dict[str, Any]:
+    return report | {"findings": [f.as_dict() for f in findings]}
 
 
 def _nominal_side(nominal: Source, session: Session | None, contour: bool) -> _Side:
@@ -240,7 +241,7 @@ def _nominal_side(nominal: Source, session: Session | None, contour: bool) -> _S
         return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
     if session is None:
         raise UsageError(
-            f"{name or 'the nominal path'} is no table of points, and a program needs its machine; "
+            f"{name or 'the nominal path'} is not a table of points, and a program needs its machine; "
             "name the machine file with -m, or a job with -j"
         )
     with nominal.errors("<stdin>"):
@@ -252,7 +253,9 @@ def _nominal_side(nominal: Source, session: Session | None, contour: bool) -> _S
 def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
     kinds = {p.profile.positions for files in sets for p in files}
     if len(kinds) > 1:
-        raise UsageError("some measured files hold axis positions and others the tip; compare them apart")
+        raise UsageError(
+            "some measured files hold axis positions, others tip positions; compare them separately"
+        )
     return kinds.pop()
 
 
@@ -260,12 +263,12 @@ def _nominal(side: _Side, axes: bool) -> tuple[Path, Index | None]:
     if side.points is not None:
         return Path.through(side.points.points_mm, side.points.line), None
     assert side.program is not None and side.loaded is not None
-    found: Nominal = nominal_of(side.program.toolpath, side.loaded.model, "axes" if axes else "tip")
-    return found.path, found.move
+    nominal: Nominal = nominal_of(side.program.toolpath, side.loaded.model, "axes" if axes else "tip")
+    return nominal.path, nominal.move
 
 
 def _same_frame(side: _Side, sets: Sequence[Sequence[Points]], axes: bool) -> None:
-    """Frames that files state never mix. Raises InputError."""
+    """Raise InputError where files state different frames."""
     stated = {p.frame: p.file for files in sets for p in files if p.frame}
     if side.points is not None and side.points.frame:
         stated.setdefault(side.points.frame, side.points.file)
@@ -275,7 +278,7 @@ def _same_frame(side: _Side, sets: Sequence[Sequence[Points]], axes: bool) -> No
     if len(stated) > 1:
         (a, file_a), (b, file_b) = list(stated.items())[:2]
         raise InputError(
-            f"states frame {a}, and {file_b} is in {b}; expected the same frame; state the points anew, or "
+            f"states frame {a}, and {file_b} is in {b}; expected the same frame; convert the points, or "
             "remove the statement and fit them with --align fit",
             file=file_a,
         )
@@ -289,7 +292,7 @@ def _names(files: Sequence[str]) -> list[str]:
 def _with_errors(
     side: _Side, path: Path, move: Index | None, points: Array, order: Order | None, reach_mm: float
 ) -> Array:
-    """Axis positions moved to where the tip of the calibrated machine would go, the tool's lever included."""
+    """Axis positions plus the error of the calibrated machine, with the tool vector: tip positions."""
     assert side.program is not None and side.loaded is not None and move is not None
     tool = side.program.toolpath.tool_mm()
     model = side.loaded.model
@@ -299,29 +302,29 @@ def _with_errors(
     return np.asarray(points + model.error(points, tool), float)
 
 
-def _taken(
+def _absorbed(
     side: _Side, path: Path, move: Index | None, placed: runs.Placed, axes: bool
 ) -> tuple[float, float, str] | None:
-    """What the fit takes of the error: rms in um across the path before and after it, and of which error;
-    None where nothing is known of that."""
+    """The error that is absorbed by the fit: rms in um across the path before and after the fit, and which
+    error; None where that is not known."""
     run, rigid = placed.runs[0], placed.rigid[0]
     moved = float(np.abs(rigid.inverse()(run.points_mm) - run.points_mm).max())
-    if moved < 1.0:  # stated in the nominal frame already, as far as anybody can tell
+    if moved < 1.0:  # probably stated in the nominal frame already
         return *runs.absorbed(path, run, rigid), "as measured"
     if side.program is None or side.loaded is None or move is None:
         return None
     toolpath = side.program.toolpath
     tool = toolpath.tool_mm()
     which = move[run.pairing.segment]
-    at = run.pairing.foot_mm
+    position_mm = run.pairing.foot_mm
     if not axes:
         nominal = nominal_of(toolpath, side.loaded.model, "axes")
         share = (run.pairing.s_mm - path.s_mm[run.pairing.segment]) / np.diff(path.s_mm)[run.pairing.segment]
         if len(nominal.path) != len(path):
             return None
         begin = nominal.path.vertex_mm[run.pairing.segment]
-        at = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
-    error = side.loaded.model.error(at, tool if tool.ndim == 1 else tool[which])
+        position_mm = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
+    error = side.loaded.model.error(position_mm, tool if tool.ndim == 1 else tool[which])
     whose = "that the calibration predicts for the uncorrected machine"
     return *runs.absorbed_of_field(path, run, error), whose
 
@@ -332,5 +335,5 @@ def _head(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions
         "sha256": hashlib.sha256(side.source.data).hexdigest(),
         "kind": "program" if side.program else "points",
     }
-    stated = ("align", "reach_mm", "tolerance_um")
-    return parts.head(nominal, side.loaded, *sets) | {key: getattr(options, key) for key in stated}
+    stated = {"align": options.align, "reach_mm": options.reach_mm, "tolerance_um": options.part_tolerance_um}
+    return parts.head(nominal, side.loaded, *sets) | stated

@@ -21,45 +21,45 @@ from olp.findings.catalogue import Finding
 def cycles(nominal: Points, files: Sequence[Points]) -> Array:
     """(n, m, 3) attained positions of the m nominal poses in n cycles, NaN where one is missing.
 
-    Points belong together by name where both sides have names, else by row; a file may hold several cycles
-    one after the other. Raises InputError where neither fits.
+    Points are paired by name where both sides have names, else by row; a file may hold several cycles one
+    after the other. Raises InputError where neither fits.
     """
-    found: list[Array] = []
+    attained: list[Array] = []
     for points in files:
         if nominal.names is not None and points.names is not None:
-            found += _by_name(nominal.names, nominal.file, points)
+            attained += _by_name(nominal.names, nominal.file, points)
             continue
         if len(points) % len(nominal):
             raise InputError(
-                f"{len(points)} points are no whole number of cycles of {len(nominal)} poses, and names that "
-                "would tell them are missing; expected a row a pose, or a column of names on both sides",
+                f"has {len(points)} points, not an integer number of cycles of {len(nominal)} poses, and no "
+                "names; expected one row per pose, or a column of names on both sides",
                 file=points.file,
             )
-        found += list(points.points_mm.reshape(-1, len(nominal), 3))
-    return np.stack(found)
+        attained += list(points.points_mm.reshape(-1, len(nominal), 3))
+    return np.stack(attained)
 
 
 def _by_name(names: Sequence[str], nominal: str, points: Points) -> list[Array]:
-    place = {name: i for i, name in enumerate(names)}
-    if len(place) < len(names):
-        twice = next(name for i, name in enumerate(names) if place[name] != i)
-        raise InputError(f'the nominal pose "{twice}" is there twice; expected each name once', file=nominal)
-    out: list[Array] = []
+    index = {name: i for i, name in enumerate(names)}
+    if len(index) < len(names):
+        twice = next(name for i, name in enumerate(names) if index[name] != i)
+        raise InputError(f'the nominal pose "{twice}" is defined twice; expected it once', file=nominal)
+    attained: list[Array] = []
     seen: dict[str, int] = {}
     assert points.names is not None
-    for name, at in zip(points.names, points.points_mm, strict=True):
-        if name not in place:
+    for name, point_mm in zip(points.names, points.points_mm, strict=True):
+        if name not in index:
             continue
         cycle = seen[name] = seen.get(name, -1) + 1
-        if cycle == len(out):
-            out.append(np.full((len(names), 3), np.nan))
-        out[cycle][place[name]] = at
-    if not out:
+        if cycle == len(attained):
+            attained.append(np.full((len(names), 3), np.nan))
+        attained[cycle][index[name]] = point_mm
+    if not attained:
         raise InputError(
-            f'none of its names is a nominal one, such as "{names[0]}"; give both the same names',
+            f'has no name of a nominal pose, such as "{names[0]}"; expected the same names in both files',
             file=points.file,
         )
-    return out
+    return attained
 
 
 def poses_report(
@@ -73,7 +73,7 @@ def poses_report(
     stated = {name: _distance(command, attained) for name, attained in groups.items()}
     fitted = align in ("fit", "each") or (align == "auto" and float(np.median(stated["after"])) > reach_mm)
     rigid = Rigid.identity()
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if fitted:
         mean, there = _means(groups["after"])
         rigid = fit_frame(mean[there], command[there])
@@ -82,13 +82,13 @@ def poses_report(
         }
         x, y, z = rigid.shift_mm.tolist()
         rest = _rms(_distance(command, groups["after"]))
-        found.append(Finding(
+        findings.append(Finding(
             "OLP611",
             f"shift {x:.4f}, {y:.4f}, {z:.4f} mm, turn {np.degrees(rigid.angle_rad):.6f} deg; rms residual "
             f"{rest:.3g} um",
         ))  # fmt: skip
         if float(stated["after"].max()) < reach_mm:
-            found += absorbed_finding(_rms(stated["after"]), rest, "as measured")
+            findings += absorbed_finding(_rms(stated["after"]), rest, "as measured")
     report: dict[str, Any] = {
         "frame": {
             "fitted": fitted, "shift_mm": rigid.shift_mm.tolist(), "angles_deg": list(rigid.angles_deg),
@@ -97,13 +97,13 @@ def poses_report(
     names = nominal.names or tuple(str(i + 1) for i in range(len(nominal)))
     for name, attained in groups.items():
         report[name], more = _group(names, command, attained, reach_mm)
-        found += more
+        findings += more
         if not 1 < len(attained) < iso9283.POSE_CYCLES:
             continue
-        found.append(Finding(
+        findings.append(Finding(
             "OLP607", f"{len(attained)} cycles {name}; ISO 9283 asks for {iso9283.POSE_CYCLES}"
         ))  # fmt: skip
-    return report, found
+    return report, findings
 
 
 def _group(
@@ -116,13 +116,13 @@ def _group(
         return {"poses": None, "iso_9283": None}, [Finding(
             "OLP601",
             f"{int((far > reach_mm).sum())} of {len(names)} poses lie farther than {reach_mm:g} mm from "
-            f"their command, {names[worst]} by {far[worst]:.4g} mm; no figures are stated",
+            f"their command, {names[worst]} by {far[worst]:.4g} mm; no figures are given",
         )]  # fmt: skip
-    found = []
+    findings = []
     missing = ~np.isfinite(distance).any(axis=0)
     if missing.any():
         which = ", ".join(name for name, gone in zip(names, missing.tolist(), strict=True) if gone)
-        found.append(Finding("OLP603", f"not measured: {which}", count=int(missing.sum())))
+        findings.append(Finding("OLP603", f"not measured: {which}", count=int(missing.sum())))
     each = iso9283.repeated(command, attained)
     rows = [
         {
@@ -143,11 +143,11 @@ def _group(
             "AP_um": ap.value_mm * UM_PER_MM, "AP_pose": names[ap.place] if ap.place >= 0 else None,
             "RP_um": rp.value_mm * UM_PER_MM, "RP_pose": names[rp.place] if rp.place >= 0 else None,
         },
-    }, found  # fmt: skip
+    }, findings  # fmt: skip
 
 
 def _means(attained: Array) -> tuple[Array, Mask]:
-    """(m, 3) means of cycles (n, m, 3), and which of them (m,) are of something."""
+    """(m, 3) means of cycles (n, m, 3), and (m,) which of them have a measured point."""
     there = np.asarray(np.isfinite(attained).all(axis=2), bool)
     count = there.sum(axis=0)
     total = np.where(there[:, :, None], attained, 0.0).sum(axis=0)
@@ -164,7 +164,7 @@ def _rms(distance_mm: Array) -> float:
 
 
 def part_frame(nominal: Points, measured: Sequence[Points], name: str) -> str:
-    """A table [work_offsets.NAME] for a job file: where the part lies, from three or more of its points.
+    """A table [work_offsets.NAME] for a job file: the frame of the part, from three or more of its points.
 
     The nominal points are those of the program, the measured ones axis positions in the machine frame without
     tool length; position = Rz(C) Ry(B) Rx(A) point + offset. Raises CannotCompute for fewer points, or
@@ -175,12 +175,12 @@ def part_frame(nominal: Points, measured: Sequence[Points], name: str) -> str:
     away = np.sqrt(((rigid(nominal.points_mm[there]) - mean[there]) ** 2).sum(axis=1)) * UM_PER_MM
     angles = {f"{axis}_deg": round(v, 9) for axis, v in zip("ABC", rigid.angles_deg, strict=True)}
     offset = {f"{axis}_mm": round(v, 6) for axis, v in zip("XYZ", rigid.shift_mm.tolist(), strict=True)}
-    said = (
+    fit = (
         f"best fit of {int(there.sum())} measured points: {away.max():.2f} um at most, "
-        f"{float(np.sqrt(np.mean(away**2))):.2f} um rms left"
+        f"{float(np.sqrt(np.mean(away**2))):.2f} um rms residual"
     )
     lines = [
-        *comment(said),
+        *comment(fit),
         f"[work_offsets.{toml_key(name)}]",
         *toml_lines(offset | angles | {"set_by": "true"}),
     ]

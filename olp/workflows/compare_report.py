@@ -15,13 +15,14 @@ from olp.files.points import Points
 from olp.findings.catalogue import Finding
 from olp.workflows.session import Loaded
 
+#: Number of lines with the largest deviations in a report.
 _WORST = 10
 
 
 def head(
     nominal: Mapping[str, Any], loaded: Loaded | None, measured: Sequence[Points], before: Sequence[Points]
 ) -> dict[str, Any]:
-    """What was compared with what, with the hashes of all of it."""
+    """What was compared, with the hashes of all files."""
     report: dict[str, Any] = {
         "schema": "olp-comparison-1",
         "nominal": dict(nominal),
@@ -66,17 +67,17 @@ def frame(placed: runs.Placed) -> dict[str, Any]:
 
 
 def group(path: Path, members: Sequence[figures.Run], right: Sequence[bool]) -> dict[str, Any]:
-    """Figures of the runs of a group, each and together; None for a run whose pairing is wrong."""
+    """Figures of the runs of a group, of each and of all; None for a run whose pairing is wrong."""
     rows: list[dict[str, Any]] = [
         run.figures(path) if good else {"name": run.name, "points": len(run.points_mm), "across_um": None}
         for run, good in zip(members, right, strict=True)
     ]
     if not all(right):
         return {"runs": rows, "iso_9283": None}
-    out: dict[str, Any] = {"runs": rows, "iso_9283": _iso_9283(path, members)}
+    report: dict[str, Any] = {"runs": rows, "iso_9283": _iso_9283(path, members)}
     sizes: list[dict[str, float]] = [row["across_um"] for row in rows if row["across_um"]]
     if sizes:
-        out["across_um"] = {
+        report["across_um"] = {
             "max": max(s["max"] for s in sizes),
             "rms": float(np.sqrt(np.mean([s["rms"] ** 2 for s in sizes]))),
             "mean": float(np.mean([s["mean"] for s in sizes])),
@@ -87,30 +88,30 @@ def group(path: Path, members: Sequence[figures.Run], right: Sequence[bool]) -> 
         for line, size in run.largest_by_line(path).items():
             worst[line] = max(worst.get(line, 0.0), size)
     top = sorted(worst.items(), key=lambda item: (-item[1], item[0]))[:_WORST]
-    out["worst"] = [{"line": line, "max_um": size} for line, size in top]
-    return out
+    report["worst"] = [{"line": line, "max_um": size} for line, size in top]
+    return report
 
 
 def _iso_9283(path: Path, members: Sequence[figures.Run]) -> dict[str, Any]:
     places = figures.stations(path)
     command, segment = path.at(places)
     each = iso9283.repeated(command, np.stack([run.at(path, places) for run in members]))
-    out: dict[str, Any] = {"cycles": len(members), "places": len(places)}
+    report: dict[str, Any] = {"cycles": len(members), "places": len(places)}
     for name, values in (("AT", each.accuracy), ("RT", each.repeatability)):
         worst = iso9283.largest(values)
-        out[f"{name}_um"] = worst.value_mm * UM_PER_MM
-        out[f"{name}_line"] = int(path.line[segment[worst.place]]) if worst.place >= 0 else None
-    return out
+        report[f"{name}_um"] = worst.value_mm * UM_PER_MM
+        report[f"{name}_line"] = int(path.line[segment[worst.place]]) if worst.place >= 0 else None
+    return report
 
 
 def verdict(report: dict[str, Any], tolerance_um: float | None) -> list[Finding]:
-    """Whether the measured path is within tolerance; sets `holds` where that was asked for."""
+    """The finding where the measured path is not within tolerance; sets `holds` where there is one."""
     size = (report["after"].get("across_um") or {}).get("max")
     if tolerance_um is None:
         return []
     if size is None:
         report["holds"] = False
-        message = f"no measured point of a cutting move counts, so {tolerance_um:g} um are not shown to hold"
+        message = f"no measured point of a cutting move counts, so {tolerance_um:g} um cannot be verified"
         return [Finding("OLP609", message)]
     report["holds"] = size <= tolerance_um
     if report["holds"]:
@@ -121,7 +122,7 @@ def verdict(report: dict[str, Any], tolerance_um: float | None) -> list[Finding]
 
 
 def cycles(groups: Mapping[str, Sequence[figures.Run]]) -> list[Finding]:
-    """Groups with fewer runs than ISO 9283 asks for; a single run asks for nothing."""
+    """Findings on groups with fewer runs than ISO 9283 asks for; a single run gives none."""
     return [
         Finding("OLP607", f"{len(members)} runs {name}; ISO 9283 asks for {iso9283.PATH_CYCLES}")
         for name, members in groups.items()

@@ -1,4 +1,4 @@
-"""How sure a run is: from what was loaded and proved to bands, probabilities, advice and findings."""
+"""The uncertainty of a run: from what was loaded and proved to bands, probabilities, advice and findings."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ def assess(
     nominal: Program,
     corrected: Program,
     groups: Index,
-    passed: Index,
-    within_um: float,
+    uncorrected: Index,
+    part_tolerance_um: float,
     date: datetime.date | None,
     tell: Progress,
     *,
     asked: bool,
 ) -> Assessment | None:
-    """The confidence of a proved program, its part of the report, and its findings; None where the
-    calibration states no uncertainty. `asked`: the user named the tolerance `within_um`."""
+    """Bands and probabilities of a proved program, its part of the report, and its findings; None where the
+    calibration states no uncertainty. `asked`: the call gives the tolerance `part_tolerance_um`."""
     uncertainty = loaded.uncertainty
     if uncertainty is None:
         return None
     unknowns, growth, expansion = unknowns_of(loaded, uncertainty, date)
-    points = waypoints(nominal, corrected, groups, passed, loaded.full)
-    found = confidence(unknowns, nominal.toolpath, points, within_um * MM_PER_UM, tell=tell)
+    points = waypoints(nominal, corrected, groups, uncorrected, loaded.full)
+    result = confidence(unknowns, nominal.toolpath, points, part_tolerance_um * MM_PER_UM, tell=tell)
     parts = [
         c for c in components(loaded.calibration, uncertainty.scaled(growth)) if c.name not in loaded.skip
     ]
-    said = summary(found, nominal.toolpath, uncertainty, growth, expansion, parts, asked=asked)
-    return found, said, findings(
-        found, growth, expansion, parts, loaded.left_out, asked=asked
+    report = summary(result, nominal.toolpath, uncertainty, growth, expansion, parts, asked=asked)
+    return result, report, findings(
+        result, growth, expansion, parts, loaded.left_out, asked=asked
     )  # fmt: skip
 
 
 def unknowns_of(
     loaded: Loaded, uncertainty: Uncertainty, date: datetime.date | None
 ) -> tuple[Unknowns, float, Expansion | None]:
-    """What is not known of the machine on the day `date`, by how much it has grown since measuring, and
-    expansion where temperatures are in question."""
+    """The unknowns of the machine on the day `date`, the factor by which they have grown since measuring,
+    and expansion where temperatures matter."""
     measured = loaded.calibration.measured
     days = None if date is None or measured is None else (date - measured).days
     growth = uncertainty.growth(days)

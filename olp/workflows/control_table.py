@@ -1,4 +1,4 @@
-"""What reading and writing of control tables take of a machine and of a call."""
+"""What reading and writing of control tables need from a machine and a call."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def given_of(
     reference: Reference | None,
     most: int | None,
 ) -> Given:
-    """The machine's name, chain and travel, and what the call states; `most` rows go in one table."""
+    """The machine's name, chain and travel, and the values of the call; a table has at most `most` rows."""
     travel = None if machine is None else np.array([machine.axes[a].travel_mm for a in AXES])
     return Given(
         machine="machine" if machine is None else machine.name,

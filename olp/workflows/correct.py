@@ -38,7 +38,7 @@ from olp.workflows.proof import (
     confidence_of,
     findings_of_model,
     last_digit_mm,
-    place_findings,
+    position_findings,
     report_of,
 )
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -46,7 +46,7 @@ from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CorrectOptions(ProofOptions):
-    """What `correct` takes; see there."""
+    """The options of `correct`."""
 
     outside_box: Outside = "refuse"
     flatten: bool = False
@@ -58,7 +58,7 @@ class CorrectOptions(ProofOptions):
 @dataclass(frozen=True, slots=True, eq=False)
 class Correction:
     """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
-    `confidence` has bands and probabilities by way-point where the calibration states uncertainties."""
+    `confidence` has bands and probabilities by waypoint where the calibration states uncertainties."""
 
     data: bytes
     report: dict[str, Any]
@@ -78,7 +78,7 @@ def correct(
     peck_clearance_mm: float | None = None,
     contour: bool = False,
     split_rapids: bool = False,
-    within_um: float | None = None,
+    part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
@@ -86,20 +86,21 @@ def correct(
     """Correct a program for a machine, and prove it.
 
     `program` is a path or the bytes of the text, `machine` the machine file or a Setup. The corrected text is
-    in the program's own dialect; only coordinate words differ, and inserted words and blocks. With `flatten`
-    loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are written out;
-    on controls that keep it in a parameter, `peck_clearance_mm` is the clearance above the last peck.
+    in the program's own dialect; only coordinate words differ, and words and blocks are inserted. With
+    `flatten` loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are
+    written out. `peck_clearance_mm` is the clearance above the last peck, for controls where it is a
+    parameter.
 
-    Where the calibration states uncertainties, the report says how probable it is that the tip stays within
-    `within_um` (default: `tolerance_um`). With `only_sure_components` components within their own
+    Where the calibration states uncertainties, the report gives the probability that the tip is within
+    `part_tolerance_um` (default: `tolerance_um`). With `only_sure_components` components within their own
     uncertainty are not corrected. Raises InputError (ProgramError with its line, ConfigError, OutsideBox) and
     CannotCompute.
     """
     session, source = opened(program, machine, job)
     options = CorrectOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten, expand_cycles=expand_cycles,
-        peck_clearance_mm=peck_clearance_mm, contour=contour, split_rapids=split_rapids, within_um=within_um,
-        only_sure_components=only_sure_components, date=date,
+        peck_clearance_mm=peck_clearance_mm, contour=contour, split_rapids=split_rapids,
+        part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
     )  # fmt: skip
     return run(session, source, options, progress)
 
@@ -118,8 +119,8 @@ def corrected(
     sources: Sources, program: Source, loaded: Loaded, options: CorrectOptions, tell: Progress,
     outside: str = "OLP403",
 ) -> Run:  # fmt: skip
-    """Correct a program and prove it; `outside` is the code of what is held at the face of the box. Raises as
-    `correct`."""
+    """Correct a program and prove it; `outside` is the code of findings outside the box, whose error is that
+    at its face. Raises as `correct`."""
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
     data = program.data
@@ -134,39 +135,39 @@ def corrected(
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
     proof = prove(
         done.nominal, second, loaded.model, tolerance_mm=done.limits.tolerance_mm, digit_mm=done.digit_mm,
-        passed=done.passed, parts=done.parts,
+        uncorrected=done.uncorrected, parts=done.parts,
     )  # fmt: skip
     _prove_without_deleted(done, loaded, options.contour)
-    sure = confidence_of(loaded, done.nominal, second, proof, done.passed, options, tell)
-    findings = _findings(done, proof, loaded, options, outside, sure[2] if sure else ())
+    assessment = confidence_of(loaded, done.nominal, second, proof, done.uncorrected, options, tell)
+    findings = _findings(done, proof, loaded, options, outside, assessment[2] if assessment else ())
     report = report_of(done.nominal, (data, program.name), loaded, proof, findings, options.tolerance_um)
     report |= _written_report(done)
-    if sure:
-        report["uncertainty"] = sure[1]
-    confidence = sure[0] if sure else None
-    return Run(done.text, done.nominal, second, proof, done.passed, report, findings, confidence)
+    if assessment:
+        report["uncertainty"] = assessment[1]
+    confidence = assessment[0] if assessment else None
+    return Run(done.text, done.nominal, second, proof, done.uncorrected, report, findings, confidence)
 
 
 def _refuse_stamped(data: bytes) -> None:
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
-            f"the program carries the stamp `{stamp.group().decode()}`; correcting it again would apply the "
-            "model twice; correct the nominal program",
+            f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
+            "the model twice; correct the nominal program",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rewritten:
-    """A program written with its corrections: `nominal` is what was read, without its words, `passed` are
-    moves that stay uncorrected, (n,) `parts` how many moves each nominal one became."""
+    """A program written with its corrections: `nominal` is the program as read, without its words,
+    `uncorrected` are moves that are left so, (n,) `parts` the number of moves that each nominal one became."""
 
     nominal: Program
     text: bytes
     limits: Limits
     digit_mm: float
-    passed: Index
+    uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
     holes: HolePlan
@@ -174,15 +175,14 @@ class _Rewritten:
 
 
 def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progress) -> _Rewritten:
-    """Read, plan and write. Words and plan of a long program are large: they end with this function."""
+    """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.dialect, Options(contour=options.contour))
     decimal = program.statements is not None and bool(program.statements.decimal)
     if options.split_rapids and decimal:
         raise UsageError(
-            "--split-rapids does not go with this dialect: nothing says how the machine goes between its "
-            "places; "
-            'state joined = "lines" and insert = true in the profile'
+            "--split-rapids does not go with this dialect: it does not state the path between its points; "
+            'set joined = "lines" and insert = true in the profile'
         )
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
@@ -201,34 +201,34 @@ def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progr
     text = written.text if written.changed else data
     largest = _largest_correction(nominal.toolpath, _ends(rows, len(nominal.toolpath)))
     return _Rewritten(
-        nominal, text, limits, digit, rows.passed, written.parts, written.tally, written.holes, largest
+        nominal, text, limits, digit, rows.uncorrected, written.parts, written.tally, written.holes, largest
     )
 
 
 def _findings(
     done: _Rewritten, proof: Proof, loaded: Loaded, options: CorrectOptions, outside: str,
-    unsure: Iterable[Finding],
+    uncertain: Iterable[Finding],
 ) -> tuple[Finding, ...]:  # fmt: skip
     tolerance_mm = done.limits.tolerance_mm
     return (
         *calibration_findings(loaded, options.date),
-        *checks.proof_findings(proof, done.passed),
+        *checks.proof_findings(proof, done.uncorrected),
         *checks.between_findings(done.nominal, proof, loaded.model),
         *checks.hole_findings(done.holes, tolerance_mm),
         *checks.stroke_findings(done.nominal, loaded.model, tolerance_mm),
-        *place_findings(proof, loaded, outside if options.outside_box == "hold" else None),
+        *position_findings(proof, loaded, outside if options.outside_box == "hold" else None),
         *checks.path_mode_findings(done.nominal, done.largest_mm),
         *checks.program_findings(done.nominal, loaded.setup, contour=options.contour),
-        *unsure,
+        *uncertain,
         *findings_of_model(done.nominal.toolpath, loaded, tolerance_mm),
     )
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:
-    """What the report says of the corrected text beyond its proof."""
+    """The parts of the report on the corrected text that are not in its proof."""
     tally = done.tally
     return {
-        "moves": checks.tally_moves(done.nominal.toolpath, len(done.passed), done.parts)
+        "moves": checks.tally_moves(done.nominal.toolpath, len(done.uncorrected), done.parts)
         | {
             "inserted_blocks": tally.inserted_blocks,
             "inserted_words": tally.inserted_words,
@@ -242,7 +242,7 @@ def _written_report(done: _Rewritten) -> dict[str, Any]:
 
 
 def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool) -> None:
-    """With the block-delete switch on, the corrected program has to come out right too."""
+    """Raise ProgramError where the corrected program is wrong with the block-delete switch on."""
     path = done.nominal.toolpath
     deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
     if not deleted.any():
@@ -255,7 +255,7 @@ def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool) -> N
         rows = plan(nominal.toolpath, loaded.model, replace(done.limits, refuse_outside=False))
         proof = prove(
             nominal, other, loaded.model, tolerance_mm=done.limits.tolerance_mm, digit_mm=done.digit_mm,
-            passed=rows.passed,
+            uncorrected=rows.uncorrected,
         )  # fmt: skip
         good = proof.holds
     except ProgramError:
@@ -277,7 +277,7 @@ def _ends(rows: Plan, count: int) -> Array:
 
 
 def _largest_correction(path: Toolpath, command_mm: Array) -> float:
-    """How far the commands are from the nominal path, in mm, where they are farthest."""
+    """The largest distance of the commands from the nominal path, in mm."""
     largest = 0.0
     for a in range(0, len(path), 1 << 16):
         away = np.nan_to_num(command_mm[a : a + (1 << 16)] - path.end_mm[a : a + (1 << 16)])

@@ -18,7 +18,8 @@ def flatten(
     *,
     expand_cycles: bool = False,
 ) -> bytes:
-    """Unroll loops, subprograms, expressions and, if asked, canned cycles into plain blocks. Not lossless."""
+    """Unroll loops, subprograms, expressions and, with `expand_cycles`, canned cycles into plain blocks. This
+    is not lossless."""
     session, source = opened(program, machine, job, "<program>")
     with source.errors("<program>"):
         setup, dialect = session.reading(source)
@@ -34,16 +35,16 @@ def unrolled(
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
 ) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are looked for beside it.
+    """The text with loops, subprograms and expressions unrolled; subprograms are searched in its folder.
 
-    With `expand_cycles` canned cycles are written out too, with `peck_clearance_mm` above the last peck on
-    controls that keep it in a parameter. Payloads that the job gives by line become comments first, as lines
-    are others afterwards. Raises UsageError for a dialect that has none of them.
+    With `expand_cycles` canned cycles are written out too. `peck_clearance_mm` is the clearance above the
+    last peck, for controls where it is a parameter. Payloads that the job gives by line become comments
+    first, as unrolling changes the lines. Raises UsageError for a dialect that has none of them.
     """
     from olp.program.directives import with_payloads
 
     if dialect.unroller is None:
-        raise UsageError(f"{dialect.title} is not unrolled; leave --flatten and --expand-cycles out")
+        raise UsageError(f"{dialect.title} cannot be unrolled; leave --flatten and --expand-cycles out")
     data = with_payloads(program.data, setup.job.payloads, dialect.comment)
 
     def beside(wanted: str) -> bytes | None:

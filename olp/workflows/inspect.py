@@ -1,4 +1,4 @@
-"""`inspect`: what a program does, and the error of the machine at a place."""
+"""`inspect`: what a program does, and the error of the machine at an axis position."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ def run(session: Session, program: Source) -> dict[str, Any]:
     """As `inspect`, in a session."""
     with program.errors("<program>"):
         setup, dialect = session.reading(program)
-        found = read(program.data, setup, dialect)
-    path = found.toolpath
+        parsed = read(program.data, setup, dialect)
+    path = parsed.toolpath
     with np.errstate(all="ignore"):
         known = path.end_mm[np.isfinite(path.end_mm).all(axis=1)]
     ranges = {
         axis: [float(known[:, i].min()), float(known[:, i].max())] if len(known) else None
         for i, axis in enumerate("XYZ")
     }
-    findings = checks.program_findings(found, setup, contour=False)
+    findings = checks.program_findings(parsed, setup, contour=False)
     return {
         "name": program.short,
         "dialect": dialect.name,
         "dialect_title": dialect.title,
-        "lines": found.lines,
+        "lines": parsed.lines,
         "moves": {kind.name.lower(): int((path.kind == kind).sum()) for kind in Kind},
-        "cycles": len(found.holes),
+        "cycles": len(parsed.holes),
         "axis_range_mm": ranges,
         "tools": sorted({f.tool for f in path.frames if f.tool is not None}),
         "work_offsets": sorted({f.work_offset for f in path.frames}),
         "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
         "path_modes": [
-            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in found.path_modes
+            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in parsed.path_modes
         ],
         "stamped": find_stamp(program.data) is not None,
         "findings": [f.as_dict() for f in findings],
@@ -64,7 +64,7 @@ def error_at(
     tool: int | tuple[float, float, float] | None = None,
     job: PathLike | None = None,
 ) -> dict[str, Any]:
-    """The error at one axis position: actual minus commanded at the tip, and what it is made of.
+    """The error at one axis position: actual minus commanded at the tip, and its parts by source.
 
     `tool` is a tool number or a tool vector in mm (gauge point to tip); the default is the tool in the
     spindle at the start.
@@ -79,12 +79,12 @@ def error_of(
 ) -> dict[str, Any]:
     """As `error_at`, in a session."""
     loaded = session.loaded("refuse")
-    at = np.array([position_mm], float)
-    inside = loaded.model.inside(at)
+    position = np.array([position_mm], float)
+    inside = loaded.model.inside(position)
     if not inside.all():
         axis = "XYZ"[int(np.flatnonzero(~inside[0])[0])]
         raise ConfigError(
-            f"{axis} = {at[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose a place in it"
+            f"{axis} = {position[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose one inside"
         )
     vector = session.tool_vector(tool)
     payload = loaded.setup.job.payload_kg
@@ -93,10 +93,10 @@ def error_of(
         "position_mm": [float(v) for v in position_mm],
         "tool_mm": [float(v) for v in vector],
         "payload_kg": payload,
-        "error_um": (loaded.model.error(at, tool_vector)[0] * 1e3).tolist(),
-        "rotation_urad": (loaded.model.rotation(at, None, payload)[0] * 1e6).tolist(),
+        "error_um": (loaded.model.error(position, tool_vector)[0] * 1e3).tolist(),
+        "rotation_urad": (loaded.model.rotation(position, None, payload)[0] * 1e6).tolist(),
         "sources": [
             {"name": source, "error_um": (part[0] * 1e3).tolist()}
-            for source, part in loaded.model.contributions(at, tool_vector)
+            for source, part in loaded.model.contributions(position, tool_vector)
         ],
     }

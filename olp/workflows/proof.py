@@ -1,4 +1,4 @@
-"""The proof of a correction in a run: what `correct` and `verify` share, from two programs to the report."""
+"""The proof of a correction, which `correct` and `verify` share: from two programs to the report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from olp.workflows.session import Loaded
 
 _PROVES = (
     "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
-    "the error model at those commands brings the tip to the nominal path, at and between the way-points",
+    "the error model at those commands brings the tip to the nominal path, at and between the waypoints",
 )
 _DOES_NOT_PROVE = (
     "that the calibration still describes the machine: measure a circle or a diagonal to see that",
@@ -42,12 +42,12 @@ _DOES_NOT_PROVE = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProofOptions:
-    """What every verb that proves a correction takes: the numerical tolerance, the tolerance of the part
-    (`within_um`, default `tolerance_um`), and the day of the run."""
+    """Options of every verb that proves a correction: the numerical tolerance, the part tolerance
+    (`part_tolerance_um`, default `tolerance_um`), and the day of the run."""
 
     tolerance_um: float = 1.0
     contour: bool = False
-    within_um: float | None = None
+    part_tolerance_um: float | None = None
     only_sure_components: bool = False
     date: datetime.date | None = None
 
@@ -59,13 +59,14 @@ class ProofOptions:
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
-    report ("olp-report-1"), the findings, and how sure it is where the calibration states uncertainties."""
+    report ("olp-report-1"), the findings, and bands and probabilities where the calibration states
+    uncertainties."""
 
     text: bytes
     nominal: Program
     corrected: Program
     proof: Proof
-    passed: Index
+    uncorrected: Index
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     confidence: Confidence | None = None
@@ -74,8 +75,8 @@ class Run:
 def verify_programs(
     nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions
 ) -> Run:
-    """Prove a corrected program, whoever wrote it; programs come with their names. Raises ProgramError
-    where the second is no correction of the first."""
+    """Prove a corrected program from any source; programs come with their names. Raises ProgramError where
+    the second is not a correction of the first."""
     (first, name), (second, other) = nominal, corrected
     limits = Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
     with naming(name or "<nominal>"):
@@ -84,42 +85,45 @@ def verify_programs(
     try:
         proof = prove(
             first, second, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
-            passed=rows.passed,
+            uncorrected=rows.uncorrected,
         )  # fmt: skip
     except OlpError as error:
         raise error.in_file(other or "<corrected>") from None
-    sure = confidence_of(loaded, first, second, proof, rows.passed, options, silent)
+    assessment = confidence_of(loaded, first, second, proof, rows.uncorrected, options, silent)
     findings = (
         *calibration_findings(loaded, options.date),
-        *checks.proof_findings(proof, rows.passed),
+        *checks.proof_findings(proof, rows.uncorrected),
         *checks.between_findings(first, proof, loaded.model),
         *checks.program_findings(first, loaded.setup, contour=options.contour),
-        *(sure[2] if sure else ()),
+        *(assessment[2] if assessment else ()),
         *findings_of_model(first.toolpath, loaded, limits.tolerance_mm),
     )
     report = report_of(first, (first.data, name), loaded, proof, findings, options.tolerance_um)
-    if sure:
-        report["uncertainty"] = sure[1]
-    return Run(second.data, first, second, proof, rows.passed, report, findings, sure[0] if sure else None)
+    if assessment:
+        report["uncertainty"] = assessment[1]
+    confidence = assessment[0] if assessment else None
+    return Run(second.data, first, second, proof, rows.uncorrected, report, findings, confidence)
 
 
 def confidence_of(
-    loaded: Loaded, nominal: Program, corrected: Program, proof: Proof, passed: Index, options: ProofOptions,
+    loaded: Loaded, nominal: Program, corrected: Program, proof: Proof, uncorrected: Index, options: ProofOptions,
     tell: Progress,
 ) -> Assessment | None:  # fmt: skip
-    """How sure a proof is; None where the calibration states no uncertainty."""
+    """Bands and probabilities of a proof; None where the calibration states no uncertainty."""
     return assess(
-        loaded, nominal, corrected, proof.groups, passed, options.within_um or options.tolerance_um,
-        options.date, tell, asked=options.within_um is not None,
+        loaded, nominal, corrected, proof.groups, uncorrected, options.part_tolerance_um or options.tolerance_um,
+        options.date, tell, asked=options.part_tolerance_um is not None,
     )  # fmt: skip
 
 
-def place_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
-    """Travel, and the calibrated box under the code `outside`, of the corrected path, with the nominal
-    lines."""
+def position_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
+    """Findings on the travel, and on the calibrated box under the code `outside`, of the corrected path, with
+    the nominal lines."""
     path = replace(proof.written, line=proof.nominal.line[proof.owner()])
-    found = state.travel_findings(path, loaded.setup.machine)
-    return found if outside is None else [*found, *state.box_findings(path, loaded.model.box_mm, outside)]
+    findings = state.travel_findings(path, loaded.setup.machine)
+    if outside is not None:
+        findings = [*findings, *state.box_findings(path, loaded.model.box_mm, outside)]
+    return findings
 
 
 def calibration_findings(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
@@ -140,7 +144,7 @@ def report_of(
     findings: tuple[Finding, ...],
     tolerance_um: float,
 ) -> dict[str, Any]:
-    """The report ("olp-report-1") as far as a proof alone can fill it."""
+    """The parts of the report ("olp-report-1") that a proof alone gives."""
     data, name = source
     size = proof.size_mm()
     bend = float(
@@ -175,8 +179,8 @@ def report_of(
 
 
 def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> dict[str, float]:
-    """What remains, by where it comes from, in um; the largest of each, of the random part two standard
-    deviations. The control rounds to its least increment where the digits written are not multiples of it."""
+    """The remaining deviation by cause, in um: the largest of each, of the random part two standard
+    deviations. The control rounds to its least increment where the written digits are not multiples of it."""
     machine, repeatability = loaded.setup.machine, loaded.calibration.repeatability_mm
     units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
     halves = [
@@ -204,7 +208,7 @@ def _multiple(length_mm: float, of_mm: float) -> bool:
 
 
 def last_digit_mm(program: Program, setup: Setup) -> float:
-    """The coarsest last digit that the corrected program is written with."""
+    """The coarsest last digit of the corrected program, in mm."""
     units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
     inch = program.dialect.inch_decimals
     return max(

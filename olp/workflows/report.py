@@ -27,8 +27,9 @@ from olp.workflows.results import ResultCorrection
 from olp.workflows.session import Session
 from olp.workflows.simulate import SimulateOptions, simulated
 
-#: points of a predicted path in a picture, about
+#: Most points of a predicted path in a picture.
 _POINTS = 120_000
+#: Least distance between them, in mm.
 _STEP_MM = 0.5
 
 
@@ -72,8 +73,8 @@ def results(result: ResultCorrection, name: str, date: datetime.date | None) -> 
 def correction(
     result: Correction, nominal: Source, session: Session, options: CorrectOptions, name: str
 ) -> bytes:
-    """The report of a correction in the form that `name` ends in; `nominal` is what was corrected, unrolled
-    where that was asked for."""
+    """The report of a correction in the form that `name` ends in; `nominal` is the program that was
+    corrected, unrolled where the call asks for it."""
     from olp.reports import document_correction as report_document
 
     report = dict(result.report) | {"test_paths": _tests(session)}
@@ -136,7 +137,7 @@ def _predicted_plots(
     corrected = session.sources.source(result.data)
     for side, text in (("before", session.sources.source(nominal.data)), ("after", corrected)):
         points = simulated(text, loaded, options).points_mm
-        # what the plots leave out is what has no place, such as a tool change
+        # points farther away are no part of the path, such as those of a tool change
         reach = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
         runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)
     if not all(run.counted.any() for group in runs.values() for run in group):

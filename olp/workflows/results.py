@@ -1,4 +1,4 @@
-"""`correct --results`: what a measuring machine reported, corrected: read, run the model forward, write,
+"""`olp results`: corrects the points that a measuring machine reported. Read, run the model forward, write,
 report."""
 
 from __future__ import annotations
@@ -19,30 +19,31 @@ from olp.core.units import UM_PER_MM
 from olp.files.point_profile import load_profile
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
-from olp.program.text.delimited import Layout, first_lines, told
+from olp.program.text.delimited import Layout, detected_layout, first_lines
 from olp.program.text.numbers import Placing, number, spliced, written
 from olp.results.forward import Forward, forward
-from olp.results.places import place_of, stylus_of
+from olp.results.places import frame_of, stylus_of
 from olp.results.reported import Reported, Stated
 from olp.results.table import read_table
 from olp.workflows.results_report import report_of
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
-#: Rounding above this is said; bar of the corrections themselves.
+#: Rounding above this, in mm, is a finding: the bar of the corrections themselves.
 _ROUNDING_MM = 2e-4
-#: Doubt about the touch above this is a warning.
+#: An error of this, in mm, from an unknown side of the touch is a warning.
 _DOUBT_MM = 1e-4
 
-#: where axis positions count, in words
+#: What axis positions are those of, in words.
 _COUNTED = {
-    "tip": "axis positions count at the tip: no tool length is active (job_defaults.length_active)",
-    "tool": "axis positions stand off the tip by the length of the tool",
-    "ram": "axis positions count at the end of the ram, from which the stylus leads to the tip",
+    "tip": "axis positions are those of the tip: no tool length is active (job_defaults.length_active)",
+    "tool": "axis positions differ from those of the tip by the length of the tool",
+    "ram": "axis positions are those of the end of the ram; the stylus leads from there to the tip",
 }
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultOptions:
-    """What `correct_results` takes beside its files; see there."""
+    """The options of `correct_results`."""
 
     profile: PathLike | Layout | None = None
     frame: str | Mapping[str, str] | None = None
@@ -79,7 +80,7 @@ def correct_results(
 
     `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset that the
     points are stated in ("machine": axis positions), `tool` the number of the stylus; where a file names
-    several, each is a mapping from the file's names to those of machine and job. `tip_radius_mm` stands for
+    several, each is a mapping from the file's names to those of machine and job. `tip_radius_mm` replaces
     that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
     Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
     """
@@ -109,8 +110,8 @@ def _corrected(
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
-            f"the results carry the stamp `{stamp.group().decode()}`; correcting them again would add the "
-            "error twice; correct the file as the machine wrote it",
+            f"the results have the stamp `{stamp.group().decode()}` of a correction; a second one would add "
+            "the error twice; correct the file that the machine wrote",
             line=data.count(b"\n", 0, stamp.start()) + 1,
         )
     reported = _read(data, layout)
@@ -126,56 +127,55 @@ def _corrected(
     reported = replace(reported, assumed=(*reported.assumed, _COUNTED[axes]))
     findings = _already(reported, loaded)
     own = bool(np.isfinite(reported.stylus_mm).all())
-    places = [place_of(setup, n) for n in reported.frames]
+    frames = [frame_of(setup, n) for n in reported.frames]
     styli = [stylus_of(setup, t, own) for t in reported.tools]
-    found = forward(
-        reported, places, styli, loaded.model, axes=axes, hold=options.outside_box == "hold",
+    result = forward(
+        reported, frames, styli, loaded.model, axes=axes, hold=options.outside_box == "hold",
         payload_kg=setup.job.payload_kg,
     )  # fmt: skip
     if radius is None and any(s.radius_mm == 0.0 and any(s.tool_vector_mm) for s in styli):
         findings.append(
             Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
         )
-    text, rounding = _write(reported, found.added_mm, loaded.digest, options.decimals)
+    text, rounding = _write(reported, result.added_mm, loaded.digest, options.decimals)
     turned = sorted(
-        {p.name for p in places if p.touched is not None and not np.allclose(p.rotation, np.eye(3))}
+        {f.name for f in frames if f.touched is not None and not np.allclose(f.rotation, np.eye(3))}
     )
     findings += [
-        *_findings(reported, found, rounding, turned),
+        *_findings(reported, result, rounding, turned),
         *state.calibration_findings(loaded.calibration, options.date, setup.machine.sanity.calibration_days),
     ]
-    outside = ~loaded.model.inside(found.axis_mm).all(axis=1)
+    outside = ~loaded.model.inside(result.axis_mm).all(axis=1)
     if outside.any():
         lines = reported.line[outside].tolist()
         findings.append(_finding("OLP403", f"{len(lines)} touches lie outside the calibrated box", lines))
-    report = report_of(reported, found, loaded, results.short, text, rounding, findings)
+    report = report_of(reported, result, loaded, results.short, text, rounding, findings)
     return ResultCorrection(text, report, tuple(findings))
 
 
 def _axes(reported: Reported, loaded: Loaded) -> Literal["tip", "tool", "ram"]:
-    """Where axis positions count: as in the programs of the machine."""
+    """What axis positions are those of: as in the programs of the machine."""
     if reported.axes_at_ram or loaded.dialect.axes_at_ram:
         return "ram"
     return "tool" if loaded.setup.machine.length_active else "tip"
 
 
-def _named(what: str, told: tuple[Any, ...], given: object) -> tuple[Any, ...]:
+def _named(what: str, stated: tuple[Any, ...], given: object) -> tuple[Any, ...]:
     """The names of machine and job for those of the file."""
     if given is None:
-        return told
+        return stated
     if not isinstance(given, Mapping):
-        if len(told) > 1:
-            names = ", ".join(str(name) for name in told)
+        if len(stated) > 1:
+            names = ", ".join(str(name) for name in stated)
             raise UsageError(
-                f"the file names {len(told)} of them ({names}); say which is which, as in --{what} "
-                f"{told[-1]}=.."
+                f"the file names several of them ({names}); name each, as in --{what} {stated[-1]}=.."
             )
-        return (given,) * len(told)
-    unknown = [name for name in given if name not in {str(t) for t in told}]
+        return (given,) * len(stated)
+    unknown = [name for name in given if name not in {str(t) for t in stated}]
     if unknown:
-        names = ", ".join(str(name) for name in told)
+        names = ", ".join(str(name) for name in stated)
         raise UsageError(f"--{what} {unknown[0]}=..: the file does not name it; it names {names}")
-    return tuple(given.get(str(name), name) for name in told)
+    return tuple(given.get(str(name), name) for name in stated)
 
 
 def _read(data: bytes, profile: Layout | None) -> Reported:
@@ -183,10 +183,10 @@ def _read(data: bytes, profile: Layout | None) -> Reported:
 
     if profile is None and is_dmis(data):
         return read_dmis(data)
-    layout = profile or told(first_lines(data))
+    layout = profile or detected_layout(first_lines(data))
     if layout is None:
         raise InputError(
-            "does not tell which columns hold X, Y and Z; name them by name or number with --column X=.. "
+            "does not show which columns hold X, Y and Z; give their names or numbers with --column X=.. "
             "--column Y=.. --column Z=.., or give a profile with --profile"
             if data.strip()
             else "holds no points; expected a table of points, or DMIS output"
@@ -195,44 +195,43 @@ def _read(data: bytes, profile: Layout | None) -> Reported:
 
 
 def _already(reported: Reported, loaded: Loaded) -> list[Finding]:
-    """What the file says of compensation that was active; refused where it would be applied twice."""
+    """Findings on compensation that was active, as the file states. Raises InputError where it would be
+    applied twice."""
     calibration = loaded.calibration
-    out = []
-    for said in reported.stated:
-        _refuse_twice(said, bool(calibration.active_during_measurement), calibration.thermal is not None)
-        out.append(Finding(
+    findings = []
+    for statement in reported.stated:
+        _refuse_twice(statement, bool(calibration.active_during_measurement), calibration.thermal is not None)
+        findings.append(Finding(
             "OLP625",
-            f"`{said.text}` says that the {said.what} was compensated while measuring; the calibration "
-            "leaves "
-            "that to the control",
-            said.line, (said.line,),
+            f"`{statement.text}` says that the control compensated the {statement.what} while measuring; the "
+            "calibration leaves that to the control",
+            statement.line, (statement.line,),
         ))  # fmt: skip
     skipped = sorted(loaded.setup.machine.compensated_by_controller)
     if skipped:
-        out.append(Finding("OLP404", f"left to the control: {', '.join(skipped)}"))
-    return out
+        findings.append(Finding("OLP404", f"left to the control: {', '.join(skipped)}"))
+    return findings
 
 
-def _refuse_twice(said: Stated, active: bool, thermal: bool) -> None:
-    if said.what == "geometry" and not active:
+def _refuse_twice(statement: Stated, active: bool, thermal: bool) -> None:
+    if statement.what == "geometry" and not active:
         raise InputError(
-            f"`{said.text}` says that these results are corrected by an error map of the control already, "
-            "and "
-            "the calibration was measured without one (active_during_measurement is empty), so they would be "
-            "corrected twice",
-            line=said.line,
+            f"`{statement.text}` says that an error map of the control has corrected these results already, "
+            "and the calibration was measured without one (active_during_measurement is empty), so they "
+            "would be corrected twice; use a calibration measured with the map active",
+            line=statement.line,
         )
-    if said.what == "temperature" and thermal:
+    if statement.what == "temperature" and thermal:
         raise InputError(
-            f"`{said.text}` says that these results are compensated for temperature already, and the "
-            "calibration has a table [thermal], so they would be corrected twice; use a calibration "
-            "without it",
-            line=said.line,
+            f"`{statement.text}` says that these results are compensated for temperature already, and the "
+            "calibration has a table [thermal], so they would be corrected twice; use a calibration without "
+            "it",
+            line=statement.line,
         )
 
 
 def _write(reported: Reported, added_mm: Array, digest: str, decimals: int | None) -> tuple[bytes, float]:
-    """The corrected text, and the largest difference that rounding leaves, in mm."""
+    """The corrected text, and the largest rounding error, in mm."""
     placing = Placing(reported.data, reported.start, reported.end)
     edits: list[tuple[int, int, bytes]] = []
     rounding = 0.0
@@ -242,10 +241,10 @@ def _write(reported: Reported, added_mm: Array, digest: str, decimals: int | Non
             value = form.value + float(added[i, j])
             start, end = int(reported.start[i, j]), int(reported.end[i, j])
             text, old = written(form, value, decimals, reported.decimal), reported.data[start:end]
-            told = number(text, reported.decimal)
-            kept = form.value if told is None else told.value
+            rounded = number(text, reported.decimal)
+            kept = form.value if rounded is None else rounded.value
             if kept != form.value and b"$" in old:
-                # a number that goes on in the next line now ends in the first
+                # a number that is continued in the next line now ends in the first
                 edits.append((start, end, text + old[old.index(b"$") : -len(old.split(b"\n")[-1].lstrip())]))
             elif kept != form.value:
                 edits.append(placing.place(start, end, text))
@@ -262,41 +261,42 @@ def _finding(code: str, message: str, lines: Sequence[int]) -> Finding:
     return Finding(code, message, few[0] if few else None, few, max(len(lines), 1))
 
 
-def _findings(reported: Reported, found: Forward, rounding_mm: float, turned: Sequence[str]) -> list[Finding]:
-    out = [Finding("OLP621", said) for said in reported.assumed]
+def _findings(
+    reported: Reported, result: Forward, rounding_mm: float, turned: Sequence[str]
+) -> list[Finding]:
+    findings = [Finding("OLP621", message) for message in reported.assumed]
     by_reason: dict[tuple[str, str], list[int]] = {}
     for item in reported.carried:
         by_reason.setdefault((item.name, item.reason), []).append(item.line)
     for (name, reason), lines in by_reason.items():
-        out.append(_finding("OLP622", f"{name} stays as it was: {reason}", lines))
-    doubt = found.doubt_mm
+        findings.append(_finding("OLP622", f"{name} is kept as written: {reason}", lines))
+    doubt = result.doubt_mm
     if doubt.any():
-        said = (
+        message = (
             "which side of the tip touched is not stated, so the error was taken at the reported point; "
-            "that is "
-            f"at most {doubt.max() * UM_PER_MM:.2g} um off"
+            f"that is at most {doubt.max() * UM_PER_MM:.2g} um off"
         )
         wrong = doubt > _DOUBT_MM
         code = "OLP623" if wrong.any() else "OLP621"
-        out.append(_finding(code, said, reported.line[wrong].tolist()))
-    if found.play_mm.any():
-        lines = reported.line[found.play_mm > 0].tolist()
+        findings.append(_finding(code, message, reported.line[wrong].tolist()))
+    if result.play_mm.any():
+        lines = reported.line[result.play_mm > 0].tolist()
         what = (
-            "the way of the approach is not known; half the lost motion is up to "
-            f"{found.play_mm.max() * 1e3:.2g} um"
+            "the direction of the approach is not known; half the backlash is up to "
+            f"{result.play_mm.max() * 1e3:.2g} um"
         )
-        out.append(_finding("OLP103", what, lines))
+        findings.append(_finding("OLP103", what, lines))
     if turned:
-        said = (
-            f"frame {', '.join(turned)} is rotated and was set on the raw machine; only its zero is corrected"
+        message = (
+            f"frame {', '.join(turned)} is rotated and was set on the uncompensated machine; only its zero "
+            "is corrected"
         )
-        out.append(Finding("OLP624", said))
+        findings.append(Finding("OLP624", message))
     if rounding_mm > _ROUNDING_MM:
-        said = (
-            f"rounding to the digits of the file leaves up to {rounding_mm * UM_PER_MM:.2g} um; see "
-            "--decimals"
+        message = (
+            f"rounding to the digits of the file is up to {rounding_mm * UM_PER_MM:.2g} um; see --decimals"
         )
-        out.append(Finding("OLP411", said))
+        findings.append(Finding("OLP411", message))
     if reported.comment is None:
-        out.append(Finding("OLP626", "the profile allows no comment, so no stamp was written"))
-    return out
+        findings.append(Finding("OLP626", "the profile allows no comment, so no stamp was written"))
+    return findings

@@ -15,24 +15,24 @@ from olp.results.forward import Forward
 from olp.results.reported import Reported
 from olp.workflows.session import Loaded
 
+#: Why corrected results are right.
 WHY = (
-    "what a measuring machine reports is where its scales say that the tip is; the tip was there plus the "
-    "error "
-    "of the machine at that axis position and with that stylus",
+    "a measuring machine reports where its scales say that the tip is; the tip was there plus the error of "
+    "the machine at that axis position and with that stylus",
     "so the error (actual - commanded) was added to every point; nothing was inverted, and no nominal value, "
     "tolerance or name was changed",
 )
+#: What corrected results do not prove.
 DOES_NOT_PROVE = (
     "that the calibration still describes the machine: measure an artefact of known size, correct its "
-    "results, "
-    "and compare",
-    "anything about the probing system (lobing, wear, wrong tip radius), which is no error of the axes",
+    "results, and compare",
+    "anything about the probing system (lobing, wear, wrong tip radius), which is not an error of the axes",
 )
 
 
 def report_of(
     reported: Reported,
-    found: Forward,
+    result: Forward,
     loaded: Loaded,
     name: str,
     text: bytes,
@@ -40,11 +40,11 @@ def report_of(
     findings: Sequence[Finding],
 ) -> dict[str, Any]:
     """The report ("olp-results-1")."""
-    added = found.added_mm * UM_PER_MM
+    added = result.added_mm * UM_PER_MM
     size = np.sqrt((added * added).sum(axis=1))
     sources = [
         {"name": source, **_size(part * UM_PER_MM)}
-        for source, part in loaded.model.contributions(found.axis_mm, found.tool_vector_mm, found.play)
+        for source, part in loaded.model.contributions(result.axis_mm, result.tool_vector_mm, result.play)
     ]
     return {
         "schema": "olp-results-1",
@@ -68,8 +68,8 @@ def report_of(
         "points": [
             {"line": line, "name": label, "axis_mm": axis, "added_um": row, "size_um": away}
             for line, label, axis, row, away in zip(
-                reported.line.tolist(), reported.names, found.axis_mm.tolist(), added.tolist(), size.tolist(),
-                strict=True,
+                reported.line.tolist(), reported.names, result.axis_mm.tolist(), added.tolist(),
+                size.tolist(), strict=True,
             )
         ],
         "corrected": {"sha256": hashlib.sha256(text).hexdigest()},

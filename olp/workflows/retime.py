@@ -31,19 +31,21 @@ from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
 
 Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
+#: Format of a trajectory, by suffix.
 _SUFFIX: Mapping[str, Format] = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
 
+#: Format of a plot, by suffix.
 PICTURES: Mapping[str, Picture] = {".svg": "svg", ".png": "png"}
 
-#: what a control's servo takes
+#: Default time between samples: a common servo cycle of controls.
 CYCLE_S = 1e-3
-#: of the tolerances that the program uses, those that `blend_study` tries
+#: Multiples of the path tolerances of the program that `blend_study` tries.
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetimeOptions:
-    """What `retime` takes beside its programs; see there."""
+    """The options of `retime`."""
 
     blend_mm: float | None = None
     study_blend: bool = False
@@ -55,8 +57,8 @@ class RetimeOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retiming:
-    """A trajectory for each stretch of the program between places that the control alone knows, as `plan`;
-    the report ("olp-retime-1"), and the findings: axes commanded beyond their travel."""
+    """A trajectory for each stretch of the program between moves of the control itself, as `plan`; the report
+    ("olp-retime-1"), and the findings: axes commanded beyond their travel."""
 
     plan: Plan
     report: dict[str, Any]
@@ -68,28 +70,28 @@ class Retiming:
 
     @property
     def routes(self) -> tuple[Route, ...]:
-        """What the trajectories drive."""
+        """The paths of the trajectories."""
         return self.plan.case.legs
 
     @property
     def lines(self) -> LineUse:
-        """What each line takes, achieves, and is held back by."""
+        """Time, speed and limit of each line."""
         return self.plan.lines
 
     @property
     def slow(self) -> tuple[SlowPlaces, ...]:
-        """Of each stretch the places where the speed is below half the feed."""
+        """Of each stretch, where the speed is below half the feed."""
         return self.plan.slow
 
     @property
     def duration_s(self) -> float:
-        """Without what the control does between stretches."""
+        """The time of all stretches, without the control's own moves between them."""
         return self.plan.duration_s
 
     @property
     def trajectory(self) -> Trajectory:
-        """The one trajectory of a program that is known all through. Raises CannotCompute where there are
-        several."""
+        """The one trajectory of a program without moves of the control itself. Raises CannotCompute where
+        there are several."""
         return self._stretch(None)
 
     def _stretch(self, number: int | None) -> Trajectory:
@@ -97,7 +99,7 @@ class Retiming:
         if number is None and count != 1:
             raise CannotCompute(
                 f"the program has {count} stretches, between which the control moves by itself (tool "
-                "changes, G28 and kin, probing), so there is no one trajectory; take them one by one"
+                "changes, G28 and similar, probing), so there is no one trajectory; take them one by one"
             )
         if number is not None and not 1 <= number <= count:
             raise UsageError(f"there is no stretch {number}; the program has {count}, counted from 1")
@@ -109,7 +111,7 @@ class Retiming:
         """The samples of every `cycle_s` as a file of a format, part by part; of one stretch, counted from
         1, where there are several.
 
-        Raises CannotCompute as `trajectory` does, UsageError for a stretch or a cycle that cannot be, and
+        Raises CannotCompute as `trajectory` does, UsageError for an impossible stretch or cycle, and
         ConfigError for Parquet without pyarrow.
         """
         trajectory = self._stretch(stretch)
@@ -120,7 +122,7 @@ class Retiming:
         self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
         stretch: int | None = None, progress: Progress | None = None,
     ) -> dict[Path, Iterator[bytes]]:  # fmt: skip
-        """What `write` writes, by path: one file, or `name-1.csv`, `name-2.csv` ... of several stretches."""
+        """The files of `write`, by path: one file, or `name-1.csv`, `name-2.csv` ... of several stretches."""
         target = Path(path)
         chosen = kind or _SUFFIX.get(target.suffix.lower(), "csv")
         if stretch is not None or len(self.trajectories) == 1:
@@ -143,11 +145,10 @@ class Retiming:
 
     def with_feeds(self, shared: Shared = "mean", progress: Progress | None = None) -> bytes:
         """The text of the program with the mean planned feed of each block in its F words, never above the
-        programmed one; `report["write_feed"]` tells what changed and what the text takes then.
+        programmed one; `report["write_feed"]` states the changes and the time of the new text.
 
-        An F word that holds for several blocks takes the feed that takes as long in all, or with "least" the
-        least planned feed of them. Raises ProgramError for a feed that cannot be written in the style of
-        its word.
+        An F word for several blocks gets the feed with the same total time, or with "least" the least planned
+        feed of them. Raises ProgramError for a feed that cannot be written in the style of its word.
         """
         data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or silent)
         return data
@@ -156,8 +157,8 @@ class Retiming:
         self, path: PathLike, stretch: int | None = None, *, from_s: float = 0.0, to_s: float | None = None
     ) -> dict[Path, bytes]:
         """Pictures of speed, velocity, acceleration and jerk over time beside their limits, by path: one
-        file (.svg or .png), or one a stretch. Raises UsageError for another suffix, and for a span of time
-        with nothing in it."""
+        file (.svg or .png), or one per stretch. Raises UsageError for another suffix, and for an empty span
+        of time."""
         from olp.reports.plots.time import motion_plot
 
         target = Path(path)
@@ -167,19 +168,20 @@ class Retiming:
         self._any()
         count = len(self.trajectories)
         numbers = [stretch] if stretch is not None else list(range(1, count + 1))
-        out = {}
+        pictures = {}
         for number in numbers:
-            found = self._stretch(number)
+            trajectory = self._stretch(number)
             route = self.routes[number - 1]
             name = f"{self.report['program'] or 'program'} on {self.report['machine']}"
             lines = f"lines {int(route.line.min())} to {int(route.line.max())}"
             where = numbered(target, number) if len(numbers) > 1 else target
-            out[where] = motion_plot(found, route, f"{name}, {lines}", kind, from_s=from_s, to_s=to_s)
-        return out
+            title = f"{name}, {lines}"
+            pictures[where] = motion_plot(trajectory, route, title, kind, from_s=from_s, to_s=to_s)
+        return pictures
 
     def _any(self) -> None:
         if not self.trajectories:
-            raise CannotCompute("the program moves nothing, so there is no trajectory")
+            raise CannotCompute("the program has no moves, so there is no trajectory")
 
     def write(
         self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
@@ -187,9 +189,9 @@ class Retiming:
     ) -> list[Path]:  # fmt: skip
         """Write the samples; the format is that of the suffix (.csv, .npz, .parquet, .json for ROS) unless
         given. All files or none. Raises as `parts` and `olp.files.write.write_files` do."""
-        found = self.files(path, kind, cycle_s, stretch)
-        write_files(found, force=force)
-        return list(found)
+        written = self.files(path, kind, cycle_s, stretch)
+        write_files(written, force=force)
+        return list(written)
 
 
 _WRITERS: Mapping[Format, Callable[[Trajectory, float], Iterator[bytes]]] = {
@@ -220,14 +222,14 @@ def retime(
     """The fastest motion found along a program that keeps every axis inside its limits of velocity,
     acceleration and jerk, the feed, and the path tolerance.
 
-    `nominal` is another program, the one before its correction, to compare times with, line by line.
-    `proof` is the report of the program's correction ("olp-report-1"), whose budget then stands beside this
-    one. `blend_mm` is the path tolerance where the program names none; it wins over the machine file, and the
-    path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
-    times the tolerances in use. `max_inertial_um` bounds the deviation that accelerations make on the
-    machine's compliance. `block_delete` leaves `/` blocks out, `flatten` unrolls loops, subprograms and
-    expressions first: lines then count in the unrolled text. Axes commanded beyond their travel are findings
-    (OLP402), and planned all the same. Raises InputError (ProgramError with its line,
+    `nominal` is another program, such as the uncorrected one, to compare times with, line by line. `proof`
+    is the report of the program's correction ("olp-report-1"), whose budget is then shown beside this one.
+    `blend_mm` is the path tolerance where the program names none; it has priority over the machine file, and
+    the path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
+    times the path tolerances in use. `max_inertial_um` limits the deviation by accelerations and the
+    machine's compliance. `block_delete` leaves `/` blocks out. `flatten` unrolls loops, subprograms and
+    expressions first: lines are then those of the unrolled text. Axes commanded beyond their travel are
+    findings (OLP402), and planned all the same. Raises InputError (ProgramError with its line,
     ConfigError), UsageError and CannotCompute.
     """
     session = Session.start(machine, job)
@@ -259,46 +261,46 @@ def run(
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
     if most_um is None:
-        found = planned(case, limits, tell)
+        plan = planned(case, limits, tell)
     else:
-        found = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
-    report = report_of(case, found, compliance, most_um)
+        plan = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
+    report = report_of(case, plan, compliance, most_um)
     if other is not None:
-        report["nominal"] = against(found, planned(other, found.limits, tell, "nominal"), other)
+        report["nominal"] = against(plan, planned(other, plan.limits, tell, "nominal"), other)
     if stated is not None:
         moving = sum(report["budget_um"].values())
         report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
-        report["blend_study"] = blend_study(case, found, FACTORS, tell)
-    # the motion keeps to the box of its way-points, so commands within travel are motion within travel
+        report["blend_study"] = blend_study(case, plan, FACTORS, tell)
+    # the motion is inside the box of its waypoints, so commands within travel are motion within travel
     findings = tuple(travel_findings(case.program.toolpath, setup.machine))
     report["findings"] = [f.as_dict() for f in findings]
-    return Retiming(found, report, findings)
+    return Retiming(plan, report, findings)
 
 
 def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
-    """A program as it is to be planned. Raises ProgramError with its file and line; CannotCompute where
-    nothing of it can be timed."""
+    """A program ready for planning. Raises ProgramError with its file and line; CannotCompute where no move
+    can be timed."""
     blend_mm, stated = options.blend_mm, session.setup.machine.blend_mm
     reading = Options(block_delete=options.block_delete, contour=options.contour)
     program.load()
     with program.errors():
         setup, dialect = session.reading(program)
         text = unrolled(session.sources, program, setup, dialect) if options.flatten else program.data
-        found = read(text, setup, dialect, reading)
+        parsed = read(text, setup, dialect, reading)
         if setup.machine.path_mode == "exact-stop" and blend_mm is None:
             # a mode of line 0 holds from the start
-            found = replace(found, path_modes=(PathMode(0, "G61.1"), *found.path_modes))
+            parsed = replace(parsed, path_modes=(PathMode(0, "G61.1"), *parsed.path_modes))
         case = Case(
-            program.short, setup, found,
+            program.short, setup, parsed,
             next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
             "the call" if blend_mm is not None else "the machine file" if stated else "the default",
             options.block_delete, options.contour, (),
         ).driven()  # fmt: skip
     if not case.legs and case.untimed()["moves"]:
         raise CannotCompute(
-            "no move of the program begins and ends at known positions of all axes, so nothing can be "
-            "timed; give start_mm in the job file, or command X, Y and Z first",
+            "no move of the program begins and ends at known positions of all axes, so nothing can be timed; "
+            "give start_mm in the job file, or command X, Y and Z first",
             file=program.name or None,
         )
     return case

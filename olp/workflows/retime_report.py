@@ -13,12 +13,12 @@ from olp.trajectory.summary import MOST, compare, summary
 from olp.trajectory.variants import Case, Plan
 
 
-def against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
+def against(plan: Plan, nominal: Plan, other: Case) -> dict[str, Any]:
     """The times of the nominal program, in all and by line."""
-    rows = compare((before.case.legs, before.lines), (found.case.legs, found.lines))
+    rows = compare((nominal.case.legs, nominal.lines), (plan.case.legs, plan.lines))
     return {
         "program": other.name,
-        "duration_s": before.duration_s,
+        "duration_s": nominal.duration_s,
         "lines_correspond": rows is not None,
         "differences": []
         if rows is None
@@ -27,36 +27,36 @@ def against(found: Plan, before: Plan, other: Case) -> dict[str, Any]:
 
 
 def proved(proof: Mapping[str, Any], setup: Setup) -> dict[str, Any]:
-    """What the proof of a correction leaves, in um. Raises UsageError for what is no such report, or is of
-    another machine."""
+    """The residual error of a proved correction, in um. Raises UsageError for another kind of report, or one
+    of another machine."""
     try:
         if proof["schema"] != "olp-report-1":
             raise KeyError(proof["schema"])
-        machine, left = str(proof["machine"]["name"]), float(proof["deviation"]["path_max_um"])
+        machine, residual_um = str(proof["machine"]["name"]), float(proof["deviation"]["path_max_um"])
         budget = {str(key): float(value) for key, value in proof["budget_um"].items()}
         program = str(proof["program"]["name"])
-        if not all(map(math.isfinite, (left, *budget.values()))):
-            raise ValueError(left)
+        if not all(map(math.isfinite, (residual_um, *budget.values()))):
+            raise ValueError(residual_um)
     except (KeyError, TypeError, ValueError, AttributeError):
         raise UsageError(
-            'the proof is no report of a correction; expected one of schema "olp-report-1", as olp correct '
-            "and olp verify write"
+            'the proof is not the report of a correction; expected schema "olp-report-1", as olp correct and '
+            "olp verify write"
         ) from None
     if machine != setup.machine.name:
         raise UsageError(f"the proof is for machine {machine!r}, and this one is {setup.machine.name!r}")
-    return {"program": program, "budget_um": budget, "path_max_um": left}
+    return {"program": program, "budget_um": budget, "path_max_um": residual_um}
 
 
-def report_of(case: Case, found: Plan, compliance: Any, max_inertial_um: float | None) -> dict[str, Any]:
-    limits = found.limits
+def report_of(case: Case, plan: Plan, compliance: Any, max_inertial_um: float | None) -> dict[str, Any]:
+    limits = plan.limits
     report: dict[str, Any] = {
         "schema": "olp-retime-1",
         "program": case.name,
         "machine": case.setup.machine.name,
         "waypoints": sum(map(len, case.legs)),
-        "pieces": sum(len(t.motion) for t in found.trajectories),
+        "pieces": sum(len(t.motion) for t in plan.trajectories),
         "path": case.tolerances(),
-        "budget_um": {"blending": found.blending_mm * 1e3, "chords_of_arcs": case.chords_mm() * 1e3},
+        "budget_um": {"blending": plan.blending_mm * 1e3, "chords_of_arcs": case.chords_mm() * 1e3},
         "untimed": case.untimed(),
         "limits": {
             "velocity_mm_s": limits.velocity.tolist(),
@@ -65,14 +65,14 @@ def report_of(case: Case, found: Plan, compliance: Any, max_inertial_um: float |
         },
         "stretches": [
             {"first_line": int(leg.line.min()), "last_line": int(leg.line.max()), "duration_s": t.duration_s}
-            for leg, t in zip(case.legs, found.trajectories, strict=True)
+            for leg, t in zip(case.legs, plan.trajectories, strict=True)
         ],
-    } | summary(found.trajectories, found.lines, found.slow)
+    } | summary(plan.trajectories, plan.lines, plan.slow)
     if compliance.any():
-        parts = [Inertial.of(t.motion, compliance) for t in found.trajectories]
+        parts = [Inertial.of(t.motion, compliance) for t in plan.trajectories]
         most = max(parts, key=lambda p: p.most_mm, default=None)
-        whole = max(found.duration_s, 1e-300)
-        square = sum(p.rms_mm**2 * t.duration_s for p, t in zip(parts, found.trajectories, strict=True))
+        whole = max(plan.duration_s, 1e-300)
+        square = sum(p.rms_mm**2 * t.duration_s for p, t in zip(parts, plan.trajectories, strict=True))
         report["budget_um"]["inertial"] = most.most_mm * 1e3 if most else 0.0
         report["inertial"] = {
             "max_um": most.most_mm * 1e3 if most else 0.0,

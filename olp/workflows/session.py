@@ -1,5 +1,4 @@
-"""A session: machine, job, calibration and programs of a run, each opened once. It is the only way from files
-to values."""
+"""A session: machine, job, calibration and programs of a run, each opened once. Files become values here."""
 
 from __future__ import annotations
 
@@ -29,8 +28,8 @@ Outside = Literal["refuse", "hold"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """Everything loaded that a run needs. `dialect` is that of the control until a program is there
-    (`reading`). `skip` are components that the control corrects, `left_out` those that are not corrected
+    """Everything loaded that a run needs. `dialect` is that of the control until a program is read
+    (`reading`). `skip` are components that the control corrects. `left_out` are those that are not corrected
     because they are within their own uncertainty; `model` has neither."""
 
     setup: Setup
@@ -44,13 +43,13 @@ class Loaded:
 
     @property
     def full(self) -> ErrorModel:
-        """The model with the components that were left out for being within their own uncertainty."""
+        """The model with the components that are left out because they are within their own uncertainty."""
         if not self.left_out:
             return self.model
         return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
 
     def heads(self) -> dict[str, dict[str, Any]]:
-        """What a report says of the machine and its calibration."""
+        """The parts of a report on the machine and its calibration."""
         machine, calibration = self.setup.machine, self.calibration
         return {
             "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
@@ -64,8 +63,8 @@ class Loaded:
         }
 
     def reading(self, program: Source) -> Loaded:
-        """The same for a program: its dialect is settled here, also for what is made of it later. Raises
-        ProgramError where it cannot be told, UsageError for a name that there is not."""
+        """The same for a program: its dialect is detected here, also for later versions of it. Raises
+        ProgramError where it cannot be detected, UsageError for an unknown name."""
         setup, dialect = _settled(self.setup, self.dialect, program)
         return replace(self, setup=setup, dialect=dialect)
 
@@ -111,7 +110,7 @@ class Session:
         return [] if path is None else [str(file) for file in files_beside(path, self.sources.read)]
 
     def control(self) -> Dialect:
-        """What the control of the machine reads and writes."""
+        """The dialect of the machine's control."""
         name = self.setup.machine.controller
         dialect = find(name)
         if dialect is None:
@@ -123,8 +122,8 @@ class Session:
         return dialect
 
     def reading(self, program: Source) -> tuple[Setup, Dialect]:
-        """The dialect of a program, and the setup with it named, so that what is made of the program later is
-        read alike. Raises as `Loaded.reading`."""
+        """The dialect of a program, and the setup with it named, so that later versions of the program are
+        read in the same way. Raises as `Loaded.reading`."""
         own = self.setup.job.described
         return _settled(self.setup, own if isinstance(own, Dialect) else self.control(), program)
 
@@ -155,7 +154,7 @@ class Session:
         machine = self.setup.machine
         if machine.calibration is not None and "all" in machine.compensated_by_controller:
             raise ConfigError(
-                'compensated_by_controller = "all": the control corrects everything already, a corrected '
+                'compensated_by_controller = "all": the control corrects everything already, so a corrected '
                 "program would be corrected twice; list the components that it corrects, or switch its "
                 "tables off"
             )
@@ -167,8 +166,8 @@ class Session:
         if only_sure:
             if uncertainty is None:
                 raise ConfigError(
-                    "the calibration states no uncertainty, so nobody knows which components are sure; give "
-                    "the file of [covariance] or sigma columns, or correct without --only-sure-components",
+                    "states no uncertainty, which --only-sure-components needs; give the file of "
+                    "[covariance] or sigma columns, or leave --only-sure-components out",
                     file=machine.calibration,
                 )
             left_out = unsure(calibration, uncertainty) - skip
@@ -209,25 +208,26 @@ class Session:
 
     def tool_vector(self, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:
         """Gauge point to tip in mm of a tool number, of a vector, or of the tool in the spindle at the start.
-        Raises ConfigError for a tool without one."""
+        Raises ConfigError for a tool without vector."""
         if isinstance(tool, tuple):
             return tool
         number = self.setup.machine.default_tool if tool is None else tool
         if not number:
             return (0.0, 0.0, 0.0)
-        found = self.setup.tool(number)
-        if found is None or found.tool_vector_mm is None:
+        described = self.setup.tool(number)
+        if described is None or described.tool_vector_mm is None:
             raise ConfigError(
-                f"tool {number} has no lever; give tools.{number}.Z_mm or gauge_to_tip_mm in the machine file"
+                f"tool {number} has no tool vector; give tools.{number}.Z_mm or gauge_to_tip_mm in the "
+                "machine file"
             )
-        return found.tool_vector_mm
+        return described.tool_vector_mm
 
 
 def opened(
     program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None, role: str | None = None
 ) -> tuple[Session, Source]:
-    """Session and program of what a caller in Python gave, the program read first. `role` as in
-    `Source.errors`. Raises InputError, ConfigError, UsageError."""
+    """Session and program of a call from Python; the program is read first. `role` as in `Source.errors`.
+    Raises InputError, ConfigError, UsageError."""
     sources = Sources()
     source = sources.source(program)
     source.load()

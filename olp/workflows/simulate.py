@@ -17,7 +17,7 @@ from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulateOptions:
-    """What `simulate` takes; see there."""
+    """The options of `simulate`."""
 
     step_mm: float = 1.0
     outside_box: Outside = "hold"
@@ -26,7 +26,8 @@ class SimulateOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """(n, 3) tip positions of the real machine in the program's first work frame, and the line of each."""
+    """(n, 3) tip positions of the machine with its errors, in the program's first work frame, and the line of
+    each."""
 
     points_mm: Array
     line: Array
@@ -51,8 +52,7 @@ def simulate(
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
 ) -> Simulation:
-    """The path of the tip that the uncompensated machine would really take, in the program's first work
-    frame."""
+    """The path of the tip that the uncompensated machine would take, in the program's first work frame."""
     session, source = opened(program, machine, job, "<program>")
     options = SimulateOptions(step_mm=step_mm, outside_box=outside_box, contour=contour)
     return run(session, source, options)

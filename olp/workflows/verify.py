@@ -1,4 +1,4 @@
-"""`verify`: a corrected program proved from the two texts alone."""
+"""`verify`: a corrected program proved from the nominal and the corrected text alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from olp.workflows.session import Loaded, Outside, PathLike, Session
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyOptions(ProofOptions):
-    """What `verify` takes; see there."""
+    """The options of `verify`."""
 
     outside_box: Outside = "hold"
 
@@ -42,19 +42,19 @@ def verify(
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
-    within_um: float | None = None,
+    part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
     progress: Progress | None = None,
 ) -> Verification:
-    """Hold a corrected program against the nominal one, from the two texts and the machine's files alone.
+    """Compare a corrected program with the nominal one, from the two texts and the machine's files alone.
 
-    Raises ProgramError where the second is no correction of the first.
+    Raises ProgramError where the second is not a correction of the first.
     """
     session = Session.start(machine, job)
     options = VerifyOptions(
-        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, within_um=within_um,
-        only_sure_components=only_sure_components, date=date,
+        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
+        part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
     )  # fmt: skip
     texts = session.sources.source(nominal), session.sources.source(corrected)
     return run(session, *texts, options, progress)

@@ -76,7 +76,7 @@ def main(target: str) -> None:
     line(plan, nominal[nominal[:, 2] < 0], colors=NOMINAL, linewidths=2.4, label="nominal path")
     for name, colour in (("before", BEFORE), ("after", AFTER)):
         foot, offset = paths[name]
-        label = {"before": "the machine as it is", "after": "corrected program"}[name]
+        label = {"before": "uncorrected path", "after": "corrected path"}[name]
         label += f", error x {EXAGGERATED:.0f}"
         line(plan, foot + EXAGGERATED * offset, colors=colour, linewidths=0.8, label=label)
         length = np.linspace(0.0, len(foot) * STEP_MM / 1e3, len(foot))
@@ -89,7 +89,7 @@ def main(target: str) -> None:
     tolerance = corrected.report["tolerance_um"]
     size.axhline(tolerance, color="0.2", linewidth=0.8, linestyle="--")
     size.text(1.005, tolerance, "tolerance", transform=size.get_yaxis_transform(), va="center", fontsize=8)
-    size.set(xlabel="path in the material, in m", ylabel="beside the nominal\npath, in um")
+    size.set(xlabel="path in the material, in m", ylabel="distance from the\nnominal path, in um")
     size.set(xlim=(0.0, length[-1]), ylim=(1e-2, 100.0))
     size.grid(color="0.9", linewidth=0.5)
     figure.savefig(target, dpi=110, metadata={"Software": None})

@@ -1,12 +1,12 @@
-"""What calibrations from lines, from points and from both leave of simulated machines.
+"""Residual errors of simulated machines after calibrations from lines, from points and from both.
 
     python tests/benchmarks/bench_calibrate.py [SEEDS]
 
-Random machines of 3 x 2 x 1 m and six chains (four with moving tables), a full set of lines each (laser
-0.5 um + 0.5 um/m, angles 1 urad, squares 5 urad, five runs there and back, drift), all through a place off
-the datum and with a reflector off the gauge point; points of a tracker in a Latin hypercube with three
-offsets of the reflector. Judged at fresh places with tools of which one was measured with. Choices (what a
-step must gain) were made on rough machines with seeds from 100, never on smooth ones.
+Random machines of 3 x 2 x 1 m and six chains (four with moving tables). Each has a full set of lines: laser
+0.5 um + 0.5 um/m, angles 1 urad, squares 5 urad, five runs in both directions, drift. All lines go through a
+point off the datum, with a reflector off the gauge point. Points of a tracker are in a Latin hypercube with
+three offsets of the reflector. Judged at fresh positions with tools of which one was measured with. Choices
+(what a step must gain) were made on rough machines with seeds from 100, never on smooth ones.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def spread(values: np.ndarray) -> str:
 
 @dataclass(frozen=True)
 class Method:
-    """What is measured: the lines, so many points of this uncertainty, lengths from so many stations, so many
-    points seen by two pods; judged with these tools."""
+    """What is measured: the lines, the number of points and their uncertainty, of stations for lengths, and
+    of points for two pods; judged with these tools."""
 
     name: str
     lines: bool
@@ -71,11 +71,11 @@ def run(method: Method, family: str, seeds: int) -> None:
             measurements, observations=(*lines, *points, *lengths, *pods), squares=squares
         )
         begin = time.process_time()
-        found = fit(taken, machine.chain)
+        fitted = fit(taken, machine.chain)
         spent += time.process_time() - begin
         for k, tool in enumerate(method.tools):
-            rows[k].append(dataclasses.astuple(left(machine, found, tool)))
-    print(f"{family} machines, {method.name}: {spent / seeds:.2f} s of CPU a fit")
+            rows[k].append(dataclasses.astuple(left(machine, fitted, tool)))
+    print(f"{family} machines, {method.name}: {spent / seeds:.2f} s of CPU per fit")
     for k, tool in enumerate(method.tools):
         before, before_framed, after, after_framed, z = np.array(rows[k]).T
         print(
@@ -85,7 +85,7 @@ def run(method: Method, family: str, seeds: int) -> None:
 
 
 def main(seeds: int) -> None:
-    print("rms in um over fresh places: median of machines (10 % to 90 %)")
+    print("rms in um over fresh positions: median of machines (10 % to 90 %)")
     for method in METHODS:
         for family in ("smooth", "rough"):
             run(method, family, seeds)

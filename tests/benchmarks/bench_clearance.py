@@ -1,8 +1,7 @@
-"""Clearance of 1e5 blocks against 1e5 triangles: time, and pairs a second. `python
-tests/benchmarks/bench_clearance.py`.
+"""Time of the clearance of 1e5 blocks against 1e5 triangles: `python tests/benchmarks/bench_clearance.py`.
 
 A free-form part of 300 x 300 mm with ripples, milled in lines of 0.3 mm moves, with a tool of 5 mm radius
-and a holder; the moves are feed moves, the mesh is a fixture, so that all of it counts. Once close above
+and a holder. The moves are feed moves and the mesh is a fixture, so that all of it counts. Once close above
 the part, once 20 mm above it, once along the wall of a fine tube."""
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import numpy as np
 
 from olp.clearance.parts import parts_of
 from olp.clearance.search import Best, search
-from olp.clearance.sweep import Ways
+from olp.clearance.sweep import Segments
 from olp.clearance.tree import Tree
 from olp.core.machine import HolderPart, Tool
 
@@ -50,7 +49,7 @@ def raster(above_mm: float) -> np.ndarray:
 
 
 def spiral() -> np.ndarray:
-    """A tenth of the blocks: a whole wall of triangles is equally near, which is the worst that can be."""
+    """A tenth of the blocks: a whole wall of triangles is equally near, which is the worst case."""
     turn = np.linspace(0.0, 200.0 * np.pi, BLOCKS // 10 + 1)
     return np.stack([34.5 * np.cos(turn), 34.5 * np.sin(turn), -turn / 12.0], axis=1)
 
@@ -64,10 +63,10 @@ def main() -> None:
         wall, cpu = time.perf_counter(), time.process_time()
         tree = Tree.of(triangle)
         count = len(tip) - 1
-        ways = Ways(tip[:-1], np.diff(tip, axis=0), np.arange(count))
+        segments = Segments(tip[:-1], np.diff(tip, axis=0), np.arange(count))
         best = Best.of(count)
         for tag, each in enumerate(parts_of(TOOL)):
-            search(tree, ways.swept(each), ways.move, best, tag)
+            search(tree, segments.swept(each), segments.move, best, tag)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(

@@ -1,6 +1,6 @@
 """Pairs a million measured points with a million nominal ones: python tests/benchmarks/bench_compare.py
 
-Prints CPU seconds of one core, and how far the recovered places are from the true ones.
+Prints CPU seconds of one core, and how far the recovered positions are from the true ones.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ import numpy as np
 from olp.comparison.pairing import pair
 from olp.comparison.path import Path
 
-COUNT, LAPS, NOISE_MM = 1_000_000, 3, 0.005
+#: points of each path
+COUNT = 1_000_000
+LAPS = 3
+NOISE_MM = 0.005
 
 
 def eight(u: np.ndarray) -> np.ndarray:
@@ -28,9 +31,9 @@ def main(count: int) -> None:
     u = np.sort(rng.uniform(0.0, places[-1], count))
     points = eight(u) + rng.normal(0.0, NOISE_MM, (count, 3))
     begin = time.process_time()
-    found = pair(path, points, "forward")
+    pairing = pair(path, points, "forward")
     spent = time.process_time() - begin
-    off = np.abs(found.s_mm - np.interp(u, places, path.s_mm))
+    off = np.abs(pairing.s_mm - np.interp(u, places, path.s_mm))
     print(f"{count} against {count}: {spent:.1f} s, largest error along the path {off.max() * 1e3:.1f} um")
 
 

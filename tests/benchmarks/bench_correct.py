@@ -1,4 +1,4 @@
-"""CPU time and memory of `olp correct` beside LinuxCNC listing the same file, in one run.
+"""CPU time and memory of `olp correct`, compared with LinuxCNC listing the same file, in one run.
 
     python tests/benchmarks/bench_correct.py [lines [python]]
 
@@ -30,9 +30,9 @@ def machine(folder: Path) -> Path:
     """A machine with all 21 errors, 50 to 100 um in its box."""
     rng = np.random.default_rng(3)
     for axis, (low, high) in BOX.items():
-        at = np.linspace(low, high, 33)
-        u = (at - low) / (high - low)
-        columns = [at]
+        position = np.linspace(low, high, 33)
+        u = (position - low) / (high - low)
+        columns = [position]
         for k in range(6):
             waves = sum(rng.normal() / (n + 1) ** 1.5 * np.sin(np.pi * (n + 1) * u + n) for n in range(4))
             columns.append((25.0 if k < 3 else 30.0) * waves)
@@ -91,13 +91,13 @@ def stages(program: Path, described: Path) -> None:
     olp.correct(program, described, progress=tell)
     tell("end", 1.0)
     print(f"  load {marks[0][1] - start:.2f}", end="")
-    for (name, at), (_, until) in pairwise(marks):
-        print(f", {name} {until - at:.2f}", end="")
+    for (name, since), (_, until) in pairwise(marks):
+        print(f", {name} {until - since:.2f}", end="")
     print(" s")
 
 
 def peers(program: Path, number: int, python: str) -> None:
-    """Other readers of G-code on the same file, where they are installed: reading alone."""
+    """Other readers of G-code on the same file, where they are installed: only reading."""
     code = {
         "pygcode": "from pygcode import Line\nfor line in open(F): str(Line(line))",
         "gcode_lib": "import gcode_lib\ngcode_lib.load(F)",
@@ -107,7 +107,7 @@ def peers(program: Path, number: int, python: str) -> None:
             print(f"  {name}: not installed")
             continue
         cpu, _ = user_seconds([python, "-c", f"F={str(program)!r}\n{text}"], 1)
-        print(f"  {name}: {cpu:.1f} s to read it, {cpu / number * 1e6:.1f} us a line")
+        print(f"  {name}: {cpu:.1f} s to read it, {cpu / number * 1e6:.1f} us per line")
 
 
 def main() -> None:
@@ -123,8 +123,8 @@ def main() -> None:
             program = folder / f"raster_{count}.ngc"
             generate = [str(ROOT / "programs" / "generate.py"), "raster", count, "-o", str(program)]
             subprocess.run([sys.executable, *generate], check=True, capture_output=True)
-            out = folder / "out.ngc"
-            correct = ["correct", str(program), "-m", str(described), "-o", str(out), "--force", "--quiet"]
+            target = folder / "out.ngc"
+            correct = ["correct", str(program), "-m", str(described), "-o", str(target), "--force", "--quiet"]
             cpu, peak = user_seconds([sys.executable, "-m", "olp", *correct])
             number = program.read_bytes().count(b"\n")
             memory = f"peak {peak / 1024:.0f} MB, {peak * 1024 / number:.0f} B/line"

@@ -23,13 +23,13 @@ def full_calibration(spacing_mm: float = 50.0, jitter_mm: float = 0.0) -> Calibr
     rng = np.random.default_rng(1)
     curves = []
     for axis, (low, high) in zip("XYZ", BOX, strict=True):
-        at = np.linspace(low, high, round((high - low) / spacing_mm) + 1)
-        at[1:-1] += jitter_mm * rng.uniform(-1.0, 1.0, len(at) - 2)
+        position = np.linspace(low, high, round((high - low) / spacing_mm) + 1)
+        position[1:-1] += jitter_mm * rng.uniform(-1.0, 1.0, len(position) - 2)
         columns = {
-            f"E{d}{axis}": np.cumsum(rng.normal(size=len(at))) * (3e-3 if d in "XYZ" else 8e-6)
+            f"E{d}{axis}": np.cumsum(rng.normal(size=len(position))) * (3e-3 if d in "XYZ" else 8e-6)
             for d in "XYZABC"
         }
-        curves.append(Curve(axis, at, columns, line_mm=(0.0, 0.0, 0.0)))
+        curves.append(Curve(axis, position, columns, line_mm=(0.0, 0.0, 0.0)))
     square = {"C0Y": 20e-6, "B0Z": -8e-6, "A0Z": 12e-6}
     return Calibration("bench", BOX, curves=tuple(curves), squareness=square)
 
@@ -79,7 +79,7 @@ def main() -> None:
             report(f"{chain} error along a path", partial(model.error, walk, tool), n)
             report(f"{chain} error along a path, a tool per point", partial(model.error, walk, tools), n)
         inner = 1.0 + 0.998 * (walk - 1.0)
-        report("command for a place of the tip", partial(invert, model, inner, tool), n)
+        report("command for a position of the tip", partial(invert, model, inner, tool), n)
         report("error with play", partial(model.error, walk, tool, play), n)
         report("chord_bound", partial(model.chord_bound, delta, tool), n)
     loaded = np.append(tool, 30.0)

@@ -1,12 +1,11 @@
-"""What three turns of refinement leave of simulated machines.
+"""Residual errors of simulated machines after three turns of refinement.
 
     python tests/benchmarks/bench_refine.py [SEEDS]
 
 Random machines of 3 x 2 x 1 m and six chains, both families. They begin with the calibration that a full set
-of lines gave, or 60 points of a tracker of 20 um; each turn is a run of 60 other points of 8 um in another
-frame. Judged at fresh places with two tools (one never measured with), rms length less the best-fit frame;
-"stated" is what the covariance says of the same. A rise counts where it is larger than the stated
-uncertainty.
+of lines gave, or 60 points of a tracker of 20 um. Each turn is a run of 60 other points of 8 um in another
+frame. Judged at fresh positions with two tools (one never measured with), rms length less the best-fit frame;
+"stated" is the same from the covariance. A rise counts where it is larger than the stated uncertainty.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ SEEDS = 20
 def main(seeds: int) -> None:
     for quick, name in ((False, "lines"), (True, "60 points of 20 um")):
         for family in ("smooth", "rough"):
-            found = [turns(seed, family, quick=quick) for seed in range(seeds)]
-            left = np.array([[one.left for one in row] for row in found])
-            stated = np.array([[one.stated for one in row] for row in found])
+            runs = [turns(seed, family, quick=quick) for seed in range(seeds)]
+            residual = np.array([[one.left for one in row] for row in runs])
+            stated = np.array([[one.stated for one in row] for row in runs])
             words = " -> ".join(
-                f"{np.median(left[:, k]):.2f} (stated {np.median(stated[:, k]):.2f})" for k in range(4)
+                f"{np.median(residual[:, k]):.2f} (stated {np.median(stated[:, k]):.2f})" for k in range(4)
             )
-            rises = left[:, 1:] - left[:, :-1]
+            rises = residual[:, 1:] - residual[:, :-1]
             beyond = int((rises > stated[:, 1:]).sum())
             falls = int((rises < 0.0).sum())
             print(

@@ -14,19 +14,20 @@ from olp.trajectory.plan import plan
 
 
 def main() -> None:
-    print("path        way-points     time s  / best known  solver            largest ratio  way-points/s")
+    print("path         waypoints     time s  / best known  solver            largest ratio   waypoints/s")
     for name in sys.argv[1:] or retime_paths.PATHS:
         route = retime_paths.route(name)
         best = retime_paths.PATHS[name][3]
         start = time.process_time()
-        found = plan(route, retime_paths.LIMITS)
+        trajectory = plan(route, retime_paths.LIMITS)
         spent = time.process_time() - start
         largest = max(
-            float(v.max()) for v in (found.audit.velocity, found.audit.acceleration, found.audit.jerk)
+            float(v.max())
+            for v in (trajectory.audit.velocity, trajectory.audit.acceleration, trajectory.audit.jerk)
         )
-        solvers = ", ".join(sorted({leg.solver for leg in found.legs}))
+        solvers = ", ".join(sorted({leg.solver for leg in trajectory.legs}))
         print(
-            f"{name:10s} {len(route):11d} {found.duration_s:10.3f} {found.duration_s / best:9.3f}"
+            f"{name:10s} {len(route):11d} {trajectory.duration_s:10.3f} {trajectory.duration_s / best:9.3f}"
             f"      {solvers:17s} {largest:.9f}  {len(route) / spent:10.0f}"
         )
 

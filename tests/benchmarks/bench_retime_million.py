@@ -1,8 +1,8 @@
-"""Time and memory of planning a million way-points: python tests/benchmarks/bench_retime_million.py [job ...]
+"""Time and memory of planning a million waypoints: python tests/benchmarks/bench_retime_million.py [job ...]
 
-    --points N     way-points of each job (default 1e6)
+    --points N     waypoints of each job (default 1e6)
 
-Each job runs in a process of its own, so that its peak of memory is its own.
+Each job runs in its own process, so that its peak of memory is its own.
 """
 
 from __future__ import annotations
@@ -110,15 +110,15 @@ def one(job: str, count: int) -> None:
     for module, name in STAGES:
         _watched(module, name, spent)
     before = resource.getrusage(resource.RUSAGE_SELF)
-    found = planner.plan(route, retime_paths.LIMITS)
+    trajectory = planner.plan(route, retime_paths.LIMITS)
     after = resource.getrusage(resource.RUSAGE_SELF)
     user = after.ru_utime - before.ru_utime
-    solvers = sorted({leg.solver for leg in found.legs})
-    slowed = max(leg.factor for leg in found.legs)
+    solvers = sorted({leg.solver for leg in trajectory.legs})
+    slowed = max(leg.factor for leg in trajectory.legs)
     print(
         f"{job:9s}{len(route):9d}{user:9.1f}{after.ru_stime - before.ru_stime:8.1f}{len(route) / user:10.0f}"
-        f"{after.ru_maxrss / 1e3:9.0f}{found.duration_s:11.1f}{len(found.motion):10d}{len(found.legs):8d}"
-        f"{slowed:9.5f}  {', '.join(solvers)}"
+        f"{after.ru_maxrss / 1e3:9.0f}{trajectory.duration_s:11.1f}{len(trajectory.motion):10d}"
+        f"{len(trajectory.legs):8d}{slowed:9.5f}  {', '.join(solvers)}"
     )
     stages = ", ".join(f"{name.strip('_')} {seconds:.1f}" for name, seconds in spent.items())
     print(f"         user s: {stages}", flush=True)
@@ -134,7 +134,7 @@ def main() -> None:
         one(given.jobs[0], int(given.points))
         return
     print(
-        "job     way-points   user s   sys s  points/s  peak MB duration s    pieces    legs   slowed solvers"
+        "job      waypoints   user s   sys s  points/s  peak MB duration s    pieces    legs   slowed solvers"
     )
     for job in given.jobs:
         start = time.monotonic()

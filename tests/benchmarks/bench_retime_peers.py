@@ -1,10 +1,10 @@
-"""TOPP-RA beside re-timing, on nine paths: python tests/benchmarks/bench_retime_peers.py PYTHON [name ...]
+"""TOPP-RA and re-timing on nine paths: python tests/benchmarks/bench_retime_peers.py PYTHON [name ...]
 
-PYTHON is an interpreter with toppra (pip install toppra; it need not have olp). It knows no jerk and no feed:
-it is given the same smooth path, with the feed as an axis of its own, and its time is one that no motion of
-limited jerk reaches. Both motions are sampled at 1 kHz, and differences of positions are held against the
-limits. Way-points a second are of CPU time: TOPP-RA's on the breaks of the path (three a way-point), its time
-on a grid of at most a quarter of a millimetre. Beside the whole planner stand its solvers alone.
+PYTHON is an interpreter with toppra (pip install toppra; it need not have olp). It has no limits of jerk and
+feed: it gets the same smooth path, with the feed as one more axis, and no motion of limited jerk reaches its
+time. Both motions are sampled at 1 kHz, and differences of positions are compared with the limits. Waypoints
+per second are of CPU time: TOPP-RA's on the breaks of the path (three per waypoint), its cycle time on a grid
+of at most a quarter of a millimetre. The solvers are also timed without the rest of the planner.
 """
 
 from __future__ import annotations
@@ -21,22 +21,25 @@ from typing import Any
 
 import numpy as np
 
+#: sampling of both motions
 CYCLE_S = 1e-3
-FINE_M, SHORTEST_M = 0.25e-3, 1e-7
+#: largest and least cell of the grid
+FINE_M = 0.25e-3
+SHORTEST_M = 1e-7
 #: acceleration along the path that is never reached
 _NO_LIMIT = 1e6
 
 
 class Cubics:
-    """A path of cubics: `shape` (k, 4, 3) by the way from each of `breaks` (k + 1,)."""
+    """A path of cubics: `shape` (k, 4, 3) by the arc length from each of `breaks` (k + 1,)."""
 
     def __init__(self, breaks: np.ndarray, shape: np.ndarray) -> None:
         self.breaks, self.shape = breaks, shape
 
-    def at(self, way: np.ndarray, order: int = 0) -> np.ndarray:
+    def at(self, arc: np.ndarray, order: int = 0) -> np.ndarray:
         """(n, 3) position, or its first or second derivative."""
-        k = np.clip(np.searchsorted(self.breaks, way, side="right") - 1, 0, len(self.shape) - 1)
-        s = (way - self.breaks[k])[:, None]
+        k = np.clip(np.searchsorted(self.breaks, arc, side="right") - 1, 0, len(self.shape) - 1)
+        s = (arc - self.breaks[k])[:, None]
         c = [self.shape[k, i] for i in range(4)]
         if order == 0:
             return np.asarray(c[0] + s * (c[1] + s * (c[2] + s * c[3])))
@@ -46,11 +49,11 @@ class Cubics:
 
 
 def grid(breaks: np.ndarray, most: float) -> np.ndarray:
-    """The breaks, none nearer to another than the shortest cell, and cells of at most so much."""
+    """The breaks, none nearer to another than the shortest cell, with cells of at most `most`."""
     kept = [breaks[0]]
-    for at in breaks[1:-1].tolist():
-        if at - kept[-1] >= SHORTEST_M and breaks[-1] - at >= SHORTEST_M:
-            kept.append(at)
+    for knot in breaks[1:-1].tolist():
+        if knot - kept[-1] >= SHORTEST_M and breaks[-1] - knot >= SHORTEST_M:
+            kept.append(knot)
     cells = np.diff(kept := np.array([*kept, breaks[-1]]))
     count = np.maximum(np.ceil(cells / most), 1).astype(int)
     step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
@@ -77,7 +80,7 @@ def peer(file: str) -> None:
 
     toppra.setup_logging("ERROR")
     with np.load(file) as given:
-        # in metres: its solver leaves out what is small, or finds nothing
+        # in metres: in millimetres its solver drops small values, or finds no motion
         shape = given["shape"] * np.array([1e-3, 1.0, 1e3, 1e6])[:, None]
         path, limits, feed = (
             Cubics(given["breaks"] / 1e3, shape),
@@ -86,17 +89,17 @@ def peer(file: str) -> None:
         )
 
     class Path_(interpolator.AbstractGeometricPath):  # type: ignore[misc]
-        """The axes, and the way itself as one more."""
+        """The axes, and the arc length as one more."""
 
         dof = 4
         path_interval = path.breaks[[0, -1]]
         waypoints = (path.breaks, None)
 
-        def __call__(self, way: Any, order: int = 0) -> np.ndarray:
-            at = np.atleast_1d(np.asarray(way, float))
-            own = (at, np.ones_like(at), np.zeros_like(at))[order]
-            states = np.column_stack((path.at(at, order), own))
-            return states if np.ndim(way) else states[0]
+        def __call__(self, arc: Any, order: int = 0) -> np.ndarray:
+            s = np.atleast_1d(np.asarray(arc, float))
+            own = (s, np.ones_like(s), np.zeros_like(s))[order]
+            states = np.column_stack((path.at(s, order), own))
+            return states if np.ndim(arc) else states[0]
 
     velocity, acceleration = np.append(limits[0], feed), np.append(limits[1], _NO_LIMIT)
 
@@ -121,11 +124,11 @@ def peer(file: str) -> None:
         return
     lasts = 2 * np.diff(cells) / (speed[1:] + speed[:-1])
     start = np.concatenate(([0.0], np.cumsum(lasts)))
-    at = np.arange(0.0, start[-1], CYCLE_S)
-    k = np.clip(np.searchsorted(start, at, side="right") - 1, 0, len(lasts) - 1)
-    u = at - start[k]
-    way = cells[k] + u * (speed[k] + 0.5 * u * (np.diff(speed) / lasts)[k])
-    np.savez(file, found=True, spent=spent, seconds=start[-1], ratios=ratios(path.at(way), limits))
+    instant = np.arange(0.0, start[-1], CYCLE_S)
+    k = np.clip(np.searchsorted(start, instant, side="right") - 1, 0, len(lasts) - 1)
+    u = instant - start[k]
+    arc = cells[k] + u * (speed[k] + 0.5 * u * (np.diff(speed) / lasts)[k])
+    np.savez(file, found=True, spent=spent, seconds=start[-1], ratios=ratios(path.at(arc), limits))
 
 
 # -- in ours -----------------------------------------------------------------------------------------------
@@ -150,9 +153,11 @@ def main() -> None:
     options = parser.parse_args()
     limits = retime_paths.LIMITS
     bounds = np.stack((limits.velocity, limits.acceleration, limits.jerk))
-    print("acc, jerk: largest ratios at 1 kHz; wp/s: way-points a second; overlap, critical: theirs alone")
     print(
-        "path       way-points |   ours s   acc    jerk |  TOPP-RA s   acc   jerk    wp/s |"
+        "acc, jerk: largest ratios at 1 kHz; wp/s: waypoints per second; overlap, critical: of these solvers"
+    )
+    print(
+        "path        waypoints |   ours s   acc    jerk |  TOPP-RA s   acc   jerk    wp/s |"
         "  time;  wp/s: whole overlap critical  over TOPP-RA"
     )
     for name in options.names:
@@ -163,10 +168,10 @@ def main() -> None:
             result = call()
             return result, count / (time.process_time() - begun)
 
-        found, rate = cpu(partial(plan, route, limits))
+        trajectory, rate = cpu(partial(plan, route, limits))
         _, by_overlap = cpu(partial(overlap, route, limits))
         _, by_critical = cpu(partial(critical, route, limits))
-        own = ratios(found.at(np.arange(0.0, found.duration_s, CYCLE_S))[0], bounds)
+        own = ratios(trajectory.at(np.arange(0.0, trajectory.duration_s, CYCLE_S))[0], bounds)
         path = smooth(route, limits)
         with tempfile.TemporaryDirectory() as folder:
             file = str(Path(folder) / "path.npz")
@@ -178,9 +183,9 @@ def main() -> None:
                 bound = float(theirs["seconds"]) if theirs["found"] else np.nan
                 other = theirs["ratios"] if theirs["found"] else np.full(3, np.nan)
         print(
-            f"{name:10s} {len(route):10d} | {found.duration_s:8.3f} {own[1]:5.3f} {own[2]:7.4f} |"
+            f"{name:10s} {len(route):10d} | {trajectory.duration_s:8.3f} {own[1]:5.3f} {own[2]:7.4f} |"
             f" {bound:10.3f} {other[1]:5.3f} {other[2]:6.1f} {their_rate:7.0f} |"
-            f" {found.duration_s / bound:6.3f}"
+            f" {trajectory.duration_s / bound:6.3f}"
             f" {rate / their_rate:12.2f} {by_overlap / their_rate:7.2f} {by_critical / their_rate:8.2f}",
             flush=True,
         )

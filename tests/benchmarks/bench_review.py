@@ -4,7 +4,7 @@
 
 A finishing raster on a machine with all 21 errors, measured too, with a workpiece mesh. By default a few
 thousand blocks carry the points; with `--lines` every point is a block of its own. Packing is from samples to
-the bytes of the page. `--browser` asks Chromium by playwright, where both are installed, with software
+the bytes of the page. `--browser` measures Chromium by playwright, where both are installed, with software
 rendering: time until the page is ready, of one frame, and of picks.
 """
 
@@ -37,11 +37,13 @@ BROWSER = [
 ]
 #: blocks that carry the points unless each has its own
 BLOCKS = 4000
-WIDE, DEEP = 1000.0, 600.0
+#: mm; the plate in X and Y
+WIDE = 1000.0
+DEEP = 600.0
 
 
 def program(folder: Path, blocks: int) -> tuple[Path, float]:
-    """A raster of so many blocks, and the length of it in mm."""
+    """A raster of `blocks` blocks, and its length in mm."""
     import generate
 
     path = folder / "raster.ngc"
@@ -80,12 +82,12 @@ def job(folder: Path, points: int, *, lines: bool) -> tuple[Path, Path, float | 
 
 
 def measured(folder: Path, path: Path, described: Path, points: int) -> Path:
-    """What the machine would do, as a tracker would see it at a quarter of the points."""
+    """The predicted run of the machine, as a tracker would measure it at a quarter of the points."""
     setup = olp.load_setup(None, described)
     step = {True: 4.0, False: 2.0}[points > 300_000]
-    out = folder / "measured.csv"
-    write_bytes(out, olp.simulate(path, setup, step_mm=step).to_csv(), force=True)
-    return out
+    target = folder / "measured.csv"
+    write_bytes(target, olp.simulate(path, setup, step_mm=step).to_csv(), force=True)
+    return target
 
 
 def run(points: int, folder: Path, *, lines: bool, timed: bool, browser: bool) -> str:
@@ -96,16 +98,16 @@ def run(points: int, folder: Path, *, lines: bool, timed: bool, browser: bool) -
     viewed = time.perf_counter() - begin
     packed, page = pack(review)
     arrays = manifest_of(review.scene)[1]
-    out = folder / f"review-{points}{'-lines' if lines else ''}.html"
-    out.write_bytes(page)
+    target = folder / f"review-{points}{'-lines' if lines else ''}.html"
+    target.write_bytes(page)
     count = len(review.scene.samples)
     print(
         f"{count} points, {review.scene.nominal.lines} lines: view {viewed:.1f} s, pack {packed:.2f} s, "
-        f"{len(page) / 1e6:.2f} MB, {len(arrays.encoded()) / count:.1f} bytes a point"
+        f"{len(page) / 1e6:.2f} MB, {len(arrays.encoded()) / count:.1f} bytes per point"
     )
     if browser:
-        print("  " + ", ".join(f"{name} {value}" for name, value in opened(out).items()))
-    return str(out)
+        print("  " + ", ".join(f"{name} {value}" for name, value in opened(target).items()))
+    return str(target)
 
 
 def pack(review: Review) -> tuple[float, bytes]:
@@ -155,7 +157,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("points", nargs="*", type=float, default=[1e5, 1e6])
-    parser.add_argument("--lines", action="store_true", help="a block a point")
+    parser.add_argument("--lines", action="store_true", help="one block per point")
     parser.add_argument("--no-time", action="store_true", help="do not plan the motion")
     parser.add_argument("--browser", action="store_true", help="open the pages in Chromium")
     parser.add_argument("--keep", type=Path, help="folder that keeps the pages")

@@ -3,9 +3,9 @@
     python tests/benchmarks/bench_statements.py [points]
 
 Prints user CPU seconds of whole commands (the least of three), the part of each stage in this process, and
-their ratio per line to the G-code one. The path is the raster of `programs/generate.py`; each block of it
-says a whole point in the others. Then the same, in this process, for arcs and lines in turn, as G-code and as
-five CAM systems say them.
+their ratio per line to the G-code one. The path is the raster of `programs/generate.py`; in the others,
+each block states a whole point. Then the same, in this process, for arcs and lines in turn, as G-code and as
+five CAM systems write them.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def posted(points: np.ndarray, rapid: np.ndarray, dialect: str) -> bytes:
             for (x, y, z), fast in zip(points.tolist(), rapid.tolist(), strict=True)
         ]
         return "\n".join([".PROGRAM raster()", *moves, ".END", ""]).encode()
-    said = [f"GOTO/{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()]
+    goto = [f"GOTO/{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()]
     if dialect == "dmis":
-        return "\n".join(["DMISMN/'BENCH',05.2", "UNITS/MM,ANGDEC", *said, "ENDFIL", ""]).encode()
+        return "\n".join(["DMISMN/'BENCH',05.2", "UNITS/MM,ANGDEC", *goto, "ENDFIL", ""]).encode()
     for k in np.flatnonzero(rapid).tolist():
-        said[k] = "RAPID\n" + said[k]
-    return "\n".join(["PARTNO BENCH", "UNITS/MM", "LOADTL/1", "FEDRAT/1200,MMPM", *said, "FINI", ""]).encode()
+        goto[k] = "RAPID\n" + goto[k]
+    return "\n".join(["PARTNO BENCH", "UNITS/MM", "LOADTL/1", "FEDRAT/1200,MMPM", *goto, "FINI", ""]).encode()
 
 
 def turns(count: int) -> list[Step]:
@@ -101,14 +101,14 @@ def main() -> None:
             files[-1].write_bytes(posted(tip, rapid, dialect))
         first = 0.0
         for program in files:
-            out = folder / f"out{program.suffix}"
-            correct = ["correct", str(program), "-m", str(described), "-o", str(out), "--force", "--quiet"]
+            target = folder / f"out{program.suffix}"
+            correct = ["correct", str(program), "-m", str(described), "-o", str(target), "--force", "--quiet"]
             correct += ["--dialect", "kawasaki-as"] if program.suffix == ".as" else []
             cpu, peak = user_seconds([sys.executable, "-m", "olp", *correct])
             number = program.read_bytes().count(b"\n")
             each = cpu / number * 1e6
             first = first or each
-            share = f"{each:.2f} us a line, {each / first:.2f} x G-code"
+            share = f"{each:.2f} us per line, {each / first:.2f} x G-code"
             print(f"{program.suffix}: {number} lines, {cpu:.2f} s, {share}, peak {peak / 1024:.0f} MB")
             if program.suffix != ".as":
                 stages(program, described)

@@ -1,4 +1,4 @@
-"""Deviations of the shipped jobs as the table of the README: python tests/benchmarks/figures.py"""
+"""Deviations of the shipped jobs as a table: python tests/benchmarks/figures.py"""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ JOBS = (
     "haas-mill/job-manifold.toml",
 )
 HEAD = (
-    "| program | moves: corrected, approximated, passed | way-points before | after | between before | after "
-    "| allowed |",
+    "| program | moves: corrected, approximated, left uncorrected | waypoints uncorrected | corrected "
+    "| between uncorrected | corrected | allowed |",
     "|---|---|---|---|---|---|---|",
 )
 

@@ -1,4 +1,4 @@
-"""Nine tool paths that tell re-timers apart: way-points in mm, feed in mm/s, path tolerance in mm."""
+"""Nine tool paths that distinguish re-timers: waypoints in mm, feed in mm/s, path tolerance in mm."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ def circle(turns: int = 5, radius: float = 50.0, sag: float = 1e-3, digit: float
 
 def freeform(lines: int = 20, width: float = 100.0, step: float = 0.2, digit: float = 1e-3) -> np.ndarray:
     """Raster over a wavy surface, as finishing passes are."""
-    out = []
+    parts = []
     x = np.arange(0.0, width + step / 2, step)
     for i in range(lines):
         y = i * 0.5
         z = 4.0 * np.sin(2 * np.pi * x / 40.0 + i * 0.05) * np.cos(2 * np.pi * y / 30.0)
         z += 1.5 * np.sin(2 * np.pi * x / 11.0)
         part = np.column_stack((x, np.full_like(x, y), z))
-        out.append(part if i % 2 == 0 else part[::-1])
-    return np.asarray(np.round(np.vstack(out) / digit) * digit)
+        parts.append(part if i % 2 == 0 else part[::-1])
+    return np.asarray(np.round(np.vstack(parts) / digit) * digit)
 
 
 def robot(count: int = 50, seed: int = 0) -> np.ndarray:
-    """Way-points far apart in space."""
+    """Waypoints far apart in space."""
     return np.asarray(np.cumsum(np.random.default_rng(seed).normal(0.0, 150.0, (count, 3)), axis=0))
 
 
@@ -51,14 +51,14 @@ def corrected(passes: int = 4, width: float = 1000.0, step: float = 5.0, seed: i
     """Straight passes after a correction: cut in pieces that are off by micrometres."""
     rng = np.random.default_rng(seed)
     x = np.arange(0.0, width + step / 2, step)
-    out = []
+    parts = []
     for i in range(passes):
         y = 0.02 * np.sin(2 * np.pi * x / 300.0 + i) + rng.normal(0.0, 2e-4, len(x))
         z = 0.01 * np.cos(2 * np.pi * x / 110.0) + rng.normal(0.0, 2e-4, len(x))
         along = 0.005 * np.sin(2 * np.pi * x / 5.0 * 0.37)
         part = np.column_stack((x + along, i * 20.0 + y, z))
-        out.append(part if i % 2 == 0 else part[::-1])
-    return np.vstack(out)
+        parts.append(part if i % 2 == 0 else part[::-1])
+    return np.vstack(parts)
 
 
 def engraving(count: int = 2000, seed: int = 3) -> np.ndarray:
@@ -95,7 +95,7 @@ def lissajous(count: int = 1000) -> np.ndarray:
     return np.asarray(100.0 * np.column_stack(waves))
 
 
-#: name: way-points, feed mm/s, tolerance mm, shortest audited time s known (reference runs of 2026)
+#: name: waypoints, feed mm/s, tolerance mm, shortest audited time s known (reference runs of 2026)
 PATHS: dict[str, tuple[Callable[[], np.ndarray], float, float, float]] = {
     "pocket": (pocket, 166.7, 0.02, 54.34),
     "robot": (robot, 400.0, 2.0, 32.94),

@@ -308,8 +308,8 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP432": (Call(**known(5.1)), Call(**known(4.9))),
     # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer
     "OLP433": (
-        Call(**known(11.2), options={"within_um": 20.0}),
-        Call(**known(9.2), options={"within_um": 20.0}),
+        Call(**known(11.2), options={"part_tolerance_um": 20.0}),
+        Call(**known(9.2), options={"part_tolerance_um": 20.0}),
     ),
     # 11.5 um/(m K) at 100 mm, half a um
     "OLP434": (

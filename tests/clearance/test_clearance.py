@@ -25,35 +25,35 @@ few = settings(max_examples=25)
 
 
 def swept_parts(rng: np.random.Generator, count: int, span: float = 50.0) -> Swept:
-    """Frusta of all sizes on ways of all lengths; some are discs, needles, cones, some stand still."""
+    """Frusta of all sizes on segments of all lengths; some are discs, needles, cones, some stand still."""
     level = np.sort(rng.uniform(0.0, 100.0, (count, 2)), axis=1)
     level[rng.random(count) < 0.1, 1] = level[rng.random(count) < 0.1, 0].mean() if count > 50 else 100.0
     level.sort(axis=1)
     radius = rng.uniform(0.0, 20.0, (count, 2))
     radius[rng.random((count, 2)) < 0.1] = 0.0
-    way = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-3.0, 2.0, (count, 1))
-    way[rng.random(count) < 0.1] = 0.0
-    return Swept(rng.uniform(-span, span, (count, 3)), way, level, radius)
+    travel = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-3.0, 2.0, (count, 1))
+    travel[rng.random(count) < 0.1] = 0.0
+    return Swept(rng.uniform(-span, span, (count, 3)), travel, level, radius)
 
 
 def triangles(rng: np.random.Generator, count: int, span: float = 60.0) -> np.ndarray:
     """Triangles of all sizes, needles among them."""
     size = 10.0 ** rng.uniform(-2.0, 1.5, (count, 1, 1))
-    out = rng.uniform(-span, span, (count, 1, 3)) + rng.normal(size=(count, 3, 3)) * size
+    corners = rng.uniform(-span, span, (count, 1, 3)) + rng.normal(size=(count, 3, 3)) * size
     thin = rng.random(count) < 0.2
-    out[thin, 2] = out[thin, 1] + 1e-3 * rng.normal(size=(int(thin.sum()), 3))
-    return out
+    corners[thin, 2] = corners[thin, 1] + 1e-3 * rng.normal(size=(int(thin.sum()), 3))
+    return corners
 
 
 def surface_points(rng: np.random.Generator, swept: Swept) -> np.ndarray:
     """(n, 3) a point somewhere within each swept frustum."""
     t, z, angle, r = (rng.random(len(swept)) for _ in range(4))
     radius = (swept.radius[:, 0] + z * (swept.radius[:, 1] - swept.radius[:, 0])) * np.sqrt(r)
-    out = swept.start + t[:, None] * swept.way
-    out[:, 0] += radius * np.cos(2 * np.pi * angle)
-    out[:, 1] += radius * np.sin(2 * np.pi * angle)
-    out[:, 2] += swept.level[:, 0] + z * (swept.level[:, 1] - swept.level[:, 0])
-    return out
+    point = swept.start + t[:, None] * swept.travel
+    point[:, 0] += radius * np.cos(2 * np.pi * angle)
+    point[:, 1] += radius * np.sin(2 * np.pi * angle)
+    point[:, 2] += swept.level[:, 0] + z * (swept.level[:, 1] - swept.level[:, 0])
+    return point
 
 
 def on_triangles(rng: np.random.Generator, triangle: np.ndarray) -> np.ndarray:
@@ -69,19 +69,19 @@ def on_triangles(rng: np.random.Generator, triangle: np.ndarray) -> np.ndarray:
 def test_no_two_points_are_nearer_and_no_plane_separates_more(seed: int) -> None:
     rng = np.random.default_rng(seed)
     swept, triangle = swept_parts(rng, 200), triangles(rng, 200)
-    found = nearest(swept, triangle)
+    result = nearest(swept, triangle)
     for _ in range(20):
         away = np.linalg.norm(surface_points(rng, swept) - on_triangles(rng, triangle), axis=1)
-        assert (found.distance_mm <= away + CLOSE_MM).all()
-        way = rng.normal(size=(200, 3))
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        assert (found.distance_mm >= swept.gap(triangle, way) - 1e-9).all()
+        assert (result.distance_mm <= away + CLOSE_MM).all()
+        direction = rng.normal(size=(200, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        assert (result.distance_mm >= swept.gap(triangle, direction) - 1e-9).all()
 
 
 @few
 @given(SEEDS)
 def test_a_point_in_common_is_a_contact(seed: int) -> None:
-    """Wherever on the way they meet."""
+    """Wherever on the segment they meet."""
     rng = np.random.default_rng(seed)
     swept, triangle = swept_parts(rng, 300), triangles(rng, 300)
     triangle += (surface_points(rng, swept) - on_triangles(rng, triangle))[:, None]
@@ -95,10 +95,10 @@ def test_a_bound_hides_nothing_below_it(seed: int) -> None:
     swept, triangle = swept_parts(rng, 200), triangles(rng, 200)
     whole = nearest(swept, triangle).distance_mm
     bound = rng.uniform(0.0, 2.0, 200) * (whole + 0.1)
-    found = nearest(swept, triangle, bound).distance_mm
+    distance = nearest(swept, triangle, bound).distance_mm
     below = whole < bound - CLOSE_MM
-    np.testing.assert_allclose(found[below], whole[below], atol=2 * CLOSE_MM)
-    assert (found >= np.minimum(whole, bound) - 2 * CLOSE_MM).all()
+    np.testing.assert_allclose(distance[below], whole[below], atol=2 * CLOSE_MM)
+    assert (distance >= np.minimum(whole, bound) - 2 * CLOSE_MM).all()
 
 
 @pytest.mark.parametrize(("corner", "expected"), [
@@ -140,8 +140,8 @@ def test_the_search_finds_what_looking_at_all_finds(seed: int, count: int) -> No
 @few
 @given(SEEDS)
 @example(9998)
-def test_no_contact_between_way_points_is_missed(seed: int) -> None:
-    """Small triangles, each somewhere in the way of a fast move, among many that are not."""
+def test_no_contact_between_waypoints_is_missed(seed: int) -> None:
+    """Small triangles, each somewhere in the path of a fast move, among many that are not."""
     rng = np.random.default_rng(seed)
     swept = swept_parts(rng, 100, 1000.0)
     hit = triangles(rng, 100) * 0.01
@@ -154,8 +154,8 @@ def test_no_contact_between_way_points_is_missed(seed: int) -> None:
 @settings(max_examples=8)
 @given(SEEDS, st.sampled_from(["cylinder", "cone"]))
 def test_it_agrees_with_coal_to_a_micrometre(seed: int, shape: str) -> None:
-    """coal measures a standing cylinder or cone against the whole mesh; the least over the way is bounded
-    from both sides, for it changes by no more than the way."""
+    """coal measures a standing cylinder or cone against the whole mesh. The least distance over the segment
+    is bounded from both sides, as it changes by no more than the distance travelled."""
     scene = Scene.of(np.random.default_rng(seed), shape)
     swept, owner = scene.swept(), np.arange(len(scene.start))
     best = Best.of(len(owner))
@@ -185,17 +185,17 @@ def cleared(folder: Path, call: Call) -> Any:
 
 
 def least(folder: Path, call: Call) -> dict[int, float]:
-    found = cleared(folder, call)
-    return dict(zip(found.line.tolist(), found.clearance_mm.tolist(), strict=True))
+    clearances = cleared(folder, call)
+    return dict(zip(clearances.line.tolist(), clearances.clearance_mm.tolist(), strict=True))
 
 
 def test_each_block_has_its_clearance_and_its_place(tmp_path: Path) -> None:
     call = Call(b"G0 Z30\nG0 X100\nG1 Z5\nG1 X70\n", tables=tool(50.0), **clamp(20.0))
-    found = cleared(tmp_path, call)
+    clearances = cleared(tmp_path, call)
     # clearances of lines 4 to 7: beside the clamp, above it, beside it
     expected = {4: 35.0, 5: 10.0, 6: 35.0, 7: 5.0}
     assert least(tmp_path, call) == pytest.approx(expected, abs=UM)
-    row = next(r for r in found.rows() if r["line"] == 7)
+    row = next(r for r in clearances.rows() if r["line"] == 7)
     assert row["point_mm"][0] == pytest.approx(60.0, abs=UM)
     assert (row["part"], row["mesh"], row["role"], row["frame"]) == ("tool", "clamp.stl", "fixture", "G54")
 
@@ -211,10 +211,10 @@ def test_a_mesh_stands_where_its_frame_is(tmp_path: Path) -> None:
     frame = '[work_offsets.G55]\nX_mm = 30.0\nC_deg = 90.0\nset_by = "true"\n'
     # about Z by 90 degrees: X40..60 becomes Y40..60
     call = Call(b"G0 X30\nG1 Y20\n", tables=tool(50.0) + frame, **clamp(0.0, frame="G55"))
-    found = cleared(tmp_path, call)
+    clearances = cleared(tmp_path, call)
     assert least(tmp_path, call)[5] == pytest.approx(15.0, abs=UM)
-    at = {r["line"]: r["point_mm"] for r in found.rows()}
-    assert at[5][0] == pytest.approx(40.0, abs=UM)
+    points = {r["line"]: r["point_mm"] for r in clearances.rows()}
+    assert points[5][0] == pytest.approx(40.0, abs=UM)
 
 
 @pytest.mark.parametrize(("chain", "expected"), [("FXYZ", 40.0), ("YFXZ", 15.0)])
@@ -227,8 +227,8 @@ def test_a_machine_mesh_stands_still_while_the_table_moves(
         b"G1 Y-25\n", tables=tool(50.0), swap={'"FXYZ"': f'"{chain}"'},
         **(clamp(0.0, "machine", "machine") | post),
     )  # fmt: skip
-    found = least(tmp_path, call)
-    assert found[4] == pytest.approx(15.0, abs=UM), "its start is nearest"
+    by_line = least(tmp_path, call)
+    assert by_line[4] == pytest.approx(15.0, abs=UM), "its start is nearest"
     back = Call(
         b"G1 Y-25\nG1 X1\n", tables=tool(50.0), swap={'"FXYZ"': f'"{chain}"'},
         **(clamp(0.0, "machine", "machine") | post),
@@ -250,13 +250,13 @@ def contacts(folder: Path, call: Call) -> list[tuple[str, tuple[int, ...]]]:
 def test_what_cuts_may_touch_the_workpiece_in_feed_moves_alone(tmp_path: Path) -> None:
     work = clamp(0.0, "workpiece") | PLATE
     head = b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y-30 Z30\nF600\n"
-    # in the plate up to its middle: the retract leaves it, and touches its walls as it does
+    # in the plate up to its middle: the retract touches its walls
     assert contacts(tmp_path / "a", Call(CUT, head=head, tables=tool(50.0), start=START, **work)) == [
         ("OLP701", (8,))
     ]
     fixture = clamp(0.0, "fixture") | PLATE
-    found = contacts(tmp_path / "b", Call(CUT, head=head, tables=tool(50.0), start=START, **fixture))
-    assert found[0] == ("OLP701", (6, 7, 8))
+    touched = contacts(tmp_path / "b", Call(CUT, head=head, tables=tool(50.0), start=START, **fixture))
+    assert touched[0] == ("OLP701", (6, 7, 8))
     shank = tool(50.0, "cutting_length_mm = 3.0\n")
     assert contacts(tmp_path / "c", Call(CUT, head=head, tables=shank, start=START, **work))[0] == (
         "OLP701", (6, 7, 8),
@@ -264,20 +264,20 @@ def test_what_cuts_may_touch_the_workpiece_in_feed_moves_alone(tmp_path: Path) -
 
 
 def test_a_retract_from_what_was_cut_is_free(tmp_path: Path) -> None:
-    """The tool stands on the bottom of what it cut, beside its wall."""
+    """The tool stands on the bottom of the pocket that it cut, beside its wall."""
     pocket = {"files": {"clamp.stl": block((5.0, -60.0, -30.0), (120.0, 60.0, 0.0))}}
     call = Call(b"G1 Z-5\nG0 Z30\nG0 X-5\n", tables=tool(50.0), **(clamp(0.0, "workpiece") | pocket))
     assert contacts(tmp_path, call) == [("OLP703", (2,))]
 
 
-def test_a_holder_is_seen_where_the_tool_is_free(tmp_path: Path) -> None:
+def test_a_holder_counts_where_the_tool_is_free(tmp_path: Path) -> None:
     holder = "[[tools.1.holder]]\nlength_mm = 40.0\nradius_mm = 30.0\n"
     call = Call(b"G0 Z-20\nG0 X20\n", tables=tool(60.0), **clamp(20.0))
     assert least(tmp_path / "bare", call)[5] == pytest.approx(15.0, abs=UM)
     tables = tool(60.0).replace("[job_defaults]", holder + "[job_defaults]")
-    found = cleared(tmp_path / "held", Call(b"G0 Z-20\nG0 X20\n", tables=tables, **clamp(20.0)))
-    assert {r["line"]: r["part"] for r in found.rows()}[5] == "holder"
-    assert found.clearance_mm.min() == 0.0
+    clearances = cleared(tmp_path / "held", Call(b"G0 Z-20\nG0 X20\n", tables=tables, **clamp(20.0)))
+    assert {r["line"]: r["part"] for r in clearances.rows()}[5] == "holder"
+    assert clearances.clearance_mm.min() == 0.0
 
 
 def test_a_mesh_that_is_none_is_refused(tmp_path: Path) -> None:

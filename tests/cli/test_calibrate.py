@@ -261,7 +261,7 @@ def test_report_of_a_fit(tmp_path: Path) -> None:
     good("fit", LINES, "-m", LINES / "machine.toml", "-o", target, "--report", page, "-q")
     text = page.read_text("utf-8")
     assert target.is_file()
-    for words in ("Errors found", "OLP802", "Datum", "half reversal", "EXX", "known within"):
+    for words in ("Errors found", "OLP802", "Datum", "half reversal", "EXX", "standard uncertainty"):
         assert words in text
 
 

@@ -52,7 +52,7 @@ def codes(report: dict[str, Any]) -> set[str]:
 
 
 def test_a_clean_run_has_no_findings(nominal: Path) -> None:
-    code, report = compared(nominal, bent(4000) + np.array((0.0, 0.0, 0.01)), "--tolerance-um", 12)
+    code, report = compared(nominal, bent(4000) + np.array((0.0, 0.0, 0.01)), "--part-tolerance-um", 12)
     assert (code, codes(report)) == (0, set())
     assert report["holds"] is True
     assert report["after"]["across_um"]["max"] == pytest.approx(10, abs=0.3)
@@ -134,10 +134,10 @@ def test_cycles_and_tolerance(nominal: Path, tmp_path: Path) -> None:
     mean, spread = 2 / 3, np.sqrt(1 / 3)
     assert few["after"]["iso_9283"]["RT_um"] == pytest.approx(mean + 3 * spread, abs=0.05)
     assert codes(json.loads(run("compare", nominal, *files, "--json").stdout)) == set()
-    result = run("compare", nominal, files[9], "--before", files[1], "--tolerance-um", 5)
+    result = run("compare", nominal, files[9], "--before", files[1], "--part-tolerance-um", 5)
     assert result.exit_code == 1
     assert "OLP609" in result.stdout
-    assert run("compare", nominal, files[4], "--tolerance-um", 5).exit_code == 0
+    assert run("compare", nominal, files[4], "--part-tolerance-um", 5).exit_code == 0
 
 
 def test_frames_that_files_state_never_mix(tmp_path: Path) -> None:
@@ -183,7 +183,7 @@ def test_a_program_before_and_after(tmp_path: Path) -> None:
     (["compare", PROGRAM, "x.csv"], "no such file"),
     (["compare", "n", "m", "--report", "r.pdf"], ".html, .json, .md"),
     (["compare", "n", "m", "--part-frame", "f.toml"], "--poses"),
-    (["compare", "n", "m", "--poses", "-o", "d.csv"], "poses are in the report"),
+    (["compare", "n", "m", "--poses", "-o", "d.csv"], "--poses has none; use --report"),
 ])  # fmt: skip
 def test_calls_that_cannot_be_right(words: list[object], said: str) -> None:
     result = run(*words)
@@ -365,14 +365,14 @@ def test_so_few_points_always_fit(nominal: Path, count: int, align: str) -> None
     few = bent(4)[:count] + np.array((500.0, 0.0, 0.0))
     measured = nominal.with_name("measured.csv")
     measured.write_text(table(few))
-    result = run("compare", nominal, measured, "--align", align, "--tolerance-um", "5")
+    result = run("compare", nominal, measured, "--align", align, "--part-tolerance-um", "5")
     assert (result.exit_code, result.stdout) == (4, "")
-    assert f"measured.csv: {count} points make no best fit" in result.stderr
+    assert f"measured.csv: {count} points are too few for a best fit" in result.stderr
     assert "--align none" in result.stderr
 
 
 def test_few_points_in_the_nominal_frame_are_as_they_are(nominal: Path) -> None:
-    code, report = compared(nominal, bent(3000)[[700]] + np.array((0, 0, 0.01)), "--tolerance-um", 12)
+    code, report = compared(nominal, bent(3000)[[700]] + np.array((0, 0, 0.01)), "--part-tolerance-um", 12)
     assert (code, codes(report), report["holds"]) == (0, {"OLP603"}, True)
     assert report["after"]["across_um"]["max"] == pytest.approx(10, abs=0.3)
 
@@ -385,10 +385,10 @@ def test_nothing_that_counts_is_no_pass(tmp_path: Path) -> None:
     measured.write_text(table(points))
     for align in ("none", "fit"):
         words = ["compare", program, measured, "-m", MACHINE, "--align", align]
-        result = run(*words, "--tolerance-um", "5")
+        result = run(*words, "--part-tolerance-um", "5")
         assert result.exit_code == 1
-        assert "NOT SHOWN TO BE WITHIN TOLERANCE" in result.stdout
-        report = json.loads(run(*words, "--tolerance-um", "5", "--json").stdout)
+        assert "NOT VERIFIED TO BE WITHIN TOLERANCE" in result.stdout
+        report = json.loads(run(*words, "--part-tolerance-um", "5", "--json").stdout)
         assert report["holds"] is False
         assert "OLP609" in codes(report)
         for said in (result.stdout, json.dumps(report)):
@@ -419,7 +419,7 @@ def test_a_pose_named_twice_is_of_the_nominal_file(tmp_path: Path) -> None:
     measured.write_text(named(POSES))
     result = run("compare", nominal, measured, "--poses")
     assert result.exit_code == 3
-    assert f'{nominal}: the nominal pose "P1" is there twice' in result.stderr
+    assert f'{nominal}: the nominal pose "P1" is defined twice' in result.stderr
 
 
 def test_a_nominal_table_may_begin_with_a_mark_of_its_encoding(nominal: Path, tmp_path: Path) -> None:

@@ -95,14 +95,14 @@ def test_what_is_missing_is_asked_for(args: list[str | Path]) -> None:
 
 def test_options_reach_the_library(mill: Path, library: Fake) -> None:
     flags = ["--flatten", "--expand-cycles", "--contour", "--split-rapids"]
-    flags += ["--only-sure-components", "--within-um", "7.5"]
+    flags += ["--only-sure-components", "--part-tolerance-um", "7.5"]
     options = ["--tolerance-um", "2.5", "--outside-box", "hold", "--date", "2027-01-31"]
     assert run("correct", "-j", mill / "job.toml", *flags, *options).exit_code == 0
     passed = dict(library.calls[0][1])
     assert passed.pop("date").isoformat() == "2027-01-31"
     assert passed == {
         "tolerance_um": 2.5, "outside_box": "hold", "flatten": True, "expand_cycles": True, "contour": True,
-        "split_rapids": True, "peck_clearance_mm": None, "progress": None, "within_um": 7.5,
+        "split_rapids": True, "peck_clearance_mm": None, "progress": None, "part_tolerance_um": 7.5,
         "only_sure_components": True,
     }  # fmt: skip
     run("correct", "-j", mill / "job.toml", "--force")

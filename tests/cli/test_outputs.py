@@ -82,7 +82,7 @@ def test_what_goes_to_a_file_only_is_not_lost_on_stdout(
     files = ["points.csv", "points.csv"] if verb == "compare" else ["part.ngc"]
     result = run(verb, *files, "-j", "job.toml", option, "-")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert f"{option} writes a file, and - is stdout; name a file" in result.stderr
+    assert f"{option} writes a file and cannot be -; name a file" in result.stderr
     assert not (folder / "-").exists()
 
 

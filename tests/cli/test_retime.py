@@ -320,7 +320,7 @@ def test_the_report_adds_up(job: Path, tmp_path: Path) -> None:
     assert tuple(head) == SLOW_COLUMNS
     assert len(rows) == report["below_half_feed"]["places"] == 6
     assert sum(float(r[2]) for r in rows) == pytest.approx(report["below_half_feed"]["seconds"], abs=1e-5)
-    for words in ("Time at a limit", "below half of the feed", "Lines that take longest", "20 um named"):
+    for words in ("Time at a limit", "below half of the feed", "Lines that take longest", "20 um from the program"):
         assert words in result.stdout
     assert max(map(len, result.stdout.splitlines())) <= 100
 
@@ -531,7 +531,7 @@ def test_a_report_that_is_none_is_refused_before_the_work(
     proof.write_text(json.dumps(good | change))
     result = run("retime", program(tmp_path), "-j", job, "--proof", proof)
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "the proof is no report of a correction" in result.stderr
+    assert "the proof is not the report of a correction" in result.stderr
 
 
 def test_names_are_no_mathematics_of_a_picture(tmp_path: Path) -> None:

@@ -23,20 +23,20 @@ def test_pose_accuracy_and_repeatability_by_hand() -> None:
     attained = np.array([
         [[10.01, 20.00, 30.0]], [[10.03, 20.00, 30.0]], [[10.02, 20.02, 30.0]], [[10.02, 19.98, 30.0]],
     ])  # fmt: skip
-    found = repeated(np.array([[10.0, 20.0, 30.0]]), attained)
-    assert found.accuracy[0] == pytest.approx(0.02, abs=1e-12)
-    assert found.repeatability[0] == pytest.approx(0.015 + 3 * 0.005 * 2 / math.sqrt(3), abs=1e-12)
-    assert found.bias[0] == pytest.approx([0.02, 0.0, 0.0], abs=1e-12)
+    figures = repeated(np.array([[10.0, 20.0, 30.0]]), attained)
+    assert figures.accuracy[0] == pytest.approx(0.02, abs=1e-12)
+    assert figures.repeatability[0] == pytest.approx(0.015 + 3 * 0.005 * 2 / math.sqrt(3), abs=1e-12)
+    assert figures.bias[0] == pytest.approx([0.02, 0.0, 0.0], abs=1e-12)
 
 
 def test_the_worst_pose_counts_and_one_cycle_has_no_repeatability() -> None:
     command = np.zeros((2, 3))
     one = np.array([[[0.003, 0.004, 0.0], [0.0, 0.0, 0.001]]])
-    found = repeated(command, one)
-    assert found.accuracy == pytest.approx([0.005, 0.001])
-    assert np.isnan(found.repeatability).all()
-    assert (largest(found.accuracy).value_mm, largest(found.accuracy).place) == (pytest.approx(0.005), 0)
-    assert largest(found.repeatability).place == -1
+    figures = repeated(command, one)
+    assert figures.accuracy == pytest.approx([0.005, 0.001])
+    assert np.isnan(figures.repeatability).all()
+    assert (largest(figures.accuracy).value_mm, largest(figures.accuracy).place) == (pytest.approx(0.005), 0)
+    assert largest(figures.repeatability).place == -1
 
 
 def test_path_accuracy_and_repeatability_by_hand() -> None:
@@ -44,7 +44,7 @@ def test_path_accuracy_and_repeatability_by_hand() -> None:
 
     In each normal plane: barycentre y = 0.020, so AT = 0.020. Distances from it 0.010, 0, 0.010; mean
     0.00666667; S = sqrt((2 x 0.00333333^2 + 0.00666667^2) / 2) = 0.0057735; RT = 0.0066667 + 3 S =
-    0.0239872. The cycles were sampled at other places each, which the figures must not see.
+    0.0239872. Each cycle was sampled at other places, which must not change the figures.
     """
     path = Path.through(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]))
     runs = []
@@ -54,11 +54,11 @@ def test_path_accuracy_and_repeatability_by_hand() -> None:
         runs.append(Run.of(str(cycle), path, points, pair(path, points, "forward"), 1.0))
     places = np.array([10.0, 33.3, 77.7])
     command, _ = path.at(places)
-    found = repeated(command, np.stack([run.at(path, places) for run in runs]))
-    assert found.accuracy == pytest.approx([0.02] * 3, abs=1e-9)
+    figures = repeated(command, np.stack([run.at(path, places) for run in runs]))
+    assert figures.accuracy == pytest.approx([0.02] * 3, abs=1e-9)
     mean = 0.02 / 3
     spread = math.sqrt((2 * (0.01 - mean) ** 2 + mean**2) / 2)
-    assert found.repeatability == pytest.approx([mean + 3 * spread] * 3, abs=1e-9)
+    assert figures.repeatability == pytest.approx([mean + 3 * spread] * 3, abs=1e-9)
 
 
 def test_the_worst_place_of_a_path_counts() -> None:
@@ -71,7 +71,7 @@ def test_the_worst_place_of_a_path_counts() -> None:
         runs.append(Run.of("", path, points, pair(path, points, "forward"), 1.0))
     places = np.array([20.0, 50.0, 90.0])
     command, _ = path.at(places)
-    found = repeated(command, np.stack([run.at(path, places) for run in runs]))
-    assert found.accuracy == pytest.approx(places / 2000, abs=1e-9)
-    assert found.repeatability == pytest.approx(places / 2000, abs=1e-6)
-    assert largest(found.accuracy).place == 2
+    figures = repeated(command, np.stack([run.at(path, places) for run in runs]))
+    assert figures.accuracy == pytest.approx(places / 2000, abs=1e-9)
+    assert figures.repeatability == pytest.approx(places / 2000, abs=1e-6)
+    assert largest(figures.accuracy).place == 2

@@ -1,4 +1,4 @@
-"""Logs of the whole of LinuxCNC, and simulated runs, beside their nominal path."""
+"""Logs of the whole of LinuxCNC, and simulated runs, compared with their nominal path."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from olp.files.point_profile import load_profile
 from olp.workflows.compare import compare
 
 pytestmark = [pytest.mark.oracle, pytest.mark.slow]
-#: sampling and the chords that stand for arcs, in um
+#: um; sampling, and the chords of arcs
 SLACK_UM = 0.15
 
 
@@ -31,7 +31,7 @@ def test_a_log_of_the_control_is_a_measurement(tmp_path: Path) -> None:
     (tmp_path / "nominal.ngc").write_bytes(nominal)
     corrected = olp.correct(nominal, machine).data
     runs, logs = [], []
-    for name, text in (("raw", nominal), ("corrected", corrected)):
+    for name, text in (("uncorrected", nominal), ("corrected", corrected)):
         runs.append(controller.run(text, machine, tmp_path / name))
         logs.append(tmp_path / name / "samples")
     sampler = load_profile("linuxcnc-sampler")
@@ -49,8 +49,8 @@ def test_a_log_of_the_control_is_a_measurement(tmp_path: Path) -> None:
     dense = densify(moves, 0.02).points
     tool_vector = tool_vectors(moves, model)[np.isin(moves.kind, (linuxcnc.FEED, linuxcnc.ARC))]
     for group, run in (("before", runs[0]), ("after", runs[1])):
-        at = run.axis[run.cutting]
-        real = at + model.error_mm(at, np.tile(tool_vector[0], (len(at), 1)))
+        axis_mm = run.axis[run.cutting]
+        real = axis_mm + model.error_mm(axis_mm, np.tile(tool_vector[0], (len(axis_mm), 1)))
         judged = distances_mm(real, dense).max() * 1e3
         assert both.report[group]["across_um"]["max"] == pytest.approx(judged, abs=SLACK_UM)
     assert both.report["before"]["across_um"]["max"] > 20
@@ -62,13 +62,13 @@ def test_simulated_runs_give_the_same_figures(tmp_path: Path) -> None:
     nominal = programs.random_program(22, features=["lines", "arcs"], range_mm=RANGE, blocks=8, inch=False)
     (tmp_path / "nominal.ngc").write_bytes(nominal)
     result = olp.correct(nominal, machine)
-    for name, text in (("raw.csv", nominal), ("corrected.csv", result.data)):
+    for name, text in (("uncorrected.csv", nominal), ("corrected.csv", result.data)):
         (tmp_path / name).write_bytes(olp.simulate(text, machine, step_mm=0.1).to_csv())
-    found = compare(
-        tmp_path / "nominal.ngc", [tmp_path / "corrected.csv"], machine, before=[tmp_path / "raw.csv"]
+    comparison = compare(
+        tmp_path / "nominal.ngc", [tmp_path / "corrected.csv"], machine, before=[tmp_path / "uncorrected.csv"]
     )
     deviation = result.report["deviation"]
     for group in ("before", "after"):
         stated = deviation[group]["between"]["max_um"]
-        assert found.report[group]["across_um"]["max"] <= stated + SLACK_UM
-        assert found.report[group]["across_um"]["max"] > 0.5 * stated
+        assert comparison.report[group]["across_um"]["max"] <= stated + SLACK_UM
+        assert comparison.report[group]["across_um"]["max"] > 0.5 * stated

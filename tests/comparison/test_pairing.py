@@ -32,7 +32,7 @@ def square(u: np.ndarray) -> np.ndarray:
 
 
 def out_and_back(u: np.ndarray) -> np.ndarray:
-    """Goes to and fro on one straight line, where only order tells the passes apart."""
+    """In both directions on one straight line, where only order distinguishes the passes."""
     x = 300 * np.abs((u / np.pi) % 2 - 1)
     return np.column_stack((x, 0 * x, 0 * x))
 
@@ -49,9 +49,9 @@ def expected(path: Path, segment: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 def recovered(path: Path, points: np.ndarray, order: str = "forward") -> tuple[np.ndarray, np.ndarray]:
-    found = pair(path, points, order)
-    parts = split(path, found.segment, points - found.foot_mm)
-    return np.column_stack((parts.normal, parts.binormal)), found.segment
+    pairing = pair(path, points, order)
+    parts = split(path, pairing.segment, points - pairing.foot_mm)
+    return np.column_stack((parts.normal, parts.binormal)), pairing.segment
 
 
 @pytest.mark.slow
@@ -67,14 +67,14 @@ def test_a_known_field_comes_back_within_the_noise(nominal: int, measured: int, 
     points = true + error + rng.normal(0, NOISE_MM, true.shape)
     if order == "backward":
         points, u, error = points[::-1], u[::-1], error[::-1]
-    found = pair(path, points, order)
-    parts = split(path, found.segment, points - found.foot_mm)
+    pairing = pair(path, points, order)
+    parts = split(path, pairing.segment, points - pairing.foot_mm)
     s = np.interp(u, np.linspace(0, turns, nominal), path.s_mm)
-    # every point is on its own lap, and where it was but for what error and noise move it along
-    assert np.abs(found.s_mm - s).max() < 0.2
+    # every point is on its own lap, and at its arc length up to error and noise along the path
+    assert np.abs(pairing.s_mm - s).max() < 0.2
     got = np.column_stack((parts.normal, parts.binormal))
-    away = np.abs(got - expected(path, found.segment, error))
-    # chords of the nominal path and the bend of the field between places add their share
+    away = np.abs(got - expected(path, pairing.segment, error))
+    # chords of the nominal path and the bend of the field between nodes add their share
     sagitta = (path.length_mm / nominal) ** 2 / 8 / 20
     assert away.max() < 5.5 * NOISE_MM + sagitta
     assert np.sqrt((away**2).mean()) < 1.1 * NOISE_MM + sagitta
@@ -86,25 +86,25 @@ def test_three_laps_with_dwell_stay_in_their_laps() -> None:
     path = Path.through(square(np.linspace(0, turns, 4001)))
     u = np.linspace(0.0, turns - 1e-6, 12_000)
     points = square(u) + rng.normal(0, NOISE_MM, (len(u), 3))
-    found = pair(path, points, "forward")
-    true = np.interp(u, np.linspace(0, turns, 4001), _way(square(np.linspace(0, turns, 4001))))
+    pairing = pair(path, points, "forward")
+    true = np.interp(u, np.linspace(0, turns, 4001), _arc_length(square(np.linspace(0, turns, 4001))))
     # in a corner a point may be given to either side by as much as it dwells; never to another lap
-    assert np.abs(found.s_mm - true).max() < 1.0
-    assert found.distance_mm.max() < 6 * NOISE_MM
+    assert np.abs(pairing.s_mm - true).max() < 1.0
+    assert pairing.distance_mm.max() < 6 * NOISE_MM
 
 
-def _way(points: np.ndarray) -> np.ndarray:
+def _arc_length(points: np.ndarray) -> np.ndarray:
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
-def test_to_and_fro_on_one_line() -> None:
+def test_both_directions_on_one_line() -> None:
     rng = np.random.default_rng(6)
     u = np.linspace(0, 6 * np.pi, 9001)
     path = Path.through(out_and_back(np.linspace(0, 6 * np.pi, 601)))
     points = out_and_back(u) + rng.normal(0, NOISE_MM, (len(u), 3))
-    found = pair(path, points, "forward")
+    pairing = pair(path, points, "forward")
     true = np.interp(u, np.linspace(0, 6 * np.pi, 601), path.s_mm)
-    assert np.abs(found.s_mm - true).max() < 1.0
+    assert np.abs(pairing.s_mm - true).max() < 1.0
 
 
 def test_parallel_passes_closer_than_the_deviation() -> None:
@@ -115,10 +115,10 @@ def test_parallel_passes_closer_than_the_deviation() -> None:
     s = np.linspace(0.5, path.length_mm - 0.5, 15_000)
     place, segment = path.at(s)
     points = place + np.array((0.0, 0.12, 0.0)) + np.random.default_rng(7).normal(0, NOISE_MM, place.shape)
-    found = pair(path, points, "forward")
+    pairing = pair(path, points, "forward")
     long = np.diff(path.s_mm)[segment] > 1
     inner = long & (place[:, 0] > 2) & (place[:, 0] < 78)
-    assert (found.segment[inner] == segment[inner]).all()
+    assert (pairing.segment[inner] == segment[inner]).all()
     free = pair(path, points, "free")
     assert (free.segment[inner] != segment[inner]).mean() > 0.5
 
@@ -130,10 +130,10 @@ def test_what_was_not_measured_leaves_the_rest_alone() -> None:
     u = np.linspace(0.3, turns - 0.3, 9000)
     u = u[(u < 7.0) | (u > 9.0)]
     points = eight(u) + field(eight(u)) + rng.normal(0, NOISE_MM, (len(u), 3))
-    found = pair(path, points, "forward")
+    pairing = pair(path, points, "forward")
     true = np.interp(u, np.linspace(0, turns, 6000), path.s_mm)
-    assert np.abs(found.s_mm - true).max() < 0.3
-    run = runs.Run.of("a", path, points, found, 1.0)
+    assert np.abs(pairing.s_mm - true).max() < 0.3
+    run = runs.Run.of("a", path, points, pairing, 1.0)
     share = np.diff(np.interp([0.3, 7.0, 9.0, turns - 0.3], np.linspace(0, turns, 6000), path.s_mm))
     assert run.covered(path) == pytest.approx((share[0] + share[2]) / path.length_mm, abs=0.005)
 
@@ -149,12 +149,12 @@ def test_a_frame_anywhere_in_space_is_found(order: str) -> None:
     if order == "free":
         points = points[rng.permutation(4000)]
     away = Rigid(rotation_of(np.array((1.9, -0.7, 2.2))), np.array((4000.0, -2500.0, 900.0)))
-    found = align(path, away(points), 1.0)
-    assert found.order == order
-    assert not found.loose
-    assert not found.candidate
+    alignment = align(path, away(points), 1.0)
+    assert alignment.order == order
+    assert not alignment.loose
+    assert not alignment.ambiguous
     # uncertainty of a best fit of 4000 points, with levers
-    assert np.abs(found.rigid(away(points)) - points).max() < 10 * NOISE_MM / np.sqrt(4000 / 6)
+    assert np.abs(alignment.rigid(away(points)) - points).max() < 10 * NOISE_MM / np.sqrt(4000 / 6)
 
 
 @pytest.mark.slow
@@ -171,13 +171,13 @@ def test_a_field_comes_back_from_another_frame_up_to_what_a_best_fit_takes() -> 
     run = placed.runs[0]
     s = np.interp(u, np.linspace(0, turns, 9000), path.s_mm)
     assert np.abs(run.pairing.s_mm - s).max() < 0.5
-    # the noise-free points under the frame that was found: what is left is noise
+    # the noise-free points in the fitted frame: the residual is noise
     there = placed.rigid[0].after(away)(real)
     want = expected(path, run.pairing.segment, there - eight(u))
     got = np.column_stack((run.deviation.normal, run.deviation.binormal))
     assert np.abs(got - want).max() < 5.5 * NOISE_MM + 1e-3
     assert np.sqrt(((got - want) ** 2).mean()) < 1.1 * NOISE_MM + 1e-3
-    # and no other frame near by leaves less
+    # and no other frame near by has a smaller residual
     least = np.sqrt((run.deviation.across**2).mean())
     for turn in np.eye(3) * 5e-5:
         other = Rigid(rotation_of(turn), np.zeros(3))(run.points_mm)
@@ -206,7 +206,7 @@ def test_a_wrong_pairing_is_a_finding_and_not_a_number() -> None:
     (np.column_stack((np.linspace(0, 500, 800), np.zeros(800), np.zeros(800))), "shift in X"),
     (np.column_stack((100 * np.cos(t := np.linspace(0, 6.28, 800)), 100 * np.sin(t), 0 * t)), "turn about Z"),
 ])  # fmt: skip
-def test_what_a_path_does_not_determine_is_said(points: np.ndarray, word: str) -> None:
+def test_what_a_path_does_not_determine_is_named(points: np.ndarray, word: str) -> None:
     path = Path.through(points)
     noisy = points + np.random.default_rng(1).normal(0, NOISE_MM, points.shape)
     placed = runs.place(path, ["a"], [noisy], "fit", "forward", 1.0)
@@ -214,8 +214,8 @@ def test_what_a_path_does_not_determine_is_said(points: np.ndarray, word: str) -
 
 
 @pytest.mark.slow
-def test_a_fit_that_takes_the_error_is_told() -> None:
-    """A field that is a mere turn: the best fit leaves nothing of it."""
+def test_a_fit_that_absorbs_the_error_is_a_finding() -> None:
+    """A field that is a pure rotation: the best fit absorbs all of it."""
     path = Path.through(eight(np.linspace(0, 2 * np.pi, 3000)))
     nominal = eight(np.linspace(0, 2 * np.pi, 1000))
     turned = Rigid(rotation_of(np.array((0.0, 0.0, 2e-4))), np.array((0.01, 0.0, 0.0)))(nominal)
@@ -249,12 +249,12 @@ def test_rigid_transforms_invert_and_their_angles_make_them(turn: list[float], s
 @pytest.mark.parametrize("count", [2, 3, 5, 9, 17])
 @pytest.mark.parametrize("curve", [eight, square])
 def test_a_few_points_far_apart_find_their_places(curve: object, count: int) -> None:
-    """Each way between them leaves thousands of nodes without a point; the first point too keeps its own."""
+    """Between two of them are thousands of nodes without a point; the first point also keeps its own."""
     rng = np.random.default_rng(count)
     u = np.linspace(0.0, 2 * np.pi * 0.999, 4000)
     path = Path.through(curve(u))  # type: ignore[operator]
     for _ in range(4):
         s = np.sort(rng.uniform(0.0, path.length_mm, count))
         points, _ = path.at(s)
-        found = pair(path, points + np.array((0.0, 0.0, 0.01)), "forward")
-        assert np.abs(found.s_mm - s).max() < 0.05
+        pairing = pair(path, points + np.array((0.0, 0.0, 0.01)), "forward")
+        assert np.abs(pairing.s_mm - s).max() < 0.05

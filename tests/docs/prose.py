@@ -48,8 +48,26 @@ def of_module(path: Path) -> Iterator[Sentence]:
     """Sentences of the strings of a module that a person may read: those of four words or more."""
     for node in ast.walk(_joined(ast.parse(path.read_text("utf-8")))):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value.split()) > 3:
-            for number, paragraph in enumerate(re.split(r"\n\s*\n|\n(?=\s*[-*\d] )|\n(?=    )", node.value)):
-                yield from split(path, node.lineno + number, " ".join(paragraph.split()))
+            for line, paragraph in _paragraphs(node.value):
+                yield from split(path, node.lineno + line, paragraph)
+
+
+def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
+    """Paragraphs and items of a string with the number of their first line; no formulas, markup or styles."""
+    if re.search(r"</\w+>|\{[^}]*:[^}]*;", text):
+        return
+    lines = text.splitlines()
+    body = min((len(row) - len(row.lstrip()) for row in lines[1:] if row.strip()), default=0)
+    held, start = list[str](), 0
+    for number, row in enumerate([*lines, ""]):
+        bare = row.strip()
+        formula = number > 0 and len(row) - len(row.lstrip()) >= body + 4
+        if held and (not bare or formula or re.match(r"[-*] ", bare)):
+            yield start, " ".join(held)
+            held = []
+        if bare and not formula:
+            start = start if held else number
+            held.append(re.sub(r"^[-*] ", "", bare))
 
 
 def split(path: Path, line: int, text: str) -> Iterator[Sentence]:

@@ -17,7 +17,7 @@ from olp.core.schema import NotNegative, Table
 from olp.core.units import UM_PER_MM, in_unit, shifted
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points
-from olp.errormodel.entry import Entry, Numbers, Place, Slot, alone
+from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, alone
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Sigmas, Writing, digits
 
 
@@ -37,9 +37,9 @@ class SagErrors(Boxed):
 
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         points = self.clamped(as_points(axis_mm))
-        out = np.zeros(points.shape)
-        out[:, 2] = -self.sag.per_mm2 * (points[:, 1] - self.sag.from_mm) ** 2
-        return out
+        result = np.zeros(points.shape)
+        result[:, 2] = -self.sag.per_mm2 * (points[:, 1] - self.sag.from_mm) ** 2
+        return result
 
     def rotation(self, axis_mm: Array, play: Array | None = None, payload_kg: Array | float = 0.0) -> Array:
         return np.zeros(as_points(axis_mm).shape)
@@ -53,9 +53,9 @@ class SagErrors(Boxed):
 
     @property
     def depends_on(self) -> Mask:
-        out = np.zeros((3, 3), np.bool_)
-        out[2, 1] = self.sag.per_mm2 != 0.0
-        return out
+        depends = np.zeros((3, 3), np.bool_)
+        depends[2, 1] = self.sag.per_mm2 != 0.0
+        return depends
 
     def backlash_at(self, axis_mm: Array) -> Array | None:
         return None
@@ -76,7 +76,7 @@ class SagNumber(Numbers):
     kind = "sag"
     names = ("SAG_Y",)
 
-    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+    def acts(self, entry: Entry, state: AxisState) -> Iterator[tuple[int, Column]]:
         yield 2, -1.0
 
     def weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
@@ -96,16 +96,16 @@ class Sags(ErrorSource[SagTable | None, Sag | None]):
     def example(self, by: float) -> Example:
         return Example(f"[sag]\nsag_um_m2 = {300.0 * by}\nfrom_mm = 20.0\nsigma_um_m2 = {30.0 * by}\n")
 
-    def read(self, stated: SagTable | None, found: Reading) -> Sag | None:
+    def read(self, stated: SagTable | None, reading: Reading) -> Sag | None:
         return None if stated is None else Sag(shifted(stated.sag_um_m2, -9), stated.from_mm)
 
-    def write(self, values: Sag, out: Writing) -> None:
-        out.table("[sag]", {"sag_um_m2": in_unit(values.per_mm2, -9), "from_mm": values.from_mm})
+    def write(self, values: Sag, writing: Writing) -> None:
+        writing.table("[sag]", {"sag_um_m2": in_unit(values.per_mm2, -9), "from_mm": values.from_mm})
 
     def models(self, values: Sag, frame: Frame) -> list[ErrorModel]:
         return [SagErrors(frame.box_mm, frame.hold, values)]
 
-    def sigmas(self, stated: SagTable | None, found: Reading) -> Sigmas:
+    def sigmas(self, stated: SagTable | None, reading: Reading) -> Sigmas:
         return {} if stated is None else {"SAG_Y": shifted(stated.sigma_um_m2, -9)}
 
     def entries(self, values: Sag, sigmas: Sigmas) -> list[Entry]:

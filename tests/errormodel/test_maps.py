@@ -239,9 +239,9 @@ def test_a_map_file_is_read_in_any_order_of_rows_and_columns(tmp_path: Path) -> 
     ("change", "expected"),
     [
         (lambda r: r[:-1], "line 12: the node X = 800, Y = 300, Z = 0 mm is missing beside this one"),
-        (lambda r: [*r, r[2]], "line 14: the node X = 0, Y = 300, Z = -400 mm stands in line 4 already"),
-        (lambda r: [*r, "401,-300,0,1,2,3"], "line 14: X_mm = 401 stands in 1 rows, other levels in 4"),
-        (lambda r: [f"{i},{i * 2},{i * 3},0,0,0" for i in range(9)], "positions lie on no grid"),
+        (lambda r: [*r, r[2]], "line 14: the node X = 0, Y = 300, Z = -400 mm is in line 4 already"),
+        (lambda r: [*r, "401,-300,0,1,2,3"], "line 14: X_mm = 401 is in 1 rows and other levels are in 4"),
+        (lambda r: [f"{i},{i * 2},{i * 3},0,0,0" for i in range(9)], "expected positions on a grid"),
         (lambda r: [*r[:4], "0,1,2"], "line 6: 3 values under 6 columns"),
         (lambda r: [], "line 1: no rows follow the header"),
     ],

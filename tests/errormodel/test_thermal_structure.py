@@ -255,7 +255,7 @@ def test_a_log_is_read() -> None:
         ("EXX@500_um", "EXX@500_urad", "its unit, um here"),
         ("EXX@500_um", "EWX@500_um", "ISO 230-1 name"),
         ("60,20.2", "0,20.2", "line 5: t_s = 0 comes after 0"),
-        ("20.2", "", 'line 5: beam_degC = "" is no number'),
+        ("20.2", "", 'line 5: beam_degC = "" is not a number'),
         ("20.1,1.5", "20.1,1,5", "line 4: 5 values under 4 columns"),
         ("[0, 0, -120]", "[0, 0]", "line 1: tool_mm = [0, 0]"),
         ("X = 0, Y", "Y", "line 2: line_mm = { Y = 5.0, Z = 1 }; expected three lengths"),

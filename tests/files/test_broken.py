@@ -106,7 +106,7 @@ MACHINE = {
     "offset no code": (
         "[work_offsets.G54]",
         "[work_offsets.G45]",
-        ["work_offsets.G45", "no work offset", "G54 to G59"],
+        ["work_offsets.G45", "not a work offset", "G54 to G59"],
     ),
     "offset lower case": ("[work_offsets.G54]", "[work_offsets.g54]", ["work_offsets.g54", "expected G54"]),
     "set_by unknown": (
@@ -125,13 +125,13 @@ MACHINE = {
         "A = 5.0 }",
         ["work_offsets.G54.touched_at_mm.A", "expected one of X, Y, Z"],
     ),
-    "touch tool a fraction": ("touch_tool = 2", "touch_tool = 2.5", ["G54.touch_tool", "a whole number"]),
+    "touch tool a fraction": ("touch_tool = 2", "touch_tool = 2.5", ["G54.touch_tool", "an integer"]),
     "touch tool undefined": (
         "touch_tool = 2",
         "touch_tool = 3",
         ["G54.touch_tool = 3 is not defined", "[tools.N]"],
     ),
-    "tool name": ("[tools.1]", "[tools.T1]", ["tools.T1", "a whole number as name"]),
+    "tool name": ("[tools.1]", "[tools.T1]", ["tools.T1", "an integer as name"]),
     "tool length text": ("Z_mm = 120.0", 'Z_mm = "120"', ["tools.1.Z_mm", "expected a number", "mm"]),
     "tool radius negative": (
         "radius_mm = 5.0",
@@ -162,11 +162,11 @@ MACHINE = {
     "decimal comma": (
         "velocity_mm_s = 400.0",
         "velocity_mm_s = 400,0",
-        ["no TOML", "decimal point instead of"],
+        ["not TOML", "decimal point instead of"],
     ),
-    "quote not closed": ('"gantry-2"', '"gantry-2', ["no TOML", "close the quotes"]),
-    "text not quoted": ('"gantry-2"', "gantry", ["no TOML", "text needs quotes"]),
-    "key twice": ("jerk_mm_s3 = 20000.0", "velocity_mm_s = 1.0", ["no TOML", "overwrite"]),
+    "quote not closed": ('"gantry-2"', '"gantry-2', ["not TOML", "close the quotes"]),
+    "text not quoted": ('"gantry-2"', "gantry", ["not TOML", "text needs quotes"]),
+    "key twice": ("jerk_mm_s3 = 20000.0", "velocity_mm_s = 1.0", ["not TOML", "overwrite"]),
     "calibration a number": ('= "calibration.toml"', "= 1", ["calibration = 1", "text in quotes", "path"]),
 }
 CALIBRATION = {
@@ -184,7 +184,7 @@ CALIBRATION = {
         "2025-05-14",
         ["valid_until", "before measured = 2026-05-14", "later"],
     ),
-    "no such date": ("2027-05-14", "2027-02-30", ["no TOML"]),
+    "no such date": ("2027-05-14", "2027-02-30", ["not TOML"]),
     "temperature text": ("= 21.0", '= "21"', ["temperature_degC", "expected a number", "degC"]),
     "model unknown": ('"rigid-body"', '"elastic"', ["model", '"rigid-body" or "huddersfield"']),
     "datum of two numbers": (
@@ -274,7 +274,11 @@ JOB = {
     "start of no axis": ("{ X = 0.0,", "{ A = 0.0,", ["start_mm.A", "expected one of X, Y, Z"]),
     "start a list": ("{ X = 0.0, Z = -10.0 }", "[0, 0, 0]", ["start_mm", "a table", "in mm"]),
     "role unknown": ('"fixture"', '"vice"', ["meshes[0].role", '"workpiece", "fixture" or "machine"']),
-    "frame undefined": ('frame = "G54"', 'frame = "G55"', ["meshes[0].frame", '"G55"', "[work_offsets]"]),
+    "frame undefined": (
+        'frame = "G54"',
+        'frame = "G55"',
+        ["meshes[0].frame", '"G55"', "[work_offsets.NAME]"],
+    ),
     "mesh missing": ("fixture.stl", "vice.stl", ["meshes[0].file", "vice.stl", "relative to the job file"]),
     "touch tool undefined": ("touch_tool = 7", "touch_tool = 8", ["G54.touch_tool = 8 is not defined"]),
     "table of tools written as value": ("[[meshes]]", "[meshes]", ["meshes", "[[ ]]"]),
@@ -303,7 +307,7 @@ X_CSV = {
         ["EXX_um = 6,5", "decimal comma", "decimal point"],
     ),
     "decimal comma": ("1000,+1,6.0", "1000,+1,6,0", ["6 values under 5 columns", "decimal comma"]),
-    "ragged": ("1000,+1,6.0,2.0,0.5", "1000,+1,6.0", ["3 values under 5 columns", "one value a column"]),
+    "ragged": ("1000,+1,6.0,2.0,0.5", "1000,+1,6.0", ["3 values under 5 columns", "one value per column"]),
     "sigma negative": ("1000,+1,6.0,2.0,0.5", "1000,+1,6.0,2.0,-0.5", ["sigma_EXX_um", "0 or above"]),
     "unsorted": ("1000,+1,6.0", "-1,+1,6.0", ["X_mm = -1 comes after 0 in direction +1", "ascending"]),
     "duplicate": ("1000,-1,8.0", "0,-1,8.0", ["X_mm = 0 is repeated in direction -1", "each position once"]),
@@ -355,7 +359,7 @@ def assert_in_order(words: list[str], sentence: str) -> None:
         start = sentence.index(word, start) + len(word)
 
 
-#: Cases whose sentence stands at a table, at another key, or in no line at all.
+#: Cases whose sentence names a table, another key, or no line at all.
 ELSEWHERE = {
     "tool touch not said",
     "amplitude in the wrong unit",

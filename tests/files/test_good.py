@@ -108,7 +108,7 @@ def test_calibration_file_fills_every_value_in_base_units() -> None:
 def test_curves_keep_their_directions_lines_and_units() -> None:
     x, y = load_calibration(GOOD / "calibration.toml").curves
     assert (x.axis, x.interpolation, x.reference) == ("X", "linear", "functional-point")
-    assert x.line_mm == (10.0, 400.0, -5.0), "axes that line_mm leaves out stood at the datum"
+    assert x.line_mm == (10.0, 400.0, -5.0), "axes that line_mm leaves out are at the datum"
     assert x.tool_mm == (0.0, 0.0, -60.0)
     np.testing.assert_array_equal(x.position_mm, [0.0, 1000.0, 2000.0])
     np.testing.assert_allclose(x.forward["EXX"], [0.0, 0.006, 0.010], rtol=1e-12)
@@ -187,7 +187,7 @@ def test_starter_set_loads_for_every_chain(chain: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("chain", "travel", "message"),
     [
-        ("XYZ", TRAVEL, "no chain"),
+        ("XYZ", TRAVEL, "not a chain"),
         ("FXYZ", TRAVEL | {"Y": (3.0, 3.0)}, "travel of Y"),
         ("FXYZ", {"X": (0.0, 1.0)}, "travel of Y"),
         ("FXYZ", TRAVEL | {"Z": (0.0, float("inf"))}, "travel of Z"),
@@ -237,10 +237,10 @@ machines = st.builds(
     compensated_by_controller=st.frozensets(st.sampled_from(COMPONENTS + SQUARENESS))
     | st.just(frozenset({"all"})),
     work_offsets=st.lists(touched_offsets, max_size=3).map(
-        lambda found: {offset.name: offset for offset in found}
+        lambda offsets: {offset.name: offset for offset in offsets}
     ),
     tools=st.lists(tools | touched_tools, max_size=3).map(
-        lambda found: {tool.number: tool for tool in found}
+        lambda drawn: {tool.number: tool for tool in drawn}
     ),
     default_tool=st.none() | st.integers(0, 99),
     default_work_offset=st.text(min_size=1),
@@ -297,14 +297,14 @@ g = 2
 
 
 def test_golden_cases_of_the_contract_load(golden: Path) -> None:
-    """Those of three linear axes: `kinematics` holds chains that are not read yet."""
+    """Only those of three linear axes: `kinematics` holds chains that are not read yet."""
     for file in sorted(golden.glob("*/machine.toml")):
         setup = load_setup(file)
         assert setup.machine.calibration is not None
         assert len(load_calibration(setup.machine.calibration, setup.machine).curves) == 3
 
 
-def test_a_compliance_of_one_number_is_what_the_tool_stays_behind(tmp_path: Path) -> None:
+def test_a_compliance_of_one_number_is_the_lag_of_the_tool(tmp_path: Path) -> None:
     text = (Path(__file__).parents[1] / "broken" / "good" / "machine.toml").read_text()
     path = tmp_path / "machine.toml"
     one, three = ("[axes.X]\ncompliance_um_per_m_s2 = 2.5", "[axes.Y]\ncompliance_um_per_m_s2 = [0.5, -3, 1]")

@@ -1,4 +1,4 @@
-"""A LinuxCNC configuration becomes a machine file that loads, in mm, with notes on what it cannot say."""
+"""A LinuxCNC configuration becomes a machine file that loads, in mm, with notes on what it does not state."""
 
 from __future__ import annotations
 
@@ -114,11 +114,11 @@ def test_compensation_of_the_control_is_listed_or_noted(tmp_path: Path) -> None:
     assert "YFXZ is assumed" in notes
     assert "[JOINT_0] COMP_FILE = x.comp corrects EXX" in notes
     assert "[JOINT_2] BACKLASH = 0.0508 mm" in notes
-    assert "JOINT_3" not in notes, "a lost motion of zero is none"
-    assert "[JOINT_0] BACKLASH" not in notes, "a table replaces the constant lost motion"
+    assert "JOINT_3" not in notes, "a backlash of zero is none"
+    assert "[JOINT_0] BACKLASH" not in notes, "a table replaces the constant backlash"
     assert "G92 offset is active" in notes
     assert "Tools 2 have a negative Z" in notes
-    assert "Tool 1 stands twice" in notes
+    assert "Tool 1 is defined twice" in notes
     assert "states no jerk" in notes
 
 
@@ -164,7 +164,7 @@ def test_kinematics_between_axes_and_joints_leave_the_joints_out(tmp_path: Path)
         ("= inch", "= cubit", 'LINEAR_UNITS is "cubit"; expected mm or inch'),
         ("COORDINATES = X Y Y Z", "COORDINATES = X Z", "lacks Y; expected a machine with the linear axes"),
         ("MAX_LIMIT = 8.0", "MAX_LIMIT = -8.0", r"axis Y has no travel; expected .* \[AXIS_Y\]"),
-        ("MAX_VELOCITY = 2\n", "MAX_VELOCITY = fast\n", r'\[AXIS_X\] MAX_VELOCITY = "fast" is no number'),
+        ("MAX_VELOCITY = 2\n", "MAX_VELOCITY = fast\n", r'\[AXIS_X\] MAX_VELOCITY = "fast" is not a number'),
         ("#INCLUDE z.inc", "#INCLUDE y.inc", r"y\.inc: no such file"),
         ("#INCLUDE z.inc", "MIN_LIMIT = 0\nMAX_LIMIT = 1", "axis Z has no MAX_ACCELERATION"),
     ],

@@ -1,4 +1,4 @@
-"""Files of measured points: layouts told from the file, profiles, and what is wrong with a file."""
+"""Files of measured points: layouts detected from the file, profiles, and what is wrong with a file."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ NUMBERS = st.floats(-1e5, 1e5).map(lambda v: round(v, 6))
     ("X [inch]\tY [inch]\tZ [inch]\n1\t0\t-1\n", [[25.4, 0, -25.4]], None),
     ("name,x_um,y_um,z_um\nA,1000,2000,3000\n", [[1, 2, 3]], ("A",)),
 ])  # fmt: skip
-def test_the_layout_is_told_from_the_file(
+def test_the_layout_is_detected_from_the_file(
     text: str, points: list[list[float]], names: tuple[str, ...] | None
 ) -> None:
-    found = parse_points(text.encode(), "f.csv")
-    assert found.points_mm == pytest.approx(np.array(points, float))
-    assert found.names == names
+    read = parse_points(text.encode(), "f.csv")
+    assert read.points_mm == pytest.approx(np.array(points, float))
+    assert read.names == names
 
 
 def test_frame_time_and_line_are_read() -> None:
-    found = parse_points(b"# frame=G55\nt_s,X_mm,Y_mm,Z_mm,line\n0,1,2,3,4\n0.5,1,2,3,9\n", "f")
-    assert (found.frame, found.line.tolist(), found.time_s.tolist()) == ("G55", [4, 9], [0.0, 0.5])
+    points = parse_points(b"# frame=G55\nt_s,X_mm,Y_mm,Z_mm,line\n0,1,2,3,4\n0.5,1,2,3,9\n", "f")
+    assert (points.frame, points.line.tolist(), points.time_s.tolist()) == ("G55", [4, 9], [0.0, 0.5])
 
 
 def test_the_sampler_of_linuxcnc_gives_axis_positions() -> None:
     text = b"0 1.0 2.0 3.0 2\noverrun\n5 1.5 2.0 3.0 2\n"
-    found = parse_points(text, "samples", load_profile("linuxcnc-sampler"))
-    assert found.points_mm.tolist() == [[1.0, 2.0, 3.0], [1.5, 2.0, 3.0]]
-    assert found.profile.positions == "axes"
+    points = parse_points(text, "samples", load_profile("linuxcnc-sampler"))
+    assert points.points_mm.tolist() == [[1.0, 2.0, 3.0], [1.5, 2.0, 3.0]]
+    assert points.profile.positions == "axes"
 
 
 @pytest.mark.parametrize(("text", "line", "words"), [
@@ -54,7 +54,7 @@ def test_the_sampler_of_linuxcnc_gives_axis_positions() -> None:
     ("X_mm,Y_mm,Z_mm\n1,2,3\n\n1,2\n", 4, "2 columns; expected at least 3"),
     ("X_mm,Y_mm,Z_mm\n1,2,3\n1,nan,3\n", 3, "not finite"),
 ])  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(text: str, line: int | None, words: str) -> None:
+def test_what_is_wrong_is_stated_with_its_line(text: str, line: int | None, words: str) -> None:
     with pytest.raises(InputError) as caught:
         parse_points(text.encode(), "f.csv")
     assert words in str(caught.value)
@@ -113,7 +113,7 @@ def test_an_unknown_key_of_a_profile_names_the_nearest(tmp_path: Path) -> None:
         load_profile(path)
 
 
-def test_the_line_of_a_row_without_its_name_is_said() -> None:
+def test_the_line_of_a_row_without_its_name_is_stated() -> None:
     profile = PointProfile(header=False, columns=ColumnsTable(X=1, Y=2, Z=3, name=4))
     with pytest.raises(InputError, match="3 columns; expected at least 4") as caught:
         parse_points(b"1,2,3,A\n# aside\n1,2,3\n", "f.csv", profile)
@@ -137,9 +137,9 @@ def test_digits_that_are_no_number_are_a_name() -> None:
     "name,X_mm,Y_mm,Z_mm\rP#1,1,2,3\rP#2,4,5,6\r",
 ])  # fmt: skip
 def test_a_hash_in_a_name_is_no_comment(text: str) -> None:
-    found = parse_points(text.encode(), "f.csv")
-    assert found.names == ("P#1", "P#2")
-    assert found.points_mm.tolist() == [[1, 2, 3], [4, 5, 6]]
+    points = parse_points(text.encode(), "f.csv")
+    assert points.names == ("P#1", "P#2")
+    assert points.points_mm.tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
 def test_a_mark_behind_a_number_is_refused_with_its_line() -> None:
@@ -148,7 +148,7 @@ def test_a_mark_behind_a_number_is_refused_with_its_line() -> None:
     assert caught.value.line == 3
 
 
-def test_a_layout_is_told_from_the_head_of_a_long_file() -> None:
+def test_a_layout_is_detected_from_the_head_of_a_long_file() -> None:
     row = b"1.000000, 2.000000,3.000000\n"
     assert layout_of(b"X;Y;Z\n" + b"1;2;3\n" * 50_000) == layout_of(b"X;Y;Z\n1;2;3\n")
     assert layout_of(b"\xef\xbb\xbfX_mm,Y_mm,Z_mm\n" + row) is not None

@@ -1,4 +1,4 @@
-"""Every code is one row, and every row is a code that something says."""
+"""Every code is one row, and every row is a code that the program states."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ TABLES = Path(codes.__path__[0])
 CODE = re.compile(r"OLP\d{3}")
 
 
-def said(source: str) -> Iterator[str]:
+def codes_in(source: str) -> Iterator[str]:
     """The codes that a text states whole, as in `Finding("OLP101", ...)`."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.fullmatch(node.value):
             yield node.value
 
 
-def repeated(found: Iterable[Rule]) -> list[str]:
-    return [code for code, count in Counter(rule.code for rule in found).items() if count > 1]
+def repeated(rules: Iterable[Rule]) -> list[str]:
+    return [code for code, count in Counter(rule.code for rule in rules).items() if count > 1]
 
 
 def unexplained(rule: Rule) -> list[str]:
-    """The texts of a rule that say nothing, or are no sentence."""
+    """The texts of a rule that are empty, or not a sentence."""
     texts = {f.name: str(getattr(rule, f.name)) for f in fields(rule) if f.type == "str"}
     sentences = ("why", "remedy", "example")
     return [n for n, t in texts.items() if len(t) < 4 or "  " in t or (n in sentences and t[-1] != ".")]
@@ -41,11 +41,11 @@ def unexplained(rule: Rule) -> list[str]:
 
 def test_every_module_of_rows_is_found() -> None:
     files = {path.stem for path in TABLES.glob("*.py")} - {"__init__"}
-    stated = {code for stem in files for code in said((TABLES / f"{stem}.py").read_text("utf-8"))}
+    stated = {code for stem in files for code in codes_in((TABLES / f"{stem}.py").read_text("utf-8"))}
     assert stated == set(RULES)
 
 
-def test_a_code_stands_in_one_row() -> None:
+def test_a_code_has_one_row() -> None:
     assert repeated(rows()) == []
     assert repeated([*rows(), RULES["OLP101"]]) == ["OLP101"]
 
@@ -65,27 +65,27 @@ def test_a_row_that_explains_nothing_is_found() -> None:
     assert unexplained(rule) == ["why", "remedy", "example"]
 
 
-def test_what_is_said_is_in_the_catalogue_and_the_other_way_round() -> None:
+def test_the_catalogue_holds_the_codes_of_the_program_and_no_others() -> None:
     modules = [path for path in PACKAGE.rglob("*.py") if path.parent != TABLES]
-    spoken = {code for path in modules for code in said(path.read_text("utf-8"))}
-    assert spoken - set(RULES) == set(), "no row explains these"
-    assert set(RULES) - spoken == set(), "nothing says these"
+    used = {code for path in modules for code in codes_in(path.read_text("utf-8"))}
+    assert used - set(RULES) == set(), "no row explains these"
+    assert set(RULES) - used == set(), "no module uses these"
 
 
-def test_a_code_in_a_call_is_seen_and_one_in_a_sentence_is_not() -> None:
+def test_a_code_in_a_call_counts_and_one_in_a_sentence_is_not() -> None:
     source = 'def f():\n    """As OLP101."""\n    yield Finding(*("OLP998",)), {"told": "OLP999"}\n'
-    assert set(said(source)) == {"OLP998", "OLP999"}
+    assert set(codes_in(source)) == {"OLP998", "OLP999"}
 
 
-def test_a_gate_looks_for_what_a_program_shows() -> None:
+def test_a_gate_looks_for_findings_of_a_program() -> None:
     assert {"OLP101", "OLP331", "OLP431", "OLP701"} <= set(GATE_CODES)
     others = ("calibration", "comparison", "control_tables", "measurements", "planning", "results", "thermal")
     assert all(not rule.gate for rule in RULES.values() if rule.topic in others)
 
 
 @pytest.mark.parametrize("path", sorted(TABLES.glob("*.py")), ids=lambda path: path.stem)
-def test_a_module_of_rows_holds_one_topic_that_bears_its_name(path: Path) -> None:
-    stated = set(said(path.read_text("utf-8")))
+def test_a_module_of_rows_holds_one_topic_with_its_name(path: Path) -> None:
+    stated = set(codes_in(path.read_text("utf-8")))
     assert {RULES[code].topic for code in stated} <= {path.stem}
 
 

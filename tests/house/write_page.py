@@ -1,6 +1,6 @@
 """The house as a page: its rooms in order, what each is for, and its modules.
 
-    python tests/house/write_page.py        # writes olp/docs/contributing/house.md anew
+    python tests/house/write_page.py        # writes olp/docs/contributing/house.md
 
 The rooms stand once, in `test_layers.ROOMS`; what a room is for stands in its own docstring.
 """

@@ -20,7 +20,7 @@ from judge.model import JudgeModel
 import olp
 from olp.cli import main
 from olp.core.errors import AlreadyCorrected, ConfigError, InputError, OlpError, OutsideBox, UsageError
-from olp.program.text.delimited import told
+from olp.program.text.delimited import detected_layout
 from olp.program.text.numbers import number, written
 from olp.results.dmis import read_dmis
 from olp.results.table import read_table
@@ -126,7 +126,7 @@ def test_each_row_may_have_its_stylus(machine: Path) -> None:
         for p, v in zip(reported, tool_vector, strict=True)
     )
     for text in (by_number, by_vector):
-        layout = told(text.splitlines()[:5])
+        layout = detected_layout(text.splitlines()[:5])
         assert layout is not None
         layout = replace(layout, point="centre")
         data = olp.correct_results(text.encode(), machine, frame="G54", profile=layout).data
@@ -263,11 +263,11 @@ def test_results_are_never_corrected_twice(machine: Path, tmp_path: Path) -> Non
     (b"X_mm,Y_mm,Z_mm\n1,2,3\n", {"frame": "G57"}, ConfigError, "G57 is not defined"),
     (b"X_mm,Y_mm,Z_mm\n1,2,3\n", {"frame": "G54", "tool": 7}, ConfigError, "stylus 7 is not defined"),
     (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,A1\n", {"frame": "G54"}, ConfigError, "stylus A1 is not defined"),
-    (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,A\n1,2,3,B\n", {"frame": "G54", "tool": 1}, UsageError, "which is which"),
+    (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,A\n1,2,3,B\n", {"frame": "G54", "tool": 1}, UsageError, "name each"),
     (b"X_mm,Y_mm,Z_mm\n1,2,x\n1,2\n", {"frame": "G54"}, InputError, "line 3: 2 columns"),
     (b"X_mm,Y_mm,Z_mm\n1,2,9999\n", {"frame": "G54"}, OutsideBox, "outside the calibrated box"),
     (b"", {"frame": "G54"}, InputError, "holds no points"),
-    (b"\xff\xfeX\x00", {"frame": "G54"}, InputError, "does not tell"),
+    (b"\xff\xfeX\x00", {"frame": "G54"}, InputError, "does not show"),
 ])  # fmt: skip
 def test_tables_that_cannot_be_right_are_refused(
     machine: Path, text: bytes, keys: dict[str, object], error: type[OlpError], words: str
@@ -320,7 +320,7 @@ def test_a_number_written_again_is_the_same_text(text: str) -> None:
 
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
-    for reader in (read_dmis, lambda d: read_table(d, told(["X_mm,Y_mm,Z_mm"]))):  # type: ignore[arg-type]
+    for reader in (read_dmis, lambda d: read_table(d, detected_layout(["X_mm,Y_mm,Z_mm"]))):  # type: ignore[arg-type]
         with contextlib.suppress(InputError):
             reader(data)
 
@@ -329,7 +329,7 @@ def test_the_command_line(machine: Path, tmp_path: Path) -> None:
     source = tmp_path / "run.csv"
     source.write_bytes(csv(truth()[0]))
     run = CliRunner()
-    words = ["correct", "--results", str(source), "-m", str(machine)]
+    words = ["results", str(source), "-m", str(machine)]
     assert run.invoke(main, words).exit_code == 3
     done = run.invoke(main, [*words, "--frame", "G54", "--report", str(tmp_path / "r.md")])
     assert done.exit_code == 0, done.output
@@ -343,6 +343,6 @@ def test_the_command_line(machine: Path, tmp_path: Path) -> None:
     assert run.invoke(main, [*words, "--frame", "G54", "--flatten"]).exit_code == 2
     assert run.invoke(main, ["correct", str(source), "-m", str(machine), "--frame", "G54"]).exit_code == 2
     piped = run.invoke(
-        main, ["correct", "--results", "-", "-m", str(machine), "--frame", "G54"], input=source.read_bytes()
+        main, ["results", "-", "-m", str(machine), "--frame", "G54"], input=source.read_bytes()
     )
     assert piped.stdout_bytes == (tmp_path / "run.corrected.csv").read_bytes()

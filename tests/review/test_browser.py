@@ -121,7 +121,7 @@ def test_positions_deviations_and_times_unpack_to_what_was_packed(page: Any, rev
         ("d_corrected", scene.samples.correction, 1e-6),
         ("d_result", scene.samples.result, 1e-6),
         ("t", scene.time_s[:, None], 1e-6),
-        ("s", scene.samples.way_mm[:, None], 1e-3),
+        ("s", scene.samples.arc_mm[:, None], 1e-3),
     ):
         found = array(page, name, truth.shape[1]).reshape(truth.shape)
         # "result" is a sum of three roundings
@@ -277,8 +277,8 @@ def test_the_path_is_coloured_by_band_and_by_probability(chromium: Any, tmp_path
     text = calibration.read_text("utf-8")
     assert "[squareness]\n" in text
     calibration.write_text(text.replace("[squareness]\n", "[squareness]\nsigma_C0Y_urad = 20.0\n"), "utf-8")
-    review = view(PROGRAM, folder / "machine.toml", within_um=8.0)
-    sure = review.scene.sureness
+    review = view(PROGRAM, folder / "machine.toml", part_tolerance_um=8.0)
+    sure = review.scene.uncertainty
     assert sure is not None
     review.write(tmp_path / "sure.html")
     with browser.opened(chromium, tmp_path / "sure.html") as page:
@@ -473,7 +473,7 @@ def test_motion_plots_show_limits_and_ways(page: Any) -> None:
     assert page.evaluate("olp.app.plots.movement.series.length") == 2
     page.select_option("#abscissa", "way")
     ends = page.evaluate("[olp.app.plots.movement.extent[1], olp.app.plots.deviation.extent[1]]")
-    assert ends == pytest.approx([page.evaluate("olp.app.way.at(-1)")] * 2, rel=1e-6)
+    assert ends == pytest.approx([page.evaluate("olp.app.arc.at(-1)")] * 2, rel=1e-6)
 
 
 # -- time ----------------------------------------------------------------------------------------------------
@@ -903,7 +903,7 @@ def test_measured_paths_and_workpieces_stand_beside_the_rest(chromium: Any, tmp_
             "['uncorrected', 'measured']"
             ".map(n => olp.app.metrics.summary(olp.app.plot_metric(), n, 1).largest)"
         )
-        # across the path the measured points are those of the machine as it is
+        # across the path the measured points are those of the uncompensated machine
         assert 0.2 * uncorrected < measured < 1.2 * uncorrected
         for name in ("nominal", "uncorrected", "result", "rapids"):
             page.evaluate("name => olp.set_layer(name, false)", name)

@@ -84,7 +84,7 @@ def test_a_point_far_from_the_path_is_refused_with_its_line(tmp_path: Path) -> N
     )
     with pytest.raises(InputError) as caught:
         olp.view(TEXT.encode(), machine, measured=[path], time=False)
-    assert str(caught.value).startswith(f"{path}:5: the point is 4 mm from its place on the path")
+    assert str(caught.value).startswith(f"{path}:5: the point is 4 mm from the path")
 
 
 def test_points_against_the_order_are_shown_in_its_order(tmp_path: Path) -> None:
@@ -128,13 +128,13 @@ def test_frames_are_told_apart(tmp_path: Path) -> None:
         path = written(tmp_path, csv(points + shift, frame))
         scene = olp.view(TEXT.encode(), machine, measured=[path], time=False).scene
         assert np.abs(scene.measured[0].delta_mm).max() < 1e-6
-    with pytest.raises(ConfigError, match="'G59' is no work offset"):
+    with pytest.raises(ConfigError, match="'G59' is not an unrotated work offset"):
         olp.view(TEXT.encode(), machine, measured=[written(tmp_path, csv(points, "G59"))], time=False)
 
 
 def test_frames_lie_where_they_were_touched_off(tmp_path: Path) -> None:
-    """Several offsets, touched off on the raw machine: the same run stated in the first, in the other, and in
-    the machine's own axes."""
+    """Several offsets, touched off on the uncompensated machine: the same run stated in the first, in the
+    other, and in the machine's own axes."""
     program, machine = NASTY / "work-offsets.ngc", NASTY / "machine.toml"
     run = olp.simulate(program, machine, step_mm=1.0)
     zero = {}
@@ -175,9 +175,9 @@ def test_several_measurements_are_layers_each(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("# frame=G54\n", ": does not tell which columns"),
+        ("# frame=G54\n", ": does not show which columns"),
         ("# frame=G54\nX_mm,Y_mm,Z_mm\n", ": holds no points"),
-        ("# frame=G54\nX_mm,Y_mm\n1,2\n", ": does not tell which columns"),
+        ("# frame=G54\nX_mm,Y_mm\n1,2\n", ": does not show which columns"),
         ("# frame=G54\nX_mm,Y_mm,Z_mm\n1,2,3\n1,2\n", ":4: 2 columns; expected at least 3"),
         ("# frame=G54\nX_mm,Y_mm,Z_mm\n1,2,3\n\n1,2,x\n", ':5: column 3 is "x"; expected a number'),
         ("# frame=G54\nX_mm,Y_mm,Z_mm\n1,2,nan\n", ":3: a number is not finite"),

@@ -63,7 +63,7 @@ def test_layers_are_drawn_where_their_deviations_lead_to(review: Review) -> None
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("most", [200_000, 50])
 def test_no_line_crosses_a_gap(review: Review, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Behind the tool change the path begins anew, also where samples are left out."""
+    """After the tool change a new path begins, also where samples are left out."""
     monkeypatch.setattr(notebook, "_MOST", most)
     vis = Visualizer()
     notebook.add_layers(vis, review)

@@ -113,7 +113,7 @@ def test_a_module_that_would_end_its_element_is_refused(
     monkeypatch: pytest.MonkeyPatch, machine: Path
 ) -> None:
     monkeypatch.setattr(pages, "_bundle", lambda: ("a='</Script>'", "main.min.js"))
-    with pytest.raises(CannotCompute, match=r"main\.min\.js: holds what would end its script element"):
+    with pytest.raises(CannotCompute, match=r"main\.min\.js: contains the end of a script element"):
         olp.view(TEXT, machine, time=False).html()
 
 
@@ -187,7 +187,7 @@ def test_layers_are_the_samples_to_a_nanometre(machine: Path) -> None:
     for name, delta in deltas.items():
         assert np.abs(page.array(page.layer(name)["delta"]) - delta).max() <= 0.5e-6 + 1e-12
     assert np.abs(page.array("t") - scene.time_s).max() <= 0.5e-6 + 1e-9
-    assert np.abs(page.array("s") - scene.samples.way_mm).max() <= 0.5e-3 + 1e-9
+    assert np.abs(page.array("s") - scene.samples.arc_mm).max() <= 0.5e-3 + 1e-9
 
 
 def test_a_source_shows_what_it_does(machine: Path) -> None:
@@ -333,8 +333,8 @@ def test_the_page_colours_by_band_and_by_probability(tmp_path: Path) -> None:
     square = "[squareness]\nsigma_C0Y_urad = 20.0\n"
     assert "[squareness]\n" in calibration.read_text()
     calibration.write_text(calibration.read_text().replace("[squareness]\n", square))
-    review = olp.view(TEXT, machine, within_um=3.0, time=False)
-    sure, page = review.scene.sureness, Page(review.html())
+    review = olp.view(TEXT, machine, part_tolerance_um=3.0, time=False)
+    sure, page = review.scene.uncertainty, Page(review.html())
     assert sure is not None
     metrics: dict[str, Any] = {m["name"]: m for m in page.manifest["metrics"]}
     band = page.array(metrics["band"]["by_layer"]["result"])
@@ -344,7 +344,7 @@ def test_the_page_colours_by_band_and_by_probability(tmp_path: Path) -> None:
     for layer in ("uncorrected", "result"):
         shown = page.array(metrics["beyond"]["by_layer"][layer])
         assert np.abs(shown - 100.0 * sure.beyond[layer]).max() <= 0.051
-    # what is far off is surely beyond
+    # points far off are beyond the tolerance with probability 1
     away = np.linalg.norm(review.scene.samples.uncorrected, axis=1) > 3e-3 + 3.0 * sure.band_mm
     assert away.any() and (sure.beyond["uncorrected"][away] > 0.99).all()
     # at the touch-off, or where a sure path is right, nothing is beyond

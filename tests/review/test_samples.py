@@ -41,7 +41,7 @@ def size_um(delta: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_program_is_shown_where_its_words_say(name: str) -> None:
-    """Every way-point of a known position is a sample, and its place is the axis position less frame and
+    """Every waypoint of a known position is a sample, and its place is the axis position less frame and
     length."""
     scene = nasty(name).scene
     path, samples = scene.nominal.toolpath, scene.samples
@@ -56,7 +56,7 @@ def test_a_program_is_shown_where_its_words_say(name: str) -> None:
     assert (np.diff(samples.move) >= 0).all()
     assert (np.diff(samples.move + samples.share) >= 0).all()
     assert (np.diff(samples.part) >= 0).all()
-    assert (np.diff(samples.way_mm) >= 0).all()
+    assert (np.diff(samples.arc_mm) >= 0).all()
     assert (np.diff(scene.time_s) >= 0).all()
 
 
@@ -130,7 +130,7 @@ def test_sources_add_up_to_the_error(tmp_path: Path) -> None:
 
 
 def test_between_way_points_the_tip_is_beside_the_path(tmp_path: Path) -> None:
-    """What is left there is how far the path is off, not how far the tip is late."""
+    """The residual there is the distance of the path, not the delay of the tip."""
     machine = random_machine(tmp_path / "m", 8)
     scene = viewed(
         tmp_path, machine, "G1 X300 Y100 F900\nG3 X300 Y180 I0 J40\nG2 X120 Y180 I-90 J30\nM2\n"
@@ -142,7 +142,7 @@ def test_between_way_points_the_tip_is_beside_the_path(tmp_path: Path) -> None:
     ]
     step = samples.axis_mm[inner + 1] - samples.axis_mm[inner - 1]
     along = np.einsum("ij,ij->i", samples.result[inner], step) / np.linalg.norm(step, axis=1)
-    # but for what way-points are rounded by
+    # except for the rounding of waypoints
     ends = np.linalg.norm(samples.result[samples.within == 1.0], axis=1)
     assert np.abs(along).max() < min(ends.max() + 1e-5, 0.87e-3)
     assert size_um(samples.result[inner]).max() > 0.05
@@ -173,11 +173,11 @@ def test_chords_of_arcs_are_fine_enough_to_look_round(tmp_path: Path) -> None:
 def test_the_step_is_what_was_asked_for(tmp_path: Path) -> None:
     scene = viewed(tmp_path, zero_machine(tmp_path / "m"), "G1 X100 F600\nM2\n", step_mm=0.25).scene
     feed = scene.nominal.toolpath.kind[scene.samples.move] == Kind.LINE
-    np.testing.assert_allclose(np.diff(scene.samples.way_mm[feed]), 0.25, atol=1e-7)
+    np.testing.assert_allclose(np.diff(scene.samples.arc_mm[feed]), 0.25, atol=1e-7)
 
 
 def test_a_gap_is_no_line(tmp_path: Path) -> None:
-    """Behind a tool change nobody knows where the axes stand until they are commanded."""
+    """After a tool change the positions of the axes are unknown until they are commanded."""
     scene = viewed(
         tmp_path, zero_machine(tmp_path / "m"), "G1 X10 F600\nT2 M6\nG43 H2\nG0 X0 Y0 Z20\nG1 X10\nM2\n"
     ).scene

@@ -1,5 +1,5 @@
-"""Routes made to break a planner, and a broken Ruckig: every motion is held to all its limits by a judge that
-shares nothing with the planner."""
+"""Routes made to break a planner, and a broken Ruckig: an independent judge checks every motion against all
+its limits."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ Case = tuple[Route, AxisLimits]
 
 def held(given: Route, limits: AxisLimits = LIMITS) -> tuple[Trajectory, Verdict]:
     """The plan of a route, which keeps everything that it has to."""
-    found = plan(given, limits)
-    verdict = judge(found.motion, given, limits)
+    trajectory = plan(given, limits)
+    verdict = judge(trajectory.motion, given, limits)
     assert verdict.wrong == ()
-    return found, verdict
+    return trajectory, verdict
 
 
 def points(*rows: tuple[float, float, float]) -> np.ndarray:
@@ -67,9 +67,9 @@ def ring(radius: float, count: int, turns: int = 1) -> np.ndarray:
 def beside_ten_metres(low: float, high: float, seed: int = 2) -> np.ndarray:
     """Segments of lengths from `low` to `high` mm in all directions, between two lines of 10 m."""
     rng = np.random.default_rng(seed)
-    way = rng.normal(size=(200, 3))
-    way *= (10.0 ** rng.uniform(np.log10(low), np.log10(high), 200) / np.linalg.norm(way, axis=1))[:, None]
-    middle = np.array([10_000.0, 0.0, 0.0]) + np.cumsum(way, axis=0)
+    step = rng.normal(size=(200, 3))
+    step *= (10.0 ** rng.uniform(np.log10(low), np.log10(high), 200) / np.linalg.norm(step, axis=1))[:, None]
+    middle = np.array([10_000.0, 0.0, 0.0]) + np.cumsum(step, axis=0)
     return np.vstack((np.zeros(3), middle, middle[-1] + [0.0, 10_000.0, 0.0]))
 
 
@@ -196,8 +196,8 @@ def test_every_limit_is_kept(name: str) -> None:
 
 @pytest.mark.parametrize("decade", range(-5, 5))
 def test_feeds_of_all_sizes(decade: int) -> None:
-    found, verdict = held(route(flat(10.0 ** min(decade, 1), 12), 10.0**decade, 0.01))
-    assert found.duration_s > 0.0
+    trajectory, verdict = held(route(flat(10.0 ** min(decade, 1), 12), 10.0**decade, 0.01))
+    assert trajectory.duration_s > 0.0
     assert verdict.feed <= 1 + 1e-6
 
 
@@ -206,18 +206,18 @@ def test_a_hundred_thousand_points() -> None:
     angle = np.linspace(0.0, 400 * np.pi, 100_001)
     curve = np.column_stack((angle * np.cos(angle), angle * np.sin(angle), np.sin(angle))) * 0.05
     given = route(np.round(curve, 3), 150.0, 0.005)
-    found = plan(given, LIMITS)
-    audit = found.audit
+    trajectory = plan(given, LIMITS)
+    audit = trajectory.audit
     assert max(audit.velocity.max(), audit.acceleration.max(), audit.jerk.max()) <= 1 + 1e-6
-    assert max(leg.deviation_mm for leg in found.legs) <= 0.005 * (1 + 1e-6)
+    assert max(leg.deviation_mm for leg in trajectory.legs) <= 0.005 * (1 + 1e-6)
 
 
 def test_one_point_and_points_that_are_one_are_rests() -> None:
     for count in (1, 2, 5):
         given = replace(route(np.full((count, 3), 7.0), 10.0, 0.0), dwell_s=np.full(count, 0.25))
-        found = plan(given, LIMITS)
-        assert found.duration_s == pytest.approx(0.25 * count)
-        assert (found.at(np.linspace(0.0, found.duration_s, 9))[0] == 7.0).all()
+        trajectory = plan(given, LIMITS)
+        assert trajectory.duration_s == pytest.approx(0.25 * count)
+        assert (trajectory.at(np.linspace(0.0, trajectory.duration_s, 9))[0] == 7.0).all()
 
 
 def test_nothing_to_drive_takes_no_time() -> None:
@@ -226,11 +226,11 @@ def test_nothing_to_drive_takes_no_time() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("what", ["point_mm", "tolerance_mm", "dwell_s", "feed_mm_s"])
-@pytest.mark.parametrize("at", [0, 1, -1])
-def test_what_is_no_number_is_refused(what: str, value: float, at: int) -> None:
+@pytest.mark.parametrize("row", [0, 1, -1])
+def test_what_is_no_number_is_refused(what: str, value: float, row: int) -> None:
     given = route(flat(1.0, 4), 10.0, 0.01)
     values = getattr(given, what).copy()
-    values[at] = value
+    values[row] = value
     if what == "feed_mm_s" and value == np.inf:
         held(replace(given, feed_mm_s=values))
         return
@@ -258,17 +258,17 @@ def test_feeds_that_never_end_are_refused(value: float) -> None:
 @pytest.mark.parametrize("off", [-1e-12, -1e-15, 0.0, 1e-15, 1e-14, 1e-13])
 @pytest.mark.parametrize("length", [1e-6, 1e-2, 3.0])
 def test_a_speed_that_is_just_reached(off: float, length: float) -> None:
-    """From rest with jerk up and down for t each, the speed is J t^2 after J t^3 of way."""
+    """From rest with jerk up and down for t each, the speed is J t^2 after a length of J t^3."""
     jerk = 1e5
     t = (length / jerk) ** (1 / 3)
     duration, rates = ruckig_moves.solve(length, 0.0, 0.0, jerk * t * t * (1 + off), 0.0, 1e6, 1e7, jerk)
     assert duration.sum() == pytest.approx(2 * t, rel=1e-3)
-    way = speed = push = 0.0
+    distance = speed = push = 0.0
     for lasts, rate in zip(duration, rates, strict=True):
         assert speed >= -1e-9 * jerk * t * t
-        way += lasts * (speed + lasts * (push / 2 + lasts * rate / 6))
+        distance += lasts * (speed + lasts * (push / 2 + lasts * rate / 6))
         speed, push = speed + lasts * (push + lasts * rate / 2), push + lasts * rate
-    assert way == pytest.approx(length, rel=1e-9)
+    assert distance == pytest.approx(length, rel=1e-9)
     assert speed == pytest.approx(jerk * t * t, rel=1e-9)
 
 
@@ -294,7 +294,7 @@ class _Raises:
     def __init__(self, dofs: int) -> None:
         pass
 
-    def calculate(self, ask: ruckig.InputParameter, found: ruckig.Trajectory) -> ruckig.Result:
+    def calculate(self, ask: ruckig.InputParameter, result: ruckig.Trajectory) -> ruckig.Result:
         raise ruckig.RuckigError("error in step 1")
 
 
@@ -304,21 +304,21 @@ class _Slow(_Raises):
     def __init__(self, dofs: int) -> None:
         self.real = ruckig.Ruckig(dofs)
 
-    def calculate(self, ask: ruckig.InputParameter, found: ruckig.Trajectory) -> ruckig.Result:
+    def calculate(self, ask: ruckig.InputParameter, result: ruckig.Trajectory) -> ruckig.Result:
         ask.max_jerk = [ask.max_jerk[0] / 3]
-        return self.real.calculate(ask, found)
+        return self.real.calculate(ask, result)
 
 
 class _Misses(_Slow):
     """Ends somewhere else."""
 
-    def calculate(self, ask: ruckig.InputParameter, found: ruckig.Trajectory) -> ruckig.Result:
+    def calculate(self, ask: ruckig.InputParameter, result: ruckig.Trajectory) -> ruckig.Result:
         ask.target_position = [ask.target_position[0] * 0.999]
-        return self.real.calculate(ask, found)
+        return self.real.calculate(ask, result)
 
 
 class _Refuses(_Raises):
-    def calculate(self, ask: ruckig.InputParameter, found: ruckig.Trajectory) -> ruckig.Result:
+    def calculate(self, ask: ruckig.InputParameter, result: ruckig.Trajectory) -> ruckig.Result:
         return ruckig.Result.ErrorExecutionTimeCalculation
 
 
@@ -329,8 +329,8 @@ class _Profile:
     class brake:
         duration = 0.0
 
-    def __init__(self, way: float, jerk: float) -> None:
-        back, forth = (0.1 * way / (2 * jerk)) ** (1 / 3), (1.1 * way / (2 * jerk)) ** (1 / 3)
+    def __init__(self, length: float, jerk: float) -> None:
+        back, forth = (0.1 * length / (2 * jerk)) ** (1 / 3), (1.1 * length / (2 * jerk)) ** (1 / 3)
         self.t = [back, 2 * back, back, forth, 2 * forth, forth, 0.0]
         self.j = [-jerk, jerk, -jerk, jerk, -jerk, jerk, 0.0]
 
@@ -339,18 +339,18 @@ class _Loop:
     def __init__(self, dofs: int) -> None:
         pass
 
-    def calculate(self, ask: ruckig.InputParameter, found: _Found) -> ruckig.Result:
-        found.profiles = [[_Profile(ask.target_position[0], ask.max_jerk[0])]]
+    def calculate(self, ask: ruckig.InputParameter, result: _Result) -> ruckig.Result:
+        result.profiles = [[_Profile(ask.target_position[0], ask.max_jerk[0])]]
         return ruckig.Result.Working
 
 
-class _Found:
+class _Result:
     def __init__(self, dofs: int) -> None:
         self.profiles: list[list[_Profile]] = []
 
 
 class _Fake:
-    """What the planner knows of ruckig, with a solver in its place."""
+    """The names of ruckig that the planner uses, with another solver."""
 
     InputParameter, Trajectory, Result, RuckigError = (
         ruckig.InputParameter, ruckig.Trajectory, ruckig.Result, ruckig.RuckigError,
@@ -376,14 +376,14 @@ def test_a_broken_ruckig_makes_nothing_wrong_or_much_slower(
     sound, _ = held(given, limits)
     fake = type("fake", (_Fake,), {"Ruckig": BROKEN[how]})
     if how == "loops back":
-        fake.Trajectory = _Found  # type: ignore[attr-defined]
+        fake.Trajectory = _Result  # type: ignore[attr-defined]
     monkeypatch.setattr(ruckig_moves, "ruckig", fake)
-    found, _ = held(given, limits)
+    trajectory, _ = held(given, limits)
     if name == "stops":
-        assert found.duration_s <= sound.duration_s * (1 + 1e-3)
+        assert trajectory.duration_s <= sound.duration_s * (1 + 1e-3)
     else:
         # the closed form has no acceleration to begin or end with
-        assert found.duration_s <= sound.duration_s * 1.5
+        assert trajectory.duration_s <= sound.duration_s * 1.5
 
 
 # -- no network --------------------------------------------------------------------------------------------
@@ -422,10 +422,10 @@ for make in ROUTES.values():
 """
 _CLOUD = """
 import ruckig
-ask, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
+ask, result = ruckig.InputParameter(1), ruckig.Trajectory(1)
 ask.current_position, ask.target_position, ask.intermediate_positions = [0.0], [1.0], [[0.5]]
 ask.max_velocity, ask.max_acceleration, ask.max_jerk = [1.0], [1.0], [1.0]
-ruckig.Ruckig(1, 0.01, 1).calculate(ask, found)
+ruckig.Ruckig(1, 0.01, 1).calculate(ask, result)
 """
 
 
@@ -433,7 +433,7 @@ ruckig.Ruckig(1, 0.01, 1).calculate(ask, found)
     not sys.platform.startswith("linux") or not shutil.which("cc"), reason="needs Linux and cc"
 )
 def test_no_socket_is_opened_from_the_libraries(tmp_path: Path) -> None:
-    """The C library's calls end the process; that they would be seen is shown by what does call them."""
+    """Socket calls of the C library end the process; programs that do call them prove that."""
     watch = tmp_path / "watch.so"
     (tmp_path / "watch.c").write_text(_WATCH)
     subprocess.run(
@@ -447,7 +447,7 @@ def test_no_socket_is_opened_from_the_libraries(tmp_path: Path) -> None:
 
 
 def test_cases_are_the_ones_that_are_meant() -> None:
-    """The list has what its names say: no case lost its teeth."""
+    """Every case has the property that its name states."""
     for name, make in {**CASES, **OWN}.items():
         given, limits = make()
         apart = np.linalg.norm(np.diff(given.point_mm, axis=0), axis=1)

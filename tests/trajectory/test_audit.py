@@ -1,4 +1,4 @@
-"""The audit against brute force, and what it must notice."""
+"""The audit against brute force, and the errors that it must detect."""
 
 from __future__ import annotations
 
@@ -52,22 +52,23 @@ def motions(draw, composed):
 def brute(motion: Motion, count: int):
     k = np.repeat(np.arange(len(motion)), count)
     u = np.tile(np.linspace(0.0, 1.0, count), len(motion)) * np.diff(motion.start_s)[k]
-    found = motion.of(k, u)[1:]
-    return [np.abs(x).max(axis=0) for x in found], np.sqrt((found[0] ** 2).sum(axis=1)).max()
+    derivatives = motion.of(k, u)[1:]
+    return [np.abs(x).max(axis=0) for x in derivatives], np.sqrt((derivatives[0] ** 2).sum(axis=1)).max()
 
 
 @settings(deadline=None, max_examples=200)
 @given(motions(composed=False))
 def test_cubics_are_measured_exactly(motion):
-    found = audit(motion, LIMITS, np.full(len(motion), 7.0))
+    result = audit(motion, LIMITS, np.full(len(motion), 7.0))
     (velocity, acceleration, jerk), speed = brute(motion, 2001)
     for ratio, most, limit in (
-        (found.velocity, velocity, LIMITS.velocity), (found.acceleration, acceleration, LIMITS.acceleration),
-        (found.jerk, jerk, LIMITS.jerk),
+        (result.velocity, velocity, LIMITS.velocity),
+        (result.acceleration, acceleration, LIMITS.acceleration),
+        (result.jerk, jerk, LIMITS.jerk),
     ):  # fmt: skip
         assert np.all(ratio * limit >= most * (1 - 1e-9) - 1e-9)
         assert np.all(ratio * limit <= most * (1 + 1e-3) + 1e-3)
-    assert speed * (1 - 1e-6) - 1e-9 <= found.feed * 7.0 <= speed * (1 + 1e-3) + 1e-3
+    assert speed * (1 - 1e-6) - 1e-9 <= result.feed * 7.0 <= speed * (1 + 1e-3) + 1e-3
 
 
 @settings(deadline=None, max_examples=100)
@@ -75,17 +76,17 @@ def test_cubics_are_measured_exactly(motion):
 def test_composed_pieces_are_bounded_and_what_is_too_large_is_measured(motion, high):
     if high:
         motion = replace(motion, time=np.pad(motion.time, ((0, 0), (0, 2)), constant_values=0.3))
-    found = audit(motion, LIMITS, np.full(len(motion), 7.0))
+    result = audit(motion, LIMITS, np.full(len(motion), 7.0))
     most, speed = brute(motion, 4001)
     limits = (LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk)
     pairs = [
         (float(r), float(m / limit))
         for ratio, values, all_limits in zip(
-            (found.velocity, found.acceleration, found.jerk), most, limits, strict=True
+            (result.velocity, result.acceleration, result.jerk), most, limits, strict=True
         )
         for r, m, limit in zip(ratio, values, all_limits, strict=True)
     ]
-    for ratio, sampled in (*pairs, (found.feed, speed / 7.0)):
+    for ratio, sampled in (*pairs, (result.feed, speed / 7.0)):
         assert ratio >= sampled * (1 - 1e-7) - 1e-100
         assert ratio <= max(sampled * (1 + 1e-4), 1.0 + 1e-9)
 
@@ -114,15 +115,15 @@ def test_slowed_by_its_factor_a_motion_keeps_its_limits(motion):
     assert slowing(audit(motion.slowed(factor), LIMITS, feeds)) <= 1.0 + 1e-9
 
 
-def test_jumps_are_seen_also_between_blocks(monkeypatch):
+def test_jumps_are_measured_also_between_blocks(monkeypatch):
     monkeypatch.setattr("olp.trajectory.pieces._BLOCK", 1)
     path = np.zeros((2, 4, 3))
     path[0, 1], path[1, 0], path[1, 1] = [1, 0, 0], [1.5, 0, 0], [3, 0, 0]
     time = [[0, 1, 0, 0], [0, 1, 2, 0]]
-    found = audit(motion_of(time, path, [1.0, 1.0]), LIMITS)
-    assert found.position_jump_mm == pytest.approx(0.5)
-    assert found.velocity_jump_mm_s == pytest.approx(2.0)
-    assert found.acceleration_jump_mm_s2 == pytest.approx(12.0)
+    result = audit(motion_of(time, path, [1.0, 1.0]), LIMITS)
+    assert result.position_jump_mm == pytest.approx(0.5)
+    assert result.velocity_jump_mm_s == pytest.approx(2.0)
+    assert result.acceleration_jump_mm_s2 == pytest.approx(12.0)
 
 
 def test_one_feed_for_each_piece():
@@ -170,7 +171,7 @@ def test_no_place_is_farther_than_the_bound(seed, count):
         place = motion.of(piece, share * np.diff(motion.start_s)[piece])[0]
         away = far_from(points, place, segment[piece], around=2)
         assert np.all(away <= bound[piece] + 1e-12)
-        # halves and eighths are held against segments as wholes: a bound is no guess far off
+        # halves and eighths are compared with whole segments, so the bound is close
         assert np.all(bound <= 0.05 * (1 + 1e-6))
 
 
@@ -194,7 +195,7 @@ def test_a_path_driven_back_and_forth():
     assert path_deviation(parts.motion, route).max() <= 0.05
 
 
-def test_a_detour_is_seen():
+def test_a_detour_is_measured():
     route = route_of([[0, 0, 0], [10, 0, 0], [10, 10, 0]])
     other = route_of([[0, 0, 0], [10, 0, 0], [12, 5, 0], [10, 10, 0]])
     parts = overlap_parts(other, LIMITS)
@@ -203,6 +204,6 @@ def test_a_detour_is_seen():
     assert path_deviation(parts.motion, route, places=9).max() > 1.9
 
 
-def test_one_way_point():
+def test_one_waypoint():
     route = Route(np.ones((1, 3)), np.zeros(0), np.zeros(0, np.int64), np.zeros(1), np.ones(1))
     assert path_deviation(Motion.rest(np.array([1.0, 1.0, 3.0]), 1.0, 0), route).tolist() == [2.0]

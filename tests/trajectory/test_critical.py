@@ -124,16 +124,16 @@ _POSITIVE = st.floats(-6, 6).map(lambda e: 10.0**e)
 
 @settings(max_examples=300, deadline=None)
 @given(_SPEED, _POSITIVE, _POSITIVE, _POSITIVE)
-def test_what_is_reached_is_reached_in_the_way(v0: float, way: float, a: float, j: float) -> None:
-    args = [np.array([e]) for e in (v0, way, a, j)]
+def test_what_is_reached_is_reached_in_the_length(v0: float, length: float, a: float, j: float) -> None:
+    args = [np.array([e]) for e in (v0, length, a, j)]
     v1 = ramps.reach(*args)
     assert v1 >= v0
     need = ramps.distance(args[0], v1, args[2], args[3])
     # a speed is known to 1e-16 of itself, and the change of speed in proportion less well
     known = 1e-9 + 1e-15 * v1 / np.maximum(v1 - v0, 1e-300)
-    assert need <= way * (1.0 + known)
+    assert need <= length * (1.0 + known)
     if v1 > v0:
-        assert need >= way * (1.0 - 1e-6 - known)
+        assert need >= length * (1.0 - 1e-6 - known)
 
 
 @settings(max_examples=300, deadline=None)
@@ -142,18 +142,18 @@ def test_ramps_fit_under_the_peak(
     v0: float, v1: float, more: float, a: float, j: float, share: float
 ) -> None:
     b, c, a_, j_ = (np.array([e]) for e in (v0, v1, a, j))
-    way = np.maximum(ramps.distance(b, c, a_, j_), 1e-6) * (1.0 + more)
+    length = np.maximum(ramps.distance(b, c, a_, j_), 1e-6) * (1.0 + more)
     top = np.array([max(v0, v1) * 3.0 + 1.0])
-    p = ramps.peak(b, c, way, top, a_, j_)
+    p = ramps.peak(b, c, length, top, a_, j_)
     used = ramps.distance(b, p, a_, j_) + ramps.distance(c, p, a_, j_)
     assert p >= max(v0, v1)
-    assert used <= way * (1.0 + 1e-9)
+    assert used <= length * (1.0 + 1e-9)
     higher = p * (1.0 + 1e-10)
-    assert p == top or sum(ramps.distance(e, higher, a_, j_) for e in (b, c)) >= way * (1.0 - 1e-9)
-    # the place where a speed is passed, and the time at which it is
+    assert p == top or sum(ramps.distance(e, higher, a_, j_) for e in (b, c)) >= length * (1.0 - 1e-9)
+    # the length after which a speed is reached, and the time
     speed = b + share * (p - b)
     place = ramps.passing(speed, b, p, a_, j_)
-    assert -1e-12 * way <= place <= ramps.distance(b, p, a_, j_) * (1.0 + 1e-9)
+    assert -1e-12 * length <= place <= ramps.distance(b, p, a_, j_) * (1.0 + 1e-9)
 
 
 @settings(max_examples=200, deadline=None)
@@ -169,6 +169,6 @@ def test_when_is_the_inverse_of_the_cubic(v: float, j: float, t: float, share: f
 @given(
     st.floats(0.0, 1e3), st.floats(1e-9, 1e5), st.floats(1e-1, 1e5), st.floats(1e-1, 1e8)
 )  # fmt: skip
-def test_one_reach_is_that_of_arrays(v0: float, way: float, acceleration: float, jerk: float) -> None:
-    arrays = ramps.reach(*(np.array([e]) for e in (v0, way, acceleration, jerk)))
-    assert ramps.reach_one(v0, way, acceleration, jerk) == pytest.approx(float(arrays[0]), rel=1e-12)
+def test_one_reach_is_that_of_arrays(v0: float, length: float, acceleration: float, jerk: float) -> None:
+    arrays = ramps.reach(*(np.array([e]) for e in (v0, length, acceleration, jerk)))
+    assert ramps.reach_one(v0, length, acceleration, jerk) == pytest.approx(float(arrays[0]), rel=1e-12)

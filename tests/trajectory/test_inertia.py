@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import olp
 from olp.core.machine import Setup
 from olp.files.config import load_setup
-from olp.trajectory.inertia import Inertial, capped, compliance_of, sure, worst
+from olp.trajectory.inertia import Inertial, capped, compliance_of, guaranteed_cap, worst
 from olp.trajectory.plan import plan
 from olp.trajectory.route import AxisLimits
 
@@ -33,32 +33,32 @@ def test_one_straight_move_in_closed_form() -> None:
 
     The integral of a^2 over one such trapezoid is A^2 (F/A - A/J) + 2/3 A^2 (A/J) = A F - A^3 / (3 J).
     """
-    feed, way = 400.0, 300.0
+    feed, length = 400.0, 300.0
     a, j = LIMITS.acceleration[0], LIMITS.jerk[0]
-    found = plan(route(np.array([[0.0, 0, 0], [way, 0, 0]]), feed, 0.0), LIMITS)
-    duration = way / feed + feed / a + a / j
-    result = Inertial.of(found.motion, own(2.0, 5.0, 7.0))
-    assert found.duration_s == pytest.approx(duration, rel=1e-6)
+    trajectory = plan(route(np.array([[0.0, 0, 0], [length, 0, 0]]), feed, 0.0), LIMITS)
+    duration = length / feed + feed / a + a / j
+    result = Inertial.of(trajectory.motion, own(2.0, 5.0, 7.0))
+    assert trajectory.duration_s == pytest.approx(duration, rel=1e-6)
     assert result.most_mm == pytest.approx(2e-6 * a, rel=1e-6)
     assert result.rms_mm == pytest.approx(
         2e-6 * np.sqrt(2.0 * (a * feed - a**3 / (3.0 * j)) / duration), rel=1e-5
     )
     # all of it lies along the path
     assert result.across_mm == pytest.approx(0.0, abs=1e-12)
-    # an axis that gives way at right angles leaves the path by all of it
+    # an axis that deflects at right angles leaves the path by the whole deflection
     sideways = np.zeros((3, 3))
     sideways[1, 0] = 2e-6
-    assert Inertial.of(found.motion, sideways).across_mm == pytest.approx(2e-6 * a, rel=1e-6)
+    assert Inertial.of(trajectory.motion, sideways).across_mm == pytest.approx(2e-6 * a, rel=1e-6)
 
 
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 10_000), matrices)
 def test_it_is_what_samples_say(seed: int, compliance: np.ndarray) -> None:
-    way, limits = random_route(seed)
-    found = plan(way, limits)
-    result = Inertial.of(found.motion, compliance)
-    motion = found.motion
+    given_route, limits = random_route(seed)
+    trajectory = plan(given_route, limits)
+    result = Inertial.of(trajectory.motion, compliance)
+    motion = trajectory.motion
     piece = np.repeat(np.arange(len(motion)), 40)
     share = np.tile((np.arange(40) + 0.5) / 40, len(motion))
     width = np.diff(motion.start_s)[piece]
@@ -73,17 +73,17 @@ def test_it_is_what_samples_say(seed: int, compliance: np.ndarray) -> None:
 
 @pytest.mark.parametrize("factor", [0.1, 3.0])
 def test_it_is_proportional_to_the_compliance(factor: float) -> None:
-    way, limits = random_route(5)
-    motion = plan(way, limits).motion
+    given_route, limits = random_route(5)
+    motion = plan(given_route, limits).motion
     one, other = Inertial.of(motion, own(1.0, 2.0, 3.0)), Inertial.of(motion, factor * own(1.0, 2.0, 3.0))
     for name in ("most_mm", "rms_mm", "across_mm"):
         assert getattr(other, name) == pytest.approx(factor * getattr(one, name), rel=1e-9)
 
 
 @given(matrices, st.floats(1e-3, 2.0))
-def test_the_sure_cap_holds_whatever_the_axes_do(compliance: np.ndarray, share: float) -> None:
+def test_the_guaranteed_cap_holds_whatever_the_axes_do(compliance: np.ndarray, share: float) -> None:
     most = share * worst(LIMITS, compliance)
-    cap = sure(LIMITS, compliance, most)
+    cap = guaranteed_cap(LIMITS, compliance, most)
     held = capped(LIMITS, compliance, cap)
     assert (held.acceleration <= LIMITS.acceleration).all()
     assert worst(held, compliance) <= most * (1 + 1e-9)
@@ -109,15 +109,15 @@ def test_the_report_states_it_beside_the_rest(job: Path, tmp_path: Path) -> None
     part = program(tmp_path)
     result = run("retime", part, "-j", job, "--report", tmp_path / "r.json")
     report = json.loads((tmp_path / "r.json").read_text())
-    found = olp.retime(part, job.with_name("machine.toml"), job)
+    retimed = olp.retime(part, job.with_name("machine.toml"), job)
     compliance = compliance_of(load_setup(job.with_name("machine.toml")).machine)
     np.testing.assert_allclose(compliance, np.diag([-3e-6, -3e-6, 0.0]), rtol=1e-12)
-    want = Inertial.of(found.trajectory.motion, compliance)
+    want = Inertial.of(retimed.trajectory.motion, compliance)
     stated = report["inertial"]
     assert stated["max_um"] == report["budget_um"]["inertial"] == pytest.approx(want.most_mm * 1e3)
     assert (stated["rms_um"], stated["line"]) == (pytest.approx(want.rms_mm * 1e3), want.line)
     assert "Inertial deviation" in result.stdout
-    assert "gives way" in result.stdout
+    assert "deflects under acceleration" in result.stdout
 
 
 @pytest.mark.parametrize("share", [0.9, 0.5, 0.2, 0.05])
@@ -125,24 +125,24 @@ def test_a_bound_holds_and_costs_no_more_than_it_must(share: float, job: Path, t
     path = job.with_name("machine.toml")
     free = olp.retime(program(tmp_path), path, job)
     allowed = share * free.report["inertial"]["max_um"]
-    held = olp.retime(program(tmp_path), path, job, max_inertial_um=allowed)
+    bounded = olp.retime(program(tmp_path), path, job, max_inertial_um=allowed)
     compliance = compliance_of(load_setup(path).machine)
-    assert Inertial.of(held.trajectory.motion, compliance).most_mm * 1e3 <= allowed
-    assert held.report["inertial"]["max_um"] <= allowed
-    assert held.report["inertial"]["max_um"] >= 0.8 * allowed
-    assert held.duration_s > free.duration_s
-    # an axis that does not give way keeps its acceleration
-    before, after = (r.report["limits"]["acceleration_mm_s2"] for r in (free, held))
-    assert after[2] == before[2]
-    assert after[0] < before[0]
-    # no slower than under the limits that make sure of it
+    assert Inertial.of(bounded.trajectory.motion, compliance).most_mm * 1e3 <= allowed
+    assert bounded.report["inertial"]["max_um"] <= allowed
+    assert bounded.report["inertial"]["max_um"] >= 0.8 * allowed
+    assert bounded.duration_s > free.duration_s
+    # an axis without compliance keeps its acceleration
+    free_limits, bounded_limits = (r.report["limits"]["acceleration_mm_s2"] for r in (free, bounded))
+    assert bounded_limits[2] == free_limits[2]
+    assert bounded_limits[0] < free_limits[0]
+    # no slower than under the limits that guarantee the bound
     axes = load_setup(path, job)
-    cap = sure(_limits(before, axes), compliance, allowed * 1e-3)
-    limits = capped(_limits(before, axes), compliance, cap)
+    cap = guaranteed_cap(_limits(free_limits, axes), compliance, allowed * 1e-3)
+    limits = capped(_limits(free_limits, axes), compliance, cap)
     names = dict(zip("XYZ", limits.acceleration.tolist(), strict=True))
-    sure_axes = {k: replace(a, acceleration_mm_s2=names[k]) for k, a in axes.machine.axes.items()}
-    surely = olp.retime(program(tmp_path), replace(axes, machine=replace(axes.machine, axes=sure_axes)))
-    assert held.duration_s <= surely.duration_s * 1.001
+    capped_axes = {k: replace(a, acceleration_mm_s2=names[k]) for k, a in axes.machine.axes.items()}
+    guaranteed = olp.retime(program(tmp_path), replace(axes, machine=replace(axes.machine, axes=capped_axes)))
+    assert bounded.duration_s <= guaranteed.duration_s * 1.001
 
 
 def _limits(acceleration: list[float], setup: Setup) -> AxisLimits:
@@ -163,9 +163,9 @@ def test_the_text_says_what_the_bound_holds(job: Path, tmp_path: Path) -> None:
 def test_a_bound_that_does_not_bind_changes_nothing(job: Path, tmp_path: Path) -> None:
     path = job.with_name("machine.toml")
     free = olp.retime(program(tmp_path), path, job)
-    held = olp.retime(program(tmp_path), path, job, max_inertial_um=1e4)
-    assert held.duration_s == free.duration_s
-    assert held.report["limits"] == free.report["limits"]
+    bounded = olp.retime(program(tmp_path), path, job, max_inertial_um=1e4)
+    assert bounded.duration_s == free.duration_s
+    assert bounded.report["limits"] == free.report["limits"]
 
 
 def test_a_bound_needs_a_compliance(tmp_path: Path) -> None:

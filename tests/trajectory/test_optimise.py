@@ -31,14 +31,14 @@ def wave(count: int = 120, size: float = 20.0, feed: float = 200.0, tolerance: f
     return route(size * np.column_stack((3 * t, np.sin(9 * t), 0.3 * np.cos(5 * t))), feed, tolerance)
 
 
-def found(given_route: Route, limits: AxisLimits = LIMITS) -> tuple[SmoothPath, Motion]:
+def optimised_along(given_route: Route, limits: AxisLimits = LIMITS) -> tuple[SmoothPath, Motion]:
     path = smooth(given_route, limits)
     return path, optimised(path, limits, best_profile(path, limits))
 
 
 def lasts(given_route: Route, limits: AxisLimits = LIMITS) -> float:
     """Time of the motion after it has been slowed to what its audit allows."""
-    path, motion = found(given_route, limits)
+    path, motion = optimised_along(given_route, limits)
     return motion.duration_s * slowing(audit(motion, limits, path.feed_mm_s[motion.shape]))
 
 
@@ -86,7 +86,7 @@ def test_optimum_is_that_of_another_solver(seed: int) -> None:
 
 @pytest.mark.parametrize("length", [30.0, 120.0, 700.0, 4000.0])
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (2.0, -1.0, 0.5)])
-def test_straight_way_takes_as_long_as_ruckig_takes(length: float, direction: tuple[float, ...]) -> None:
+def test_a_straight_path_takes_as_long_as_ruckig_takes(length: float, direction: tuple[float, ...]) -> None:
     u = np.array(direction) / np.linalg.norm(direction)
     points = np.linspace(0.0, length, 9)[:, None] * u
     most = [float((limit / np.maximum(np.abs(u), 1e-12)).min()) for limit in
@@ -100,14 +100,14 @@ def test_straight_way_takes_as_long_as_ruckig_takes(length: float, direction: tu
     assert least * (1.0 - 1e-9) <= lasts(route(points, 1e4, 0.01)) < least * 1.003 + 0.012
 
 
-def test_reversed_way_takes_as_long() -> None:
+def test_a_reversed_path_takes_as_long() -> None:
     forth = wave()
     back = replace(forth, point_mm=forth.point_mm[::-1].copy())
     assert lasts(back) == pytest.approx(lasts(forth), rel=5e-3)
 
 
 @pytest.mark.parametrize("scale", [0.1, 3.0])
-def test_larger_way_with_larger_limits_takes_as_long(scale: float) -> None:
+def test_a_larger_path_with_larger_limits_takes_as_long(scale: float) -> None:
     small = wave()
     large = replace(
         small, point_mm=small.point_mm * scale, feed_mm_s=small.feed_mm_s * scale,
@@ -117,7 +117,7 @@ def test_larger_way_with_larger_limits_takes_as_long(scale: float) -> None:
     assert lasts(large, limits) == pytest.approx(lasts(small), rel=2e-3)
 
 
-def test_more_way_points_of_the_same_curve_do_not_slow_it() -> None:
+def test_more_waypoints_of_the_same_curve_do_not_slow_it() -> None:
     assert lasts(wave(2000)) < 1.02 * lasts(wave(500))
 
 

@@ -30,23 +30,23 @@ def route_of(points, feed=100.0, tolerance=0.01) -> Route:
 
 
 def check(route: Route, limits: AxisLimits = LIMITS, *, differences: bool = True):
-    """Every law that holds for any route of two way-points and more."""
+    """Every law that holds for any route of two or more waypoints."""
     parts = overlap_parts(route, limits)
     motion = parts.motion
     assert least_s(route, limits).sum() <= motion.duration_s * (1 + 1e-8) + 1e-12
     assert len(motion) == len(parts.segment) and np.all(np.diff(motion.start_s) >= 0.0)
     assert np.array_equal(motion.line, route.line[parts.segment])
     assert np.all(np.diff(parts.segment) >= 0)
-    found = audit(motion, limits, route.feed_mm_s[parts.segment])
+    result = audit(motion, limits, route.feed_mm_s[parts.segment])
     size = np.abs(route.point_mm).max() + 1.0
     # times late in the motion are rounded: a phase is longer or shorter by this
     late = motion.duration_s * 2.0**-52
-    assert slowing(found) <= 1.0 + 1e-6 + late * float((limits.jerk / limits.acceleration).max())
-    speed = float((found.velocity * limits.velocity).max())
-    rate = float((found.acceleration * limits.acceleration).max())
-    assert found.position_jump_mm <= 1e-9 + 1e-14 * size + late * speed
-    assert found.velocity_jump_mm_s <= 2e-9 * speed + 2 * late * rate
-    assert found.acceleration_jump_mm_s2 <= 2e-9 * rate + 2 * late * float((found.jerk * limits.jerk).max())
+    assert slowing(result) <= 1.0 + 1e-6 + late * float((limits.jerk / limits.acceleration).max())
+    speed = float((result.velocity * limits.velocity).max())
+    rate = float((result.acceleration * limits.acceleration).max())
+    assert result.position_jump_mm <= 1e-9 + 1e-14 * size + late * speed
+    assert result.velocity_jump_mm_s <= 2e-9 * speed + 2 * late * rate
+    assert result.acceleration_jump_mm_s2 <= 2e-9 * rate + 2 * late * float((result.jerk * limits.jerk).max())
     moved = np.diff(motion.start_s)[:, None] > 0
     shape = motion.path[motion.shape[moved[:, 0]]]
     straight = ~shape[:, 2:].any(axis=(1, 2))
@@ -74,7 +74,7 @@ def check(route: Route, limits: AxisLimits = LIMITS, *, differences: bool = True
 
 
 def corners(route: Route, parts) -> None:
-    """Each way-point is passed within its tolerance; with none, at rest."""
+    """The motion passes each waypoint within its tolerance; with tolerance 0, at rest."""
     motion = parts.motion
     size = np.abs(route.point_mm).max() + 1.0
     group = groups_of_same(route.point_mm)
@@ -104,8 +104,8 @@ def routes(draw):
     point, points = np.zeros(3), []
     for _ in range(count):
         points.append(point)
-        way = np.array([draw(st.sampled_from([-1.0, 0.0, 0.0, 0.3, 1.0])) for _ in range(3)])
-        point = point + way * draw(st.one_of(powers(1e-2, 100.0), powers(1e-9, 1e4)))
+        direction = np.array([draw(st.sampled_from([-1.0, 0.0, 0.0, 0.3, 1.0])) for _ in range(3)])
+        point = point + direction * draw(st.one_of(powers(1e-2, 100.0), powers(1e-9, 1e4)))
     feeds = [draw(st.one_of(st.just(np.inf), powers(1.0, 1e3), powers(1e-5, 1e4))) for _ in range(count - 1)]
     near = [draw(st.one_of(st.just(0.0), powers(1e-4, 1.0), st.just(1e3))) for _ in range(count)]
     return route_of(points, feeds, near)
@@ -175,7 +175,7 @@ def test_no_motion():
         assert motion.at(np.zeros(1))[0].tolist() == [[1.0, 2.0, 3.0]]
 
 
-def test_one_stopped_way_point_among_equals_stops():
+def test_one_stopped_waypoint_among_equals_stops():
     route = route_of([[0, 0, 0], [5, 0, 0], [5, 0, 0], [5, 5, 0]], tolerance=[0, 0.1, 0, 0])
     parts = check(route)
     whole = overlap(route_of([[0, 0, 0], [5, 0, 0], [5, 5, 0]], tolerance=0.0), LIMITS)
@@ -196,9 +196,9 @@ class Raises(ruckig_moves.ruckig.Ruckig):
 
 
 class LoopsBack(ruckig_moves.ruckig.Ruckig):
-    def calculate(self, ask, found):
+    def calculate(self, ask, result):
         ask.current_velocity = [-0.01]
-        return super().calculate(ask, found)
+        return super().calculate(ask, result)
 
 
 @pytest.mark.parametrize("broken", [Raises, LoopsBack])
@@ -209,9 +209,9 @@ def test_a_broken_ruckig(monkeypatch, broken, name):
     replaced = []
 
     def solved(*args):
-        found = ruckig_moves.solve_all(*args)
-        replaced.append(found.replaced.any())
-        return found
+        moves = ruckig_moves.solve_all(*args)
+        replaced.append(moves.replaced.any())
+        return moves
 
     monkeypatch.setattr("olp.trajectory.overlap.solve_all", solved)
     parts = check(CASES[name])

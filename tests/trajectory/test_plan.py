@@ -38,20 +38,20 @@ def route_of(points: np.ndarray, feed: float = 100.0, tolerance: float = 0.01) -
     )  # fmt: skip
 
 
-def assert_within(found: Trajectory, limits: AxisLimits, feed: float = np.inf) -> None:
+def assert_within(trajectory: Trajectory, limits: AxisLimits, feed: float = np.inf) -> None:
     """Sampled at 1 kHz and inside every piece, and by differences of the samples."""
-    motion = found.motion
+    motion = trajectory.motion
     inside = (
         motion.start_s[:-1, None] + np.diff(motion.start_s)[:, None] * np.linspace(0.0, 1.0, 7)[1:-1]
     ).ravel()
-    for times in (found.sample_times(1e-3), inside):
-        _, velocity, acceleration, jerk, _ = found.at(times)
+    for times in (trajectory.sample_times(1e-3), inside):
+        _, velocity, acceleration, jerk, _ = trajectory.at(times)
         assert (np.abs(velocity) <= limits.velocity * (1 + 1e-6)).all()
         assert (np.abs(acceleration) <= limits.acceleration * (1 + 1e-6)).all()
         assert (np.abs(jerk) <= limits.jerk * (1 + 1e-6)).all()
         assert (np.sqrt((velocity * velocity).sum(axis=1)) <= feed * (1 + 1e-6)).all()
-    times = np.arange(0.0, found.duration_s, 1e-3)
-    position, velocity = found.at(times)[:2]
+    times = np.arange(0.0, trajectory.duration_s, 1e-3)
+    position, velocity = trajectory.at(times)[:2]
     # positions are known to their last digits, times to theirs, in which the axis moves on
     noise = 4 * 2.0**-53 * (np.abs(position).max(axis=0) + 2 * (times[:, None] + 1e-3) * np.abs(velocity))
     for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
@@ -77,21 +77,21 @@ def test_any_polyline_is_driven_within_all_limits(
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.normal(size=(count, 3)) * scale * np.exp(rng.normal(size=(count, 1))), axis=0)
     route = route_of(points, feed, tolerance)
-    found = plan(route, LIMITS)
-    assert_within(found, LIMITS, feed)
-    assert max(leg.deviation_mm for leg in found.legs) <= tolerance * (1 + 1e-6) + 1e-9
-    begin, end = found.at(np.array([0.0, found.duration_s]))[0]
+    trajectory = plan(route, LIMITS)
+    assert_within(trajectory, LIMITS, feed)
+    assert max(leg.deviation_mm for leg in trajectory.legs) <= tolerance * (1 + 1e-6) + 1e-9
+    begin, end = trajectory.at(np.array([0.0, trajectory.duration_s]))[0]
     assert np.abs(begin - points[0]).max() <= 1e-9
     assert np.abs(end - points[-1]).max() <= 1e-9
-    for state in found.at(np.array([0.0, found.duration_s]))[1:3]:
+    for state in trajectory.at(np.array([0.0, trajectory.duration_s]))[1:3]:
         assert np.abs(state).max() <= 1e-6
 
 
 def test_lines_come_in_order() -> None:
     rng = np.random.default_rng(4)
-    found = plan(route_of(np.cumsum(rng.normal(size=(30, 3)), axis=0)), LIMITS)
-    assert (np.diff(found.motion.line) >= 0).all()
-    assert set(found.motion.line.tolist()) <= set(range(1, 30))
+    trajectory = plan(route_of(np.cumsum(rng.normal(size=(30, 3)), axis=0)), LIMITS)
+    assert (np.diff(trajectory.motion.line) >= 0).all()
+    assert set(trajectory.motion.line.tolist()) <= set(range(1, 30))
 
 
 def test_dwells_are_waited_at_rest() -> None:
@@ -109,7 +109,7 @@ def test_a_solver_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) 
         raise ValueError("no")
 
     bent = {solvers.CRITICAL, solvers.OPTIMISED}
-    for module, name, left in (
+    for module, name, remaining in (
         (solvers, "smooth", {solvers.OVERLAP}),
         (solvers, "best_profile", {solvers.OVERLAP}),
         (contest, "optimised", {solvers.OVERLAP, solvers.CRITICAL}),
@@ -117,10 +117,10 @@ def test_a_solver_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch) 
     ):
         with monkeypatch.context() as patch:
             patch.setattr(module, name, broken)
-            assert {leg.solver for leg in plan(route, LIMITS).legs} <= left
+            assert {leg.solver for leg in plan(route, LIMITS).legs} <= remaining
 
 
-def test_what_no_solver_drives_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_route_that_no_solver_drives_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*args: object) -> None:
         raise ValueError("no")
 
@@ -148,26 +148,26 @@ def arcs(count: int, seed: int = 0) -> Route:
 
 def test_short_runs_are_planned_together_as_well_as_one_by_one() -> None:
     route = arcs(40)
-    found = plan(route, LIMITS, optimise=False)
-    assert_within(found, LIMITS, 100.0)
+    trajectory = plan(route, LIMITS, optimise=False)
+    assert_within(trajectory, LIMITS, 100.0)
     stops = np.flatnonzero(route.tolerance_mm == 0.0)
     alone = 0.0
     for a, b in pairwise(stops.tolist()):
         run = route_of(route.point_mm[a : b + 1])
         alone += plan(run, LIMITS, optimise=False).duration_s
-    assert found.duration_s == pytest.approx(alone + route.dwell_s.sum(), rel=1e-6)
-    assert sum(leg.duration_s for leg in found.legs) == pytest.approx(found.duration_s)
-    assert [leg.first for leg in found.legs] == [0, *(leg.last for leg in found.legs[:-1])]
-    assert {leg.solver for leg in found.legs} == {solvers.OVERLAP, solvers.CRITICAL}
-    assert max(found.audit.position_jump_mm, found.audit.velocity_jump_mm_s) <= 1e-8
+    assert trajectory.duration_s == pytest.approx(alone + route.dwell_s.sum(), rel=1e-6)
+    assert sum(leg.duration_s for leg in trajectory.legs) == pytest.approx(trajectory.duration_s)
+    assert [leg.first for leg in trajectory.legs] == [0, *(leg.last for leg in trajectory.legs[:-1])]
+    assert {leg.solver for leg in trajectory.legs} == {solvers.OVERLAP, solvers.CRITICAL}
+    assert max(trajectory.audit.position_jump_mm, trajectory.audit.velocity_jump_mm_s) <= 1e-8
     # every stop is met at rest, for as long as it dwells
-    at_rest = np.abs(found.motion.of(np.arange(len(found.motion)), np.zeros(len(found.motion)))[1]).max(
-        axis=1
-    )
-    still = found.motion.of(np.flatnonzero(at_rest <= 1e-9), np.zeros(int((at_rest <= 1e-9).sum())))[0]
+    at_rest = np.abs(
+        trajectory.motion.of(np.arange(len(trajectory.motion)), np.zeros(len(trajectory.motion)))[1]
+    ).max(axis=1)
+    still = trajectory.motion.of(np.flatnonzero(at_rest <= 1e-9), np.zeros(int((at_rest <= 1e-9).sum())))[0]
     away = np.linalg.norm(still[:, None] - route.point_mm[stops[:-1]][None], axis=2).min(axis=0)
     assert away.max() <= 1e-9
-    waits = np.diff(found.motion.start_s)[~found.motion.time.any(axis=1)]
+    waits = np.diff(trajectory.motion.start_s)[~trajectory.motion.time.any(axis=1)]
     assert waits.sum() == pytest.approx(route.dwell_s.sum())
 
 
@@ -196,9 +196,9 @@ def test_shipped_jobs(job: str) -> None:
     folder = PROGRAMS / job
     stated = olp.load_setup(folder / "machine.toml", folder / "job.toml").job
     assert stated.program is not None
-    found = olp.retime(stated.program, folder / "machine.toml", folder / "job.toml")
-    assert found.duration_s > 10.0
-    for trajectory in found.trajectories:
+    retimed = olp.retime(stated.program, folder / "machine.toml", folder / "job.toml")
+    assert retimed.duration_s > 10.0
+    for trajectory in retimed.trajectories:
         assert_within(trajectory, trajectory.limits)
         assert all(leg.factor < 1.01 for leg in trajectory.legs)
         assert max(leg.deviation_mm for leg in trajectory.legs) <= 0.1

@@ -1,4 +1,4 @@
-"""From programs to routes: way-points, chords, tolerances, rests; by hand and by law."""
+"""From programs to routes: waypoints, chords, tolerances, rests; by hand and by law."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ INNER = 1.0 - CHORD_SHARE
 
 
 def driven(text: str, controller: str = "linuxcnc", **options: float) -> tuple[Route, ...]:
-    found = routes(reading(text, controller), **options)
-    for route in found:
+    result = routes(reading(text, controller), **options)
+    for route in result:
         sound(route)
-    return found
+    return result
 
 
 def one(text: str, controller: str = "linuxcnc", **options: float) -> Route:
@@ -76,7 +76,7 @@ def test_lines_rapids_and_their_lines() -> None:
     assert route.dwell_s.tolist() == [0] * 5
 
 
-#: text after `G1 F60` at X0 Y0, control, tolerances of its way-points
+#: text after `G1 F60` at X0 Y0, control, tolerances of its waypoints
 TOLERANCES: dict[str, tuple[str, str, list[float]]] = {
     "bare": ("X10\nY10", "linuxcnc", [0, BLEND_MM, 0]),
     "the smaller one": ("G64 P0.1\nX10\nG64 P0.02 Y10\nG64 P0.3 X0", "linuxcnc", [0, 0.02, 0.02, 0]),
@@ -94,8 +94,8 @@ TOLERANCES: dict[str, tuple[str, str, list[float]]] = {
     "rapids of ISO do not": ("X10.\nY10.\nG0 X0.\nG1 Y0.\nX5.", "haas", [0, BLEND_MM, 0, 0, BLEND_MM, 0]),
     "a stop": ("X10\nM0\nX20\nX30", "linuxcnc", [0, 0, BLEND_MM, 0]),
     "an end": ("X10\nM8\nX20\nM2", "linuxcnc", [0, 0, 0]),
-    "steps without a way": ("X10\nX10\nX10 Y10\nY10", "linuxcnc", [0, BLEND_MM, 0]),
-    "a stop on a step without a way": ("X10\nG61.1 X10\nG64\nM0\nX10\nX20", "linuxcnc", [0, 0, 0]),
+    "steps of no length": ("X10\nX10\nX10 Y10\nY10", "linuxcnc", [0, BLEND_MM, 0]),
+    "a stop on a step of no length": ("X10\nG61.1 X10\nG64\nM0\nX10\nX20", "linuxcnc", [0, 0, 0]),
 }  # fmt: skip
 
 
@@ -174,9 +174,9 @@ size = st.floats(0.01, 400).map(lambda v: round(v, 3))
 
 
 @given(size, st.floats(0.05, 6.2), st.floats(1e-4, 1).map(lambda v: round(v, 5)), st.booleans())
-def test_chords_stay_within_their_share(r: float, sweep: float, tolerance: float, left: bool) -> None:
-    x, y = r * math.cos(sweep), (1 if left else -1) * r * math.sin(sweep)
-    code = "G3" if left else "G2"
+def test_chords_stay_within_their_share(r: float, sweep: float, tolerance: float, ccw: bool) -> None:
+    x, y = r * math.cos(sweep), (1 if ccw else -1) * r * math.sin(sweep)
+    code = "G3" if ccw else "G2"
     text = f"G64 P{tolerance:.5f}\nG0 X{r:.7f}\nF60 {code} X{x:.7f} Y{y:.7f} I{-r:.7f}\nM2"
     try:
         route = one(text)
@@ -210,20 +210,20 @@ def test_routes_part_where_the_position_is_lost() -> None:
         "T1 M6\nG4 P1\nG0 X1 Y1 Z9\nG1 X10 F60\nT2 M6\nG4 P2\nG0 X5\nY5\nG4 P3\nZ5\nX6\nG38.2 Z0\nG4 P4\n"
         "G0 Z9\nX9\nG28 Z9\nG4 P5\nX1\nM2\n"
     )
-    found = driven(text)
-    assert [r.line.tolist() for r in found] == [[4], [11, 12], [15]]
-    assert [r.dwell_s.tolist() for r in found] == [[1, 0], [5, 0, 0], [4, 5]]
-    assert found[0].feed_mm_s.tolist() == [1]
+    parts = driven(text)
+    assert [r.line.tolist() for r in parts] == [[4], [11, 12], [15]]
+    assert [r.dwell_s.tolist() for r in parts] == [[1, 0], [5, 0, 0], [4, 5]]
+    assert parts[0].feed_mm_s.tolist() == [1]
 
 
-def test_a_probe_is_not_driven_beyond_its_start_and_an_unknown_start_is_no_way() -> None:
+def test_a_probe_is_not_driven_beyond_its_start_and_an_unknown_start_is_no_step() -> None:
     route = one("G1 X1 F60\nX9\nG38.2 X20\nM2")
     assert route.point_mm[:, 0].tolist() == [0, 1, 9, 20]
     bare = setup_of("linuxcnc", "")
     unknown = Setup(bare.machine)
     program = read(b"F60\nG0 X1\nY1\nZ1\nG1 X2\nM2\n", unknown, DIALECTS["linuxcnc"])
-    (found,) = routes(program)
-    assert found.point_mm.tolist() == [[1, 1, 1], [2, 1, 1]]
+    (driven_route,) = routes(program)
+    assert driven_route.point_mm.tolist() == [[1, 1, 1], [2, 1, 1]]
 
 
 def test_nothing_driven_is_no_route() -> None:
@@ -242,10 +242,10 @@ def test_strokes_of_cycles() -> None:
 
 
 def test_limits_are_the_machines() -> None:
-    found = axis_limits(setup_of("linuxcnc", "").machine)
-    assert found.velocity.tolist() == [500] * 3
-    assert found.acceleration.tolist() == [2000] * 3
-    assert found.jerk.tolist() == [20000] * 3
+    limits = axis_limits(setup_of("linuxcnc", "").machine)
+    assert limits.velocity.tolist() == [500] * 3
+    assert limits.acceleration.tolist() == [2000] * 3
+    assert limits.jerk.tolist() == [20000] * 3
 
 
 # -- laws ----------------------------------------------------------------------------------------------
@@ -255,10 +255,10 @@ corners = st.lists(st.tuples(steps, steps, steps), min_size=2, max_size=8)
 modes = st.sampled_from(["G61", "G61.1", "G64", "G64 P0.02", "G93"])
 
 
-def text_of(at: list[tuple[float, ...]], mode: str, scale: float = 1.0, parts: int = 1) -> str:
+def text_of(points: list[tuple[float, ...]], mode: str, scale: float = 1.0, parts: int = 1) -> str:
     """A polyline, each block in so many collinear parts of the same time in all."""
     rows, here = [mode], (0.0, 0.0, 0.0)
-    for to in at:
+    for to in points:
         for i in range(1, parts + 1):
             x, y, z = ((a + (b - a) * i / parts) * scale for a, b in zip(here, to, strict=True))
             feed = 8 * parts if "G93" in mode else 240 * scale
@@ -268,8 +268,8 @@ def text_of(at: list[tuple[float, ...]], mode: str, scale: float = 1.0, parts: i
 
 
 @given(corners, modes)
-def test_collinear_parts_take_no_more_time(at: list[tuple[float, ...]], mode: str) -> None:
-    whole, split = driven(text_of(at, mode)), driven(text_of(at, mode, parts=4))
+def test_collinear_parts_take_no_more_time(points: list[tuple[float, ...]], mode: str) -> None:
+    whole, split = driven(text_of(points, mode)), driven(text_of(points, mode, parts=4))
     assert len(whole) == len(split)
     for a, b in zip(whole, split, strict=True):
         assert seconds(b) == pytest.approx(seconds(a), rel=1e-7)
@@ -280,8 +280,8 @@ def test_collinear_parts_take_no_more_time(at: list[tuple[float, ...]], mode: st
 
 
 @given(corners, st.sampled_from(["G61", "G61.1", "G64", "G93"]))
-def test_inches_drive_the_same_route(at: list[tuple[float, ...]], mode: str) -> None:
-    metric, inch = driven(text_of(at, "G21 " + mode)), driven(text_of(at, "G20 " + mode, 1 / 25.4))
+def test_inches_drive_the_same_route(points: list[tuple[float, ...]], mode: str) -> None:
+    metric, inch = driven(text_of(points, "G21 " + mode)), driven(text_of(points, "G20 " + mode, 1 / 25.4))
     for a, b in zip(metric, inch, strict=True):
         np.testing.assert_allclose(a.point_mm, b.point_mm, atol=1e-6)
         np.testing.assert_allclose(a.feed_mm_s, b.feed_mm_s, rtol=1e-6)
@@ -289,13 +289,13 @@ def test_inches_drive_the_same_route(at: list[tuple[float, ...]], mode: str) -> 
 
 
 @given(corners)
-def test_incremental_drives_the_same_route(at: list[tuple[float, ...]]) -> None:
+def test_incremental_drives_the_same_route(points: list[tuple[float, ...]]) -> None:
     rows, here = ["G91 F60"], (0, 0, 0)
-    for to in at:
+    for to in points:
         x, y, z = (b - a for a, b in zip(here, to, strict=True))
         rows.append(f"G1 X{x} Y{y} Z{z}")
         here = (int(to[0]), int(to[1]), int(to[2]))
-    plain = "\n".join(["F60", *(f"G1 X{x} Y{y} Z{z}" for x, y, z in at)])
+    plain = "\n".join(["F60", *(f"G1 X{x} Y{y} Z{z}" for x, y, z in points)])
     for a, b in itertools.zip_longest(driven("\n".join(rows)), driven(plain)):
         np.testing.assert_array_equal(a.point_mm, b.point_mm)
         np.testing.assert_array_equal(a.tolerance_mm, b.tolerance_mm)
@@ -322,7 +322,7 @@ def test_shipped_programs_and_their_corrections_give_routes(name: str) -> None:
     assert len(corrected) == len(nominal)
     for a, b in zip(nominal, corrected, strict=True):
         sound(b)
-        # taking up lost motion costs time of its own
+        # taking up backlash costs time
         assert seconds(b) == pytest.approx(seconds(a), rel=1e-2, abs=0.05)
         assert b.dwell_s.sum() == pytest.approx(a.dwell_s.sum())
         np.testing.assert_allclose(b.point_mm.max(axis=0), a.point_mm.max(axis=0), atol=0.2)

@@ -82,10 +82,10 @@ def test_rest_to_rest_takes_the_time_of_the_closed_form(length, speed, accelerat
 def test_states_meet_start_and_target():
     case = (402.869, 0.26, 60.0, 0.1, -20.0, 2.096, 3427.0, 31846.0)
     arrays = [np.array([x]) for x in case]
-    found = solve_all(*arrays)
-    state = states(found.duration_s, found.jerk, *arrays[:5])
+    moves = solve_all(*arrays)
+    state = states(moves.duration_s, moves.jerk, *arrays[:5])
     assert state.missing.max() < 1e-12
-    assert not found.replaced.any()
+    assert not moves.replaced.any()
 
 
 def test_target_speed_that_is_just_out_of_reach():
@@ -113,9 +113,9 @@ class Raises(ruckig_moves.ruckig.Ruckig):
 class LoopsBack(ruckig_moves.ruckig.Ruckig):
     """Answers another question: one with an end speed that needs a run-up."""
 
-    def calculate(self, ask, found):
+    def calculate(self, ask, result):
         ask.target_velocity = [min(ask.max_velocity[0] * 0.9, ask.target_velocity[0] + 0.1)]
-        return super().calculate(ask, found)
+        return super().calculate(ask, result)
 
 
 class Refuses(ruckig_moves.ruckig.Ruckig):
@@ -130,12 +130,12 @@ def test_a_broken_ruckig_is_replaced(broken, case):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ruckig_moves.ruckig, "Ruckig", broken)
         check(case, *solve(*case))
-        found = solve_all(*(np.array([x]) for x in case))
-        assert broken is LoopsBack or found.replaced.all()
+        solved = solve_all(*(np.array([x]) for x in case))
+        assert broken is LoopsBack or solved.replaced.all()
 
 
-def test_no_socket_and_no_way_points(monkeypatch):
-    """Ruckig's way-points go to a server: nothing may ever set them."""
+def test_no_socket_and_no_waypoints(monkeypatch):
+    """Ruckig sends waypoints to a server: nothing may ever set them."""
 
     def refuse(*_, **__):
         raise AssertionError("a socket was opened")
@@ -161,7 +161,7 @@ def test_a_start_that_brakes_and_an_end_that_speeds_up():
     check(case, own[0][used], jerk[0][used])
 
 
-def test_a_target_out_of_reach_is_told():
+def test_a_target_out_of_reach_is_refused():
     # from 100 mm/s nothing stops within a micrometre
     with pytest.raises(CannotCompute, match="no move over"):
         solve(1e-3, 100.0, 0.0, 0.0, 0.0, 200.0, 1000.0, 1e4)

@@ -32,15 +32,15 @@ def laws_hold(given_route: Route, path: SmoothPath) -> None:
     end = path.at(path.break_mm[-1:])
     assert np.abs(end[0] - point[-1]).max() <= 1e-12 * (1 + np.abs(point).max())
     assert np.abs(path.shape[0, 2:]).max() == 0.0 == np.abs(path.shape[-1, 2:]).max()
-    # no place further from the polyline than the tolerance of the way-points around it
-    ways = (path.break_mm[:-1, None] + np.linspace(0.0, 1.0, 5) * np.diff(path.break_mm)[:, None]).ravel()
+    # no point farther from the polyline than the tolerance of the waypoints around it
+    arc_mm = (path.break_mm[:-1, None] + np.linspace(0.0, 1.0, 5) * np.diff(path.break_mm)[:, None]).ravel()
     inner = given_route.tolerance_mm[1:-1]
     if inner.size:
-        q = path.at(ways)[0]
+        q = path.at(arc_mm)[0]
         source = np.repeat(path.source, 5)
         assert (far_from(point, q, source) <= inner.max() * (1.0 + 1e-9) + 1e-9).all()
     else:
-        assert far_from(point, path.at(ways)[0], np.repeat(path.source, 5)).max() < 1e-9
+        assert far_from(point, path.at(arc_mm)[0], np.repeat(path.source, 5)).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", sorted(CASES))
@@ -71,9 +71,9 @@ def test_summed_kernels_are_the_kernels_summed(seed: int, count: int) -> None:
     a, m, b = (np.searchsorted(x, e) for e in (centre - width, centre, centre + width))
     taylor = deviations(x, centre, width, bend, a, m, b)
     t = 0.37 * np.diff(x)
-    at = x[:-1] + t
-    out = 1.0 - np.abs((at[:, None] - centre) / width)
-    want = (np.maximum(out, 0.0) ** 3 / 6.0 * width) @ bend
+    arc_mm = x[:-1] + t
+    inside = 1.0 - np.abs((arc_mm[:, None] - centre) / width)
+    want = (np.maximum(inside, 0.0) ** 3 / 6.0 * width) @ bend
     f, f1, f2, f3 = (taylor[:, i] for i in range(4))
     t = t[:, None]
     got = f + t * (f1 + t * (f2 / 2.0 + t * f3 / 6.0))
@@ -100,7 +100,7 @@ def test_many_points_keep_their_digits() -> None:
     assert np.abs(last - point[-1]).max() < 1e-9
 
 
-def test_reversals_are_told() -> None:
+def test_reversals_need_a_stop() -> None:
     point = np.array([[0, 0, 0], [10, 0, 0], [10, 0, 0], [4, 0, 0], [4, 3, 0], [4, 1, 1e-7]], float)
     assert needs_stop(point).tolist() == [False, True, False, False, True, False]
     assert not needs_stop(point[:1]).any()
@@ -128,8 +128,8 @@ def test_rests_are_met_exactly_and_straight() -> None:
             ),
             limits,
         )  # fmt: skip
-        ways = np.linspace(0.0, 1.0, 300) * min(alone.break_mm[-1], path.break_mm[end] - path.break_mm[k])
-        assert np.abs(path.at(path.break_mm[k] + ways)[0] - alone.at(ways)[0]).max() <= 1e-9
+        arc_mm = np.linspace(0.0, 1.0, 300) * min(alone.break_mm[-1], path.break_mm[end] - path.break_mm[k])
+        assert np.abs(path.at(path.break_mm[k] + arc_mm)[0] - alone.at(arc_mm)[0]).max() <= 1e-9
 
 
 def test_nothing_to_drive() -> None:

@@ -26,13 +26,13 @@ def straight(length: float = 100.0, feed: float = FEED) -> Route:
     return route(np.array([[0.0, 0, 0], [length, 0, 0]]), feed, 0.0)
 
 
-def length_of(way: Route) -> float:
-    return float(np.sqrt((np.diff(way.point_mm, axis=0) ** 2).sum(axis=1)).sum())
+def length_of(route: Route) -> float:
+    return float(np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1)).sum())
 
 
 def test_one_straight_move_in_closed_form() -> None:
-    way = straight()
-    lines, slow = usage(plan(way, LIMITS), way)
+    route = straight()
+    lines, slow = usage(plan(route, LIMITS), route)
     duration = 100.0 / FEED + 2.0 * HALF_RAMP_S
     assert lines.seconds == pytest.approx([duration], rel=1e-7)
     assert lines.lost_s() == pytest.approx([2.0 * HALF_RAMP_S], rel=1e-6)
@@ -52,9 +52,9 @@ def test_one_straight_move_in_closed_form() -> None:
 
 
 def test_a_dwell_is_no_slow_motion() -> None:
-    way = straight()
-    way.dwell_s[1] = 3.0
-    lines, slow = usage(plan(way, LIMITS), way)
+    route = straight()
+    route.dwell_s[1] = 3.0
+    lines, slow = usage(plan(route, LIMITS), route)
     bare, places = usage(plan(straight(), LIMITS), straight())
     assert lines.dwell_s == pytest.approx([3.0])
     assert lines.seconds == pytest.approx(bare.seconds)
@@ -64,26 +64,26 @@ def test_a_dwell_is_no_slow_motion() -> None:
 def test_moves_of_one_line_have_their_own_feeds() -> None:
     """As in a canned cycle: over, down at feed, and up again."""
     point = np.array([[0.0, 0, 0], [50, 0, 0], [50, 0, -10], [50, 0, 0]])
-    way = Route(point, np.array([np.inf, 5.0, np.inf]), np.full(3, 7), np.zeros(4), np.zeros(4))
-    found = plan(way, LIMITS)
-    feed = feeds_of_pieces(found.motion, way)
-    middle = found.motion.of(np.arange(len(found.motion)), 0.5 * np.diff(found.motion.start_s))
+    route = Route(point, np.array([np.inf, 5.0, np.inf]), np.full(3, 7), np.zeros(4), np.zeros(4))
+    trajectory = plan(route, LIMITS)
+    feed = feeds_of_pieces(trajectory.motion, route)
+    middle = trajectory.motion.of(np.arange(len(trajectory.motion)), 0.5 * np.diff(trajectory.motion.start_s))
     down = middle[1][:, 2] < 0.0
     assert (feed == np.where(down, 5.0, np.inf)).all()
-    lines, _ = usage(found, way)
+    lines, _ = usage(trajectory, route)
     assert lines.feed_length_mm == pytest.approx([10.0])
     assert lines.length_mm == pytest.approx([70.0])
     assert lines.feed_mm_s == pytest.approx([5.0])
-    assert lines.feed_seconds == pytest.approx([np.diff(found.motion.start_s)[down].sum()])
+    assert lines.feed_seconds == pytest.approx([np.diff(trajectory.motion.start_s)[down].sum()])
 
 
 @settings(max_examples=12)
 @given(st.integers(0, 10_000))
 def test_lines_and_places_share_out_the_whole(seed: int) -> None:
-    way, limits = random_route(seed)
-    found = plan(way, limits)
-    lines, slow = usage(found, way)
-    whole = found.duration_s
+    route, limits = random_route(seed)
+    trajectory = plan(route, limits)
+    lines, slow = usage(trajectory, route)
+    whole = trajectory.duration_s
     assert lines.seconds.sum() + lines.dwell_s.sum() == pytest.approx(whole, rel=1e-9)
     assert (lines.at_limit_s <= lines.seconds[:, None] * (1 + 1e-9) + 1e-12).all()
     # how well the limits are kept is for the judges of the planner to say
@@ -92,8 +92,8 @@ def test_lines_and_places_share_out_the_whole(seed: int) -> None:
     assert (slow.slowest_mm_s < 0.5 * slow.feed_mm_s).all()
     assert (slow.lost_s >= 0.5 * slow.seconds * (1 - 1e-9)).all()
     assert (np.diff(slow.start_s) > 0.0).all()
-    # the motion of a line is driven no faster than its feed; rounded corners may shorten the way
-    near = lines.feed_length_mm - 8.0 * way.tolerance_mm.max()
+    # the motion of a line is driven no faster than its feed; rounded corners may shorten the path
+    near = lines.feed_length_mm - 8.0 * route.tolerance_mm.max()
     fed = np.isfinite(lines.feed_mm_s)
     assert (near[fed] <= lines.feed_seconds[fed] * lines.feed_mm_s[fed] * (1 + 1e-5)).all()
 
@@ -101,9 +101,9 @@ def test_lines_and_places_share_out_the_whole(seed: int) -> None:
 @settings(max_examples=6)
 @given(st.integers(0, 10_000))
 def test_two_stretches_make_one_table(seed: int) -> None:
-    way, limits = random_route(seed)
-    other = replace(way, line=way.line + len(way.line) // 2)
-    parts = [usage(plan(r, limits), r)[0] for r in (way, other)]
+    route, limits = random_route(seed)
+    other = replace(route, line=route.line + len(route.line) // 2)
+    parts = [usage(plan(r, limits), r)[0] for r in (route, other)]
     both = LineUse.joined(parts)
     assert (np.diff(both.line) > 0).all()
     for name in ("seconds", "dwell_s", "length_mm", "feed_seconds", "feed_length_mm", "at_limit_s"):
@@ -120,11 +120,11 @@ def test_nothing_has_a_table_too() -> None:
 
 
 def test_blocks_of_pieces_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
-    way, limits = random_route(11)
-    found = plan(way, limits)
-    lines, slow = usage(found, way)
+    route, limits = random_route(11)
+    trajectory = plan(route, limits)
+    lines, slow = usage(trajectory, route)
     monkeypatch.setattr("olp.trajectory.usage._BLOCK", 3)
-    again, places = usage(found, way)
+    again, places = usage(trajectory, route)
     assert len(slow) == len(places) > 1
     for name in SlowPlaces.__slots__:
         np.testing.assert_allclose(getattr(slow, name), getattr(places, name), rtol=1e-12, atol=1e-12)
@@ -140,16 +140,16 @@ def test_partners_are_found_among_inserted_points(seed: int, density: float) -> 
     def shifted(p: np.ndarray) -> np.ndarray:
         return p + 0.04 * np.sin(p[..., ::-1] / 300.0) + 0.02
 
-    out, index = [shifted(point[0])], [0]
+    points, index = [shifted(point[0])], [0]
     for a, b in pairwise(point):
         if np.linalg.norm(b - a) > 3.0 and r.random() < density:
             shares = np.linspace(0.0, 1.0, int(r.integers(3, 5)))[1:-1]
-            out += [shifted(a + s * (b - a)) for s in shares]
-        index.append(len(out))
-        out.append(shifted(b))
-    found = partners(point, np.array(out))
-    assert found is not None
-    assert found.tolist() == index
+            points += [shifted(a + s * (b - a)) for s in shares]
+        index.append(len(points))
+        points.append(shifted(b))
+    result = partners(point, np.array(points))
+    assert result is not None
+    assert result.tolist() == index
 
 
 def test_another_path_has_no_partners() -> None:
@@ -162,7 +162,7 @@ def test_times_are_compared_line_by_line() -> None:
     nominal = route(np.array([[0.0, 0, 0], [100, 0, 0], [100, 50, 0]]), 20.0, 0.0)
     point = np.array([[0.0, 0, 0], [50, 0.01, 0], [100, 0.02, 0], [100, 50, 0]])
     corrected = route(point, np.array([20.0, 20.0, 5.0]), 0.0)
-    sides = [([way], usage(plan(way, LIMITS), way)[0]) for way in (nominal, corrected)]
+    sides = [([each], usage(plan(each, LIMITS), each)[0]) for each in (nominal, corrected)]
     rows = compare(*sides)
     assert rows is not None
     assert [row["line"] for row in rows] == [1, 0]

@@ -314,7 +314,7 @@ def test_a_covariance_reads_back_and_fits_its_own_calibration_alone(tmp_path: Pa
     assert load_uncertainty(target, load_calibration(target)) is not None
     square = next(line for line in text.split("\n") if line.startswith("C0Y_urad"))
     target.write_text(text.replace(square, "C0Y_urad = 1.5"))
-    with pytest.raises(ConfigError, match="covariance of another calibration"):
+    with pytest.raises(ConfigError, match=r"does not belong to calibration\.toml"):
         load_uncertainty(target, load_calibration(target))
 
 
@@ -417,7 +417,7 @@ def codes(findings: tuple[olp.Finding, ...]) -> set[str]:
 
 
 def test_a_correction_tells_how_sure_it_is(tmp_path: Path) -> None:
-    result = olp.correct(PROGRAM, shop(tmp_path), within_um=5.0)
+    result = olp.correct(PROGRAM, shop(tmp_path), part_tolerance_um=5.0)
     found, said = result.confidence, result.report["uncertainty"]
     assert found is not None
     assert found.line.tolist() == [3, 4, 5, 6, 7]
@@ -455,11 +455,11 @@ def test_only_sure_components_leaves_the_unsure_squareness(tmp_path: Path) -> No
 
 
 def test_where_nothing_is_known_well_correction_is_not_advised(tmp_path: Path) -> None:
-    result = olp.correct(PROGRAM, shop(tmp_path, sigma=30.0), within_um=5.0)
+    result = olp.correct(PROGRAM, shop(tmp_path, sigma=30.0), part_tolerance_um=5.0)
     assert codes(result.findings) == {"OLP431", "OLP432", "OLP433", "OLP435"}
     gain = next(f for f in result.findings if f.code == "OLP431")
     assert gain.lines == (4, 5)
-    good = olp.correct(PROGRAM, shop(tmp_path, sigma=0.001, square=0.001), within_um=5.0)
+    good = olp.correct(PROGRAM, shop(tmp_path, sigma=0.001, square=0.001), part_tolerance_um=5.0)
     assert codes(good.findings) == set()
 
 

@@ -164,7 +164,7 @@ def test_a_file_of_deviations(tmp_path: Path) -> None:
         ("# sigma_um = 5\n", ROWS.format("measured_", "mm"), "vector from the gauge point"),
         ("# sigma_um = -5\n# tool_mm = [0, 0, 0]\n", ROWS.format("measured_", "mm"), "line 1: sigma_um"),
         ("# sigma_um = 5\n", ROWS.format("deviation_", "mm"), "deviation_X_um"),
-        ("# sigma_um = 5 um\n", ROWS.format("measured_", "mm"), "line 1: sigma_um = 5 um is no value"),
+        ("# sigma_um = 5 um\n", ROWS.format("measured_", "mm"), "line 1: sigma_um = 5 um is not a value"),
     ],
 )
 def test_files_that_leave_something_open(tmp_path: Path, head: str, body: str, words: str) -> None:
@@ -241,7 +241,7 @@ def test_the_command_puts_right_what_is_wrong(shop: Path, tmp_path: Path) -> Non
     for a, b in zip(new.curves, good.curves, strict=True):
         assert all(np.array_equal(a.mean(name), b.mean(name)) for name in a.names)
     assert (shop / "wrong.toml").read_text("utf-8") == wrong
-    # the covariance beside it is that of the calibration before somebody changed it
+    # the covariance beside it is that of the calibration before the change
     assert "[covariance]" not in target.read_text("utf-8")
     assert call(shop, "wrong.toml", "-o", str(shop / "wrong.toml"), "--force").exit_code == 2
 

@@ -100,15 +100,15 @@ def test_files_that_describe_themselves(tmp_path: Path) -> None:
     ("text", "words"),
     [
         (line("exx", "EXX", 'sense = "laser"'), "line 12: lines[0].sense"),
-        (line("ecz", "ECZ", 'instrument = "level"'), "vertical Z, which a level cannot see"),
-        (line("ecx", "ECX", 'instrument = "level"'), "vertical Z, which a level cannot see"),
+        (line("ecz", "ECZ", 'instrument = "level"'), "vertical Z, which a level cannot measure"),
+        (line("ecx", "ECX", 'instrument = "level"'), "vertical Z, which a level cannot measure"),
         (line("no", "EXX"), "no such file"),
-        (line("ecz", "EXX"), "read in lengths, and the file holds angles"),
-        (line("exx", "EXX", 'square = "S"'), "square belongs to straightness"),
+        (line("ecz", "EXX"), "holds angles, but EXX is read in lengths"),
+        (line("exx", "EXX", 'square = "S"'), "square is for straightness only"),
         (line("exx", "EYX", 'square = "S"'), 'square "S" is not defined'),
         (line("exx", "EXX", "sigma_urad = 1.0"), "expected sigma_um"),
-        (line("exx", "EXX", 'sense = "table-motion actual-minus-commanded"'), "carries the tool, no table"),
-        (line("exx", "EXX", 'reference = "table"'), "carries the tool, no table"),
+        (line("exx", "EXX", 'sense = "table-motion actual-minus-commanded"'), "moves the tool, not a table"),
+        (line("exx", "EXX", 'reference = "table"'), "moves the tool, not a table"),
         (line("exx", "EXX", "tool = [0, 0, 0]"), "did you mean tool_mm"),
     ],
 )  # fmt: skip
@@ -229,7 +229,7 @@ def test_the_table_says_what_was_found(example: Path) -> None:
 
 
 def test_the_example_finds_the_errors_that_were_simulated(example: Path) -> None:
-    """The independent judge reads both calibrations; the frame of the machine is nobody's to measure."""
+    """The independent judge reads both calibrations; the frame of the machine cannot be measured."""
     true, found = JudgeModel(PROGRAMS / "gantry-plate"), JudgeModel(example)
     at = np.random.default_rng(3).uniform(found.box[:, 0], found.box[:, 1], (800, 3))
     for tool in ((0.0, 0.0, -120.0), (80.0, -40.0, -200.0)):

@@ -144,7 +144,7 @@ def test_figures_of_an_example_and_their_order() -> None:
     box, path = report["box"]["left"], report["program"]["left"]
     assert set(box) == {"as it is", "olp correct", *FORMATS} == set(path)
     assert box["olp correct"]["max_um"] < 1.0 and path["olp correct"]["max_um"] < 1.87
-    # lost motion of 6 um is all that a volumetric table leaves
+    # the only residual of a volumetric table is a backlash of 6 um
     assert box["isg"]["rms_um"] == pytest.approx(3.0, abs=0.02)
     order = ["olp correct", "isg", "siemens-cec", "linuxcnc", "klipper", "as it is"]
     framed = [box[name]["rms_in_frame_um"] for name in order]

@@ -90,8 +90,8 @@ def check(seed: int, folder: Path) -> None:
     found = judged(nominal, result.data, folder, kinds=KINDS if whole else CUTTING)
     bar = allowed_um(nominal) + SLACK_UM
     if recipe.directed:
-        # where one axis turns the straightness of another jumps by what depends on direction, and that axis
-        # cannot follow against its own flank: README, honest limits
+        # at a reversal of one axis the straightness of another jumps by its part that depends on direction, and
+        # that axis cannot follow against its own backlash: README, honest limits
         bar += DIRECTED_JUMP_UM
     assert found.after.judged > 0
     assert found.max_um <= bar, f"line {found.worst_line}: {features}"

@@ -139,7 +139,7 @@ def test_the_first_move_and_the_retract_keep_their_height(bent: Path) -> None:
     assert min(heights) >= -5.15
 
 
-# -- lost motion by text ---------------------------------------------------------------------------------
+# -- backlash by text ------------------------------------------------------------------------------------
 
 
 def test_no_move_is_made_that_nobody_asked_for(tmp_path: Path) -> None:

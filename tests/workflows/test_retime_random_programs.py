@@ -56,7 +56,7 @@ def test_shipped_programs_and_their_corrections_keep_every_limit(name: str) -> N
 @pytest.mark.oracle
 @pytest.mark.slow
 def test_samples_of_linuxcnc_keep_every_limit(tmp_path: Path) -> None:
-    """Flattened, and those that LinuxCNC itself interprets then; a refusal names its line."""
+    """Unrolled, and those that LinuxCNC itself interprets then; a refusal names its line."""
     path = spacious(tmp_path, (0.0, 0.0, 0.0))
     setup = olp.load_setup(path, path.with_name("job.toml"))
     done, wrong = 0, {}

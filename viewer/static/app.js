@@ -1,5 +1,5 @@
 "use strict";
-// The state of the page and what follows from it; every view listens here.
+// The state of the page and its consequences; every view listens here.
 (() => {
   const listeners = new Map();
   OLP.on = (event, call) => listeners.set(event, [...(listeners.get(event) ?? []), call]);
@@ -18,7 +18,7 @@
       this.rows = get(manifest.line);
       this.kind = get(manifest.rapid);
       this.time = get(manifest.time);
-      this.way = get(manifest.way);
+      this.arc = get(manifest.way); // arc length, mm
       this.samples = this.time.length;
       this.end = this.time[this.samples - 1];
       this.layers = new Map();
@@ -56,14 +56,14 @@
       this.runs();
     }
 
-    // First sample of each row of the listing, -1 where a row moves nothing.
+    // First sample of each row of the listing, -1 where a row has no move.
     runs() {
       const rows = this.manifest.arrays[this.manifest.listing.row_nominal].n;
       this.first = new Int32Array(rows).fill(-1);
       for (let i = this.samples - 1; i > 0; i--) if (this.rows[i] >= 0) this.first[this.rows[i]] = i;
     }
 
-    // Samples [a, b] of the run of a row that holds `near`, or else of its first run; null where it moves nothing.
+    // Samples [a, b] of the run of a row that holds `near`, or else of its first run; null where it has no move.
     run(row, near = -1) {
       let a = near > 0 && this.rows[near] === row ? near : (this.first[row] ?? -1);
       if (a < 0) return null;
@@ -73,7 +73,7 @@
       return [a, b];
     }
 
-    // Sample (may be between two) at a time; held where nothing is known between.
+    // Sample (may be between two) at a time; constant in gaps.
     sample_of(time) {
       const i = OLP.find(this.time, time),
         j = Math.min(this.samples - 1, i + 1),
@@ -114,7 +114,7 @@
       OLP.emit("span");
     }
 
-    // Marks the moves of a row; the tool goes to their end unless it is to stay.
+    // Marks the moves of a row; the tool goes to their end, without `stay`.
     select_row(row, stay = false) {
       const run = this.run(row, this.state.sample);
       if (run) {
@@ -168,7 +168,7 @@
       }
     }
 
-    // Rapids once: several layers of them would only hide the path.
+    // Draws rapids of one layer only: several would hide the path.
     show_rapids() {
       let free = this.state.rapids;
       for (const {path, uniforms} of this.scene.lines.values()) {
@@ -193,7 +193,7 @@
       OLP.emit("metric");
     }
 
-    // Layers have colours of their own only while no metric has the say: then those without its values step back.
+    // Without a metric layers have their own colours; with one, layers without values are grey.
     paint() {
       const metric = this.metrics.find(this.state.metric);
       for (const {path, uniforms} of this.scene.lines.values())
@@ -201,12 +201,12 @@
       this.scene.viewer.set_dirty();
     }
 
-    // What the plots show while paths have the colours of their layers.
+    // The metric of the plots while paths have the colours of their layers.
     plot_metric() {
       return this.metrics.find("magnitude") ?? this.manifest.metrics[0] ?? null;
     }
 
-    // Layer that the tool runs on, and where it is (mm, enlarged).
+    // Layer of the tool, and the position of the tool (mm, enlarged).
     tool_layer() {
       return (
         ["result", "corrected", "nominal"].map(n => this.layers.get(n)).find(l => l?.visible) ?? this.layers.values().next().value
@@ -237,13 +237,13 @@
       return AXES[this.state.theme][i % 3];
     }
 
-    // Layer whose errors are to be judged: the last state that is shown.
+    // Layer whose errors the verdict judges: the last state that is shown.
     judged(metric) {
       const names = this.metrics.layers(metric).filter(n => this.layers.get(n).visible);
       return JUDGED.map(p => names.find(n => n.startsWith(p))).find(Boolean) ?? names[0] ?? null;
     }
 
-    // Goes round the rows by their largest value; returns {rank, count, sample, value, layer} or null.
+    // The next row by its largest value, in a circle; returns {rank, count, sample, value, layer} or null.
     worst(step = 1) {
       const metric = this.metrics.find(this.state.metric) ?? this.plot_metric(),
         name = this.judged(metric),

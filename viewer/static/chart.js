@@ -1,7 +1,7 @@
 "use strict";
 // A line chart on a canvas: any number of points as one minimum and maximum per pixel column, so no peak is lost.
 (() => {
-  const CORNER = 130; // px that a choice takes at the top right
+  const CORNER = 130; // px of the select at the top right
   const EDGE = {left: 54, right: 12, top: 24, bottom: 22};
 
   // Index of the first x that is not below `value`, in an ascending array.
@@ -77,7 +77,7 @@
       return c;
     }
 
-    // One [column, low, high] per pixel column that holds points, or the points themselves where they are few.
+    // One [column, low, high] per pixel column with points, or the points where they are few.
     columns({x, y}) {
       const [a, b] = this.window,
         first = Math.max(0, lower(x, a) - 1),

@@ -1,8 +1,8 @@
 "use strict";
 // Colour maps that are even in lightness, so that colour-blind readers see the order too, and their look-up tables.
 (() => {
-  // Control points in OKLCH (lightness, chroma, hue in degrees): lightness runs one way in every sequential map, and
-  // to one side from the middle in every diverging one; hues keep off the red-green pair.
+  // Control points in OKLCH (lightness, chroma, hue in degrees): lightness is monotonic in every sequential map, and
+  // on either side of the middle in every diverging one; hues avoid the red-green pair.
   const MAPS = {
     ember: {
       label: "blue – violet – amber",
@@ -70,7 +70,7 @@
     return linear.map(v => 255 * Math.min(1, Math.max(0, v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055)));
   }
 
-  // Interpolated in OKLab's plane, where a straight way between two colours is even to the eye.
+  // Interpolated in OKLab's plane, where a straight line between two colours is even to the eye.
   function along(stops, x) {
     const at = Math.min(1, Math.max(0, x)) * (stops.length - 1),
       i = Math.min(stops.length - 2, Math.floor(at)),
@@ -96,11 +96,11 @@
     const at = scale.mode === "steps" ? (Math.min(9, Math.floor(x * 10)) + 0.5) / 10 : x;
     if (scale.kind === "diverging") return along(DIVERGING[scale.theme], at);
     const {stops} = MAPS[scale.map];
-    // On a dark ground the dark end is lifted off it; the steps stay even.
+    // On a dark ground the dark end is lighter; the steps are still even.
     return along(scale.theme === "dark" ? stops.map(([L, C, h]) => [0.5 + 0.8 * (L - 0.34), C, h]) : stops, at);
   }
 
-  // Table of SIZE + 1 colours as RGBA bytes: the last is for values nobody knows.
+  // Table of SIZE + 1 colours as RGBA bytes: the last is for unknown values.
   function table(scale) {
     const out = new Uint8Array(4 * (SIZE + 1));
     for (let i = 0; i < SIZE; i++) out.set([...rgb(scale, i / (SIZE - 1)), 255], 4 * i);

@@ -1,10 +1,10 @@
 "use strict";
-// What draws the scene: WebGL, or without it (remote desktops, locked-down computers) a 2-D canvas with the same camera.
+// Draws the scene: WebGL, or without it (remote desktops, locked-down computers) a 2-D canvas with the same camera.
 (() => {
   const T = MeshCat.THREE,
     SHADES = 24;
 
-  // What draws: "none", "software" or "hardware".
+  // Kind of WebGL: "none", "software" or "hardware".
   OLP.graphics = () => {
     try {
       const context = document.createElement("canvas").getContext("webgl2"),
@@ -23,7 +23,7 @@
     return renderer;
   };
 
-  // Stands in for three's renderer; `draw(context, width, height, ratio)` is set once the scene is there.
+  // Replaces three's renderer; `draw(context, width, height, ratio)` is set once the scene is there.
   OLP.flat_renderer = pane => {
     const canvas = document.createElement("canvas"),
       context = canvas.getContext("2d");

@@ -7,15 +7,15 @@
     constructor(app) {
       this.app = app;
       const press = id => () => $(id).click();
-      // [keys, what they do, call]
+      // [keys, description, call]
       this.table = [
         [[" "], "play or pause", press("play")],
-        [[",", "ArrowLeft"], "block before", press("step-back")],
+        [[",", "ArrowLeft"], "previous block", press("step-back")],
         [[".", "ArrowRight"], "next block", press("step-forward")],
         [["ArrowUp"], "row above", () => app.select_row(Math.max(0, app.state.row - 1))],
         [["ArrowDown"], "row below", () => app.select_row(Math.min(app.listing.n - 1, app.state.row + 1))],
         [["w"], "next worst point", () => this.worst(1)],
-        [["W"], "worst point before", () => this.worst(-1)],
+        [["W"], "previous worst point", () => this.worst(-1)],
         [["+", "="], "exaggerate more", () => this.exaggerate(1)],
         [["-"], "exaggerate less", () => this.exaggerate(-1)],
         [["1"], "isometric", press("view-iso")],
@@ -41,7 +41,7 @@
         [["d"], "dark or light", press("theme")],
         [
           ["Escape"],
-          "let go of the selection",
+          "clear the selection",
           () => {
             app.set_span([-1, -1]);
             app.pointer.set_measuring(false);
@@ -102,12 +102,12 @@
 
     worst(step) {
       const {app} = this,
-        found = app.worst(step),
+        point = app.worst(step),
         {number, unit_label} = OLP.colour;
-      if (!found) app.toast("No values to rank", 2500);
+      if (!point) app.toast("No values to rank", 2500);
       else
         app.toast(
-          `Worst ${found.rank} of ${found.count}: ${number(found.value, 4)} ${unit_label(found.unit)}, ${app.layers.get(found.layer).label}, line ${app.listing.number(app.state.row, 0)}`,
+          `Worst ${point.rank} of ${point.count}: ${number(point.value, 4)} ${unit_label(point.unit)}, ${app.layers.get(point.layer).label}, line ${app.listing.number(app.state.row, 0)}`,
           4000,
         );
     }

@@ -96,7 +96,7 @@ void main() {
       this.mesh.renderOrder = 10 + order;
     }
 
-    // Sends what `path.fill` left in the buffer.
+    // Sends the buffer that `path.fill` filled.
     send(origin) {
       const {path, mesh} = this;
       if (this.source !== path.buffer) this.allocate();

@@ -1,6 +1,6 @@
 "use strict";
-// Program text, nominal beside corrected, with the file's own line numbers. Only the rows in sight exist, and the scroll
-// is scaled where a million rows would be higher than a browser can lay out. Text enters by textContent alone.
+// Program text, nominal beside corrected, with the line numbers of the files. Only visible rows exist, and the scroll is
+// scaled where a million rows would be higher than a browser can lay out. Text enters by textContent alone.
 (() => {
   const ROW = 19,
     TALLEST = 8e6,
@@ -20,7 +20,7 @@
       this.host = document.getElementById("listing-rows");
       this.height = Math.min(this.n * ROW, TALLEST);
       this.inner.style.height = this.height + "px";
-      this.top = 0; // first row in sight, may be a part
+      this.top = 0; // first visible row, may be a part
       this.rows = [];
       this.current = this.selected = -1;
       const digits = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length;
@@ -52,7 +52,7 @@
         ...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})),
       );
       head.lastChild.title = this.errors[1]
-        ? "Largest deviation of the line, before → after the correction"
+        ? "Largest deviation of the line, uncorrected → corrected"
         : "Largest deviation of the line";
     }
 
@@ -123,7 +123,7 @@
       this.paint();
     }
 
-    // The corrected line with what differs from the nominal one marked.
+    // The corrected line with its differences from the nominal one marked.
     show_change(cell, nominal, corrected) {
       const old = nominal.slice(0, SHOWN),
         text = corrected.slice(0, SHOWN);
@@ -142,13 +142,13 @@
     scroll_to(top) {
       this.top = Math.max(0, Math.min(this.highest, top));
       const span = this.height - this.box.clientHeight;
-      this.told = this.scaled ? (this.top / Math.max(1e-9, this.highest)) * span : this.top * ROW;
-      this.box.scrollTop = this.told;
-      this.told = this.box.scrollTop;
+      this.scrolled = this.scaled ? (this.top / Math.max(1e-9, this.highest)) * span : this.top * ROW;
+      this.box.scrollTop = this.scrolled;
+      this.scrolled = this.box.scrollTop;
       this.paint();
     }
 
-    // Brings a row into sight.
+    // Makes a row visible.
     show(row) {
       if (row < this.top + 1 || row > this.top + this.room - 2) this.scroll_to(row - this.room / 2 + 0.5);
       else this.paint();
@@ -156,7 +156,7 @@
 
     listen() {
       this.box.addEventListener("scroll", () => {
-        if (this.box.scrollTop === this.told) return;
+        if (this.box.scrollTop === this.scrolled) return;
         const span = this.height - this.box.clientHeight;
         this.top = this.scaled ? (this.box.scrollTop / Math.max(1, span)) * this.highest : this.box.scrollTop / ROW;
         this.paint();
@@ -164,7 +164,7 @@
       this.box.addEventListener(
         "wheel",
         e => {
-          if (!this.scaled) return; // a scaled scroll would leap over thousands of rows
+          if (!this.scaled) return; // a scaled scroll would skip thousands of rows
           e.preventDefault();
           this.scroll_to(this.top + e.deltaY / ROW);
         },
@@ -195,7 +195,7 @@
       return this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
     }
 
-    // Next row after `from` with the text on either side, going round; -1 where there is none.
+    // Next row after `from` with the text on either side, in a circle; -1 where there is none.
     search(text, from) {
       const wanted = text.toLowerCase();
       for (let step = 1; step <= this.n; step++) {

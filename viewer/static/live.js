@@ -1,5 +1,5 @@
 "use strict";
-// A live page asks its own server, and nothing else, whether the inputs have changed.
+// A live page asks its own server, and no other, whether the inputs have changed.
 (() => {
   const EVERY_MS = 1000;
 
@@ -16,7 +16,7 @@
         }
         app.toast(null, 0, "lost");
       } catch {
-        app.toast("The server is gone; this is its last answer", 0, "lost");
+        app.toast("The server does not answer; this is its last page", 0, "lost");
       }
       setTimeout(ask, EVERY_MS);
     };

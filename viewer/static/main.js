@@ -1,10 +1,10 @@
 "use strict";
-// Puts the page together; what goes wrong is told in the page itself.
+// Puts the page together; errors are shown in the page itself.
 (() => {
   const $ = id => document.getElementById(id);
-  const SHARE = 0.03; // of the size of the job that the largest deviation is enlarged to
+  const SHARE = 0.03; // size of the largest deviation, enlarged, as a share of the size of the job
 
-  // Corners of what the feed moves of the base path span, and the radius round their middle that holds all else.
+  // Corners of the box of the feed moves of the base path, and the radius about its middle that contains all else.
   function extent(app) {
     const whole = [
         [Infinity, Infinity, Infinity],
@@ -35,7 +35,7 @@
           ),
         ),
       );
-    // machine nodes move with the axes, by no more than the path is wide
+    // machine nodes move with the axes, by at most the size of the path
     const meshes = app.meshes.reach.map(
       ([centre, radius]) => Math.hypot(...centre.map((v, j) => v - middle[j])) + radius + 2 * far,
     );
@@ -56,7 +56,7 @@
 
   function extend(app) {
     let timer = 0;
-    // A line of talk at the foot of the picture; kind "lost" stays until it is taken back.
+    // A message at the bottom of the picture; kind "lost" is shown until it is removed.
     app.toast = (text, ms, kind = "") => {
       const box = $("toast");
       if (text === null) {
@@ -132,7 +132,7 @@
     const app = new OLP.App(manifest, await OLP.unpack(manifest, $("olp-data").textContent.trim()));
     app.scene = new OLP.Scene(app, $("pane"));
     [...app.layers.values()].forEach((path, order) => {
-      path.given = path.D ? path.colour : OLP.NEUTRAL; // the palette owns the colours
+      path.given = path.D ? path.colour : OLP.NEUTRAL; // colours belong to the palette
       app.state.layers[path.name] = path.visible;
       app.scene.add_path(path, order);
     });

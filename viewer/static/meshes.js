@@ -5,9 +5,9 @@
 
   const MOST_EDGED = 300000; // corners of faces; edges of finer meshes are noise
 
-  const FAINT = 0.13; // of the machine, which stands before the path
+  const FAINT = 0.13; // opacity of the machine, which is in front of the path
 
-  // Faces with corners of their own, so that each has its own normal.
+  // Faces with separate corners, so that each has its own normal.
   function flat(vertices, faces) {
     const geometry = new T.BufferGeometry(),
       corners = new Float32Array(3 * faces.length);
@@ -17,7 +17,7 @@
     return geometry;
   }
 
-  // Sharp edges: they tell the shape of what is seen through.
+  // Sharp edges: they show the shape of transparent bodies.
   function edges(geometry, {colour, opacity}) {
     const lines = new T.LineSegments(
       new T.EdgesGeometry(geometry, 25),
@@ -37,8 +37,8 @@
         const geometry = flat(arrays.get(mesh.vertices), arrays.get(mesh.faces));
         const opacity = mesh.role === "machine" ? Math.min(mesh.opacity, FAINT) : mesh.opacity,
           clear = opacity < 1;
-        // Pushed back a little: paths on a face stay in front of it. Lit by corner, and what is clear from the front only:
-        // large clear faces are what costs software GL most.
+        // Pushed back a little, so that paths on a face are in front of it. Lit by corner, and transparent bodies from the
+        // front only: large transparent faces cost software GL most.
         const material = new T.MeshLambertMaterial({
           color: mesh.colour,
           transparent: clear,
@@ -67,7 +67,7 @@
           : [];
     }
 
-    // A ball and a shank where the file brings no mesh of the tool.
+    // A ball and a shank where the file has no mesh of the tool.
     draw_tool(radius) {
       const {viewer} = this.app.scene,
         objects = [];

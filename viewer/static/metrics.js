@@ -15,8 +15,8 @@
       return metric ? Object.keys(metric.by_layer).filter(name => this.app.layers.has(name)) : [];
     }
 
-    // (n) values in the metric's unit for a layer, NaN where unknown and in rapids, which cut nothing; null where the
-    // metric does not speak of the layer.
+    // (n) values in the metric's unit for a layer, NaN where unknown and in rapids, which do not cut; null where the
+    // metric has none for the layer.
     values(metric, name) {
       if (!metric || !(name in metric.by_layer) || !this.app.layers.has(name)) return null;
       const key = metric.name + "\n" + name;

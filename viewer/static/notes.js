@@ -80,7 +80,7 @@
         );
     }
 
-    // The page as it was sent, with the notes of now in its manifest.
+    // The page as it was sent, with the current notes in its manifest.
     html() {
       const {head, body} = OLP.shell,
         scripts = [...document.querySelectorAll("body > script")].slice(1);
@@ -131,7 +131,7 @@
       this.app.toast("The address now holds this view and its notes", 4000);
     }
 
-    // The view in the address; one that cannot be read is left alone.
+    // Restores the view in the address; one that cannot be read is ignored.
     restore() {
       const text = /^#view=([\w-]+)$/.exec(location.hash)?.[1];
       if (!text) return false;

@@ -1,5 +1,5 @@
 "use strict";
-// What lies over the picture: tool ring, current points, triad, scale, notes and measured lines. Redrawn with each picture.
+// The overlay of the picture: tool ring, current points, triad, scale, notes and measured lines, redrawn with it.
 (() => {
   const KEEP_OFF = ["legend", "readout", "views"],
     WIDEST = 40;
@@ -97,15 +97,15 @@
     free(x, y, wide, high) {
       const clash = (a, b) => this.taken.some(r => a < r[2] && a + wide > r[0] && b < r[3] && b + high > r[1]);
       const within = (v, size, whole) => Math.min(Math.max(4, v), Math.max(4, whole - size - 4));
-      const places = [0, -1, 1, -2, 2, -3, 3, -4, 4].flatMap(down =>
+      const corners = [0, -1, 1, -2, 2, -3, 3, -4, 4].flatMap(down =>
         [0, -0.5, 0.5, -1, 1].map(aside => [
           within(x + aside * (wide + 24), wide, this.view.w),
           within(y + down * (high + 8), high, this.view.h),
         ]),
       );
-      // Nearest first; the point itself stays in sight.
-      places.sort((p, q) => Math.hypot(p[0] - x, p[1] - y) - Math.hypot(q[0] - x, q[1] - y));
-      const [left, top] = places.find(([a, b]) => !clash(a, b)) ?? places[0];
+      // Nearest first; the point itself is not hidden.
+      corners.sort((p, q) => Math.hypot(p[0] - x, p[1] - y) - Math.hypot(q[0] - x, q[1] - y));
+      const [left, top] = corners.find(([a, b]) => !clash(a, b)) ?? corners[0];
       this.taken.push([left, top, left + wide, top + high]);
       return [left, top];
     }
@@ -186,7 +186,7 @@
       }
     }
 
-    // A round length and the deviation that it would be at this exaggeration.
+    // A round length, and the deviation of that length at this exaggeration.
     scale(w, h) {
       const {context: c} = this,
         length = OLP.colour.round_up(90 / this.view.scale / 2.5),

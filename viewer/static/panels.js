@@ -7,7 +7,7 @@
     element.append(...children);
     return element;
   };
-  const OWN = new Set(["largest", "mean", "rms", "std. deviation", "within tolerance"]); // the page works these out for any metric
+  const OWN = new Set(["largest", "mean", "rms", "std. deviation", "within tolerance"]); // the page computes these for any metric
   const ROLES = {workpiece: "Workpiece", fixture: "Fixture", machine: "Machine", tool: "Tool"};
 
   class Panels {
@@ -120,7 +120,7 @@
       return mark;
     }
 
-    // The file's own figures of layers that this page does not work out: a row a label.
+    // The file's own figures of layers that this page does not compute: one row per label.
     packed_rows(table, names) {
       const rows = new Map(),
         {number} = OLP.colour;
@@ -204,7 +204,7 @@
       if (!verdict) return;
       box.className = verdict.ok ? "pass" : "fail";
       box.replaceChildren(make("b", {textContent: verdict.ok ? "PASS" : "FAIL"}), make("span", {textContent: verdict.text}));
-      box.title = "Largest predicted deviation before → after the correction, against the tolerance";
+      box.title = "Largest predicted deviation, uncorrected → corrected, against the tolerance";
     }
 
     readout() {

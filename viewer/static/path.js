@@ -1,11 +1,11 @@
 "use strict";
-// One path: base + k * deviation. Everything stays on the CPU in blocks; what the view needs goes to the drawing buffer.
+// One path: base + k * deviation. All of it is on the CPU in blocks; the part for the view goes to the drawing buffer.
 (() => {
   const BLOCK = 256,
     FLOATS = 16; // floats of one vertex: a0 a1 d0 d1 (3 each), side, scalar, sample, kind
   const RAPID = 1,
     GAP = 2;
-  const CHORD = 2; // px of a drawn segment, at the least
+  const CHORD = 2; // least length of a drawn segment, px
 
   class Path {
     // spec: the manifest's layer; P (n,3) mm; D (n,3) mm or null; index (n) nominal samples or null; kind (N) of the segment ending in a sample
@@ -107,7 +107,7 @@
       return total;
     }
 
-    // Fills the buffer with at most `cap` segments; positions are less `origin`, so that float32 serves any zoom.
+    // Fills the buffer with at most `cap` segments; positions are minus `origin`, so that float32 suffices at any zoom.
     // A run of skipped samples never crosses a change of kind or an end of the selection, and keeps its largest value.
     fill(cap, total, origin, selection) {
       const {P, D, kind, index, values, n, need} = this,
@@ -174,7 +174,7 @@
       }
     }
 
-    // Nearest drawn place to the pixel (px, py) of the pane within `limit` pixels: {layer, at, distance} or null. Exact for any k.
+    // Nearest drawn point to the pixel (px, py) of the pane within `limit` pixels: {layer, at, distance} or null. Exact for any k.
     pick(view, px, py, limit, cut, rapids) {
       const {clip: e, w, h, scale, k, ortho} = view,
         {P, D, kind, index, n} = this;

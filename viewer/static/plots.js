@@ -1,7 +1,7 @@
 "use strict";
 // The two linked plots: deviation along the path, and the motion of each axis against its limits.
 (() => {
-  // [name, title, unit, what the choice says]
+  // [name, title, unit, text of the choice]
   const MOTIONS = [
     ["speed", "Speed", "mm/s", "path and feed"],
     ["velocity", "Velocity", "mm/s", "velocity"],
@@ -50,16 +50,16 @@
 
     // Ascending abscissa of the nominal samples.
     get axis() {
-      return this.abscissa === "time" ? this.app.time : this.app.way;
+      return this.abscissa === "time" ? this.app.time : this.app.arc;
     }
     get x_label() {
-      return this.abscissa === "time" ? "time, s" : "way, mm";
+      return this.abscissa === "time" ? "time, s" : "distance along the path, mm";
     }
     time_at(x) {
-      return this.abscissa === "time" ? x : this.between(this.app.way, this.app.time, x);
+      return this.abscissa === "time" ? x : this.between(this.app.arc, this.app.time, x);
     }
     x_of(time) {
-      return this.abscissa === "time" ? time : this.between(this.app.time, this.app.way, time);
+      return this.abscissa === "time" ? time : this.between(this.app.time, this.app.arc, time);
     }
 
     between(from, to, x) {
@@ -109,7 +109,7 @@
         } = this.app,
         time = arrays.get(motion.time),
         kind = this.motion;
-      const x = this.abscissa === "time" ? time : this.cached("motion way", () => Float64Array.from(time, t => this.x_of(t)));
+      const x = this.abscissa === "time" ? time : this.cached("motion arc", () => Float64Array.from(time, t => this.x_of(t)));
       let series,
         limits = [];
       if (kind === "speed") {

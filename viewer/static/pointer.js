@@ -1,5 +1,5 @@
 "use strict";
-// The mouse on the picture: what lies under it, a click that chooses, two clicks that measure.
+// The mouse on the picture: the point under it, a click that selects, two clicks that measure.
 (() => {
   const $ = id => document.getElementById(id),
     STILL = 4; // px that a click may move
@@ -19,7 +19,7 @@
       app.measure_text = () => this.text();
     }
 
-    // Nearest place to a pixel of the page: {layer, sample, distance, at} or null; at = own index of the layer.
+    // Nearest point to a pixel of the page: {layer, sample, distance, at} or null; at = own index of the layer.
     pick(x, y) {
       const box = this.pane.getBoundingClientRect(),
         hit = this.app.scene.pick(x - box.left, y - box.top);
@@ -70,7 +70,7 @@
       this.app.overlay.measured = [];
       $("measure").setAttribute("aria-pressed", on);
       this.pane.classList.toggle("measuring", on);
-      if (on) this.app.toast("Click two places on the paths", 3000);
+      if (on) this.app.toast("Click two points on the paths", 3000);
       this.app.overlay.draw();
     }
 
@@ -109,12 +109,12 @@
       app.overlay.hover = {layer: hit.layer, at: hit.at};
       app.overlay.draw();
       app.plots.charts.forEach(c => c.set_mark("hover", app.plots.x_of(app.time_of(hit.sample))));
-      this.told = true;
+      this.tipped = true;
     }
 
     hide() {
-      if (!this.told) return;
-      this.told = false;
+      if (!this.tipped) return;
+      this.tipped = false;
       $("tip").hidden = true;
       this.app.overlay.hover = null;
       this.app.overlay.draw();

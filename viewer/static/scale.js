@@ -1,5 +1,5 @@
 "use strict";
-// The colours of the values: range, steps, pass or fail, and the bar that tells them.
+// The colours of the values: range, steps, pass or fail, and the colour bar.
 (() => {
   const $ = id => document.getElementById(id),
     BINS = 60;
@@ -74,7 +74,7 @@
       return this.metric?.kind ?? "sequential";
     }
 
-    // A round number that no value of a feed move on the metric's layers passes.
+    // A round number that no value of a feed move on the metric's layers exceeds.
     automatic() {
       if (!this.metric) return;
       const parts = this.app.metrics
@@ -89,7 +89,7 @@
       const value = OLP.parse(text);
       if (Number.isFinite(value)) {
         this[end] = value;
-        if (this.kind === "diverging") [this.min, this.max] = [-Math.abs(value), Math.abs(value)]; // zero stays in the middle of its colours
+        if (this.kind === "diverging") [this.min, this.max] = [-Math.abs(value), Math.abs(value)]; // zero is in the middle of its colours
       }
       if (!(this.max > this.min)) this.automatic();
       this.apply();
@@ -126,7 +126,7 @@
       this.draw();
     }
 
-    // Share of the samples by value, for the layer that is judged.
+    // Share of the samples by value, for the judged layer.
     histogram() {
       const name = this.app.judged(this.metric),
         values = name && this.app.metrics.values(this.metric, name),

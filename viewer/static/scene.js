@@ -1,5 +1,5 @@
 "use strict";
-// MeshCat's viewer with our paths in it: what is drawn, when, and where a point lands on the screen.
+// MeshCat's viewer with the paths in it: what is drawn, when, and the pixel of a point.
 (() => {
   const T = MeshCat.THREE,
     MM = 0.001; // the viewer's scene is in metres
@@ -16,9 +16,9 @@
         graphics === "none" ? OLP.flat_renderer(pane) : OLP.gl_renderer(pane, graphics === "hardware"),
       );
       this.flat = Boolean(this.viewer.renderer.flat);
-      this.viewer.gui.domElement.hidden = true; // its scene tree goes on writing to it
-      this.viewer.set_property(["Background"], "visible", false); // the page's own shows through, at no cost
-      window.onload = null; // the viewer takes it over to size itself by the window
+      this.viewer.gui.domElement.hidden = true; // its scene tree still writes to it
+      this.viewer.set_property(["Background"], "visible", false); // the page's own background shows through, at no cost
+      window.onload = null; // the viewer sets it, to size itself by the window
       for (const path of [["Grid"], ["Axes"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"]])
         this.viewer.set_property(path, "visible", false);
       const light = new T.DirectionalLight(0xffffff, 0.55);
@@ -79,7 +79,7 @@
       this.viewer.set_dirty();
     }
 
-    // What projects a point (mm) to the pane: clip matrix, pane size, px per (mm / depth), exaggeration.
+    // The projection of a point (mm) to the pane: clip matrix, pane size, px per (mm / depth), exaggeration.
     view(k) {
       const camera = this.viewer.camera,
         {clientWidth: w, clientHeight: h} = this.pane;
@@ -98,7 +98,7 @@
       };
     }
 
-    // Pixel of the pane where the point (mm) lands, or null behind the eye.
+    // Pixel of the pane of a point (mm), or null behind the eye.
     project([x, y, z], {clip: e, w, h} = this.view(0)) {
       const v = e[3] * x + e[7] * y + e[11] * z + e[15];
       if (v < 1e-6) return null;
@@ -108,7 +108,7 @@
       ];
     }
 
-    // Nearest place on a drawn path to a pixel of the pane; layers above win ties.
+    // Nearest point on a drawn path to a pixel of the pane; of equal ones that of the upper layer.
     pick(x, y, limit = 8) {
       let best = null;
       for (const lines of [...this.lines.values()].reverse()) {
@@ -126,7 +126,7 @@
       this.timer = setTimeout(() => this.refill(), ms);
     }
 
-    // Chooses anew what of each path is drawn, for the camera as it stands.
+    // Chooses again which part of each path is drawn, for the current camera.
     refill() {
       clearTimeout(this.timer);
       if (!this.pane.clientWidth || !this.app.camera) return;
@@ -153,7 +153,7 @@
       else if (ms < BUDGET.fast && thinned && this.budget < BUDGET.most) this.budget = Math.min(BUDGET.most, this.budget * 1.6);
     }
 
-    // Waits until the picture is really drawn.
+    // Waits until the picture is drawn.
     finish() {
       if (this.flat) return;
       const gl = this.viewer.renderer.getContext();

@@ -2,7 +2,7 @@
 // Play, scrub, rate and steps on the re-timed time.
 (() => {
   const $ = id => document.getElementById(id);
-  const LONGEST_FRAME = 0.25; // s: a page that slept does not leap
+  const LONGEST_FRAME = 0.25; // s: a page that was asleep does not jump
 
   function clock(s) {
     const minutes = Math.floor(s / 60),

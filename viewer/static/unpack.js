@@ -15,8 +15,8 @@
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // Quantised, differenced along each column, byte planes; `plus` are arrays whose values come on top. Sums are whole
-  // numbers in float64: exact, and free to pass the range of int32.
+  // Quantised, differenced along each column, byte planes; `plus` are arrays whose values are added. Sums are integers in
+  // float64: exact, also beyond the range of int32.
   function undifference({n, c, q, off}, bytes, plus) {
     const m = n * c,
       out = new Float64Array(m);

@@ -1,10 +1,10 @@
 "use strict";
-// The mouse on a chart: what lies under it, a click that chooses, a wheel that zooms about it, a drag that moves along.
+// The mouse on a chart: the value under it, a click that selects, a wheel that zooms about it, a drag that moves along.
 (() => {
   const STILL = 3,
     LEAST = 1e-7; // px that a click may move; smallest window as a share of the whole
 
-  // The window [a, b], moved back to what there is.
+  // The window [a, b], moved back into the data.
   function within(chart, [a, b]) {
     const shift = Math.max(0, chart.extent[0] - a) + Math.min(0, chart.extent[1] - b);
     return [a + shift, b + shift];

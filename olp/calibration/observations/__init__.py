@@ -1,1 +1,1 @@
-"""Readings of instruments as values and as rows of the adjustment, one file an instrument."""
+"""Readings of instruments as values and as rows of the adjustment, one file per instrument."""

@@ -1,8 +1,8 @@
-"""What an instrument has to say of itself so that the one adjustment can use it.
+"""What every instrument provides so that the adjustment can use its readings.
 
-An `Observation` is what was read, as a value. In an adjustment it is a `State`: the readings that were kept
-and the present values of the unknowns that it has for itself (a zero, the place of a station). The estimator,
-the report and the prediction of a plan loop over these two and name no kind.
+An `Observation` is what was read, as a value. In an adjustment it is a `State`: the readings that are used,
+and the present values of its own unknowns (a zero, the position of a station). The estimator, the report and
+the prediction of a plan use these two only, and no specific instrument.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ from olp.calibration.estimator.parameters import Parameters, Unknowns
 from olp.core.arrays import Array, Index
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 
-#: A reading whose residual is so many standard deviations is left out, at most this share of a set.
-OUTLIER, SHARE = 6.0, 0.05
-#: The runs may spread by so much more than stated.
+#: A reading is left out where its residual is more than so many standard deviations.
+OUTLIER = 6.0
+#: At most this share of a set is left out.
+SHARE = 0.05
+#: Runs may spread by at most this factor more than stated.
 SCATTER = 1.5
 
 
@@ -50,8 +52,8 @@ class Outlier:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screened:
-    """An observation without the readings that their own repetitions speak against; `noise` is None where
-    only `start` knows it."""
+    """An observation without the readings that are far from their repetitions; `noise` is None where only
+    `start` determines it."""
 
     observation: Observation
     noise: Noise | None = None
@@ -60,12 +62,13 @@ class Screened:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Advance:
-    """By how much a solution moves the own unknowns of an observation, and whether that is nothing."""
+    """By how much a solution changes the own unknowns of an observation; `small` where that is negligible."""
 
     values: Array
     small: bool = True
 
 
+#: The step of an observation without unknowns of its own.
 STILL = Advance(np.zeros(0))
 
 
@@ -81,12 +84,12 @@ class Observation(ABC):
         return False
 
     def screened(self) -> Screened:
-        """Without the readings that their own repetitions speak against. Raises ConfigError."""
+        """Without the readings that are far from their repetitions. Raises ConfigError."""
         return Screened(self)
 
     @abstractmethod
     def reach(self, axis: int) -> Array:
-        """(n,) positions of an axis in mm that its readings tell of, none where they tell nothing."""
+        """(n,) positions in mm at which its readings depend on an axis; empty where they do not."""
 
     @abstractmethod
     def start(self, noise: Noise | None = None) -> State:
@@ -97,8 +100,8 @@ class Observation(ABC):
 class State(ABC):
     """An observation within an adjustment. A frozen value; each step of the adjustment makes a new one.
 
-    `noun` is what a sentence counts it as (several of them), "" for one that no sentence counts; `tally` the
-    sum of the report that it counts in, `section` the table of the report that holds its `row`, "" for none.
+    `noun` names several of them in a sentence, "" where no sentence counts them. `tally` is the sum of the
+    report that it counts in; `section` is the table of the report that holds its `row`, "" for none.
     """
 
     __slots__ = ()
@@ -112,18 +115,18 @@ class State(ABC):
 
     @property
     def component(self) -> str:
-        """The ISO 230-1 name of the error that all readings are of, "" where they are of several."""
+        """The ISO 230-1 name of the error that all its readings measure, "" for several errors."""
         return ""
 
     @property
     def label(self) -> str:
-        """Its file, or what stands for it."""
+        """Its file, or its noun where it has none."""
         return self.observation.source or self.noun
 
     @property
     @abstractmethod
     def count(self) -> int:
-        """How many readings, as people count them."""
+        """The number of its readings, as a report counts them."""
 
     @abstractmethod
     def block(self, parameters: Parameters, theta: Array) -> Block:
@@ -131,19 +134,19 @@ class State(ABC):
         as they are here. Raises ConfigError and CannotCompute."""
 
     def step(self, block: Block, theta: Array) -> Advance:
-        """How its own unknowns move with a solution."""
+        """How its own unknowns change with a solution."""
         return STILL
 
     def slips(self, block: Block, theta: Array, settled: bool) -> Sequence[Outlier]:
-        """Readings that do not fit a solution; `settled` says that no observation moves any more."""
+        """Readings that do not fit a solution; `settled` says that all own unknowns have converged."""
         return ()
 
     def moved(self, step: Advance, slips: Sequence[Outlier]) -> State:
-        """After a step and without readings."""
+        """After a step and without the readings of `slips`."""
         return self
 
     def scatter(self) -> str | None:
-        """A sentence where runs spread by more than is stated."""
+        """A message where runs spread by more than is stated."""
         return None
 
     def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
@@ -165,15 +168,15 @@ class Result(Generic[S]):
 
     @classmethod
     def of(cls, state: S, block: Block, theta: Array) -> Result[S]:
-        return cls(state, *left(block, theta))
+        return cls(state, *residual_and_chi_square(block, theta))
 
     def row(self) -> dict[str, Any]:
         return self.state.row(self.residual, self.chi_square)
 
 
 class Scattered(Observation):
-    """Readings at places all over the volume: `axis_mm` (n, 3) axis positions, `tool_mm` (n, 3) the vectors
-    to the reflector. A smooth field beside the curves is looked for in these."""
+    """Readings at positions all over the volume: `axis_mm` (n, 3) axis positions, `tool_mm` (n, 3) the vectors
+    to the reflector. The search for a smooth field beside the curves uses these."""
 
     __slots__ = ()
     axis_mm: Array
@@ -200,22 +203,22 @@ class ScatteredState(State):
     def block(self, parameters: Unknowns, theta: Array) -> Block: ...
 
     @abstractmethod
-    def spread_over_rows(self, places: Index) -> Index:
-        """A number of each place (n,), from 1, as that of each row of the block; 0 for rows of no place."""
+    def spread_over_rows(self, numbers: Index) -> Index:
+        """A number of each point (n,), from 1, as that of each row of the block; 0 for rows of no point."""
 
 
 T = TypeVar("T", bound=Scattered)
 
 
-def left(block: Block, theta: Array) -> tuple[Array, float]:
+def residual_and_chi_square(block: Block, theta: Array) -> tuple[Array, float]:
     """Residuals of a block and the sum of squares of the standardised ones."""
     _, residual, sigma = residuals_of(block, theta)
     return residual, float(np.sum((residual / sigma) ** 2))
 
 
 def slips_of(block: Block, theta: Array, source: str, rows: Index, word: str) -> list[Outlier]:
-    """Places whose residual is no noise, the worst ones first; `rows` (n,) are their lines in the file, and
-    the block has as many rows for each."""
+    """Points whose residual is larger than noise, the worst ones first; `rows` (n,) are their lines in the
+    file, and the block has as many rows for each."""
     _, residual, sigma = residuals_of(block, theta)
     rest = residual.reshape(len(rows), -1)
     off = np.abs(residual / sigma).reshape(rest.shape).max(axis=1)
@@ -228,7 +231,7 @@ def slips_of(block: Block, theta: Array, source: str, rows: Index, word: str) ->
 
 
 def without(cloud: T, rows: Index, slips: Sequence[Outlier]) -> T:
-    """The places whose lines `rows` (n,) are not those of slips."""
+    """The points whose lines `rows` (n,) are not those of slips."""
     use = ~np.isin(rows, [slip.row for slip in slips])
     columns = {f.name: getattr(cloud, f.name) for f in dataclasses.fields(cloud)}  # type: ignore[arg-type]
     kept = {
@@ -240,7 +243,7 @@ def without(cloud: T, rows: Index, slips: Sequence[Outlier]) -> T:
 
 
 def scatter_words(label: str, noise: Noise, sigma: float, unit: str, scale: float) -> str | None:
-    """What is wrong where runs spread by more than the stated `sigma`; `scale` takes it to `unit`."""
+    """A message where runs spread by more than the stated `sigma`; `scale` converts to `unit`."""
     if noise.spread is None or sigma <= 0.0 or noise.spread <= SCATTER * sigma:
         return None
     return (
@@ -250,7 +253,7 @@ def scatter_words(label: str, noise: Noise, sigma: float, unit: str, scale: floa
 
 
 def unit_of(name: str) -> tuple[str, float]:
-    """The unit in which people read a component, and the factor to it."""
+    """The unit in which a report shows a component, and the factor to it."""
     return ("urad", 1.0 / RAD_PER_URAD) if name[1] in "ABC" else ("um", UM_PER_MM)
 
 

@@ -1,7 +1,7 @@
 """Circles of a ball-bar as rows of the adjustment.
 
-A ball-bar has an unknown centre and radius, servo mismatch and lost motion of both axes: in one direction
-servo mismatch and squareness are one column, so squareness stays unseen then.
+A ball-bar has an unknown centre and radius, and servo mismatch and backlash of both axes. In one direction
+servo mismatch and squareness are one column, so squareness is then not observable.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from olp.core.units import AXES
 #: First and second axis of each plane, counter-clockwise seen from + of the third, and its squareness.
 PLANES = {"XY": (0, 1, "C0Y"), "YZ": (1, 2, "A0Z"), "ZX": (2, 0, "B0Z")}
 UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "lost_1", "lost_2")
-#: Readings this near to where an axis turns round are left out of the fit: there friction makes spikes.
+#: Readings this near to the reversal of an axis are left out of the fit: friction makes spikes there.
 SKIP_DEG = 2.5
+#: A circle needs so many readings.
 _FEWEST = 8
 
 #: All of UNKNOWNS of a circle but scale and square, which the machine's errors explain.
@@ -75,7 +76,7 @@ class Circles(Observation):
         return AXES[first], AXES[second]
 
     def reach(self, axis: int) -> Array:
-        return np.asarray(circle_places(self)[:, axis])
+        return np.asarray(circle_positions(self)[:, axis])
 
     def start(self, noise: Noise | None = None) -> CirclesState:
         return CirclesState(self, Noise(self.sigma, 0.0, None))
@@ -83,7 +84,7 @@ class Circles(Observation):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CirclesState(AlongState):
-    """Circles in an adjustment. One row a reading away from the reversals."""
+    """Circles in an adjustment. One row per reading away from the reversals."""
 
     observation: Circles
     noise: Noise
@@ -110,20 +111,20 @@ def columns(circles: Circles) -> Array:
     ))  # fmt: skip
 
 
-def circle_places(circles: Circles) -> Array:
+def circle_positions(circles: Circles) -> Array:
     """(n, 3) commanded axis positions."""
     return np.asarray(np.array(circles.centre_mm) + circles.radius_mm * _outward(circles))
 
 
 def _outward(circles: Circles) -> Array:
     first, second, _ = PLANES[circles.plane]
-    out = np.zeros((len(circles.angle_rad), 3))
-    out[:, first], out[:, second] = np.cos(circles.angle_rad), np.sin(circles.angle_rad)
-    return out
+    outward = np.zeros((len(circles.angle_rad), 3))
+    outward[:, first], outward[:, second] = np.cos(circles.angle_rad), np.sin(circles.angle_rad)
+    return outward
 
 
 def circle_used(circles: Circles) -> np.ndarray:
-    """(n,) readings away from where an axis turns round: there friction makes spikes."""
+    """(n,) whether a reading is away from the reversals, where friction makes spikes."""
     quarter = np.abs((circles.angle_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4)
     return np.asarray(quarter > np.radians(SKIP_DEG))
 
@@ -132,7 +133,7 @@ def circle_block(circles: Circles, parameters: Unknowns) -> Block:
     """The readings of all circles about one centre, one row each. Raises ConfigError."""
     if circles.sigma <= 0.0:
         raise ConfigError(
-            f"circle {circles.plane} states no uncertainty; expected sigma_um", file=circles.source
+            f"circle {circles.plane}: no uncertainty is stated; expected sigma_um", file=circles.source
         )
     used = circle_used(circles)
     if used.sum() < 2 * len(UNKNOWNS):
@@ -143,6 +144,6 @@ def circle_block(circles: Circles, parameters: Unknowns) -> Block:
         )
     free = columns(circles)[:, _NUISANCE]
     return along_block(
-        circle_places(circles)[used], _outward(circles)[used], circles.tool_mm, circles.value[used],
+        circle_positions(circles)[used], _outward(circles)[used], circles.tool_mm, circles.value[used],
         circles.sigma, free[used], [], parameters, circles.source or f"circle {circles.plane}",
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Readings of a laser along face and body diagonals as rows of the adjustment.
 
-The laser has an unknown zero, drift and scale, and the lost motion of the diagonal as a whole is free.
+The laser has an unknown zero, drift and scale, and the backlash of the diagonal as a whole is free.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Diagonal(Observation):
     def __post_init__(self) -> None:
         length = self.length_mm
         if not np.isfinite(length) or length <= 0.0:
-            raise ConfigError("diagonal: start and end are one place", file=self.source)
+            raise ConfigError("diagonal: start_mm and end_mm are equal; expected two positions", file=self.source)
         if np.count_nonzero(np.abs(self.unit) > 1e-9) < 2:
             raise ConfigError(
                 f"diagonal: only {self.name.strip('0')} moves; expected a diagonal in two or three axes",
@@ -72,7 +72,7 @@ class Diagonal(Observation):
     @property
     def name(self) -> str:
         """As ISO 230-6 names diagonals: P or N for each axis as it goes up in the last axis that moves; 0
-        for an axis that stands."""
+        for an axis that does not move."""
         u = self.unit
         moving = np.flatnonzero(np.abs(u) > 1e-9)
         u = u * np.sign(u[moving[-1]])
@@ -84,8 +84,8 @@ class Diagonal(Observation):
 
     def elongation(self) -> tuple[float, float]:
         """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty:
-        from the scatter of the readings (`sigma` where that is more) or, where that is larger, from how far
-        the means of the targets are off the line."""
+        from the scatter of the readings (`sigma` where that is more) or, where that is larger, from the
+        deviations of the target means from the line."""
         x = self.distance_mm - self.distance_mm.mean()
         spread = float(x @ x)
         if spread == 0.0:
@@ -100,7 +100,7 @@ class Diagonal(Observation):
         return slope, max(max(noise, self.sigma) / np.sqrt(spread), bow / apart)
 
     def reach(self, axis: int) -> Array:
-        return np.asarray(diagonal_places(self)[:, axis])
+        return np.asarray(diagonal_positions(self)[:, axis])
 
     def start(self, noise: Noise | None = None) -> DiagonalState:
         return DiagonalState(self, noise_of_diagonal(self))
@@ -108,7 +108,7 @@ class Diagonal(Observation):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiagonalState(AlongState):
-    """A diagonal in an adjustment, with the noise of its readings. One row a reading."""
+    """A diagonal in an adjustment, with the noise of its readings. One row per reading."""
 
     observation: Diagonal
     noise: Noise
@@ -129,13 +129,13 @@ class DiagonalState(AlongState):
         return scatter_words(taken.source or "diagonal", self.noise, taken.sigma, "um", UM_PER_MM)
 
 
-def diagonal_places(diagonal: Diagonal) -> Array:
+def diagonal_positions(diagonal: Diagonal) -> Array:
     """(n, 3) commanded axis positions."""
     return np.asarray(np.array(diagonal.start_mm) + diagonal.distance_mm[:, None] * diagonal.unit)
 
 
 def noise_of_diagonal(diagonal: Diagonal) -> Noise:
-    """From repeated runs and what is stated, as of a line. Raises ConfigError where neither tells."""
+    """From repeated runs and what is stated, as of a line. Raises ConfigError where both are missing."""
     if diagonal.sigma <= 0.0 and len(np.unique(diagonal.run)) < 2:
         raise ConfigError(
             f"diagonal {diagonal.name} has no repeated readings and states no sigma; expected at least two "
@@ -164,6 +164,6 @@ def diagonal_block(diagonal: Diagonal, parameters: Unknowns, noise: Noise) -> Bl
         believed += [(ramp, noise.drift) for ramp in drift_ramps(as_line).T]
     along = np.tile(diagonal.unit, (n, 1))
     return along_block(
-        diagonal_places(diagonal), along, diagonal.tool_mm, diagonal.value, noise.sigma,
+        diagonal_positions(diagonal), along, diagonal.tool_mm, diagonal.value, noise.sigma,
         np.stack(free, axis=1), believed, parameters, diagonal.source or f"diagonal {diagonal.name}",
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""Lengths from stations that nobody surveyed (sequential multilateration) as rows of the adjustment.
+"""Lengths from stations of unknown position (sequential multilateration) as rows of the adjustment.
 
-A tracking interferometer reads |tip - station| less a dead length. Both are unknowns of one station; the
-first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^2, then Gauss and Newton.
+A tracking interferometer reads |tip - station| less a dead length; station and dead length are unknown. The
+first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^2, then Gauss-Newton follows.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.units import UM_PER_MM
 
+#: Readings whose rows are built at once, to limit memory.
 CHUNK = 4000
-#: Gauss and Newton have arrived where no station moves by more than this.
+#: The Gauss-Newton iteration has converged where no station moves by more than this.
 STILL_MM = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lengths(Scattered):
-    """Lengths that a tracking interferometer read from one station, whose place and dead length nobody knows.
+    """Lengths that a tracking interferometer read from one station of unknown position and dead length.
 
     `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
     point to the reflector, `length_mm` (n,) the readings, `sigma_mm` (n,) or one number their standard
@@ -81,7 +82,7 @@ class Lengths(Scattered):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Station:
-    """Where a station is thought to be, in the machine's frame, and its dead length."""
+    """The estimated position of a station, in the machine's frame, and its dead length."""
 
     place_mm: Array
     dead_mm: float
@@ -92,7 +93,7 @@ class Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LengthsState(ScatteredState):
-    """Lengths in an adjustment, and where their station is thought to be."""
+    """Lengths in an adjustment, and the estimate of their station."""
 
     noun = "lengths"
     tally = "lengths"
@@ -111,7 +112,7 @@ class LengthsState(ScatteredState):
         return Advance(values, bool(np.abs(values[:3]).max() < STILL_MM))
 
     def slips(self, block: Block, theta: Array, settled: bool) -> Sequence[Outlier]:
-        # before the stations stand still, a residual may be theirs
+        # before the stations have converged, a residual may come from them
         if not settled:
             return ()
         return slips_of(block, theta, self.observation.source, self.observation.row, "length")
@@ -120,8 +121,8 @@ class LengthsState(ScatteredState):
         kept = without(self.observation, self.observation.row, slips)
         return LengthsState(kept, self.station.moved(step.values))
 
-    def spread_over_rows(self, places: Index) -> Index:
-        return places
+    def spread_over_rows(self, numbers: Index) -> Index:
+        return numbers
 
     def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
         return {
@@ -134,20 +135,20 @@ class LengthsState(ScatteredState):
 
 
 def first_station(lengths: Lengths) -> Station:
-    """The closed-form guess, as if the machine had no errors. Raises CannotCompute where the points leave a
-    choice."""
+    """The closed-form guess, as if the machine had no errors. Raises CannotCompute where the points do
+    not determine it."""
     tip = lengths.axis_mm + lengths.tool_mm
     centre = tip.mean(axis=0)
     q, length = (tip - centre) / 1000.0, lengths.length_mm / 1000.0
     table = np.column_stack([2.0 * q, 2.0 * length, np.ones(len(q))])
     right = (q**2).sum(axis=1) - length**2
-    found, _, rank, _ = np.linalg.lstsq(table, right, rcond=1e-9)
+    solution, _, rank, _ = np.linalg.lstsq(table, right, rcond=1e-9)
     if rank < 5:
         raise CannotCompute(
             f"the points of {lengths.source or 'a station'} lie in one plane or are too few; expected points "
             "all over the volume"
         )
-    return Station(1000.0 * found[:3] + centre, 1000.0 * float(found[3]))
+    return Station(1000.0 * solution[:3] + centre, 1000.0 * float(solution[3]))
 
 
 def lengths_block(lengths: Lengths, parameters: Unknowns, theta: Array, station: Station) -> Block:

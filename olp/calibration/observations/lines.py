@@ -1,6 +1,6 @@
 """Lines and squares as rows of the adjustment.
 
-A line's zero is not known, nor is the slope of a straightness: that of the line it was read against. Two
+The zero of a line is not known, nor is the slope of a straightness, which contains that of its reference. Two
 lines that were read against the legs of one square share one such slope and the square's own error. A
 laser's wavelength scales a positioning line. All readings of a line drift together: a continuous function
 of time, linear during each run.
@@ -37,9 +37,9 @@ from olp.core.units import AXES
 Reference = Literal["functional-point", "table"]
 #: Targets this close are one.
 SAME_MM = 0.05
-#: No instrument reads better than this: 10 nm, 10 nrad.
+#: No instrument reads better than this (mm, rad): 10 nm, 10 nrad.
 LEAST = 1e-5, 1e-8
-#: What an instrument may drift in a run where one run alone cannot tell: 2 um, 2 urad.
+#: Drift of an instrument over a run, assumed where there is one run only (mm, rad): 2 um, 2 urad.
 DRIFT = 2e-3, 2e-6
 
 
@@ -51,11 +51,11 @@ class Line(Observation):
     axis is its last letter. `target_mm` (n,) axis positions, `value` (n,) in mm or rad, `run` (n,) from 1,
     `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` is where the other axes
     stood (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference` "table"
-    the reflector stayed fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
+    the reflector was fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
     straightness. Straightness lines that name the same `square` were read against its two legs.
     `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
-    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 is not known: the spread of the runs
-    tells. `source` is the file and `row` (n,) the line of each reading in it. Raises ConfigError.
+    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then
+    follows from the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it. Raises ConfigError.
     """
 
     component: str
@@ -117,7 +117,7 @@ class Line(Observation):
 
     def screened(self) -> Screened:
         """Without readings far outside the spread of their repetitions, and the noise of the others. Raises
-        ConfigError where neither repetitions nor the line tell the noise."""
+        ConfigError where neither repetitions nor the line give the noise."""
         return _screened(self)
 
     def start(self, noise: Noise | None = None) -> LineState:
@@ -126,7 +126,7 @@ class Line(Observation):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineState(State):
-    """A line in an adjustment, with the noise of its readings. One row a reading."""
+    """A line in an adjustment, with the noise of its readings. One row per reading."""
 
     noun = "lines"
     observation: Line
@@ -183,7 +183,7 @@ class Square:
 def noise_of(line: Line) -> Noise:
     """From the spread of repeated readings and, where there are none, from what the line states.
 
-    Raises ConfigError where neither tells.
+    Raises ConfigError where both are missing.
     """
     groups = group_of(line)
     n, several = len(line.value), len(np.unique(line.run)) > 1
@@ -191,7 +191,7 @@ def noise_of(line: Line) -> Noise:
     spread: float | None = None
     drift = 0.0
     if several:
-        # the mean of each target and direction is taken out of both sides: what is left is the drift
+        # the mean of each target and direction is removed on both sides, so the ramps describe the drift
         count = int(groups.max()) + 1
         own = ramps - _means(ramps, groups, count)[groups]
         value = line.value - _means(line.value[:, None], groups, count)[groups, 0]
@@ -199,7 +199,7 @@ def noise_of(line: Line) -> Noise:
         free = n - count - int(rank)
         if free >= 3:
             rest = value - own @ steps
-            # by the median, so that one slip of the hand does not blunt all readings
+            # from the median, so that one slip does not enlarge the noise of all readings
             robust = 1.4826 * float(np.median(np.abs(rest))) * np.sqrt(n / free)
             spread = min(float(np.sqrt(rest @ rest / free)), 1.3 * robust)
             drift = float(np.sqrt(np.mean(steps**2)))
@@ -236,7 +236,7 @@ def targets_of(line: Line) -> Array:
 
 
 def drift_ramps(line: Line) -> Array:
-    """(n, runs) columns: each rises from 0 to 1 during one run and stays there."""
+    """(n, runs) columns: each rises from 0 to 1 during one run and is 1 after it."""
     index = np.arange(len(line.run), dtype=float)
     starts = np.concatenate([[0], np.flatnonzero(np.diff(line.run)) + 1, [len(line.run)]])
     return np.stack(
@@ -267,7 +267,7 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
         row, tool = AXES.index(line.component[1]), np.array(line.tool_mm)
         parts = []
         for other in range(3):
-            # what stands still still turns what moves: a constant angle tilts the line of an axis it carries
+            # an axis at rest still has an angle there, and this tilts the line of an axis that it carries
             own = other == axis
             on_table = own and line.reference == "table"
             where = side if own else None
@@ -326,8 +326,8 @@ def _part(line: Line, use: np.ndarray) -> Line:
 
 
 def _about_group(line: Line) -> Array:
-    """(n,) deviation from the others of the same target and direction, freed of the level of its run; zero
-    where fewer than three were read."""
+    """(n,) deviation from the others of the same target and direction, with the level of its run removed;
+    zero where fewer than three were read."""
     group = group_of(line)
     rest = line.value.copy()
     for _ in range(3):

@@ -1,7 +1,7 @@
-"""All readings of one calibration, in the one sense of this package: actual minus commanded, of the tool
-relative to the workpiece, right-handed, mm and rad, by axis position.
+"""All readings of one calibration, in the sign convention of this package: actual minus commanded, of the
+tool relative to the workpiece, right-handed, mm and rad, by axis position.
 
-Readers turn units, senses and instruments' habits into observations; nothing after them knows another sense.
+Readers convert units and the conventions of instruments; everything after them uses this convention only.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ T = TypeVar("T", bound=Observation)
 
 @dataclass(frozen=True, slots=True)
 class MapWish:
-    """That errors which no rigid bodies make are to be mapped: whether the readings scale the stated noise,
-    and what interpolation of the map may lose, in mm."""
+    """Asks for a map of errors that are not rigid. `noise` says whether the readings scale the stated noise,
+    `within_mm` how far interpolation of the map may be off."""
 
     noise: Literal["learnt", "stated"] = "learnt"
     within_mm: float = 2e-4
@@ -29,10 +29,10 @@ class MapWish:
 
 @dataclass(frozen=True, slots=True)
 class Measurements:
-    """All readings of one calibration, as taken: what `fit` takes.
+    """All readings of one calibration, as taken; the input of `fit`.
 
     `observations` are of any kinds; their order is that of the report. `map` asks for a map of what is not
-    rigid. `periods_mm` are the periods of screws and scales by axis, where cyclic errors are looked for;
+    rigid. `periods_mm` are the periods of screws and scales by axis, for which cyclic errors are fitted;
     `active_during_measurement` are the errors that the control corrected then.
     """
 

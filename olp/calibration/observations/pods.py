@@ -1,8 +1,8 @@
-"""Directions from stations whose poses nobody knows (theodolites, angular pods) as rows of the adjustment.
+"""Directions from stations of unknown pose (theodolites, angular pods) as rows of the adjustment.
 
-Each pod reads azimuth and elevation of the reflector in its own frame. Angles alone leave the scale of
-everything open; one known distance between two pods closes it. Poses start from the directions of the nominal
-points and follow by Gauss and Newton.
+Each pod reads azimuth and elevation of the reflector in an unknown instrument frame. Angles alone do not
+determine the scale; one known distance between two pods does. Poses start from the directions of the nominal
+points and are iterated by Gauss-Newton.
 """
 
 from __future__ import annotations
@@ -28,23 +28,28 @@ from olp.core.errors import CannotCompute, ConfigError
 from olp.core.rigid_fit import fit_points, rotation_of
 from olp.core.units import RAD_PER_URAD
 
+#: Points whose rows are built at once, to limit memory.
 CHUNK = 2000
-#: Gauss and Newton have arrived where no pod moves by more than this.
+#: The Gauss-Newton iteration has converged where no pod moves by more than this.
 STILL_MM = 1e-5
-#: Turns of a pod count per metre of lever, so that all unknowns are of one size.
+#: Turns of a pod are multiplied by this lever arm (1 m), so that all unknowns have one size.
 LEVER_ARM_MM = 1000.0
-_STEPS, _AROUND = 30, (-0.7, 0.5, 1.7)
-#: A pose whose directions miss the nominal points by more than this (rad) is no pose.
-_FOUND_RAD = 2e-3
+#: Iterations of a first pose, at most.
+_STEPS = 30
+#: Where a pod may start along each axis: shares of the extent of the points, from their lower end.
+_AROUND = (-0.7, 0.5, 1.7)
+#: A pose is refused where its directions miss the nominal points by more than this (rad, rms).
+_LARGEST_MISS_RAD = 2e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pods(Scattered):
-    """Directions in which pods or theodolites saw the reflector, each in its own frame that nobody knows.
+    """Directions to the reflector from pods or theodolites, each in its own unknown instrument frame.
 
     `axis_mm` (n, 3) and `tool_mm` (n, 3) or (3,) as for Points; `azimuth_rad` and `elevation_rad` (n, k) of k
-    pods, `sigma` the standard uncertainty of an angle in rad. `baselines` are known distances: (pod, pod from
-    0, mm, standard uncertainty in mm); without one nobody knows the scale. Raises ConfigError.
+    pods, `sigma` the standard uncertainty of an angle in rad. `baselines` are known distances: (pod, pod, mm,
+    standard uncertainty in mm), pods counted from 0. Without one the scale is not observable. Raises
+    ConfigError.
     """
 
     axis_mm: Array
@@ -94,20 +99,20 @@ class Pods(Scattered):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Place of a pod, and the rotation that takes directions of the machine's frame into the pod's."""
+    """Position of a pod, and the rotation that takes directions of the machine's frame into the pod's."""
 
     place_mm: Array
     rotation: Array
 
     def moved(self, step: Array) -> Pose:
-        """After a shift in mm and a turn in rad times LEVER_MM, in the machine's frame."""
+        """After a shift in mm and a turn in rad times LEVER_ARM_MM, in the machine's frame."""
         return Pose(self.place_mm + step[:3], self.rotation @ rotation_of(-step[3:] / LEVER_ARM_MM))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PodsState(ScatteredState):
-    """Directions in an adjustment, and the poses of their pods. Two rows (rad) of each point and pod, then
-    one (mm) of each baseline."""
+    """Directions in an adjustment, and the poses of their pods. Two rows (rad) per point and pod, then one
+    (mm) per baseline."""
 
     noun = "directions"
     tally = ""
@@ -133,9 +138,9 @@ class PodsState(ScatteredState):
         moved = [pose.moved(turn) for pose, turn in zip(self.poses, step.values, strict=True)]
         return PodsState(self.observation, tuple(moved))
 
-    def spread_over_rows(self, places: Index) -> Index:
+    def spread_over_rows(self, numbers: Index) -> Index:
         pods = self.observation
-        parts = [np.repeat(places[start : start + CHUNK], 2) for start in range(0, len(places), CHUNK)]
+        parts = [np.repeat(numbers[start : start + CHUNK], 2) for start in range(0, len(numbers), CHUNK)]
         whole = [np.tile(part, pods.count) for part in parts]
         return np.concatenate([*whole, np.zeros(len(pods.baselines), np.int64)])
 
@@ -156,7 +161,7 @@ def first_poses(pods: Pods) -> tuple[Pose, ...]:
 
 def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: Sequence[Pose]) -> Block:
     """The directions of all pods and the distances between them, linearised where the machine's errors are
-    `theta`. Six unknowns a pod: shift, and turn times LEVER_MM."""
+    `theta`. Six unknowns per pod: shift, and turn times LEVER_ARM_MM."""
     size, unknowns = parameters.size, 6 * pods.count
     tip = pods.axis_mm + pods.tool_mm
 
@@ -201,13 +206,13 @@ def _linear(tip: Array, pods: Pods, k: int, part: slice, pose: Pose) -> tuple[Ar
     own[:, 0, 0], own[:, 0, 1] = -y / flat**2, x / flat**2
     own[:, 1, 0], own[:, 1, 1], own[:, 1, 2] = -x * z / flat / square, -y * z / flat / square, flat / square
     rows = own @ pose.rotation
-    # a turn w of the pod moves what it sees by -w x ray
+    # a turn w of the pod changes its angles as a shift of the tip by -w x ray does
     turned = np.cross(rows, ray[:, None, :])
     return misses, rows, np.concatenate([-rows, turned / LEVER_ARM_MM], axis=2)
 
 
 def _resected(tip: Array, pods: Pods, k: int) -> Pose:
-    """The pose that sees the nominal points where they were seen; from starts all about them, the best."""
+    """The pose whose angles to the nominal points fit the readings best, from starts all around them."""
     azimuth, elevation = pods.azimuth_rad[:, k], pods.elevation_rad[:, k]
     flat = np.cos(elevation)
     seen = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
@@ -229,12 +234,12 @@ def _resected(tip: Array, pods: Pods, k: int) -> Pose:
                 break
         if best is None or cost < best[0]:
             best = cost, pose
-        if cost < 0.1 * _FOUND_RAD:
+        if cost < 0.1 * _LARGEST_MISS_RAD:
             break
-    if best is None or best[0] > _FOUND_RAD:
+    if best is None or best[0] > _LARGEST_MISS_RAD:
         raise CannotCompute(
-            f"pod {k + 1} of {pods.source or 'the pods'} sees the points from no place; look at its angles, "
-            "and whether their rows are those of the points"
+            f"pod {k + 1} of {pods.source or 'the pods'}: no pose fits its angles to the points; check the "
+            "angles, and that their rows are those of the points"
         )
     return best[1]
 

@@ -1,9 +1,9 @@
-"""Points in space as rows of the adjustment: places of the reflector in a frame that nobody knows.
+"""Points in space as rows of the adjustment: positions of the reflector in an unknown instrument frame.
 
-The best-fit rigid transform brings them near the machine's frame; what it leaves of the six motions of the
-frame, and of the instrument's scale, are unknowns of these points alone. Points in the machine's own frame
-have no such unknowns: what they show of the frame is the machine's. Balls of an artefact that the machine
-probed are such points too: commanded is where it found them, measured where its certificate has them.
+The best-fit rigid transform brings them near the machine's frame. Six small motions of the frame, and the
+instrument's scale, remain as unknowns of these points alone. Points in the machine's own frame have no such
+unknowns: a shift or turn that they show is an error of the machine. Balls of an artefact that the machine
+probed are such points too: commanded is where the machine touched them, measured is the certificate.
 """
 
 from __future__ import annotations
@@ -33,25 +33,24 @@ from olp.core.units import UM_PER_MM
 
 #: Points in the frame of the machine are nearer than this to where they were commanded.
 FRAME_MM = 10.0
-#: Points whose rows are made at once: 30 MB with 600 parameters.
+#: Points whose rows are built at once: 30 MB with 600 parameters.
 CHUNK = 2000
 #: No coordinate is known better than this: 1 nm.
 LEAST_MM = 1e-6
-#: Cosine of the elevation from which a pole counts as near.
+#: The cosine of an elevation counts as no less than this, near the vertical of the instrument.
 STEEP = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points(Scattered):
-    """Places of the reflector as one set-up of a tracker (or any instrument of coordinates) saw them.
+    """Positions of the reflector from one set-up of a tracker, or of any instrument of coordinates.
 
     `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
-    point to the reflector, `measured_mm` (n, 3) its places in the instrument's frame, which nobody knows, but
-    which is the same for all of these points; with `known_frame` they are in the frame of the machine, that
-    of the axis positions and tool vectors, as TCP points are against a simulation model. `sigma` is the
-    standard uncertainty of a coordinate in mm, or `covariance_mm2` (n, 3, 3) that of the coordinates of each
-    point, and `sigma` their root mean square; `sigma_scale` that of the instrument's scale (mm/mm). Raises
-    ConfigError.
+    point to the reflector, `measured_mm` (n, 3) its positions in one unknown instrument frame. With
+    `known_frame` they are in the frame of the machine, that of the axis positions and tool vectors; such as
+    TCP points against a simulation model. `sigma` is the standard uncertainty of a coordinate in mm. With
+    `covariance_mm2` (n, 3, 3), of the coordinates of each point, it is their root mean square. `sigma_scale`
+    is the standard uncertainty of the instrument's scale (mm/mm). Raises ConfigError.
     """
 
     axis_mm: Array
@@ -92,9 +91,9 @@ class Points(Scattered):
             off = np.linalg.norm(columns["measured_mm"] - axis - columns["tool_mm"], axis=1)
             if off.max() > FRAME_MM:
                 raise ConfigError(
-                    f"a point is {off.max():.4g} mm off where it was commanded, row "
-                    f"{columns['row'][int(off.argmax())]}; expected places in the machine's frame within "
-                    f'{FRAME_MM:g} mm, or no frame = "known"',
+                    f"row {columns['row'][int(off.argmax())]}: the point is {off.max():.4g} mm from its "
+                    f"commanded position; expected at most {FRAME_MM:g} mm in the machine's frame; check the "
+                    'coordinates, or remove frame = "known"',
                     file=self.source or None,
                 )
         for name, column in columns.items():
@@ -111,7 +110,7 @@ class Points(Scattered):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointsState(ScatteredState):
-    """Points in an adjustment: no unknowns but those that the rows eliminate. Three rows a point."""
+    """Points in an adjustment: no unknowns but those that the rows eliminate. Three rows per point."""
 
     noun = "points"
     tally = "points"
@@ -130,8 +129,8 @@ class PointsState(ScatteredState):
     def moved(self, step: Advance, slips: Sequence[Outlier]) -> PointsState:
         return PointsState(without(self.observation, self.observation.row, slips))
 
-    def spread_over_rows(self, places: Index) -> Index:
-        return np.repeat(places, 3)
+    def spread_over_rows(self, numbers: Index) -> Index:
+        return np.repeat(numbers, 3)
 
     def row(self, residual: Array, chi_square: float) -> dict[str, Any]:
         return {
@@ -144,8 +143,8 @@ class PointsState(ScatteredState):
 
 
 def points_block(points: Points, parameters: Unknowns) -> Block:
-    """The readings of one set-up: three rows a point, along the axes or, where the points have covariances of
-    their own, along the principal axes of each. Raises CannotCompute where they make no frame."""
+    """The readings of one set-up: three rows per point, along the axes or, where the points have covariances,
+    along the principal axes of each. Raises CannotCompute where they determine no frame."""
     nominal = points.axis_mm + points.tool_mm
     frame = _frame(points)
     deviation = frame(points.measured_mm) - nominal
@@ -180,8 +179,8 @@ def points_block(points: Points, parameters: Unknowns) -> Block:
 
 
 def deviations(points: Points) -> Array:
-    """(n, 3) measured less commanded places of the reflector in mm, in the frame that fits best, or in that
-    of the machine where it is known. Raises CannotCompute where the points make no frame."""
+    """(n, 3) measured less commanded positions of the reflector in mm, in the frame that fits best, or in
+    that of the machine where it is known. Raises CannotCompute where the points determine no frame."""
     return np.asarray(_frame(points)(points.measured_mm) - points.axis_mm - points.tool_mm)
 
 
@@ -196,8 +195,8 @@ def polar_points(
     *, sigma_mm: Array, sigma_rad: float, sigma_scale: float = 0.0, source: str = "",
     row: Index | None = None,
 ) -> Points:  # fmt: skip
-    """Distances and two angles from one station whose pose nobody knows, as points in its frame: `sigma_mm`
-    (n,) or one number of a distance, `sigma_rad` of an angle. Raises ConfigError."""
+    """Distances and two angles from one station of unknown pose, as points in its instrument frame:
+    `sigma_mm` (n,) or one number of a distance, `sigma_rad` of an angle. Raises ConfigError."""
     distance = np.asarray(distance_mm, float)
     flat, up = np.cos(elevation_rad), np.sin(elevation_rad)
     c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)

@@ -14,8 +14,9 @@ from olp.calibration.observations.base import Noise, State, rms
 from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
 
+#: Readings whose rows are built at once, to limit memory.
 CHUNK = 2000
-#: Columns of nuisances whose part of its own is below this share of the largest are combinations of others.
+#: Singular values of the nuisances below this share of the largest count as zero.
 _RANK = 1e-7
 
 
@@ -37,7 +38,7 @@ class AlongState(State):
     @property
     @abstractmethod
     def name(self) -> str:
-        """What it is called in the report."""
+        """Its name in the report."""
 
     @abstractmethod
     def block(self, parameters: Unknowns, theta: Array) -> Block: ...
@@ -57,8 +58,8 @@ def along_block(
     position: Array, along: Array, tool_mm: tuple[float, float, float], value: Array, sigma: float,
     free: Array, believed: list[tuple[Array, float]], parameters: Unknowns, label: str,
 ) -> Block:  # fmt: skip
-    """Rows `along` . error = value, with free nuisances and such of a believed standard deviation."""
-    # a part of a circle, or one direction, cannot tell all nuisances apart: what they span is what counts
+    """Rows `along` . error = value, with free nuisances and such with a prior standard deviation."""
+    # in a part of a circle, or in one direction, nuisances may depend on each other: only their span counts
     basis, size, _ = np.linalg.svd(free, full_matrices=False)
     local = [basis[:, size > _RANK * size[0]] * np.sqrt(len(value))]
     local += [column[:, None] for column, _ in believed]

@@ -1,4 +1,4 @@
-"""Values of squareness, as any instrument gave them, as rows of the adjustment."""
+"""Values of squareness, from any instrument, as rows of the adjustment."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 
-#: No value is better than this: 10 nrad.
+#: No value is more accurate than this: 10 nrad.
 LEAST_RAD = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
 class SquarenessReading(Observation):
-    """The squareness of two axes as some instrument gave it, already in the contract's sense.
+    """The squareness of two axes from any instrument, in the sign convention of this package.
 
     `component` is C0Y, B0Z or A0Z; `value_rad` the lean of the mean line of the later axis against that of
     the earlier one, as at the axis positions `line_mm` with tool vector `tool_mm`, over the lengths

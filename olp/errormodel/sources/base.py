@@ -1,9 +1,9 @@
 """What an error source is: all that `olp` knows of one kind of error of a machine, in one file.
 
-A source is registered in `registry`; nothing else names it. It holds the values of the error, its keys in
-calibration.toml, how it is read and written, its model, its uncertainty, and its lines in `olp inspect` and
-in the fingerprint. It opens no file: what its tables name comes through `Reading`, and what it writes goes
-through `Writing`.
+A source is registered in `registry`; nothing else names it. It holds the values of the error and its keys in
+calibration.toml, how it is read and written, its model and its uncertainty. It also holds its lines in
+`olp inspect` and in the fingerprint. It opens no file: what its tables name comes through `Reading`, and what
+it writes goes through `Writing`.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ class GridColumns(Protocol):
 
 class Reading(Protocol):
     """What a source learns from the calibration file beside its own tables. The methods raise ConfigError
-    where a file is wrong and InputError where it cannot be read; `each` and `one` gather both, so that all
-    problems are told at once."""
+    where a file is wrong and InputError where it cannot be read. `each` and `one` gather both, so that all
+    problems are reported at once."""
 
     @property
     def machine(self) -> str: ...
@@ -135,9 +135,9 @@ class Writing(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """What a model counts on: the chain such as "FXYZ", (3, 2) calibrated axis positions, whether it holds at
-    their faces, and the state of the machine while measuring. `loads` are errors per kg that stand for
-    themselves, such as those of beams."""
+    """What a model needs: the chain such as "FXYZ", (3, 2) calibrated axis positions, whether it holds at
+    their faces, and the state of the machine while measuring. `loads` are errors per kg that are bodies of
+    their own, such as those of beams."""
 
     chain: str
     datum_mm: Vector
@@ -158,13 +158,13 @@ class Example:
 
 
 class ErrorSource(Generic[Stated, Values]):
-    """One kind of error. What a source leaves out does what is said here: nothing.
+    """One kind of error. A method that a source leaves out does nothing.
 
     `key` is its key in calibration.toml and `schema` that key's type and pydantic field; `field` the field of
-    `Calibration` that holds its values, "" for `Calibration.more`. `correctable` is False for what is random:
-    it has no model. `covered` is False where no covariance speaks of its numbers: then they are no part of
-    the fingerprint, and a covariance holds whatever becomes of them. `numbers` are the kinds of
-    numbers that a covariance may hold of it.
+    `Calibration` that holds its values, "" for `Calibration.more`. `correctable` is False for a random error:
+    it has no model. `covered` is False where no covariance holds its numbers. Then they are no part of the
+    fingerprint, and a covariance holds whatever their values are. `numbers` are the kinds of numbers that a
+    covariance may hold of it.
     """
 
     key: str
@@ -181,18 +181,18 @@ class ErrorSource(Generic[Stated, Values]):
 
     def stated(self, file: Any) -> Stated:
         """Its tables in a file that has been read."""
-        found: Stated = getattr(file, self.key)
-        return found
+        tables: Stated = getattr(file, self.key)
+        return tables
 
     def named(self, values: Mapping[str, Any]) -> list[str]:
         """The files that it names, in a file as TOML gives it."""
         return []
 
-    def read(self, stated: Stated, found: Reading) -> Values:
+    def read(self, stated: Stated, reading: Reading) -> Values:
         """Its values, from its tables. Raises ConfigError, InputError."""
         raise NotImplementedError
 
-    def write(self, values: Values, out: Writing) -> None:
+    def write(self, values: Values, writing: Writing) -> None:
         """Its tables and files, so that they read back the same. Raises ConfigError."""
         raise NotImplementedError
 
@@ -201,7 +201,7 @@ class ErrorSource(Generic[Stated, Values]):
         return []
 
     def loads(self, values: Values, frame: Frame) -> list[ComponentTable]:
-        """Errors per kg that stand for themselves: the model of `compliance` evaluates them."""
+        """Errors per kg that are bodies of their own: the model of `compliance` evaluates them."""
         return []
 
     def models(self, values: Values, frame: Frame) -> list[ErrorModel]:
@@ -209,7 +209,7 @@ class ErrorSource(Generic[Stated, Values]):
         backlash and cyclic terms make together. Raises ConfigError."""
         return []
 
-    def sigmas(self, stated: Stated, found: Reading) -> Sigmas:
+    def sigmas(self, stated: Stated, reading: Reading) -> Sigmas:
         """The standard uncertainties that its tables and files state."""
         return {}
 
@@ -218,15 +218,15 @@ class ErrorSource(Generic[Stated, Values]):
         return []
 
     def fingerprint(self, values: Values, datum_mm: Vector) -> Iterator[str]:
-        """Lines that change with every number that a covariance speaks of."""
+        """Lines that change with every number that a covariance may hold."""
         return iter(())
 
     def inspect(self, values: Values, frame: Frame) -> dict[str, Any]:
-        """What `olp inspect` says, with units in the keys; lists of several sources add."""
+        """What `olp inspect` shows, with units in the keys; lists of several sources add."""
         return {}
 
     def inspect_axis(self, values: Values, axis: str) -> dict[str, Any]:
-        """What it says beside the limits of an axis."""
+        """What it shows beside the limits of an axis."""
         return {}
 
 
@@ -242,7 +242,8 @@ def vector(values: Sequence[float]) -> Vector:
 
 def line_at(stated: Position, datum_mm: Vector) -> Vector:
     """Where the other axes stood; an axis left out stood at the datum."""
-    return vector([datum if at is None else at for at, datum in zip(stated.values, datum_mm, strict=True)])
+    positions = zip(stated.values, datum_mm, strict=True)
+    return vector([datum if position is None else position for position, datum in positions])
 
 
 def line_key(line_mm: Vector | None, axis: str) -> dict[str, float] | None:

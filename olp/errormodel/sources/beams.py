@@ -74,20 +74,20 @@ class Beam:
     def bends(self, q: Array) -> tuple[Array, Array]:
         """Deflection in mm and slope in rad, both per kg and along `direction`, at axis positions q (n,)."""
         first, second = self.span_mm
-        sense = np.sign(second - first)
+        sign = np.sign(second - first)
         length = abs(second - first)
-        a = (q - first) * sense
+        a = (q - first) * sign
         b = length - a
         # N/kg over N/mm2 mm4
         unit = GRAVITY_N_KG / (self.youngs_modulus_GPa * 1e3 * self.second_moment_mm4)
         if self.support == "simple":
-            return unit * a**2 * b**2 / (3.0 * length), sense * unit * a * b * (b - a) / (3.0 * length)
+            return unit * a**2 * b**2 / (3.0 * length), sign * unit * a * b * (b - a) / (3.0 * length)
         if self.support == "fixed":
             return (
                 unit * a**3 * b**3 / (3.0 * length**3),
-                sense * unit * a**2 * b**2 * (b - a) / (2.0 * length**3),
+                sign * unit * a**2 * b**2 * (b - a) / (2.0 * length**3),
             )
-        return unit * a**3 / 3.0, sense * unit * a**2 / 2.0
+        return unit * a**3 / 3.0, sign * unit * a**2 / 2.0
 
     def problems(self, box_mm: Array) -> list[str]:
         low, high = box_mm[AXES.index(self.axis)]
@@ -193,12 +193,12 @@ class Beams(ErrorSource[list[BeamTable], tuple[Beam, ...]]):
         table += "section_mm = [40.0, 60.0, 5.0]\ntool_mm = [0.0, 0.0, -80.0]\n"
         return Example(f"{table}youngs_modulus_GPa = {modulus}\n")
 
-    def read(self, stated: list[BeamTable], found: Reading) -> tuple[Beam, ...]:
-        return tuple(_beam(table, found.datum_mm) for table in stated)
+    def read(self, stated: list[BeamTable], reading: Reading) -> tuple[Beam, ...]:
+        return tuple(_beam(table, reading.datum_mm) for table in stated)
 
-    def write(self, values: tuple[Beam, ...], out: Writing) -> None:
+    def write(self, values: tuple[Beam, ...], writing: Writing) -> None:
         for beam in values:
-            out.table(
+            writing.table(
                 "[[compliance_beam]]",
                 {
                     "axis": beam.axis,

@@ -74,29 +74,29 @@ class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]])
     def named(self, values: Mapping[str, Any]) -> list[str]:
         return files_of_tables(values, self.key)
 
-    def read(self, stated: list[ComplianceTable], found: Reading) -> tuple[ComponentTable, ...]:
+    def read(self, stated: list[ComplianceTable], reading: Reading) -> tuple[ComponentTable, ...]:
         def one(table: ComplianceTable) -> ComponentTable:
-            grid = found.components(table.file)
+            grid = reading.components(table.file)
             return ComponentTable(
                 axis=next(iter(grid.columns))[2],
                 arguments=grid.arguments,
                 knots_mm=grid.knots_mm,
                 columns=grid.columns,
-                line_mm=line_at(table.line_mm, found.datum_mm),
+                line_mm=line_at(table.line_mm, reading.datum_mm),
                 tool_mm=table.tool_mm,
                 reference=table.reference,
                 interpolation=table.interpolation,
                 name=f"compliance {table.file}",
             )
 
-        return found.each(self.key, stated, one)
+        return reading.each(self.key, stated, one)
 
-    def write(self, values: tuple[ComponentTable, ...], out: Writing) -> None:
+    def write(self, values: tuple[ComponentTable, ...], writing: Writing) -> None:
         for table in values:
-            out.table(
+            writing.table(
                 "[[compliance]]",
                 {
-                    "file": out.csv("load", _csv(table)),
+                    "file": writing.csv("load", _csv(table)),
                     "line_mm": line_key(table.line_mm, table.axis),
                     "tool_mm": floats(table.tool_mm),
                     "reference": None if table.reference == "functional-point" else table.reference,

@@ -20,7 +20,7 @@ from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.schema import Position, Table, Text, Triple
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit_text
-from olp.errormodel.entry import Entry, Numbers, Place, Slot, alone, component_acts
+from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, alone, component_acts
 from olp.errormodel.gridded import frozen, refuse
 from olp.errormodel.sources.base import (
     ErrorSource,
@@ -144,8 +144,8 @@ class Mean(Numbers):
         good = len(x) >= 2 and np.isfinite(x).all() and not np.any(np.diff(x) <= 0.0)
         return len(x) if good else 0
 
-    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
-        yield from component_acts(entry.name, 1.0, place)
+    def acts(self, entry: Entry, state: AxisState) -> Iterator[tuple[int, Column]]:
+        yield from component_acts(entry.name, 1.0, state)
 
     def weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
         x = entry.position_mm
@@ -161,9 +161,9 @@ class Mean(Numbers):
         """As stated at every position, wherever in a cell that is."""
         x, cells = entry.position_mm, _cells(entry)
         sigma = np.interp(q, x, entry.rest)
-        at = np.clip((q - x[0]) / (x[-1] - x[0]), 0.0, 1.0) * cells
-        cell = np.minimum(at.astype(np.int32), cells - 1)
-        share = at - cell
+        cells_passed = np.clip((q - x[0]) / (x[-1] - x[0]), 0.0, 1.0) * cells
+        cell = np.minimum(cells_passed.astype(np.int32), cells - 1)
+        share = cells_passed - cell
         size = sigma / np.sqrt(share**2 + (1.0 - share) ** 2)
         yield cell, size * (1.0 - share)
         yield cell + 1, size * share
@@ -174,9 +174,9 @@ class Half(Mean):
 
     kind = "half"
 
-    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
-        if place.play is not None:
-            yield from component_acts(entry.name, place.play, place)
+    def acts(self, entry: Entry, state: AxisState) -> Iterator[tuple[int, Column]]:
+        if state.play is not None:
+            yield from component_acts(entry.name, state.play, state)
 
 
 def _cells(entry: Entry) -> int:
@@ -206,30 +206,30 @@ class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
     def named(self, values: Mapping[str, Any]) -> list[str]:
         return files_of_tables(values, self.key)
 
-    def read(self, stated: list[CurveTable], found: Reading) -> tuple[Curve, ...]:
+    def read(self, stated: list[CurveTable], reading: Reading) -> tuple[Curve, ...]:
         def one(table: CurveTable) -> Curve:
-            columns = found.curve(table.file)
+            columns = reading.curve(table.file)
             return Curve(
                 axis=columns.axis,
                 position_mm=columns.position_mm,
                 columns={} if columns.forward is not None else columns.columns,
                 forward=columns.forward or {},
                 backward=columns.backward or {},
-                line_mm=line_at(table.line_mm, found.datum_mm),
+                line_mm=line_at(table.line_mm, reading.datum_mm),
                 tool_mm=table.tool_mm,
                 reference=table.reference,
                 interpolation=table.interpolation,
             )
 
-        return found.each(self.key, stated, one)
+        return reading.each(self.key, stated, one)
 
-    def write(self, values: tuple[Curve, ...], out: Writing) -> None:
+    def write(self, values: tuple[Curve, ...], writing: Writing) -> None:
         for curve in values:
-            sigma = {name: s for name in curve.names if (s := out.sigma(name)) is not None}
-            out.table(
+            sigma = {name: s for name in curve.names if (s := writing.sigma(name)) is not None}
+            writing.table(
                 "[[curves]]",
                 {
-                    "file": out.csv(curve.axis.lower(), _csv(curve, sigma)),
+                    "file": writing.csv(curve.axis.lower(), _csv(curve, sigma)),
                     "line_mm": line_key(curve.line_mm, curve.axis),
                     "tool_mm": floats(curve.tool_mm),
                     "reference": None if curve.reference == "functional-point" else curve.reference,
@@ -237,14 +237,14 @@ class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
                 },
             )
 
-    def sigmas(self, stated: list[CurveTable], found: Reading) -> Sigmas:
-        out: dict[str, Array | float] = {}
+    def sigmas(self, stated: list[CurveTable], reading: Reading) -> Sigmas:
+        sigmas: dict[str, Array | float] = {}
         for table in stated:
             # most files have none, and need not be parsed twice
-            if b"sigma_" in found.content(table.file):
-                sigma = found.curve(table.file).sigma
-                out |= {name: values for name, values in sigma.items() if values.any()}
-        return out
+            if b"sigma_" in reading.content(table.file):
+                sigma = reading.curve(table.file).sigma
+                sigmas |= {name: values for name, values in sigma.items() if values.any()}
+        return sigmas
 
     def entries(self, values: tuple[Curve, ...], sigmas: Sigmas) -> list[Entry]:
         return [
@@ -257,7 +257,7 @@ class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
     def fingerprint(self, values: tuple[Curve, ...], datum_mm: Vector) -> Iterator[str]:
         for curve in values:
             line = datum_mm if curve.line_mm is None else curve.line_mm
-            others = [at for at, axis in zip(line, AXES, strict=True) if axis != curve.axis]
+            others = [position for position, axis in zip(line, AXES, strict=True) if axis != curve.axis]
             read = f"{curve.reference} {curve.interpolation}"
             yield f"{curve.axis} {read} {digits(others)} {digits(curve.tool_mm)}"
             yield digits(curve.position_mm)
@@ -268,8 +268,8 @@ class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
     def inspect(self, values: tuple[Curve, ...], frame: Frame) -> dict[str, Any]:
         """The size of each of the 18 component errors."""
         return {
-            title: [_size(values, name, unit, scale) for name in COMPONENTS if name[1] in senses]
-            for title, senses, unit, scale in (
+            title: [_size(values, name, unit, scale) for name in COMPONENTS if name[1] in directions]
+            for title, directions, unit, scale in (
                 ("position_errors", "XYZ", "um", UM_PER_MM),
                 ("angular_errors", "ABC", "urad", 1.0 / RAD_PER_URAD),
             )

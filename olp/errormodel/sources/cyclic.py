@@ -19,7 +19,7 @@ from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.schema import Positive, Table, refusal
 from olp.core.units import RAD_PER_URAD, UM_PER_MM, in_unit, shifted
-from olp.errormodel.entry import Entry, Numbers, Place, Slot, component_acts
+from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, component_acts
 from olp.errormodel.gridded import refuse
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, digits
 
@@ -89,8 +89,8 @@ class Wave(Numbers):
     def count(self, entry: Entry) -> int:
         return 2 if entry.period_mm > 0.0 else 0
 
-    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
-        yield from component_acts(entry.name, 1.0, place)
+    def acts(self, entry: Entry, state: AxisState) -> Iterator[tuple[int, Column]]:
+        yield from component_acts(entry.name, 1.0, state)
 
     def weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
         angle = q * (2.0 * np.pi / entry.period_mm)
@@ -114,7 +114,7 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
         roll = f'[[cyclic]]\ncomponent = "EAZ"\nperiod_mm = 40.0\namplitude_urad = {15.0 * by}\n'
         return Example(f"{screw}{roll}phase_rad = 0.7\n")
 
-    def read(self, stated: list[CyclicTable], found: Reading) -> tuple[Cyclic, ...]:
+    def read(self, stated: list[CyclicTable], reading: Reading) -> tuple[Cyclic, ...]:
         return tuple(
             Cyclic(
                 table.component,
@@ -127,10 +127,10 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
             for table in stated
         )
 
-    def write(self, values: tuple[Cyclic, ...], out: Writing) -> None:
+    def write(self, values: tuple[Cyclic, ...], writing: Writing) -> None:
         for term in values:
             angular = term.component[1] in "ABC"
-            out.table(
+            writing.table(
                 "[[cyclic]]",
                 {
                     "component": term.component,
@@ -154,9 +154,9 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
                     f"amplitude_{unit}": term.amplitude * scale,
                 }
                 for term in values
-                if term.component[1] in senses
+                if term.component[1] in directions
             ]
-            for title, senses, unit, scale in (
+            for title, directions, unit, scale in (
                 ("position_errors", "XYZ", "um", UM_PER_MM),
                 ("angular_errors", "ABC", "urad", 1.0 / RAD_PER_URAD),
             )

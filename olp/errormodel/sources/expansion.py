@@ -130,33 +130,33 @@ class ScaleExpansion(ErrorSource[ThermalTable | None, Thermal | None]):
         part = f"workpiece_um_m_K = {23.0 * by}\nclamped_at_mm = [0.0, 10.0, -50.0]\n"
         return Example(f"[thermal]\n{scales}{part}")
 
-    def read(self, stated: ThermalTable | None, found: Reading) -> Thermal | None:
+    def read(self, stated: ThermalTable | None, reading: Reading) -> Thermal | None:
         if stated is None:
             return None
-        at, now = found.temperature_degC, found.temperatures_degC
+        calibrated_degC, now = reading.temperature_degC, reading.temperatures_degC
         return Thermal(
             scale_per_K=vector([shifted(getattr(stated, f"{axis}_scale_um_m_K"), -6) for axis in AXES]),
             fixed_at_mm=stated.fixed_at_mm,
             workpiece_per_K=shifted(stated.workpiece_um_m_K, -6),
             clamped_at_mm=stated.clamped_at_mm,
-            calibrated_at_degC=at,
-            scale_degC=vector([now.get(f"{axis}_scale", at) for axis in AXES]),
+            calibrated_at_degC=calibrated_degC,
+            scale_degC=vector([now.get(f"{axis}_scale", calibrated_degC) for axis in AXES]),
             workpiece_degC=now.get("workpiece", REFERENCE_DEGC),
         )
 
-    def write(self, values: Thermal | None, out: Writing) -> None:
+    def write(self, values: Thermal | None, writing: Writing) -> None:
         if values is not None:
-            write_table(values, out)
+            write_table(values, writing)
 
     def models(self, values: Thermal | None, frame: Frame) -> list[ErrorModel]:
         return [] if values is None else [ThermalExpansion.of(values, frame.box_mm, frame.hold)]
 
 
-def write_table(thermal: Thermal, out: Writing) -> None:
+def write_table(thermal: Thermal, writing: Writing) -> None:
     """The table [thermal], with room for the key `structure`."""
     scales = zip(AXES, thermal.scale_per_K, strict=True)
     fixed, clamped = thermal.fixed_at_mm, thermal.clamped_at_mm
-    out.table(
+    writing.table(
         "[thermal]",
         {
             **{f"{axis}_scale_um_m_K": in_unit(scale, -6) for axis, scale in scales},

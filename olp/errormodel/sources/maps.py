@@ -1,6 +1,6 @@
 """Measured deviation maps: the error of the tip over a grid of axis positions.
 
-A map knows nothing of orientation, so nothing of tools other than the one it was measured with.
+A map does not hold the orientation. So it holds for no tool but the one with which it was measured.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class DeviationMap:
     """Deviations of the tip (nx, ny, nz, 3) in mm over axis positions `knots_mm` (three arrays), measured
     with the tool vector `tool_mm`.
 
-    A "residual" map adds to the curves; a "total" one is all that was measured and stands in for them. An
-    axis in `holds_along` may have one level: the map is taken to be the same all along it. `sigma`, of the
-    shape of the values, are standard uncertainties in mm; of a residual map beside those of the curves.
+    A "residual" map adds to the curves; a "total" one is all that was measured and replaces them. An axis in
+    `holds_along` may have one level: the map is taken to be the same all along it. `sigma`, of the shape of
+    the values, are standard uncertainties in mm; those of a residual map come beside those of the curves.
     Raises ConfigError.
     """
 
@@ -80,15 +80,13 @@ class DeviationMap:
         for axis, knots in zip(AXES, self.knots_mm, strict=True):
             if len(knots) == 1 and axis not in self.holds_along:
                 problems.append(
-                    f"{self.name} has one level along {axis}, so it tells nothing of how the error changes "
-                    f'there; expected two levels or more, or holds_along = ["{axis}"] where the error is '
-                    f"known "
-                    "to be the same all along it"
+                    f"{self.name} has one level along {axis}; expected two levels or more, or "
+                    f'holds_along = ["{axis}"] if the error is known to be the same all along it'
                 )
             elif len(knots) > 1 and axis in self.holds_along:
                 problems.append(
-                    f"{self.name} has {len(knots)} levels along {axis}, and holds_along names it; expected "
-                    "one level, or the axis left out there"
+                    f"{self.name} has {len(knots)} levels along {axis}, and holds_along names {axis}; "
+                    "expected one level, or the axis left out of holds_along"
                 )
         return problems
 
@@ -139,12 +137,12 @@ class MapErrors(Boxed):
 
 class MapTable(Table):
     file: Text = Field(
-        description="the path of a CSV file with the columns X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um, a row "
-        "a node; and sigma_DX_um, sigma_DY_um, sigma_DZ_um where uncertainties are stated"
+        description="the path of a CSV file with the columns X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um, one row "
+        "per node; and sigma_DX_um, sigma_DY_um, sigma_DZ_um where uncertainties are stated"
     )
     kind: Literal["residual", "total"] = Field(
-        description='"residual" (what the curves leave; adds to them) or "total" (all that was measured; no '
-        "curves, squareness or cyclic errors beside it)"
+        description='"residual" (adds to the curves) or "total" (all that was measured; no curves, '
+        'squareness or cyclic errors beside it)'
     )
     tool_mm: Triple = Field(
         default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"
@@ -176,9 +174,9 @@ class Maps(ErrorSource[list[MapTable], tuple[DeviationMap, ...]]):
     def named(self, values: Mapping[str, Any]) -> list[str]:
         return files_of_tables(values, self.key)
 
-    def read(self, stated: list[MapTable], found: Reading) -> tuple[DeviationMap, ...]:
+    def read(self, stated: list[MapTable], reading: Reading) -> tuple[DeviationMap, ...]:
         def one(table: MapTable) -> DeviationMap:
-            grid = found.deviations(table.file)
+            grid = reading.deviations(table.file)
             order = [grid.arguments.index(axis) for axis in AXES]
 
             def rows(prefix: str) -> Array:
@@ -196,18 +194,21 @@ class Maps(ErrorSource[list[MapTable], tuple[DeviationMap, ...]]):
                 sigma=rows("sigma_") if "sigma_DX" in grid.columns else None,
             )
 
-        return found.each(self.key, stated, one)
+        return reading.each(self.key, stated, one)
 
-    def write(self, values: tuple[DeviationMap, ...], out: Writing) -> None:
+    def write(self, values: tuple[DeviationMap, ...], writing: Writing) -> None:
         for described in values:
             columns = {f"D{axis}_um": described.values[..., i] for i, axis in enumerate(AXES)}
             if described.sigma is not None:
                 columns |= {f"sigma_D{axis}_um": described.sigma[..., i] for i, axis in enumerate(AXES)}
-            text = {name: [in_unit_text(v, -3) for v in at.ravel().tolist()] for name, at in columns.items()}
-            out.table(
+            text = {
+                name: [in_unit_text(v, -3) for v in column.ravel().tolist()]
+                for name, column in columns.items()
+            }
+            writing.table(
                 "[[maps]]",
                 {
-                    "file": out.csv("map", grid_rows(AXES, described.knots_mm, text)),
+                    "file": writing.csv("map", grid_rows(AXES, described.knots_mm, text)),
                     "kind": described.kind,
                     "tool_mm": floats(described.tool_mm),
                     "interpolation": described.interpolation,

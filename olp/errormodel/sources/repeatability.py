@@ -37,14 +37,14 @@ class Repeatability(ErrorSource[RepeatabilityTable | None, Vector | None]):
     def example(self, by: float) -> Example:
         return Example(f"[repeatability]\nX_um = {0.8 * by}\nY_um = {0.5 * by}\n")
 
-    def read(self, stated: RepeatabilityTable | None, found: Reading) -> Vector | None:
+    def read(self, stated: RepeatabilityTable | None, reading: Reading) -> Vector | None:
         if stated is None:
             return None
         return vector([shifted(getattr(stated, f"{axis}_um"), -3) for axis in AXES])
 
-    def write(self, values: Vector | None, out: Writing) -> None:
+    def write(self, values: Vector | None, writing: Writing) -> None:
         if values is not None:
-            out.table(
+            writing.table(
                 "[repeatability]", {f"{a}_um": in_unit(s, -3) for a, s in zip(AXES, values, strict=True)}
             )
 

@@ -14,7 +14,7 @@ from olp.core.interpolation import Column
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.schema import NotNegative, Table
 from olp.core.units import RAD_PER_URAD, in_unit, shifted
-from olp.errormodel.entry import Entry, Numbers, Place, alone
+from olp.errormodel.entry import AxisState, Entry, Numbers, alone
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Sigmas, Writing, digits
 
 #: Angles C0Y, B0Z, A0Z in rad.
@@ -46,9 +46,9 @@ class Tilt(Numbers):
     kind = "squareness"
     names = SQUARENESS
 
-    def acts(self, entry: Entry, place: Place) -> Iterator[tuple[int, Column]]:
+    def acts(self, entry: Entry, state: AxisState) -> Iterator[tuple[int, Column]]:
         row, sign = _SHEAR[entry.name]
-        yield row, sign * (place.q - place.datum_mm)
+        yield row, sign * (state.q - state.datum_mm)
 
 
 class Squareness(ErrorSource[SquarenessTable, Angles]):
@@ -66,16 +66,16 @@ class Squareness(ErrorSource[SquarenessTable, Angles]):
         lines = (f"{n}_urad = {v}\nsigma_{n}_urad = {0.1 * v}\n" for n, v in angles.items())
         return Example("[squareness]\n" + "".join(lines))
 
-    def read(self, stated: SquarenessTable, found: Reading) -> Angles:
+    def read(self, stated: SquarenessTable, reading: Reading) -> Angles:
         return {name: shifted(getattr(stated, f"{name}_urad"), -6) for name in SQUARENESS}
 
-    def write(self, values: Angles, out: Writing) -> None:
-        out.table(
+    def write(self, values: Angles, writing: Writing) -> None:
+        writing.table(
             "[squareness]",
             {f"{name}_urad": in_unit(values.get(name, 0.0), -6) for name in SQUARENESS},
         )
 
-    def sigmas(self, stated: SquarenessTable, found: Reading) -> Sigmas:
+    def sigmas(self, stated: SquarenessTable, reading: Reading) -> Sigmas:
         sigma = {name: shifted(getattr(stated, f"sigma_{name}_urad"), -6) for name in SQUARENESS}
         return {name: value for name, value in sigma.items() if value}
 

@@ -31,9 +31,9 @@ from olp.errormodel.sources.expansion import Thermal, write_table
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A temperature sensor: at `reference_degC` its part causes no distortion; `range_degC` are the structure
-    temperatures that were identified, `lag_s` how slowly the structure follows; below 0 it leads the
-    sensor."""
+    """A temperature sensor. At `reference_degC` its part causes no distortion; `range_degC` are the structure
+    temperatures that were identified. `lag_s` is the time by which the structure lags the sensor, below 0 by
+    which it leads it."""
 
     name: str
     reference_degC: float
@@ -61,7 +61,7 @@ class Distortion:
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
     """Sensors and what their parts do. `temperatures_degC` are structure temperatures by sensor, None where
-    nobody has stated them: then the model adds nothing. Raises ConfigError."""
+    none are stated: then the model adds nothing. Raises ConfigError."""
 
     sensors: tuple[Sensor, ...]
     distortions: tuple[Distortion, ...]
@@ -75,7 +75,11 @@ class Structure:
 
     def _problems(self) -> list[str]:
         names = [sensor.name for sensor in self.sensors]
-        problems = [f"sensor {n} stands twice" for n in sorted(set(names)) if names.count(n) > 1]
+        problems = [
+            f"sensor {n} is defined twice; expected each sensor once"
+            for n in sorted(set(names))
+            if names.count(n) > 1
+        ]
         for sensor in self.sensors:
             numbers = (sensor.reference_degC, *sensor.range_degC, sensor.lag_s)
             if not np.all(np.isfinite(numbers)) or sensor.range_degC[1] < sensor.range_degC[0]:
@@ -86,23 +90,22 @@ class Structure:
             if d.component not in COMPONENTS or d.sensor not in names or not d.span_mm[0] < d.span_mm[1]:
                 problems.append(
                     f"distortion of {d.component} by {d.sensor}: expected an ISO 230-1 name, one of the "
-                    f"sensors "
-                    "and an ascending span"
+                    "sensors and an ascending span"
                 )
         return problems
 
     def at(self, temperatures_degC: Mapping[str, float]) -> Structure:
-        """The same at structure temperatures: all of them. Raises ConfigError."""
+        """This structure at temperatures of all its sensors' parts. Raises ConfigError."""
         names = [sensor.name for sensor in self.sensors]
         missing = [name for name in names if name not in temperatures_degC]
         unknown = sorted(set(temperatures_degC) - set(names))
         if missing or unknown:
-            what = f"no temperature of sensor {missing[0]}" if missing else f"{unknown[0]} is no sensor"
+            what = f"no temperature of sensor {missing[0]}" if missing else f"{unknown[0]} is not a sensor"
             raise ConfigError(f"{what}; expected a temperature of each of {', '.join(names)}")
         return replace(self, temperatures_degC=temperatures_degC)
 
     def settled(self, time_s: Array, sensors_degC: Mapping[str, Array], at_s: float | None) -> Structure:
-        """The same at the structure temperatures that a log leads to, at a time in it or at its end; the log
+        """This structure at the temperatures that a log leads to, at a time in it or at its end. The log
         starts settled. Raises ConfigError."""
         upto = len(time_s) if at_s is None else int(np.searchsorted(time_s, at_s, side="right"))
         if at_s is not None and not time_s[0] <= at_s <= time_s[-1]:
@@ -110,12 +113,12 @@ class Structure:
                 f"the time {at_s:g} s is not in the log of temperatures, {time_s[0]:g} to {time_s[-1]:g} s"
             )
         lags = {sensor.name: sensor.lag_s for sensor in self.sensors}
-        found = {
+        structure_degC = {
             name: float(lagged(time_s[:upto], values[:upto], lags[name])[-1])
             for name, values in sensors_degC.items()
             if name in lags
         }
-        return self.at(found)
+        return self.at(structure_degC)
 
     def outside(self) -> dict[str, float]:
         """The sensors whose structure temperature is outside the identified range."""
@@ -138,9 +141,9 @@ class Structure:
             name, value = next(iter(wrong.items()))
             low, high = ranges[name]
             raise ConfigError(
-                f"sensor {name}: the structure is at {value:.2f} degC, and was identified from {low:.2f} to "
-                f"{high:.2f} degC; log the drift there too, or take the end of the range with "
-                f"--outside-box hold"
+                f"sensor {name}: the structure is at {value:.2f} degC; expected a temperature in the identified "
+                f"range, {low:.2f} to {high:.2f} degC; log the drift there too, or take the end of the range "
+                "with --outside-box hold"
             )
         return {
             s.name: float(np.clip(stated[s.name], *s.range_degC)) - s.reference_degC for s in self.sensors
@@ -166,15 +169,15 @@ class Structure:
         )
 
     def cover_problems(self, box_mm: Array) -> list[str]:
-        out = {}
+        problems = {}
         for d in self.distortions:
             low, high = box_mm[AXES.index(d.component[2])]
             if d.span_mm[0] > low + COVER_MM or d.span_mm[1] < high - COVER_MM:
-                out[d.component] = (
+                problems[d.component] = (
                     f"the distortion of {d.component} is known from {d.span_mm[0]:g} to {d.span_mm[1]:g} mm; "
                     f"expected all of the box, {low:g} to {high:g} mm"
                 )
-        return list(out.values())
+        return list(problems.values())
 
     def components(self) -> Sequence[str]:
         """The components that it holds."""
@@ -186,13 +189,13 @@ Range = Annotated[tuple[float, float], Field(strict=False)]
 
 class SensorTable(Table):
     name: Text = Field(description="the name of the sensor, as in logs and job files")
-    reference_degC: float = Field(description="what it says where its part distorts nothing, in degC")
+    reference_degC: float = Field(description="its reading where its part distorts nothing, in degC")
     range_degC: Range = Field(
         description="the structure temperatures that were identified, [min, max] in degC"
     )
     lag_s: float = Field(
         default=0.0,
-        description="how slowly the structure follows the sensor, in s; below 0 the sensor is behind it",
+        description="the time by which the structure lags the sensor, in s; below 0 the sensor lags",
     )
 
 
@@ -274,27 +277,27 @@ class ThermalStructure(ErrorSource[str | None, Structure | None]):
         return Example(f'[thermal]\nstructure = "{name}"\n', {name: file}, {"beam": 24.0})
 
     def stated(self, file: Any) -> str | None:
-        found: str | None = None if file.thermal is None else file.thermal.structure
-        return found
+        name: str | None = None if file.thermal is None else file.thermal.structure
+        return name
 
     def named(self, values: Mapping[str, Any]) -> list[str]:
         name = values.get("thermal", {}).get("structure")
         return [name] if name else []
 
-    def read(self, stated: str | None, found: Reading) -> Structure | None:
+    def read(self, stated: str | None, reading: Reading) -> Structure | None:
         if stated is None:
             return None
-        make = lambda file: structure_of(found.document(file, ThermalFile))  # noqa: E731
-        return found.one(("thermal", "structure"), stated, make)
+        make = lambda file: structure_of(reading.document(file, ThermalFile))  # noqa: E731
+        return reading.one(("thermal", "structure"), stated, make)
 
-    def write(self, values: Structure | None, out: Writing) -> None:
+    def write(self, values: Structure | None, writing: Writing) -> None:
         if values is None:
             return
-        if out.find("[thermal]") is None:
-            write_table(Thermal(), out)
-        table = out.find("[thermal]")
+        if writing.find("[thermal]") is None:
+            write_table(Thermal(), writing)
+        table = writing.find("[thermal]")
         assert table is not None
-        table["structure"] = out.document("thermal", structure_tables(values, out.machine))
+        table["structure"] = writing.document("thermal", structure_tables(values, writing.machine))
 
     def models(self, values: Structure | None, frame: Frame) -> list[ErrorModel]:
         tables = () if values is None else values.tables(hold=frame.hold)
@@ -363,10 +366,11 @@ def _distortion(table: DistortionTable) -> Distortion:
 
 def _line(stated: Position, component: str) -> Vector:
     """Where the other axes stood; that of the component's own axis does not matter."""
-    missing = [a for a, at in zip(AXES, stated.values, strict=True) if at is None and a != component[2]]
+    positions = zip(AXES, stated.values, strict=True)
+    missing = [a for a, position in positions if position is None and a != component[2]]
     if missing:
         raise ConfigError(f"line_mm of {component} names no {missing[0]}; expected where each axis stood")
-    return vector([0.0 if at is None else at for at in stated.values])
+    return vector([0.0 if position is None else position for position in stated.values])
 
 
 def structure_tables(structure: Structure, machine: str) -> Iterator[tuple[str, dict[str, object]]]:

@@ -15,11 +15,12 @@ from olp.files.problems import Problem, config_error, nearest
 from olp.files.tables import unit_columns
 from olp.files.write import PathLike, Reader, read_bytes
 
+#: The errors of a deviation map.
 MAP_COLUMNS = ("DX_um", "DY_um", "DZ_um")
 SIGMA_COLUMNS = tuple(f"sigma_{name}" for name in MAP_COLUMNS)
-#: Positions this close are one level.
+#: In mm: positions this close are one level.
 LEVEL_MM = 1e-6
-#: So many missing nodes are named one by one.
+#: Missing nodes that are named one by one; further ones are counted.
 _NAMED = 6
 
 
@@ -34,11 +35,11 @@ class GridTable:
 
 
 def read_map(path: PathLike, read: Reader = read_bytes) -> GridTable:
-    """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, a row a node in any order, and standard
-    uncertainties `sigma_DX_um, sigma_DY_um, sigma_DZ_um` where they are stated; the columns DX, sigma_DX ..
-    of the result are in mm.
+    """Read a deviation map: `X_mm, Y_mm, Z_mm, DX_um, DY_um, DZ_um`, one row per node in any order. Standard
+    uncertainties `sigma_DX_um, sigma_DY_um, sigma_DZ_um` are optional.
 
-    Raises InputError where the file cannot be read, ConfigError with every problem and its line.
+    The columns DX, sigma_DX ... of the result are in mm. Raises InputError where the file cannot be read,
+    ConfigError with every problem and its line.
     """
     table = _parse(read(path), str(path), _map_problems)
     return GridTable(
@@ -48,9 +49,9 @@ def read_map(path: PathLike, read: Reader = read_bytes) -> GridTable:
 
 def read_component_grid(path: PathLike, read: Reader = read_bytes) -> GridTable:
     """Read component errors of one axis per kg: one to three columns of axis positions (`Y_mm`, `Z_mm`), then
-    `EZY_um_kg`, `EAY_urad_kg` ...; the columns of the result are in mm/kg and rad/kg by ISO 230-1 name.
+    `EZY_um_kg`, `EAY_urad_kg` and similar.
 
-    Raises as `read_map`.
+    The columns of the result are in mm/kg and rad/kg by ISO 230-1 name. Raises as `read_map`.
     """
     table = _parse(read(path), str(path), _component_problems)
     return GridTable(table.arguments, table.knots_mm, {n[:3]: v for n, v in table.columns.items()})
@@ -61,20 +62,20 @@ def _parse(data: bytes, file: str, problems_of: Callable[[int, Sequence[str]], l
     sheet = read_sheet(data, file, wanted)
     header, rows = sheet.header, sheet.rows
     if sheet.problems or not rows:
-        nothing = (sheet.line, "no rows follow the header; expected one a node")
+        nothing = (sheet.line, "no rows follow the header; expected one row per node")
         raise config_error(sheet.problems or [nothing], file)
     arguments = tuple(name[0] for name in header if name in _POSITIONS)
-    at = np.array([[row[header.index(f"{a}_mm")] for a in arguments] for _, row in rows])
-    knots, index = _levels(at)
-    found = _node_problems(arguments, knots, index, rows)
-    if found:
-        raise config_error(found, file)
+    position_mm = np.array([[row[header.index(f"{a}_mm")] for a in arguments] for _, row in rows])
+    knots, index = _levels(position_mm)
+    problems = _node_problems(arguments, knots, index, rows)
+    if problems:
+        raise config_error(problems, file)
     shape = tuple(len(k) for k in knots)
     columns = {}
-    for place, name in enumerate(header):
+    for column, name in enumerate(header):
         if name not in _POSITIONS:
             values = np.empty(shape)
-            values[tuple(index.T)] = [row[place] for _, row in rows]
+            values[tuple(index.T)] = [row[column] for _, row in rows]
             columns[name] = values
     return GridTable(arguments, knots, columns)
 
@@ -92,7 +93,7 @@ def _map_problems(line: int, header: Sequence[str]) -> list[Problem]:
         known = (*known, *SIGMA_COLUMNS)
     if not problems and missing:
         problems.append(
-            (line, f"there is no column {', '.join(missing)}; expected {', '.join(known)}, a row a node")
+            (line, f"there is no column {', '.join(missing)}; expected {', '.join(known)}, one row per node")
         )
     return problems
 
@@ -109,7 +110,7 @@ def _component_problems(line: int, header: Sequence[str]) -> list[Problem]:
         problems.append((line, "there is no error column; expected one such as EZX_um_kg or EBX_urad_kg"))
     if len(axes) > 1:
         problems.append(
-            (line, f"errors of the axes {' and '.join(axes)}; expected those of one axis: a file for each")
+            (line, f"errors of the axes {' and '.join(axes)}; expected those of one axis: one file per axis")
         )
     return problems
 
@@ -124,15 +125,15 @@ def _header_problems(line: int, header: Sequence[str], known: Sequence[str]) -> 
     return names(line, header, wrong)
 
 
-def _levels(at: Array) -> tuple[tuple[Array, ...], Index]:
+def _levels(position_mm: Array) -> tuple[tuple[Array, ...], Index]:
     """Ascending levels along each argument, and the (rows, arguments) number of each row's level."""
     knots = []
-    index = np.zeros(at.shape, np.int64)
-    for k in range(at.shape[1]):
-        found = np.unique(at[:, k])
-        first = np.concatenate([[True], np.diff(found) > LEVEL_MM])
-        knots.append(found[first])
-        index[:, k] = (np.cumsum(first) - 1)[np.searchsorted(found, at[:, k])]
+    index = np.zeros(position_mm.shape, np.int64)
+    for k in range(position_mm.shape[1]):
+        values = np.unique(position_mm[:, k])
+        first = np.concatenate([[True], np.diff(values) > LEVEL_MM])
+        knots.append(values[first])
+        index[:, k] = (np.cumsum(first) - 1)[np.searchsorted(values, position_mm[:, k])]
     return tuple(knots), index
 
 
@@ -144,14 +145,14 @@ def _node_problems(
     problems: list[Problem] = []
 
     def node(number: int) -> str:
-        place = np.unravel_index(number, shape)
-        return ", ".join(f"{a} = {k[int(i)]:g}" for a, k, i in zip(arguments, knots, place, strict=True))
+        levels = np.unravel_index(number, shape)
+        return ", ".join(f"{a} = {k[int(i)]:g}" for a, k, i in zip(arguments, knots, levels, strict=True))
 
     first: dict[int, int] = {}
     for (line, _), number in zip(rows, flat.tolist(), strict=True):
         if number in first:
             problems.append(
-                (line, f"the node {node(number)} mm stands in line {first[number]} already; expected it once")
+                (line, f"the node {node(number)} mm is in line {first[number]} already; expected it once")
             )
         first.setdefault(number, line)
     missing = np.setdiff1d(np.arange(int(np.prod(shape))), flat)
@@ -166,37 +167,34 @@ def _node_problems(
         problems.append(
             (
                 first[int(beside)],
-                f"the node {node(number)} mm is missing beside this one; expected a row for each node of the "
-                f"{size} grid",
+                f"the node {node(number)} mm is missing beside this one; expected one row per node "
+                f"of the {size} grid",
             )
         )
     if len(missing) > _NAMED:
-        problems.append((None, f"{len(missing)} of the {size} nodes are missing; expected a row for each"))
+        problems.append((None, f"{len(missing)} of the {size} nodes are missing; expected one row per node"))
     return problems
 
 
 def _stray(
     arguments: Sequence[str], knots: Sequence[Array], index: Index, rows: Sequence[Row]
 ) -> list[Problem]:
-    """Rows at a level that few others share: they lie on no grid."""
+    """Rows at a level that few others share: they are not on a grid."""
     problems: list[Problem] = []
     for k, axis in enumerate(arguments):
         counts = np.bincount(index[:, k])
         usual = int(np.bincount(counts).argmax())
         rare = np.flatnonzero(2 * counts <= usual)
         if usual == 1 and len(rows) > 1 and len(counts) == len(rows) and len(arguments) > 1:
-            problems.append(
-                (rows[0][0], f"every row has a {axis}_mm of its own: the positions lie on no grid")
-            )
+            problems.append((rows[0][0], f"every row has another {axis}_mm; expected positions on a grid"))
             continue
         for level in rare.tolist():
             line = rows[int(np.flatnonzero(index[:, k] == level)[0])][0]
             problems.append(
                 (
                     line,
-                    f"{axis}_mm = {knots[k][level]:g} stands in {counts[level]} rows, other levels in "
-                    f"{usual}: it "
-                    "lies on no grid; expected a row for each combination of levels",
+                    f"{axis}_mm = {knots[k][level]:g} is in {counts[level]} rows and other levels are in "
+                    f"{usual}, so it is not on a grid; expected one row per combination of levels",
                 )
             )
     return problems

@@ -30,8 +30,8 @@ V = TypeVar("V")
 
 
 def files_beside(path: PathLike, read: Reader = read_bytes) -> list[FilePath]:
-    """The files that a calibration file names, as far as it can be read; its loader says what is wrong with
-    it."""
+    """The files that a calibration file names, none where it cannot be read: its loader reports what is
+    wrong."""
     try:
         values = tomllib.loads(read(path).decode("utf-8-sig"))
         names = [name for source in SOURCES for name in source.named(values)]
@@ -50,9 +50,10 @@ def load_calibration(
 ) -> Calibration:
     """The calibration of an olp-calibration-1 file.
 
-    With `machine` it must belong to that machine. `temperatures_degC` are the job's: a scale that they
-    leave out is at the calibration's temperature, the workpiece at 20 degC. `read` opens every file. Raises
-    InputError where the file cannot be read, and ConfigError with all problems of it and of its curve files.
+    With `machine` it must belong to that machine. `temperatures_degC` are those of the job. The default of a
+    scale is the temperature of the calibration, that of the workpiece 20 degC. `read` opens every file.
+    Raises InputError where the file cannot be read, and ConfigError with all problems of it and of the files
+    that it names.
     """
     reading = CalibrationReading(path, temperatures_degC or {}, read)
     file = reading.file
@@ -70,16 +71,16 @@ def load_calibration(
             measured=file.measured,
             valid_until=file.valid_until,
             active_during_measurement=file.active_during_measurement,
-            more=tuple((source.key, found) for source, found in values.items() if not source.field and found),
-            **{source.field: found for source, found in values.items() if source.field},
+            more=tuple((source.key, value) for source, value in values.items() if not source.field and value),
+            **{source.field: value for source, value in values.items() if source.field},
         )
     except ConfigError as error:
         raise error.in_file(str(path)) from None
 
 
 class CalibrationReading:
-    """A calibration file while it is read; gathers what is wrong with the files that it names. Raises
-    InputError and ConfigError of the file itself."""
+    """A calibration file while it is read. It collects what is wrong with the files that it names, and raises
+    InputError and ConfigError for the file itself."""
 
     def __init__(self, path: PathLike, temperatures_degC: Mapping[str, float], read: Reader) -> None:
         values, self._lines = read_toml(read(path), str(path))
@@ -88,18 +89,18 @@ class CalibrationReading:
         self.temperature_degC = self.file.temperature_degC
         self.temperatures_degC = temperatures_degC
         self._path, self._read = path, read
-        self._found: list[Problem] = []
+        self._problems: list[Problem] = []
         self._errors: list[ConfigError] = []
 
     def refuse(self, problems: Iterator[tuple[Path, str]]) -> None:
-        """Keys and what is wrong with them."""
-        self._found += [(line_of(key, self._lines), sentence) for key, sentence in problems]
+        """Take keys and what is wrong with them."""
+        self._problems += [(line_of(key, self._lines), sentence) for key, sentence in problems]
 
     def finish(self) -> None:
         """Raises ConfigError where anything was wrong."""
         errors = list(self._errors)
-        if self._found:
-            errors.insert(0, config_error(self._found, str(self._path)))
+        if self._problems:
+            errors.insert(0, config_error(self._problems, str(self._path)))
         if errors:
             raise _merged(errors)
 
@@ -120,7 +121,7 @@ class CalibrationReading:
             error.in_file(str(self._beside(file)))
         except InputError as error:
             where = line_of(key, self._lines)
-            self._found.append((where, f'{dotted(key)} = "{file}": {error.message}'))
+            self._problems.append((where, f'{dotted(key)} = "{file}": {error.message}'))
         return None
 
     def content(self, file: str) -> bytes:
@@ -149,8 +150,8 @@ def _mismatches(file: CalibrationHead, machine: Machine | None) -> Iterator[tupl
     if file.machine != machine.name:
         yield (
             ("machine",),
-            f'machine = "{file.machine}" is not the name in the machine file; expected "{machine.name}": '
-            "a calibration belongs to one machine",
+            f'machine = "{file.machine}" is not the name in the machine file; expected "{machine.name}", '
+            "because a calibration belongs to one machine",
         )
     if file.model == "huddersfield" and machine.chain != "FXYZ":
         yield (
@@ -163,13 +164,13 @@ def _mismatches(file: CalibrationHead, machine: Machine | None) -> Iterator[tupl
         yield (
             ("active_during_measurement",),
             f"active_during_measurement names {', '.join(both)}, and so does compensated_by_controller of "
-            "the machine file; expected each in one of them: the curves do not hold what the control "
-            "corrected while measuring",
+            "the machine file; expected each in one of them, because the curves do not hold errors that the "
+            "control corrected while measuring",
         )
 
 
 def _merged(errors: Sequence[ConfigError]) -> ConfigError:
-    """One error for several files; each problem names its own."""
+    """One error for several files. Each problem names its file."""
     if len(errors) == 1:
         return errors[0]
     problems = tuple(problem for error in errors for problem in str(error).split("\n"))

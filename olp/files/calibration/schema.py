@@ -1,4 +1,4 @@
-"""The keys of a calibration file: its head, the tables of every error source, and how well all is known."""
+"""The keys of a calibration file: its head, the tables of every error source, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class CovarianceTable(Table):
     file: Text | None = Field(
         default=None,
         description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
-        "this file; the sigma columns and keys if left out",
+        "this file; sigma columns and keys are used if left out",
     )
     growth_per_year: NotNegative = Field(
         default=0.0,
-        description="the share of themselves by which standard uncertainties grow in a year after measured: "
-        "0.5 makes half as much again",
+        description="the growth of standard uncertainties per year after measured, as a share: 0.5 makes "
+        "them half as large again",
     )
     temperature_K: NotNegative = Field(
         default=0.0,
@@ -40,10 +40,10 @@ class CalibrationHead(Table):
     valid_until: datetime.date | None = Field(
         default=None, description="the last date of validity, such as 2027-05-14, without quotes"
     )
-    temperature_degC: float = Field(description="the temperature of scales while measuring, in degC")
+    temperature_degC: float = Field(description="the temperature of the scales while measuring, in degC")
     sign: Sign = Field(description=f'the sign of all values, "{SIGN}"')
     model: Literal["rigid-body", "huddersfield"] = Field(description='"rigid-body" or "huddersfield"')
-    datum_mm: Triple = Field(description="the axis positions from which levers count, [X, Y, Z] in mm")
+    datum_mm: Triple = Field(description="the axis positions from which lever arms count, [X, Y, Z] in mm")
     box_mm: Annotated[tuple[Interval, Interval, Interval], Field(strict=False)] = Field(
         description="the calibrated axis positions, [[min, max], [min, max], [min, max]] of X, Y, Z in mm"
     )
@@ -67,7 +67,7 @@ class CalibrationHead(Table):
 _TABLES: dict[str, Any] = {source.key: source.schema for source in SOURCES if source.schema is not None}
 _TABLES["covariance"] = (
     CovarianceTable | None,
-    Field(default=None, description="the table [covariance]: how well all this is known"),
+    Field(default=None, description="the table [covariance]: the uncertainty of the calibration"),
 )
 
 #: A calibration file: its head, and a key of every registered source.
@@ -81,6 +81,6 @@ CalibrationFile: type[CalibrationHead] = create_model(
 
 
 def covariance_of(file: CalibrationHead) -> CovarianceTable:
-    """The table [covariance]; its defaults where the file has none."""
+    """The table [covariance], with its defaults where the file has none."""
     stated: CovarianceTable | None = vars(file)["covariance"]
     return stated or CovarianceTable()

@@ -30,8 +30,8 @@ _DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
 
 
 def load_structure(path: PathLike, machine: str | None = None, read: Reader = read_bytes) -> Structure:
-    """The structure of an olp-thermal-1 file. Raises InputError where it cannot be read, ConfigError with all
-    problems."""
+    """The structure of an olp-thermal-1 file. Raises InputError where the file cannot be read, ConfigError
+    with all problems."""
     try:
         return structure_of(read_document(path, ThermalFile, machine, read))
     except ConfigError as error:
@@ -39,7 +39,7 @@ def load_structure(path: PathLike, machine: str | None = None, read: Reader = re
 
 
 def read_document(path: PathLike, schema: type[T], machine: str | None, read: Reader) -> T:
-    """A TOML file by its schema, whose key `machine` must be that of the machine file. Raises InputError,
+    """A TOML file by its schema. Its key `machine` must be the name in the machine file. Raises InputError,
     ConfigError."""
     values, lines = read_toml(read(path), str(path))
     file = validate(schema, values, lines, str(path))
@@ -51,17 +51,18 @@ def read_document(path: PathLike, schema: type[T], machine: str | None, read: Re
 
 
 def structure_text(structure: Structure, machine: str, notes: Sequence[str] = ()) -> bytes:
-    """An olp-thermal-1 file that reads back the same; notes become comments."""
+    """An olp-thermal-1 file that reads back as an equal structure. Notes become comments."""
     above = "".join(f"{line}\n" for note in notes for line in comment(note))
     return (above + toml_document(structure_tables(structure, machine))).encode()
 
 
 def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:
     """A log: `t_s`, sensors `NAME_degC`, and readings of drift `EXX@500_um` (component @ axis position in
-    mm); a reading may be empty. Comment lines `# tool_mm = [0, 0, -120]` and `# line_mm = [0, 500, -300]` say
-    with what and where it was read.
+    mm). A reading may be empty.
 
-    Raises InputError where it cannot be read, ConfigError with every problem and its line.
+    Comment lines `# tool_mm = [0, 0, -120]` and `# line_mm = [0, 500, -300]` state the tool vector and the
+    positions of the axes. Raises InputError where the file cannot be read, ConfigError with every problem and
+    its line.
     """
     return parse_drift_log(read(path), str(path))
 
@@ -69,12 +70,12 @@ def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:
 def parse_drift_log(data: bytes, file: str) -> DriftLog:
     """As `read_drift_log`, from the bytes of the file."""
     sheet = read_sheet(data, file, _LOG)
-    placed, wrong = _placed(sheet.text)
-    found = [*sheet.problems, *_time_problems(sheet.rows), *wrong]
-    if len(sheet.rows) < 2 and not found:
-        found.append((sheet.line, f"{len(sheet.rows)} rows follow the header; expected at least 2"))
-    if found:
-        raise config_error(found, file)
+    vectors, wrong = _stated_vectors(sheet.text)
+    problems = [*sheet.problems, *_time_problems(sheet.rows), *wrong]
+    if len(sheet.rows) < 2 and not problems:
+        problems.append((sheet.line, f"{len(sheet.rows)} rows follow the header; expected at least 2"))
+    if problems:
+        raise config_error(problems, file)
     columns = sheet.columns
     sensors = {name.removesuffix("_degC"): columns[name] for name in columns if name.endswith("_degC")}
     readings: dict[tuple[str, float], Array] = {}
@@ -82,8 +83,8 @@ def parse_drift_log(data: bytes, file: str) -> DriftLog:
         match = _READING.fullmatch(name)
         if match:
             readings[match[1], float(match[2])] = columns[name]
-    line_mm = placed.get("line_mm")
-    return DriftLog(columns["t_s"], sensors, readings, line_mm, placed.get("tool_mm", ZERO), file)
+    line_mm = vectors.get("line_mm")
+    return DriftLog(columns["t_s"], sensors, readings, line_mm, vectors.get("tool_mm", ZERO), file)
 
 
 def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
@@ -118,7 +119,7 @@ def _number(name: str, cell: str) -> tuple[float, str | None]:
     except ValueError:
         value = math.nan
     good = math.isfinite(value)
-    return value, None if good else f'{name} = "{cell}" is no number; expected a finite number'
+    return value, None if good else f'{name} = "{cell}" is not a number; expected a finite number'
 
 
 def _time_problems(rows: Sequence[Row]) -> Iterator[Problem]:
@@ -131,14 +132,14 @@ _LOG = Wanted(
     "holds no header; expected t_s, NAME_degC ..., EXX@500_um ...",
     _header_problems,
     _number,
-    "; expected one value a column",
+    "; expected one value per column",
     form=LOOSE_CSV,
 )
 
 
-def _placed(text: str) -> tuple[dict[str, Vector], list[Problem]]:
-    """What comment lines say of line and tool."""
-    found: dict[str, Vector] = {}
+def _stated_vectors(text: str) -> tuple[dict[str, Vector], list[Problem]]:
+    """`line_mm` and `tool_mm` from comment lines."""
+    vectors: dict[str, Vector] = {}
     problems: list[Problem] = []
     for number, line in enumerate(text.splitlines(), 1):
         match = _DATA.fullmatch(line)
@@ -149,17 +150,17 @@ def _placed(text: str) -> tuple[dict[str, Vector], list[Problem]]:
             if isinstance(value, dict) and match[1] == "line_mm":
                 value = [value.get(axis) for axis in AXES]
             x, y, z = (float(v) for v in value)
-            found[match[1]] = (x, y, z)
+            vectors[match[1]] = (x, y, z)
         except (ValueError, TypeError):
             problems.append((number, f"{match[1]} = {match[2]}; expected three lengths, [X, Y, Z] in mm"))
-    return found, problems
+    return vectors, problems
 
 
 def sensors_of(log: DriftLog, names: Mapping[str, object]) -> dict[str, Array]:
-    """The sensors of a log that a structure has. Raises ConfigError where one is missing."""
+    """The columns of a log for the sensors of a structure. Raises ConfigError where one is missing."""
     missing = [name for name in names if name not in log.sensors_degC]
     if missing:
         raise ConfigError(
-            f"has no column {missing[0]}_degC; expected one for each sensor of the structure", file=log.name
+            f"has no column {missing[0]}_degC; expected one column per sensor of the structure", file=log.name
         )
     return {name: log.sensors_degC[name] for name in names}

@@ -1,5 +1,5 @@
-"""A calibration as the text of its files: an olp-calibration-1 file, and beside it what its sources
-write."""
+"""A calibration as the text of its files: an olp-calibration-1 file, and the files of its sources beside
+it."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ def calibration_files(
     """The bytes of `target`, an olp-calibration-1 file, and of its curves `<stem>-x.csv` ..., maps
     `<stem>-map.csv` and loads `<stem>-load.csv` beside it.
 
-    `sigma` holds standard uncertainties by component, (n,) in mm or rad at the positions of its curve, and
-    `covariance` becomes `<stem>-covariance.npz`; notes become comments. Curves read back as the very same
-    doubles; so does every other number of 15 digits or fewer in the unit of its key, longer ones within the
-    last bit. The temperatures of a job are no part of a calibration and are not written. Raises ConfigError
-    where it has no date of measuring, or where a sigma fits no curve.
+    `sigma` holds standard uncertainties by component, (n,) in mm or rad at the positions of its curve.
+    `covariance` becomes `<stem>-covariance.npz`, and notes become comments. Curves read back as the very same
+    doubles. So does every other number of 15 digits or fewer in the unit of its key; longer ones read back
+    within the last bit. The temperatures of a job are not part of a calibration and are not written. Raises
+    ConfigError where the date of measuring is missing, or where a sigma fits no curve.
     """
     if calibration.measured is None:
         raise ConfigError("the calibration has no date of measuring; give it, such as 2026-05-14")
-    out = CalibrationWriting(target, calibration.machine, sigma or {})
+    writing = CalibrationWriting(target, calibration.machine, sigma or {})
     for source, values in calibration.sources():
-        source.write(values, out)
-    out.finish()
+        source.write(values, writing)
+    writing.finish()
     if covariance is not None:
         archive = target.with_name(f"{target.stem}-covariance.npz")
-        out.files[archive] = covariance_bytes(covariance)
-        out.table("[covariance]", {"file": archive.name})
+        writing.files[archive] = covariance_bytes(covariance)
+        writing.table("[covariance]", {"file": archive.name})
     above = [*(line for note in notes for line in comment(note)), *_head(calibration)]
-    text = "\n".join(above) + "\n" + toml_document(out.tables)
-    return {target: text.encode(), **out.files}
+    text = "\n".join(above) + "\n" + toml_document(writing.tables)
+    return {target: text.encode(), **writing.files}
 
 
 class CalibrationWriting:
@@ -74,7 +74,7 @@ class CalibrationWriting:
         return self._put(f"{self._target.stem}-{what}.toml", toml_document(tables))
 
     def finish(self) -> None:
-        """Raises ConfigError where a standard uncertainty was not asked for."""
+        """Raises ConfigError where a standard uncertainty belongs to no curve."""
         if self._sigma:
             named = ", ".join(sorted(self._sigma))
             raise ConfigError(f"sigma of {named} fits no curve; expected names of its curves")

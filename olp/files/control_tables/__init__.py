@@ -1,1 +1,1 @@
-"""Compensation tables of controls, read and written, one file a control."""
+"""Compensation tables of controls, read and written, one module per control."""

@@ -1,4 +1,4 @@
-"""What the formats of compensation tables share: what is given to them, and what they give back."""
+"""What the formats of compensation tables share: their inputs, and their results."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ from olp.files.problems import Problem, config_error
 from olp.findings.catalogue import Finding
 from olp.program.text.rows import Form
 
-#: "error": a value is actual minus commanded, which the control takes off; "correction": it adds the value.
+#: The sign convention of a table. "error": a value is actual minus commanded, and the control subtracts it.
+#: "correction": the control adds the value.
 Sense = Literal["error", "correction"]
 Load = Callable[[Path], bytes]
 
-#: Rows nearer than this are a mistake: no slope between them means anything.
+#: In mm: rows nearer than this are refused, because a slope between them means nothing.
 LEAST_STEP_MM = 1e-6
 
-#: What of a calibration tables hold, or need not: the rest of it depends on more than the axes.
+#: Fields of a calibration that tables hold or do not need. The others depend on more than the axes.
 _IN_TABLES = frozenset(
     {
         "machine", "box_mm", "model", "datum_mm", "curves", "squareness", "backlash_mm", "cyclic",
@@ -46,10 +47,10 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 class Given:
     """What a caller states beside a file.
 
-    `machine` is the name of the machine, `travel_mm` its travels (3, 2) or None; `sense` None where the
-    caller says nothing. `axis` names the axis of a file that does not; `kind` is LinuxCNC's COMP_FILE_TYPE;
-    `names` are the control's names of axes; `reference` says where errors of axes that carry the workpiece
-    count; `most` limits the rows of a table.
+    `machine` is the name of the machine, `travel_mm` its travels (3, 2) or None. `sense` is the sign
+    convention, None where the caller does not state it. `axis` is the axis of a file that does not name it.
+    `kind` is LinuxCNC's COMP_FILE_TYPE. `names` are the control's names of axes. `reference` is the point of
+    errors of axes that carry the workpiece. `most` limits the rows of a table.
     """
 
     machine: str = "machine"
@@ -66,7 +67,7 @@ class Given:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What a table says, and what a person should know about it."""
+    """The calibration in a table, and what you should know about it."""
 
     calibration: Calibration
     findings: tuple[Finding, ...] = ()
@@ -75,8 +76,8 @@ class Imported:
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """The bytes of a table by file, the table itself first. `corrects` are the ISO names that the control
-    corrects once the table is active."""
+    """The bytes of a table by file, the table itself first. `corrects` are the ISO names of the errors that
+    the control corrects when the table is active."""
 
     files: Mapping[Path, bytes]
     corrects: frozenset[str]
@@ -86,8 +87,8 @@ class Exported:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """One format. `sense` is that of the format, None where the caller has to state it. `status` says what
-    the layout is known from, `holds` what it can hold."""
+    """One format. `sense` is its sign convention, None where the caller has to state it. `status` is the
+    source of the layout, `holds` what it can hold."""
 
     key: str
     title: str
@@ -101,19 +102,20 @@ class Format:
 
 
 def sense_of(given: Given, own: Sense | None, key: str) -> Sense:
-    """The sense of a table: the caller's, else the format's. Raises UsageError where neither states one."""
+    """The sign convention of a table: the caller's, else the format's. Raises UsageError where both are
+    unknown."""
     sense = given.sense or own
     if sense is None:
         raise UsageError(
-            f"the sense of {key} tables is not known from a public source; state it: --sense error (values "
-            "are actual minus commanded, and the control takes them off) or --sense correction (the control "
-            "adds them), and run the verification program before any part"
+            f"no public source states the sign convention of {key} tables; state it with --sense error "
+            "(values are actual minus commanded, and the control subtracts them) or --sense correction (the "
+            "control adds them). Run the verification program before any part"
         )
     return sense
 
 
 def sign(sense: Sense) -> float:
-    """Times this, a value of the table is an error, and an error a value."""
+    """The factor between values of the table and errors, in both directions."""
     return 1.0 if sense == "error" else -1.0
 
 
@@ -123,18 +125,18 @@ def signed(values: Array, factor: float) -> Array:
 
 
 def text_of(data: bytes) -> str:
-    """The text of a table; bytes beyond ASCII stand in comments only and are kept apart."""
+    """The text of a table. Bytes beyond ASCII are in comments only, and each becomes one character."""
     return data.decode("latin-1").removeprefix("\xef\xbb\xbf")
 
 
 def lines(data: bytes, remark: str | None = None) -> Iterator[tuple[int, str]]:
-    """Every line of a table with its number, without blanks around it and without what follows `remark`."""
+    """Every line of a table with its number, without blanks around it and without comments after `remark`."""
     form = Form(None, remark=remark)
     return ((line, text.strip()) for line, text in form.lines(text_of(data)))
 
 
 def number(cell: str) -> float | None:
-    """The finite number that a cell holds, None for anything else."""
+    """The finite number in a cell, None for anything else."""
     return float(cell) if _NUMBER.fullmatch(cell) and np.isfinite(float(cell)) else None
 
 
@@ -145,13 +147,14 @@ def shown(value: float) -> str:
 
 def refuse(problems: Iterable[Problem], file: Path) -> None:
     """Raise ConfigError where there are problems."""
-    found = list(problems)
-    if found:
-        raise config_error(found, str(file))
+    listed = list(problems)
+    if listed:
+        raise config_error(listed, str(file))
 
 
 def order_problems(rows: Sequence[tuple[int, float]], what: str) -> Iterator[Problem]:
-    """Rows (line, position) that do not ascend by a nanometre or more, or are fewer than two."""
+    """The problems of rows (line, position) that do not ascend by a nanometre or more, or are fewer than
+    two."""
     for (_, before), (line, position) in pairwise(rows):
         if not position - before >= LEAST_STEP_MM:
             yield line, f"{what} {position:g} comes after {before:g}; expected ascending positions, each once"
@@ -166,7 +169,7 @@ def linear_curve(
     backward: Array | None,
     reference: Reference = "functional-point",
 ) -> Curve:
-    """A curve of one component as controls take it: straight lines between the rows."""
+    """A curve of one component as controls use it: straight lines between the rows."""
     one = {} if backward is not None else {name: forward}
     both = ({name: forward}, {name: backward}) if backward is not None else ({}, {})
     return Curve(name[2], position_mm, one, both[0], both[1], ZERO, ZERO, reference, "linear")
@@ -179,9 +182,9 @@ def calibration_of(
     squareness: Mapping[str, float] | None = None,
     backlash_mm: Vector = ZERO,
 ) -> Calibration:
-    """A calibration of what a table says; its box is what all tables cover, within the travel.
+    """A calibration from tables. Its box is the range that all tables cover, within the travel.
 
-    Raises ConfigError where neither a table nor the machine says how far an axis goes.
+    Raises ConfigError where neither a table nor the machine states the range of an axis.
     """
     box = np.empty((3, 2))
     unknown = []
@@ -199,12 +202,12 @@ def calibration_of(
         if box[j, 0] >= box[j, 1]:
             raise ConfigError(
                 f"the tables of axis {axis} have no positions in common with each other or with its travel; "
-                "is it the right machine?",
+                "check that the machine file (-m) is of this machine",
                 file=str(file),
             )
     if unknown:
         raise ConfigError(
-            f"no table says how far {', '.join(unknown)} may go; name the machine file with -m",
+            f"no table states the range of {', '.join(unknown)}; name the machine file with -m",
             file=str(file),
         )
     square = {name: (squareness or {}).get(name, 0.0) for name in SQUARENESS}
@@ -215,7 +218,8 @@ def calibration_of(
 
 
 def _grouped(curves: Sequence[Curve]) -> Iterator[Curve]:
-    """Components of an axis at the same positions in one curve, those of both directions apart."""
+    """One curve for the components of an axis at the same positions. Those with both directions are
+    separate."""
     groups: dict[tuple[object, ...], list[Curve]] = {}
     for curve in curves:
         key = (curve.axis, bool(curve.forward), curve.reference, curve.position_mm.tobytes())
@@ -231,24 +235,24 @@ def _grouped(curves: Sequence[Curve]) -> Iterator[Curve]:
 def not_held(
     calibration: Calibration, held: Iterable[str], written: Iterable[Rows] = ()
 ) -> Iterator[Finding]:
-    """A finding where a calibration holds errors that are not among `held`, cyclic ones that the rows do not
-    follow, or what no table holds."""
+    """A finding where a calibration has errors that are not among `held`, cyclic errors that the rows do not
+    follow, or anything that no table holds."""
     square = {name for name, value in calibration.squareness.items() if value}
     names = {name for curve in calibration.curves for name in curve.names if _any(curve, name)} | square
-    lost = sorted(names - set(held))
-    parts = [f"{', '.join(lost)} cannot be held"] if lost else []
+    omitted = sorted(names - set(held))
+    parts = [f"the format cannot hold {', '.join(omitted)}"] if omitted else []
     followed = {rows.name for rows in written if rows.cyclic and rows.name[1] in AXES}
     cyclic = sorted({c.component for c in calibration.cyclic if c.amplitude} - followed)
     if cyclic:
-        parts.append(f"cyclic errors of {', '.join(cyclic)} are not followed")
+        parts.append(f"the rows do not follow cyclic errors of {', '.join(cyclic)}")
     others = [
         f.name for f in fields(calibration) if f.name not in _IN_TABLES and _states(calibration, f.name)
     ]
     others += [key for key, _ in calibration.more]
     if others:
-        parts.append(f"no table holds what the calibration states of {', '.join(others)}")
+        parts.append(f"no table holds {', '.join(others)} of the calibration")
     if parts:
-        yield Finding("OLP871", "; ".join(parts) + ": they stay in the machine", count=len(lost) or 1)
+        yield Finding("OLP871", "; ".join(parts) + ": they stay uncorrected", count=len(omitted) or 1)
 
 
 def _states(calibration: Calibration, name: str) -> bool:
@@ -263,38 +267,39 @@ def _any(curve: Curve, name: str) -> bool:
 
 def coarse(rows: Iterable[Rows], good_mm: float, good_rad: float) -> Iterator[Finding]:
     """A finding where straight lines between rows miss a curve."""
-    found = [r for r in rows if r.miss > 1.001 * (good_rad if r.name[1] in "ABC" else good_mm)]
-    if found:
+    missed = [r for r in rows if r.miss > 1.001 * (good_rad if r.name[1] in "ABC" else good_mm)]
+    if missed:
         worst = "; ".join(
             f"{r.name} by {r.miss * 1e6:.2f} urad"
             if r.name[1] in "ABC"
             else f"{r.name} by {r.miss * 1e3:.2f} um"
-            for r in found
+            for r in missed
         )
-        yield Finding("OLP873", f"straight lines between the rows miss the curves: {worst}", count=len(found))
+        sentence = f"straight lines between the rows miss the curves: {worst}"
+        yield Finding("OLP873", sentence, count=len(missed))
 
 
 def backlash_in_table(calibration: Calibration, axes: Iterable[str]) -> Iterator[Finding]:
-    """A finding where a table takes up a constant lost motion."""
-    found = [axis for axis in axes if calibration.backlash_mm[AXES.index(axis)]]
-    if found:
-        keys = ", ".join(f"{axis}_um" for axis in found)
+    """A finding where a table compensates a constant backlash."""
+    compensated = [axis for axis in axes if calibration.backlash_mm[AXES.index(axis)]]
+    if compensated:
+        keys = ", ".join(f"{axis}_um" for axis in compensated)
         yield Finding(
             "OLP875",
-            f"the table takes up the lost motion of {', '.join(found)}: leave {keys} out of [backlash] in "
-            "the calibration that corrects programs while it is active",
-            count=len(found),
+            f"the table compensates the backlash of {', '.join(compensated)}: leave {keys} out of [backlash] "
+            "in the calibration that corrects programs while it is active",
+            count=len(compensated),
         )
 
 
 def backlash_left_out(calibration: Calibration) -> Iterator[Finding]:
-    """A finding where a format without directions leaves lost motion in the machine."""
+    """A finding where a format without directions leaves backlash uncorrected."""
     axes = {a for a in AXES if calibration.backlash_mm[AXES.index(a)]}
     axes |= {curve.axis for curve in calibration.curves if curve.forward}
     if axes:
         yield Finding(
             "OLP871",
-            f"the format knows no direction: the lost motion of {', '.join(sorted(axes))} stays in the "
-            "machine, and the mean of both directions is written",
+            f"the format has no directions: the table holds the mean of both, and the backlash of "
+            f"{', '.join(sorted(axes))} stays uncorrected",
             count=len(axes),
         )

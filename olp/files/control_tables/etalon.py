@@ -1,7 +1,8 @@
-"""Etalon's exchange format, variant "Vendor": a section a parameter, as ISG and Beckhoff controls read it.
+"""Etalon's exchange format, variant "Vendor": one section per parameter, read by ISG and Beckhoff controls.
 
-`[EXX]` with `Gridpoints = {`, a line `position value` a row, `}`; `[C0Y]` with `VALUE = ...`; `//` begins a
-comment; mm and rad. The sense and the zero of levers are those of the ISG format (see there).
+A section `[EXX]` has `Gridpoints = {`, one line `position value` per row, and `}`. A section `[C0Y]` has
+`VALUE = ...`. `//` begins a comment; units are mm and rad. The sign convention and the zero of lever arms are
+those of the ISG format (see there).
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     reference = reference_of(given)
     curves: list[Curve] = []
     square: dict[str, float] = {}
-    left: list[str] = []
+    ignored: list[str] = []
     problems: list[Problem] = []
     seen: set[str] = set()
     for line, name, rows, value in _sections(load(path), problems):
         if name in seen:
-            problems.append((line, f"[{name}] stands twice; expected it once"))
+            problems.append((line, f"[{name}] is defined twice; expected it once"))
         seen.add(name)
         if name in COMPONENTS and rows:
             problems += base.order_problems([(n, q) for n, q, _ in rows], name)
@@ -62,15 +63,15 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
             what = "Gridpoints" if name in COMPONENTS else "VALUE"
             problems.append((line, f"[{name}] holds no {what}; expected {what}"))
         elif rows or value != 0.0:
-            left.append(f"[{name}] (line {line})")
+            ignored.append(f"[{name}] (line {line})")
     base.refuse(problems, path)
     if not curves and not square:
         raise ConfigError('holds no error of X, Y or Z; expected sections such as [EXX], variant "Vendor"',
                           file=str(path))  # fmt: skip
     findings = []
-    if left:
-        message = f"{', '.join(left)} are no errors of X, Y, Z and were left out"
-        findings.append(Finding("OLP872", message, count=len(left)))
+    if ignored:
+        message = f"{', '.join(ignored)} are not errors of X, Y, Z and were left out"
+        findings.append(Finding("OLP872", message, count=len(ignored)))
     return Imported(base.calibration_of(given, curves, path, square), tuple(findings))
 
 
@@ -100,13 +101,13 @@ def _sections(data: bytes, problems: list[Problem]) -> Iterator[tuple[int, str, 
             if len(numbers) == 2 and numbers[0] is not None and numbers[1] is not None:
                 rows.append((line, numbers[0], numbers[1]))
             else:
-                problems.append((line, f'"{bare[:40]}" is no row; expected a position and a value'))
+                problems.append((line, f'"{bare[:40]}" is not a row; expected a position and a value'))
         elif name and re.fullmatch(r"Gridpoints\s*=\s*\{", bare, re.IGNORECASE):
             inside = True
         elif name and (stated := re.fullmatch(r"VALUE\s*=\s*(\S+)", bare, re.IGNORECASE)):
             value = base.number(stated[1])
             if value is None:
-                problems.append((line, f'VALUE = "{stated[1]}" is no number'))
+                problems.append((line, f'VALUE = "{stated[1]}" is not a number; expected a number in rad'))
         elif not name or name in (*COMPONENTS, *SQUARENESS):
             problems.append((line, f'"{bare[:40]}" is not understood; expected Gridpoints or VALUE'))
 
@@ -120,7 +121,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     factor = base.sign(sense)
     lines = [
         f"// Errors of {calibration.machine}, variant Vendor; mm and rad; chain {given.chain}",
-        f"// sense: {sense}; levers count from axis position 0 without a tool",
+        f"// sense: {sense}; lever arms count from axis position 0 without a tool",
     ]
     written = []
     for name in COMPONENTS:
@@ -152,7 +153,7 @@ FORMAT = Format(
     ".txt",
     SENSE,
     "documentation of Beckhoff and ISG",
-    "18 components and squareness with levers and tool, mean of both directions",
+    "18 components and squareness with lever arms and tool, mean of both directions",
     _read,
     _write,
     control,

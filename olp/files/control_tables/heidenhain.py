@@ -1,11 +1,13 @@
 """Axis-error tables of Heidenhain controls: `.COM` tables of values, and a `.CMA` that assigns them to axes.
 
-A column of a .COM is a function of the axis in whose column of the .CMA its name stands. A .COM has the
-columns AXISPOS, one column an axis that is moved, and BACKLASH: the values of its own axis in the negative
-direction, where they differ. The row of the .CMA with `*` in ACTIVE is in force. Columns are fixed by the
-places of their names. Source: technical manuals (MANUALplus 620, TNC 407, iTNC 530); the first and last line
-of a table are taken from other tables of these controls. Whether values are added to the command or taken
-off it is not verified: the caller states it, and a verification program is written beside the table.
+A .CMA has one column per axis, which names the .COM of that axis; its row with `*` in ACTIVE is in force.
+The columns of a .COM are functions of the position of its axis: AXISPOS, one column per axis that is moved,
+and BACKLASH. BACKLASH holds the values of the own axis in the negative direction, where they differ. Columns
+begin at the positions of their names.
+
+Source: technical manuals (MANUALplus 620, TNC 407, iTNC 530). The first and last line of a table are taken
+from other tables of these controls. It is not verified whether the control adds values to the command or
+subtracts them. The caller states it, and a verification program is written beside the table.
 """
 
 from __future__ import annotations
@@ -37,6 +39,7 @@ from olp.findings.catalogue import Finding
 
 #: Rows of a table, as a TNC 407 takes them.
 MOST_ROWS = 256
+#: The components that a table can hold.
 TRANSLATIONS = tuple(name for name in COMPONENTS if name[1] in AXES)
 _BEGIN = re.compile(r"BEGIN\s+(\S+)\s+(MM|INCH)\b.*", re.IGNORECASE)
 _END = re.compile(r"\[END\]|END\b.*", re.IGNORECASE)
@@ -66,15 +69,15 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     others = [c for c in cells if c not in names and c not in ("NR", "ACTIVE") and cells[c].strip("-")]
     findings = []
     if others:
-        message = f"tables of {', '.join(others)} are of no linear axis X, Y, Z and were left out"
+        message = f"tables of {', '.join(others)} are not of a linear axis X, Y, Z and were left out"
         findings.append(Finding("OLP872", message, count=len(others)))
     return Imported(base.calibration_of(given, curves, path), tuple(findings))
 
 
 def _sheet(text: str, file: Path) -> Sheet:
-    """A table with fixed columns: each reaches from the place of its name to that of the next."""
+    """A table with fixed columns: each reaches from the start of its name to that of the next."""
     columns: list[str] = []
-    places: list[int] = []
+    starts: list[int] = []
     rows: list[tuple[int, dict[str, str]]] = []
     problems: list[Problem] = []
     for line, raw in enumerate(text.expandtabs(8).splitlines(), 1):
@@ -86,20 +89,20 @@ def _sheet(text: str, file: Path) -> Sheet:
         elif _END.fullmatch(bare.strip()):
             break
         elif bare and not columns:
-            found = list(re.finditer(r"\S+", bare))
-            columns, places = [m[0].upper() for m in found], [m.start() for m in found]
+            names = list(re.finditer(r"\S+", bare))
+            columns, starts = [m[0].upper() for m in names], [m.start() for m in names]
             double = sorted({name for name in columns if columns.count(name) > 1})
             if double:
-                problems.append((line, f"column {', '.join(double)} stands twice; expected it once"))
+                problems.append((line, f"column {', '.join(double)} is defined twice; expected it once"))
         elif bare:
-            ends = [*places[1:], len(bare) + 1]
-            cells = [bare[start:end] for start, end in zip(places, ends, strict=True)]
-            if any(len(cell.split()) > 1 for cell in cells) or bare[: places[0]].strip():
-                problems.append((line, "a cell does not stand under its column; expected fixed columns"))
+            ends = [*starts[1:], len(bare) + 1]
+            cells = [bare[start:end] for start, end in zip(starts, ends, strict=True)]
+            if any(len(cell.split()) > 1 for cell in cells) or bare[: starts[0]].strip():
+                problems.append((line, "a cell is not under the name of its column; expected fixed columns"))
             rows.append((line, {name: cell.strip() for name, cell in zip(columns, cells, strict=True)}))
     base.refuse(problems, file)
     if not columns:
-        raise ConfigError("holds no names of columns; expected such as NR AXISPOS X", file=str(file))
+        raise ConfigError("has no names of columns; expected names such as NR AXISPOS X", file=str(file))
     return columns, rows
 
 
@@ -115,15 +118,15 @@ def _columns(axis: str, file: Path, data: bytes, names: dict[str, str], factor: 
     for line, cells in rows:
         numbers = [base.number(cells[column]) for column in used]
         wrong = [column for column, number in zip(used, numbers, strict=True) if number is None]
-        problems += [(line, f'{column} = "{cells[column]}" is no number') for column in wrong]
+        problems += [(line, f'{column} = "{cells[column]}" is not a number') for column in wrong]
         table.append([0.0 if number is None else number for number in numbers])
-    place = used.index("AXISPOS")
+    position = used.index("AXISPOS")
     lines = [line for line, _ in rows]
-    pairs = list(zip(lines, (row[place] for row in table), strict=True))
+    pairs = list(zip(lines, (row[position] for row in table), strict=True))
     problems += [] if problems else base.order_problems(pairs, "AXISPOS")
     own = next((column for column in used if names.get(column) == axis), None)
     if "BACKLASH" in used and own is None:
-        problems.append((None, f"has BACKLASH, but no column of its own axis {axis}"))
+        problems.append((None, f"has BACKLASH, but no column of its own axis {axis}; expected both"))
     base.refuse(problems, file)
     values = np.array(table)
     curves = []
@@ -134,7 +137,7 @@ def _columns(axis: str, file: Path, data: bytes, names: dict[str, str], factor: 
         backward = None
         if column == own and "BACKLASH" in used:
             backward = base.signed(values[:, used.index("BACKLASH")], factor)
-        curves.append(base.linear_curve(f"E{names[column]}{axis}", values[:, place], forward, backward))
+        curves.append(base.linear_curve(f"E{names[column]}{axis}", values[:, position], forward, backward))
     return curves
 
 
@@ -150,16 +153,16 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     crossed: set[str] = set()
     for axis in AXES:
         own = [component_rows(straight, f"E{d}{axis}", most=most) for d in AXES]
-        found = [rows for rows in own if rows is not None]
-        if not found:
+        parts = [rows for rows in own if rows is not None]
+        if not parts:
             continue
-        position = _shared(found, most)
-        found = [_onto(rows, position) for rows in found]
-        written += found
-        crossed |= {rows.name for rows in found if rows.both and rows.name[1] != axis}
+        position = _shared(parts, most)
+        parts = [_onto(rows, position) for rows in parts]
+        written += parts
+        crossed |= {rows.name for rows in parts if rows.both and rows.name[1] != axis}
         file = target.with_name(f"{target.stem}_{axis.lower()}.com")
         assigned[axis] = file.name
-        files[file] = _com(file.name, axis, found, names, factor)
+        files[file] = _com(file.name, axis, parts, names, factor)
     header = ["NR", "ACTIVE", *(names[axis] for axis in AXES)]
     row = ["0", "*", *(assigned.get(axis, "") for axis in AXES)]
     cma = _fixed([f"BEGIN {target.name.upper()} MM"], header, [row])
@@ -169,24 +172,24 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
         *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS), written),
         *base.coarse(written, MISS_MM, MISS_RAD),
         *base.backlash_in_table(calibration, AXES),
-        Finding("OLP874", f"values have the sense stated, {sense}; run {verify.name} before any part"),
+        Finding("OLP874", f"the sign convention is {sense}, as stated; run {verify.name} before any part"),
     ]
     if crossed:
         named = ", ".join(sorted(crossed))
-        message = f"{named} differ by direction, and BACKLASH is for the own axis: the mean is written"
+        message = f"{named} differ by direction, and BACKLASH is for the own axis only: the mean is written"
         findings.append(Finding("OLP871", message, count=len(crossed)))
     held = {
         rows.name for rows in written if any(rows.name in c.names for c in along_axes(calibration).curves)
     }
     square = {n for n, value in calibration.squareness.items() if value}
-    notes = (f"sense of the values: {sense}; the tables have no place for a comment",)
+    notes = (f"sign convention of the values: {sense}; the tables cannot hold a comment",)
     return Exported({target: cma, **files, verify: program}, frozenset(held | square), tuple(findings), notes)
 
 
-def _shared(found: Sequence[Rows], most: int) -> np.ndarray:
-    """The positions of all columns of an axis; those of the longest where together they are too many."""
-    position = np.unique(np.concatenate([rows.position_mm for rows in found]))
-    return position if len(position) <= most else max((r.position_mm for r in found), key=len)
+def _shared(parts: Sequence[Rows], most: int) -> np.ndarray:
+    """The positions of all columns of an axis. Where these are too many, those of the longest column."""
+    position = np.unique(np.concatenate([rows.position_mm for rows in parts]))
+    return position if len(position) <= most else max((r.position_mm for r in parts), key=len)
 
 
 def _onto(rows: Rows, position: np.ndarray) -> Rows:
@@ -198,12 +201,12 @@ def _onto(rows: Rows, position: np.ndarray) -> Rows:
     return Rows(rows.name, position, forward, backward, rows.both, rows.miss, rows.cyclic)
 
 
-def _com(name: str, axis: str, found: Sequence[Rows], names: dict[str, str], factor: float) -> bytes:
-    own = next((rows for rows in found if rows.name[1] == axis), None)
+def _com(name: str, axis: str, parts: Sequence[Rows], names: dict[str, str], factor: float) -> bytes:
+    own = next((rows for rows in parts if rows.name[1] == axis), None)
     both = own is not None and own.both
-    header = ["NR", "AXISPOS", *(names[rows.name[1]] for rows in found), *(["BACKLASH"] if both else [])]
-    values = [found[0].position_mm]
-    values += [base.signed(rows.forward if rows is own else rows.mean, factor) for rows in found]
+    header = ["NR", "AXISPOS", *(names[rows.name[1]] for rows in parts), *(["BACKLASH"] if both else [])]
+    values = [parts[0].position_mm]
+    values += [base.signed(rows.forward if rows is own else rows.mean, factor) for rows in parts]
     if own is not None and both:
         values.append(base.signed(own.backward, factor))
     table = zip(*(column.tolist() for column in values), strict=True)
@@ -222,7 +225,7 @@ FORMAT = Format(
     "Heidenhain axis-error tables (.CMA, .COM)",
     ".cma",
     None,
-    "technical manuals; frame of the file and sense not verified",
+    "technical manuals; frame of the file and sign convention not verified",
     "9 translations by the position of one axis, the own one in both directions; squareness as slopes",
     _read,
     _write,

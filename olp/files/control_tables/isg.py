@@ -1,12 +1,12 @@
 """The tables of ISG kernels and Beckhoff TF5280 (volumetric compensation), format ISG_CSV.
 
-A header of arguments (X Y Z, and rotary axes) and parameters (EXX ... ECZ, C0Y, B0Z, A0Z), then rows of
-numbers, parted by blanks; `//` begins a comment, a line with `#` a new block with a header of its own; mm and
+A block has a header of arguments (X Y Z, and rotary axes) and parameters (EXX ... ECZ, C0Y, B0Z, A0Z), then
+rows of numbers, separated by blanks. `//` begins a comment, and a line with `#` a new block. Units are mm and
 rad. More than one argument makes a table over a grid. The control interpolates linearly.
 
-The documentation calls the parameters errors (ISO 230-1, ISO/TR 16907): actual minus commanded. Levers are
-taken to count from axis position 0, without a tool. For axes that carry the workpiece it does not say whether
-errors are those at the tool or at a point fixed on the table; a caller has to state that.
+The documentation calls the parameters errors (ISO 230-1, ISO/TR 16907): actual minus commanded. Lever arms
+are assumed to count from axis position 0, without a tool. For axes that carry the workpiece the documentation
+does not say whether errors are those at the tool or at a point fixed on the table. The caller states it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ from olp.files.control_tables.base import Exported, Format, Given, Imported, Loa
 from olp.files.problems import Problem
 from olp.findings.catalogue import Finding
 
+#: The sign convention of the format.
 SENSE: Sense = "error"
+#: Names of columns that are arguments.
 _ARGUMENTS = "XYZABCUVW"
 
 #: A block: the line of its header, its names, and its rows with their lines.
@@ -42,7 +44,7 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     reference = reference_of(given)
     curves: list[Curve] = []
     square: dict[str, float] = {}
-    left: list[str] = []
+    ignored: list[str] = []
     problems: list[Problem] = []
     seen: set[str] = set()
     for line, header, rows in _blocks(load(path), problems):
@@ -52,10 +54,10 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
         lines = [number for number, _ in rows]
         for name in names:
             if name in seen:
-                problems.append((line, f"{name} stands in two blocks; expected it once"))
+                problems.append((line, f"{name} is defined twice; expected it in one block"))
             seen.add(name)
             if not rows:
-                problems.append((line, f"no row follows the header of {name}"))
+                problems.append((line, f"no row follows the header of {name}; expected at least 2"))
                 continue
             values = table[:, header.index(name)]
             if name in SQUARENESS:
@@ -64,20 +66,20 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
                 else:
                     square[name] = float(values[0]) * factor + 0.0
             elif name in COMPONENTS:
-                found = _component(name, header, arguments, table, lines, problems)
-                if found is not None:
-                    position, error = found
+                columns = _component(name, header, arguments, table, lines, problems)
+                if columns is not None:
+                    position, error = columns
                     error = base.signed(error, factor)
                     curves.append(base.linear_curve(name, position, error, None, reference(name[2])))
             elif np.any(values):
-                left.append(f"{name} (line {line})")
+                ignored.append(f"{name} (line {line})")
     base.refuse(problems, path)
     if not curves and not square:
         raise ConfigError("holds no error of X, Y or Z; expected columns such as X EXX EYX", file=str(path))
     findings = []
-    if left:
-        message = f"{', '.join(left)} are no errors of X, Y, Z and were left out"
-        findings.append(Finding("OLP872", message, count=len(left)))
+    if ignored:
+        message = f"{', '.join(ignored)} are not errors of X, Y, Z and were left out"
+        findings.append(Finding("OLP872", message, count=len(ignored)))
     return Imported(base.calibration_of(given, curves, path, square), tuple(findings))
 
 
@@ -93,9 +95,9 @@ def _blocks(data: bytes, problems: list[Problem]) -> Iterator[Block]:
             line, header = number, bare.split()
             double = sorted({name for name in header if header.count(name) > 1})
             if double:
-                problems.append((number, f"column {', '.join(double)} stands twice; expected it once"))
+                problems.append((number, f"column {', '.join(double)} is defined twice; expected it once"))
             if base.number(header[0]) is not None:
-                problems.append((number, f'"{bare[:40]}" is no header; expected names such as X EXX EYX'))
+                problems.append((number, f'"{bare[:40]}" is not a header; expected names such as X EXX EYX'))
         elif bare:
             cells = [base.number(cell) for cell in bare.split()]
             whole = [cell for cell in cells if cell is not None]
@@ -116,7 +118,7 @@ def _component(
     lines: list[int],
     problems: list[Problem],
 ) -> tuple[Array, Array] | None:
-    """Positions and values of a component by its own axis; other arguments must change nothing."""
+    """Positions and values of a component by its own axis. Other arguments must not change them."""
     axis, values = name[2], table[:, header.index(name)]
     if axis not in arguments:
         problems.append(
@@ -125,42 +127,42 @@ def _component(
         return None
     own = table[:, header.index(axis)]
     if len(arguments) == 1:
-        found = list(base.order_problems(list(zip(lines, own.tolist(), strict=True)), axis))
-        problems += found
-        return None if found else (own, values)
+        wrong_order = list(base.order_problems(list(zip(lines, own.tolist(), strict=True)), axis))
+        problems += wrong_order
+        return None if wrong_order else (own, values)
     position = np.unique(own)
     first = {q: values[own == q][0] for q in position.tolist()}
     for line, q, value in zip(lines, own.tolist(), values.tolist(), strict=True):
         if value != first[q]:
             others = ", ".join(a for a in arguments if a != axis)
             problems.append(
-                (line, f"{name} changes with {others} as well; a calibration holds curves of one axis, and "
-                 "no table over several: leave this block to the control")
+                (line, f"{name} changes with {others} as well; a calibration holds curves of one axis only: "
+                 "remove this block and leave it to the control")
             )  # fmt: skip
             return None
     return position, np.array([first[q] for q in position.tolist()])
 
 
 def reference_of(given: Given) -> Callable[[str], Reference]:
-    """Where errors of an axis count; raises UsageError where that has to be stated and is not."""
+    """The reference point of the errors of an axis. Raises UsageError where it is needed and not stated."""
     check_chain(given)
     carried = given.chain.split("F")[0]
     return lambda axis: (given.reference or "functional-point") if axis in carried else "functional-point"
 
 
 def check_chain(given: Given) -> None:
-    """Raise UsageError where an axis carries the workpiece and nobody says where its errors count."""
+    """Raise UsageError where an axis carries the workpiece and its reference point is not stated."""
     carried = given.chain.split("F")[0]
     if carried and given.reference is None:
         raise UsageError(
             f"axis {', '.join(carried)} carries the workpiece (chain {given.chain}), and the format does not "
-            "say where its errors count; state it: --reference table (at a point fixed on the table) or "
-            "--reference functional-point (at the tool)"
+            "state the point of its errors; give --reference table (a point fixed on the table) or "
+            "--reference functional-point (the tool)"
         )
 
 
 def without_direction(calibration: Calibration) -> Calibration:
-    """The mean of both directions, without lost motion."""
+    """The mean of both directions, without backlash."""
     curves = [
         replace(curve, columns={n: curve.mean(n) for n in curve.names}, forward={}, backward={})
         for curve in calibration.curves
@@ -169,13 +171,13 @@ def without_direction(calibration: Calibration) -> Calibration:
 
 
 def corrected_names(calibration: Calibration) -> frozenset[str]:
-    """What a volumetric table corrects: every component and squareness that the calibration holds."""
+    """The errors that a volumetric table corrects: every component and squareness of the calibration."""
     square = {name for name, value in calibration.squareness.items() if value}
     return frozenset({name for curve in calibration.curves for name in curve.names} | square)
 
 
 def control(calibration: Calibration, chain: str) -> Control:
-    """The control with this table; it holds the value at the faces of the box."""
+    """The control with this table. Outside the box it keeps the values at the faces."""
     return Volumetric(build(calibration, chain, outside="hold"))
 
 
@@ -188,7 +190,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     )
     lines = [
         f"// Errors of {calibration.machine}; mm and rad; chain {given.chain}, workpiece to tool",
-        f"// sense: {sense}; levers count from axis position 0 without a tool",
+        f"// sense: {sense}; lever arms count from axis position 0 without a tool",
     ]
     square = {name: table.squareness[name] for name in SQUARENESS if table.squareness.get(name, 0.0)}
     if square:
@@ -216,7 +218,7 @@ FORMAT = Format(
     ".csv",
     SENSE,
     "documentation of Beckhoff and ISG",
-    "18 components and squareness with levers and tool, mean of both directions",
+    "18 components and squareness with lever arms and tool, mean of both directions",
     _read,
     _write,
     control,

@@ -1,8 +1,8 @@
 """Klipper's skew correction: `[skew_correction NAME]` with xy_skew, xz_skew, yz_skew.
 
-A factor says how far the later axis leans to + of the earlier one, per unit of length: + is an acute angle.
-The firmware takes the shear out exactly: x' = x - y xy - z (xz - xy yz), y' = y - z yz. Saved values stand at
-the end of printer.cfg behind `#*#`. Source: the skew_correction module of Klipper.
+A factor is the lean of the later axis to + of the earlier one, per unit of length: + is an acute angle. The
+firmware removes the shear exactly: x' = x - y xy - z (xz - xy yz), y' = y - z yz. Saved values are at the end
+of printer.cfg behind `#*#`. Source: the skew_correction module of Klipper.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ _SECTION = re.compile(r"\[\s*([^\]\s]+)\s*([^\]]*?)\s*\]")
 
 
 def _read(path: Path, given: Given, load: Load) -> Imported:
-    found: dict[str, dict[str, float]] = {}
+    sections: dict[str, dict[str, float]] = {}
     problems: list[Problem] = []
     for line, section, key, value in _entries(load(path)):
         if key is None:
-            if section in found:
-                problems.append((line, f"[skew_correction {section}] stands twice; expected it once"))
-            found.setdefault(section, {})
+            if section in sections:
+                problems.append((line, f"[skew_correction {section}] is defined twice; expected it once"))
+            sections.setdefault(section, {})
         elif key not in _KEYS:
-            problems.append((line, f"{key} is no key of skew_correction; expected {', '.join(_KEYS)}"))
+            problems.append((line, f"{key} is not a key of skew_correction; expected {', '.join(_KEYS)}"))
         elif (number := base.number(value)) is None:
-            problems.append((line, f'{key} = "{value}" is no number'))
+            problems.append((line, f'{key} = "{value}" is not a number'))
         else:
-            found[section][key] = number
+            sections[section][key] = number
     base.refuse(problems, path)
-    filled = {name: values for name, values in found.items() if values}
+    filled = {name: values for name, values in sections.items() if values}
     if len(filled) != 1:
         what = f"sections {', '.join(filled)}" if filled else "no section [skew_correction NAME] with factors"
-        raise ConfigError(f"holds {what}; expected one; cut the file down to it", file=str(path))
+        raise ConfigError(f"holds {what}; expected one; remove the others from the file", file=str(path))
     ((name, values),) = filled.items()
     xy, xz, yz = (values.get(key, 0.0) for key in _KEYS)
     square = {"C0Y": 0.0 - xy, "B0Z": xz, "A0Z": 0.0 - yz}
@@ -51,7 +51,7 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
 
 
 def _entries(data: bytes) -> Iterator[tuple[int, str, str | None, str]]:
-    """(line, section, key, value) inside sections of skew_correction; the key is None at their header."""
+    """(line, section, key, value) inside sections of skew_correction. The key is None at their header."""
     section: str | None = None
     for line, raw in base.lines(data):
         bare = raw.removeprefix("#*#").strip()

@@ -1,10 +1,11 @@
 """LinuxCNC's screw compensation: COMP_FILE and COMP_FILE_TYPE of a joint, and BACKLASH where it has none.
 
-A line is `nominal forward reverse`. Type 0 holds where the axis really was, every other type what is added to
-the command: trim = nominal - actual. The control takes straight lines between rows and the end values
-outside, forward or reverse by the sign of the joint's velocity, and ramps from one to the other; at most 256
-rows, in ascending order. A file replaces BACKLASH. Comments are not allowed: reading stops at the first
-line that is no row. Source: the INI section of the integrator manual, and the motion controller's source.
+A line is `nominal forward reverse`. Type 0 holds the actual position of the axis. Every other type holds what
+the control adds to the command: trim = nominal - actual. The control interpolates linearly between rows and
+uses the end values outside. It takes forward or reverse by the sign of the joint's velocity, and ramps from
+one to the other. A file has at most 256 rows, in ascending order, and replaces BACKLASH. Comments are not
+allowed: the control stops reading at the first line that is not a row. Sources: the INI section of the
+integrator manual, and the source of the motion controller.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ from olp.files.linuxcnc import Reading, joints_of, sections_of, unit_mm
 from olp.files.problems import Problem
 from olp.findings.catalogue import Finding
 
+#: Rows that LinuxCNC reads.
 MOST_ROWS = 256
-#: COMP_FILE_TYPE of a file that holds actual positions, and where the INI file states none.
+#: COMP_FILE_TYPE of a file that holds actual positions, and the default of an INI file without this key.
 ACTUAL_POSITIONS = 0
+#: COMP_FILE_TYPE of a file that holds what the control adds.
 TRIMS = 1
 
 
@@ -45,13 +48,13 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     reading = Reading(str(path), sections_of(path, load))
     reading.mm = unit_mm(reading)
     curves: list[Curve] = []
-    lost = [0.0, 0.0, 0.0]
+    backlash_mm = [0.0, 0.0, 0.0]
     for j, (axis, joints) in enumerate(joints_of(reading).items()):
         tables = [joint for joint in joints if reading.text(joint, "COMP_FILE")]
         if len(tables) > 1:
             raise ConfigError(
-                f"{', '.join(tables)} move axis {axis}, each with a COMP_FILE; expected one table an axis: "
-                "name one of the files with --axis",
+                f"{', '.join(tables)} move axis {axis}, each with a COMP_FILE; expected one table per axis: "
+                "give one of the files with --axis",
                 file=str(path),
             )
         if tables:
@@ -59,10 +62,10 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
             kind = int(reading.number(tables[0], "COMP_FILE_TYPE") or ACTUAL_POSITIONS)
             curves.append(_curve(axis, load(name), name, kind, reading.mm))
         else:
-            lost[j] = max((reading.length(joint, "BACKLASH") or 0.0 for joint in joints), default=0.0)
-    if not curves and not any(lost):
+            backlash_mm[j] = max((reading.length(joint, "BACKLASH") or 0.0 for joint in joints), default=0.0)
+    if not curves and not any(backlash_mm):
         raise ConfigError("no joint has a COMP_FILE or a BACKLASH; expected one of them", file=str(path))
-    backlash: Vector = (lost[0], lost[1], lost[2])
+    backlash: Vector = (backlash_mm[0], backlash_mm[1], backlash_mm[2])
     calibration = base.calibration_of(given, curves, path, backlash_mm=backlash)
     return Imported(calibration, notes=tuple(reading.notes))
 
@@ -75,14 +78,14 @@ def _curve(axis: str, data: bytes, file: Path, kind: int, mm: float) -> Curve:
         if not cells:
             continue
         if len(cells) != 3 or any(base.number(cell) is None for cell in cells):
-            sentence = f'"{text[:40]}" is no row of three numbers; LinuxCNC stops reading at it'
-            problems.append((line, sentence + ": expected nominal, forward, reverse"))
+            sentence = f'"{text[:40]}" is not a row; LinuxCNC stops reading here'
+            problems.append((line, sentence + "; expected three numbers: nominal, forward, reverse"))
             continue
         rows.append((line, cells))
     if not problems:
         problems = list(base.order_problems([(n, float(c[0])) for n, c in rows], "nominal"))
         if len(rows) > MOST_ROWS:
-            problems.append((rows[MOST_ROWS][0], f"{len(rows)} rows; LinuxCNC takes {MOST_ROWS}"))
+            problems.append((rows[MOST_ROWS][0], f"{len(rows)} rows; LinuxCNC takes at most {MOST_ROWS}"))
     base.refuse(problems, file)
     sides = []
     for column in (1, 2):
@@ -99,7 +102,7 @@ def _curve(axis: str, data: bytes, file: Path, kind: int, mm: float) -> Curve:
 def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     if target.suffix.lower() != ".ini":
         raise UsageError(
-            "is no name for this table; expected an INI file, which names the others", file=str(target)
+            "has no ending .ini; expected an INI file, which names the table files", file=str(target)
         )
     kind = TRIMS if given.kind is None else given.kind
     most = min(MOST_ROWS, given.most or MOST_ROWS)
@@ -135,7 +138,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
 
 
 def _table(rows: Rows, kind: int) -> bytes:
-    out = []
+    lines = []
     table = zip(rows.position_mm.tolist(), rows.forward.tolist(), rows.backward.tolist(), strict=True)
     for nominal, forward, backward in table:
         cells = [base.shown(nominal)]
@@ -144,8 +147,8 @@ def _table(rows: Rows, kind: int) -> bytes:
                 cells.append(format(Decimal(repr(nominal)) + Decimal(repr(error)), "f"))
             else:
                 cells.append(base.shown(0.0 - error))
-        out.append(" ".join(cells))
-    return ("\n".join(out) + "\n").encode()
+        lines.append(" ".join(cells))
+    return ("\n".join(lines) + "\n").encode()
 
 
 FORMAT = Format(
@@ -154,7 +157,7 @@ FORMAT = Format(
     ".ini",
     "correction",
     "source and manual; run against the control itself in the tests",
-    "EXX, EYY, EZZ by their own position, both directions, 256 rows an axis",
+    "EXX, EYY, EZZ by their own position, both directions, 256 rows per axis",
     _read,
     _write,
     lambda calibration, chain: AxisTables(calibration),

@@ -1,11 +1,13 @@
 """Sag compensation of Sinumerik controls: tables `$AN_CEC`, one input axis and one output axis each.
 
-`$AN_CEC[t,n]` is the value at row n of table t, rows stand at equal steps from `_MIN` to `_MAX`, the end
-values hold outside, and the control takes straight lines between. `_DIRECTION` 0 is for both directions of
-the input axis, 1 and -1 for one of them: two tables make a lost motion that depends on position. Tables add
-up. The number of rows must stand in MD18342 before the tables are loaded; a Sinumerik 828D has 8 tables of
-200 rows. Source: the function manual "Compensations" (K3). Whether values are added to the command or taken
-off it is not verified: the caller states it, and a verification program is written beside the table.
+`$AN_CEC[t,n]` is the value at row n of table t. Rows are at equal steps from `_MIN` to `_MAX`. The control
+interpolates linearly between them and uses the end values outside. `_DIRECTION` 0 is for both directions of
+the input axis, 1 and -1 for one of them: two tables make a backlash that depends on position. Values of
+several tables are added. MD18342 must hold the number of rows before the tables are loaded. A Sinumerik 828D
+has 8 tables of 200 rows.
+
+Source: the function manual "Compensations" (K3). It is not verified whether the control adds values to the
+command or subtracts them. The caller states it, and a verification program is written beside the table.
 """
 
 from __future__ import annotations
@@ -37,13 +39,15 @@ from olp.files.control_tables.verification import checks, siemens_program
 from olp.files.problems import Problem
 from olp.findings.catalogue import Finding
 
-#: Rows of a table where the caller says nothing: those of a Sinumerik 828D.
+#: Rows of a table where the caller does not limit them: those of a Sinumerik 828D.
 MOST_ROWS = 200
+#: The components that a table can hold.
 TRANSLATIONS = tuple(name for name in COMPONENTS if name[1] in AXES)
 _VALUE = re.compile(r"\$AN_CEC\[\s*(\d+)\s*,\s*(\d+)\s*\]\s*=\s*(\S+)", re.IGNORECASE)
 _KEY = re.compile(r"\$AN_CEC_([A-Z_]+)\[\s*(\d+)\s*\]\s*=\s*(\S+)", re.IGNORECASE)
 _FRAME = re.compile(r"%.*|N?\d*\s*(CHANDATA\(\d+\)|M17|M30|M2|M02)", re.IGNORECASE)
 _KEYS = ("INPUT_AXIS", "OUTPUT_AXIS", "STEP", "MIN", "MAX", "DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
+#: The highest row number that is read: a higher one is a mistake.
 _MOST_NUMBER = 100_000
 
 
@@ -62,20 +66,20 @@ def _read(path: Path, given: Given, load: Load) -> Imported:
     tables = _tables(load(path), problems)
     base.refuse(problems, path)
     names = {control.upper(): axis for axis, control in _names(given).items()}
-    found: dict[tuple[str, int], tuple[int, np.ndarray, np.ndarray]] = {}
+    sides: dict[tuple[str, int], tuple[int, np.ndarray, np.ndarray]] = {}
     for table in tables.values():
         read = _one(table, names, problems)
         if read is None:
             continue
         name, direction, position, values = read
-        if (name, direction) in found or (name, 0) in found or (direction == 0 and (name, 1) in found):
-            first = found.get((name, direction)) or found.get((name, 0)) or found[name, 1]
+        if (name, direction) in sides or (name, 0) in sides or (direction == 0 and (name, 1) in sides):
+            first = sides.get((name, direction)) or sides.get((name, 0)) or sides[name, 1]
             problems.append(
                 (table.line, f"a second table of {name[2]} for {name[1]} (the first at line {first[0]}); "
-                 "expected one for both directions, or one a direction: add them up")
+                 "expected one for both directions, or one per direction: add their values")
             )  # fmt: skip
-        found[name, direction] = table.line, position, base.signed(values, factor)
-    curves = [curve for name in COMPONENTS for curve in _curves(name, found, problems)]
+        sides[name, direction] = table.line, position, base.signed(values, factor)
+    curves = [curve for name in COMPONENTS for curve in _curves(name, sides, problems)]
     base.refuse(problems, path)
     if not curves:
         raise ConfigError("holds no table; expected lines such as $AN_CEC[0,0]=0.012", file=str(path))
@@ -93,9 +97,9 @@ def _tables(data: bytes, problems: list[Problem]) -> dict[int, _Table]:
             table = tables.setdefault(int(value[1]), _Table(line))
             row = int(value[2])
             if number is None or row > _MOST_NUMBER:
-                problems.append((line, f'"{bare[:50]}" holds no number, or too high a row'))
+                problems.append((line, f'"{bare[:50]}" holds no number, or a row above {_MOST_NUMBER}'))
             elif row in table.rows:
-                problems.append((line, f"row {row} of table {value[1]} stands twice; expected it once"))
+                problems.append((line, f"row {row} of table {value[1]} is defined twice; expected it once"))
             else:
                 table.rows[row] = line, number
         elif key and key[1].upper() in _KEYS:
@@ -116,7 +120,7 @@ def _one(
         name = text.strip("()\"' ").upper()
         if name not in names:
             problems.append(
-                (line, f'{key} "{name}" is none of {", ".join(names)}; name it, such as '
+                (line, f'{key} "{name}" is not one of {", ".join(names)}; name its axis, such as '
                  f'--axis-name X={name or "X1"}')
             )  # fmt: skip
         axes.append(names.get(name, "X"))
@@ -125,7 +129,7 @@ def _one(
                          ("MULT_BY_TABLE", 0), ("IS_MODULO", 0)):  # fmt: skip
         line, text = table.keys.get(key, (table.line, "" if default is None else str(default)))
         if base.number(text) is None:
-            problems.append((line, f"{key} is missing, or no number"))
+            problems.append((line, f"{key} is missing or not a number; expected a number"))
         else:
             numbers[key] = Decimal(text)
     if len(problems) > before:
@@ -134,15 +138,15 @@ def _one(
         if numbers[key]:
             problems.append((table.keys[key][0], f"{key} makes {what}, which a calibration cannot hold"))
     if numbers["DIRECTION"] not in (-1, 0, 1):
-        problems.append((table.keys["DIRECTION"][0], "DIRECTION is none of 0, 1, -1"))
+        problems.append((table.keys["DIRECTION"][0], "DIRECTION is wrong; expected 0, 1 or -1"))
     step, low, high = numbers["STEP"], numbers["MIN"], numbers["MAX"]
     if step <= 0 or high <= low:
-        problems.append((table.line, "STEP is not above 0, or MAX not above MIN"))
+        problems.append((table.line, "STEP or MAX is wrong; expected STEP above 0 and MAX above MIN"))
         return None
     exact = (high - low) / step
     count = int(exact.to_integral_value(ROUND_HALF_EVEN)) + 1
     if exact != count - 1:
-        problems.append((table.keys["MAX"][0], f"MAX - MIN is {exact:.3f} steps; expected whole steps"))
+        problems.append((table.keys["MAX"][0], f"MAX - MIN is {exact:.3f} steps; expected an integer"))
     elif set(table.rows) != set(range(count)):
         missing = sorted(set(range(min(count, _MOST_NUMBER))) - set(table.rows))
         what = f"row {missing[0]} is missing" if missing else f"row {max(table.rows)} lies beyond MAX"
@@ -155,20 +159,21 @@ def _one(
 
 
 def _curves(
-    name: str, found: dict[tuple[str, int], tuple[int, np.ndarray, np.ndarray]], problems: list[Problem]
+    name: str, tables: dict[tuple[str, int], tuple[int, np.ndarray, np.ndarray]], problems: list[Problem]
 ) -> Iterator[Curve]:
-    if (name, 0) in found:
-        _, position, values = found[name, 0]
+    if (name, 0) in tables:
+        _, position, values = tables[name, 0]
         yield base.linear_curve(name, position, values, None)
         return
-    sides = [found.get((name, direction)) for direction in (1, -1)]
+    sides = [tables.get((name, direction)) for direction in (1, -1)]
     one = next((side for side in sides if side is not None), None)
     if one is None:
         return
     line, position, values = one
     columns = [np.zeros(len(position)) if side is None else side[2] for side in sides]
     if any(side is not None and not np.array_equal(side[1], position) for side in sides):
-        problems.append((line, f"the tables of {name} for both directions differ in MIN, MAX or STEP"))
+        sentence = f"the tables of {name} differ by direction in MIN, MAX or STEP; expected the same in both"
+        problems.append((line, sentence))
         return
     yield base.linear_curve(name, position, columns[0], columns[1])
 
@@ -199,7 +204,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
     head = [
         "%_N_NC_CEC_INI",
         f"; sag compensation of {calibration.machine}, mm; sense: {sense}",
-        "; error: values are actual minus commanded, taken off the command; correction: added to it",
+        "; error: values are actual minus commanded, subtracted from the command; correction: added to it",
         f"; {count} tables of at most {longest} rows: set MD18342 for each before loading, then MD32710",
         "CHANDATA(1)",
     ]
@@ -211,7 +216,7 @@ def _write(calibration: Calibration, target: Path, given: Given) -> Exported:
         *base.not_held(calibration, (*TRANSLATIONS, *SQUARENESS), written),
         *base.coarse(written, MISS_MM, MISS_RAD),
         *base.backlash_in_table(calibration, AXES),
-        Finding("OLP874", f"values have the sense stated, {sense}; run {verify.name} before any part"),
+        Finding("OLP874", f"the sign convention is {sense}, as stated; run {verify.name} before any part"),
     ]
     held = {
         rows.name for rows in written if any(rows.name in c.names for c in along_axes(calibration).curves)
@@ -236,7 +241,7 @@ FORMAT = Format(
     "Siemens Sinumerik sag compensation (CEC)",
     ".mpf",
     None,
-    "function manual; sense not verified",
+    "function manual; sign convention not verified",
     "9 translations by the position of one axis, both directions; squareness as slopes",
     _read,
     _write,

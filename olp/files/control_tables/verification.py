@@ -1,5 +1,8 @@
-"""Small programs that show whether a table has the right sense: one axis moves between two places where the
-table differs most, and the comments say what an instrument must read."""
+"""Small programs that show whether a table has the right sign convention.
+
+One axis moves between the two positions where the table differs most. The comments state the reading of an
+instrument.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +13,20 @@ import numpy as np
 
 from olp.calibration.control_tables.rows import Rows
 
-#: Pairs of axes that are looked at, those with the largest difference first.
+#: Pairs of axes that a program checks, those with the largest difference first.
 _PAIRS = 3
-#: Smaller differences than this are hard to see with a dial gauge.
+#: In mm: a dial gauge hardly shows smaller differences.
 LEAST_MM = 2e-4
+#: Slow enough that the axis follows the command.
 _FEED_MM_MIN = 500
+#: Time to read the instrument.
 _DWELL_S = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Axis `moves` goes from `first_mm` to `second_mm`, always approached in +; without a table `shows` then
-    reads `change_um` (actual minus commanded)."""
+    """Axis `moves` moves from `first_mm` to `second_mm`, both approached in +. Without a table the reading
+    along `shows` then changes by `change_um` (actual minus commanded)."""
 
     moves: str
     shows: str
@@ -32,8 +37,8 @@ class Check:
 
 
 def checks(rows: Sequence[Rows]) -> list[Check]:
-    """What to look at, the largest differences first. Both places are approached in +, from one before."""
-    found = []
+    """The checks, the largest differences first. Both positions are approached in +, from one before them."""
+    listed = []
     for one in rows:
         position, forward = one.position_mm, one.forward
         # the first position is where the axis comes from
@@ -43,50 +48,50 @@ def checks(rows: Sequence[Rows]) -> list[Check]:
         low, high = sorted((1 + int(np.argmin(forward[1:])), 1 + int(np.argmax(forward[1:]))))
         change = float(forward[high] - forward[low]) * 1e3
         if abs(change) >= LEAST_MM * 1e3:
-            places = float(position[low]), float(position[high]), float(position[0])
-            found.append(Check(one.name[2], one.name[1], *places, change))
-    found.sort(key=lambda check: -abs(check.change_um))
-    return found[:_PAIRS]
+            positions = float(position[low]), float(position[high]), float(position[0])
+            listed.append(Check(one.name[2], one.name[1], *positions, change))
+    listed.sort(key=lambda check: -abs(check.change_um))
+    return listed[:_PAIRS]
 
 
 def _says(check: Check) -> Iterator[str]:
     shown = f"{check.shows} by {check.change_um:+.1f} um"
     yield f"{check.moves} from {check.first_mm:g} to {check.second_mm:g} mm; instrument along {check.shows}"
     yield f"table off: reading changes {shown} (actual minus commanded)"
-    yield "table on, right sense: it does not change"
-    yield f"table on, WRONG sense: it changes {check.shows} by {2 * check.change_um:+.1f} um"
+    yield "table on, right sign: it does not change"
+    yield f"table on, WRONG sign: it changes {check.shows} by {2 * check.change_um:+.1f} um"
 
 
 _HEAD = (
-    "shows whether the compensation table has the right sense",
-    "one axis moves at a time; put the others where nothing is in the way",
+    "shows whether the compensation table has the right sign",
+    "one axis moves at a time; move the others clear of obstacles first",
     "run it with the table off, then on, laser or dial gauge between tool and table",
 )
 
 
-def siemens_program(found: Sequence[Check], machine: str) -> bytes:
-    """A main program for Sinumerik controls; axis words are those of the geometry axes."""
+def siemens_program(listed: Sequence[Check], machine: str) -> bytes:
+    """A main program for Sinumerik controls. Axis words are those of the geometry axes."""
     lines = [f"; verification of tables of {machine}", *(f"; {text}" for text in _HEAD)]
     lines.append("G90 G71 G94 G40 D0")
-    for check in found:
+    for check in listed:
         lines += [f"; {text}" for text in _says(check)]
         lines.append("M0")
-        for place in (check.before_mm, check.first_mm):
-            lines.append(f"SUPA G1 {check.moves}{place:.4f} F{_FEED_MM_MIN}")
+        for position in (check.before_mm, check.first_mm):
+            lines.append(f"SUPA G1 {check.moves}{position:.4f} F{_FEED_MM_MIN}")
         lines += [f"G4 F{_DWELL_S} ; read", f"SUPA G1 {check.moves}{check.second_mm:.4f} F{_FEED_MM_MIN}"]
         lines += [f"G4 F{_DWELL_S} ; read"]
     return ("\n".join([*lines, "M30"]) + "\n").encode("ascii", "replace")
 
 
-def heidenhain_program(found: Sequence[Check], names: Mapping[str, str], name: str) -> bytes:
-    """A plain-language program; M91 moves to positions of the machine."""
+def heidenhain_program(listed: Sequence[Check], names: Mapping[str, str], name: str) -> bytes:
+    """A plain-language program. M91 moves to positions of the machine."""
     dwell = ["CYCL DEF 9.0 DWELL TIME", f"CYCL DEF 9.1 DWELL {_DWELL_S}"]
     body = [f"; {text}" for text in _HEAD]
-    for check in found:
+    for check in listed:
         body += [*(f"; {text}" for text in _says(check)), "STOP"]
         moves = [
-            f"L {names[check.moves]}{place:+.4f} R0 F{_FEED_MM_MIN} M91"
-            for place in (check.before_mm, check.first_mm, check.second_mm)
+            f"L {names[check.moves]}{position:+.4f} R0 F{_FEED_MM_MIN} M91"
+            for position in (check.before_mm, check.first_mm, check.second_mm)
         ]
         body += [moves[0], moves[1], *dwell, moves[2], *dwell]
     lines = [f"BEGIN PGM {name.upper()} MM", *body, f"END PGM {name.upper()} MM"]

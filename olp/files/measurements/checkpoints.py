@@ -1,12 +1,11 @@
-"""Points that stand alone: a CSV file that says in comments how it was taken, or the points of a plan.
+"""Points of one set-up: a CSV file that states in comments how it was taken, or the points of a plan.
 
     # sigma_um = 8
     # tool_mm = [0.0, 0.0, -120.0]
     # frame = "instrument"
     X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm
 
-Columns deviation_X_um, deviation_Y_um, deviation_Z_um (actual minus commanded) may stand in place of the
-measured ones.
+Columns deviation_X_um, deviation_Y_um, deviation_Z_um (actual minus commanded) may replace the measured ones.
 """
 
 from __future__ import annotations
@@ -29,11 +28,12 @@ from olp.files.measurements.stated import stated_as
 from olp.files.problems import config_error
 from olp.files.write import PathLike, read_bytes
 
+#: The key of positions in the frame of the machine.
 MACHINE = "machine"
 
 
 class StatedOfPoints(Table):
-    """What a file of points may say of itself in comments `# key = value`."""
+    """What a file of points may state about itself in comments `# key = value`."""
 
     sigma_um: Positive | None = Field(
         default=None, description="the standard uncertainty of a coordinate, in um"
@@ -45,35 +45,35 @@ class StatedOfPoints(Table):
         default=None, description="the vector from the gauge point to the reflector, [X, Y, Z] in mm"
     )
     frame: Literal["machine", "instrument"] = Field(
-        default="instrument", description='what positions count in: "machine", or "instrument": its own'
+        default="instrument",
+        description='the frame of measured positions: "machine", or "instrument" (unknown)',
     )
 
 
 def load_checkpoints(
     path: PathLike, *, sigma_um: float | None = None, tool_mm: Vector | None = None
 ) -> tuple[Points, bool]:
-    """The points of one set-up, and whether they count in the machine's frame.
+    """The points of one set-up, and whether they are in the machine's frame.
 
-    `sigma_um` and `tool_mm` fill in what the file does not say. Raises InputError where it cannot be read,
-    and ConfigError with every problem.
+    `sigma_um` and `tool_mm` apply where the file does not state them. Raises InputError where the file cannot
+    be read, and ConfigError with every problem.
     """
     source = FilePath(path)
     if source.is_dir() or source.suffix.lower() == ".toml":
-        found = load_measurements([source]).of(Points)
-        if len(found) != 1:
-            raise ConfigError(
-                f"holds {len(found)} sets of points; expected one; name its file", file=str(path)
-            )
-        return found[0], False
+        sets = load_measurements([source]).of(Points)
+        if len(sets) != 1:
+            sentence = f"holds {len(sets)} sets of points; expected one; name its file"
+            raise ConfigError(sentence, file=str(path))
+        return sets[0], False
     data = read_bytes(source)
     header = next((line for line in data.splitlines() if line.strip() and not line.startswith(b"#")), b"")
     deviates = b"deviation_" in header
     readings = parse_point_readings(data, str(path), DEVIATION if deviates else MEASURED)
-    keys = {key: said for key, said in readings.keys.items() if key in StatedOfPoints.model_fields}
+    keys = {key: value for key, value in readings.keys.items() if key in StatedOfPoints.model_fields}
     stated = stated_as(keys, StatedOfPoints, readings.file, bare=False)
     problems = []
     if stated.sigma_um is not None and sigma_um is not None and stated.sigma_um != sigma_um:
-        problems.append(f"sigma_um = {stated.sigma_um:g}, and {sigma_um:g} in the call; expected it once")
+        problems.append(f"sigma_um = {stated.sigma_um:g}, but {sigma_um:g} in the call; expected it once")
     sigma = stated.sigma_um if stated.sigma_um is not None else sigma_um
     if sigma is None:
         problems.append("the uncertainty of a coordinate is not stated; expected a comment # sigma_um = 8")
@@ -88,13 +88,13 @@ def load_checkpoints(
     if problems:
         raise config_error([(None, text) for text in problems], str(path))
     vector = np.array(tool) if readings.tool_mm is None else readings.tool_mm
-    places = readings.measured
+    measured = readings.measured
     if deviates:
-        places = readings.axis_mm + vector + readings.measured * MM_PER_UM
+        measured = readings.axis_mm + vector + readings.measured * MM_PER_UM
     points = Points(
         axis_mm=readings.axis_mm,
         tool_mm=vector,
-        measured_mm=places,
+        measured_mm=measured,
         sigma=(sigma or 0.0) * MM_PER_UM,
         sigma_scale=stated.sigma_scale_um_m * PER_UNIT,
         source=str(path),

@@ -1,4 +1,4 @@
-"""CSV files of instruments: named columns of numbers, and what the file says about itself in comments."""
+"""CSV files of instruments: named columns of numbers, and what the file states about itself in comments."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ T = TypeVar("T", bound=Table)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """(n,) numbers by column, words of the columns that hold words, and the line of each row."""
+    """(n,) numbers by column, words by column of words, and the line of each row."""
 
     file: str
     number: Mapping[str, Array]
@@ -44,7 +44,7 @@ def read_columns(
     """
     file = str(path)
     data = read_bytes(path)
-    # what it states is judged before its columns
+    # comments are judged before columns
     keys = stated_as(dict(stated_keys(decoded(data, file))), model, file)
     known = (*needed, *words, *optional)
 
@@ -57,32 +57,30 @@ def read_columns(
                 problems.append((line, f'column "{name}" is not known; {hint}'))
         problems += missing(line, header, (*needed, *words))
         if len(set(header)) < len(header):
-            problems.append((line, "a column stands twice; expected each once"))
+            problems.append((line, "a column is repeated; expected each once"))
         return problems
 
     def number(name: str, cell: str) -> tuple[float, str | None]:
         return (0.0, None if cell else f"{name} is empty") if name in words else _number(name, cell)
 
     nothing = f"holds no readings; expected the columns {','.join(known)}"
-    many = "; write decimal points, no commas"
+    many = "; write decimal points, not commas"
     sheet = read_sheet(data, file, Wanted(nothing, header_problems, number, many=many))
     if sheet.problems:
         raise config_error(sheet.problems, file)
     if len(sheet.rows) < 2:
         raise config_error([(sheet.line, f"{len(sheet.rows)} readings; expected at least 2")], file)
     numbers = {name: np.array(column) for name, column in sheet.columns.items() if name not in words}
-    texts = {
-        name: tuple(cells[sheet.header.index(name)] for _, cells in sheet.records) for name in words
-    }
+    texts = {name: tuple(cells[sheet.header.index(name)] for _, cells in sheet.records) for name in words}
     return Columns(file, numbers, texts, sheet.lines), keys
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:
-    value, said = finite(cell), None
+    value, wrong = finite(cell), None
     if math.isnan(value):
-        said = f'{name} = "{cell[:40]}"; expected a finite number'
+        wrong = f'{name} = "{cell[:40]}"; expected a finite number'
     elif name == "direction" and value not in (1.0, -1.0):
-        said = f"direction = {cell}; expected 1 or -1"
+        wrong = f"direction = {cell}; expected 1 or -1"
     elif name == "run" and (value != int(value) or value < 1):
-        said = f"run = {cell}; expected a whole number from 1"
-    return value, said
+        wrong = f"run = {cell}; expected an integer from 1"
+    return value, wrong

@@ -1,4 +1,4 @@
-"""What may be said of one line: in a plan, in its [defaults], or in the file of readings itself."""
+"""The keys of one line: in a plan, in its [defaults], or in the file of readings itself."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from olp.files.measurements.readings import SENSES
 def _sense(value: object) -> object:
     if value not in SENSES:
         raise refusal(
-            f"= {shown(value)} is no sense; expected one of " + ", ".join(f'"{sense}"' for sense in SENSES)
+            f"= {shown(value)} is not a sign convention; expected one of "
+            + ", ".join(f'"{sense}"' for sense in SENSES)
         )
     return value
 
@@ -26,18 +27,18 @@ Instrument = Literal["laser", "level", "autocollimator", "straightedge", "other"
 
 
 class LineKeys(Table):
-    """What may be said of one line, in a plan, in its [defaults], or in the file itself."""
+    """The keys of one line, in a plan, in its [defaults], or in the file itself."""
 
     line_mm: Position = Field(
         default_factory=Position,
-        description="where the other two axes stood, such as { Y = 700.0, Z = -600.0 } in mm",
+        description="the positions of the other two axes, such as { Y = 700.0, Z = -600.0 } in mm",
     )
     tool_mm: Triple | None = Field(
         default=None, description="the vector from the gauge point to the reflector, [X, Y, Z] in mm"
     )
     reference: Literal["functional-point", "table"] | None = Field(
         default=None,
-        description='"functional-point" (reflector at the tool) or "table" (it stayed on a moving table)',
+        description='"functional-point" (reflector at the tool) or "table" (reflector on a moving table)',
     )
     square: Text | None = Field(
         default=None, description="the name of the square whose leg the straightness was read against"
@@ -45,14 +46,14 @@ class LineKeys(Table):
     sense: Sense | None = Field(
         default=None,
         description='"actual-minus-commanded" or "commanded-minus-actual" of the tool relative to the '
-        'workpiece; "table-motion ..." in front: of the table itself',
+        'workpiece; the prefix "table-motion" for readings of the table itself',
     )
     sigma_um: NotNegative | None = Field(
         default=None,
         description="the standard uncertainty of one reading in um; from the spread of the runs if left out",
     )
     sigma_urad: NotNegative | None = Field(
-        default=None, description="the same of a reading of an angle, in urad"
+        default=None, description="the standard uncertainty of one reading of an angle, in urad"
     )
     sigma_scale_um_m: NotNegative | None = Field(
         default=None,
@@ -61,9 +62,9 @@ class LineKeys(Table):
     instrument: Instrument | None = Field(
         default=None, description='"laser", "level", "autocollimator", "straightedge" or "other"'
     )
-    reflector: Text | None = Field(default=None, description="words on the optics, kept for the report")
+    reflector: Text | None = Field(default=None, description="a description of the optics, for the report")
     profile: Text | None = Field(
-        default=None, description="the profile that says how the file is laid out, relative to the plan"
+        default=None, description="the path of the profile of the file's layout, relative to the plan"
     )
 
 
@@ -71,7 +72,7 @@ class LineTable(LineKeys):
     file: Text = Field(description="the path of the file of readings, relative to this file")
     component: Literal[COMPONENTS] | None = Field(  # type: ignore[valid-type]
         default=None,
-        description='the ISO 230-1 name of what was read, such as "EXX"; the file may say it instead',
+        description='the ISO 230-1 name of what was read, such as "EXX"; the file may state it instead',
     )
 
 
@@ -95,7 +96,7 @@ class Stated(LineKeys):
         default=[], description="the periods of screw and scale of this axis, [..] in mm"
     )
     square_error_urad: float | None = Field(
-        default=None, description="by how much the square's angle is more than 90 degrees, in urad"
+        default=None, description="the deviation of the square's angle, + above 90 degrees, in urad"
     )
     square_sigma_urad: NotNegative | None = Field(
         default=None, description="the standard uncertainty of the square's angle, in urad"

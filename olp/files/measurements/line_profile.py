@@ -1,4 +1,4 @@
-"""Readings of one line from any text of columns: the layout is written once as an olp-line-profile-1 file.
+"""Readings of one line from text files with columns, whose layout is an olp-line-profile-1 file.
 
 schema = "olp-line-profile-1"
 instrument = "laser, export of the shop"
@@ -41,9 +41,10 @@ from olp.program.text.rows import Form
 Column = Text | Annotated[int, Field(ge=1)]
 Direction = Annotated[int, Field(ge=-1, le=1)]
 
+#: Marks between groups of three digits, by name.
 _THOUSANDS = {"none": "", "point": ".", "comma": ",", "space": " ", "apostrophe": "'"}
 
-#: Files of instruments for which no grammar and no specimen is public; their programs export text.
+#: Endings of files of instruments whose format is not public. Their programs export text.
 WITHOUT_GRAMMAR = {
     ".rtl": "a Renishaw linear measurement",
     ".rta": "a Renishaw angular measurement",
@@ -60,7 +61,7 @@ WITHOUT_GRAMMAR = {
 class LineColumns(Table):
     target: Column = Field(description="the column of target positions: its name, or its number from 1")
     value: Column | list[Column] = Field(
-        description="the column of readings, or a list of columns, one a run: names, or numbers from 1"
+        description="the column of readings, or a list of columns, one per run: names, or numbers from 1"
     )
     run: Column | None = Field(default=None, description="the column of run numbers")
     direction: Column | None = Field(default=None, description="the column of directions")
@@ -73,7 +74,9 @@ class LineProfile(Table):
     schema_: Literal["olp-line-profile-1"] = Field(
         alias="schema", description='the format, "olp-line-profile-1"'
     )
-    instrument: Text | None = Field(default=None, description="the instrument or program that writes these")
+    instrument: Text | None = Field(
+        default=None, description="the instrument or program that writes the files"
+    )
     delimiter: Literal["comma", "semicolon", "tab", "space"] = Field(
         default="comma", description='"comma", "semicolon", "tab" or "space" (any blanks) between columns'
     )
@@ -84,11 +87,11 @@ class LineProfile(Table):
         default="none", description="the mark between groups of three digits"
     )
     header_lines: Annotated[int, Field(ge=0)] = Field(
-        default=0, description="how many lines stand before the names of columns, or before the data"
+        default=0, description="the number of lines before the names of columns, or before the data"
     )
     header: bool = Field(default=True, description="whether a line with the names of columns comes first")
-    comment: Text = Field(default="#", description="what lines begin with that hold no reading")
-    end: Text | None = Field(default=None, description="what the line begins with that ends the data")
+    comment: Text = Field(default="#", description="the mark at the beginning of lines that hold no reading")
+    end: Text | None = Field(default=None, description="the beginning of the line that ends the data")
     position_unit: Literal["mm", "um", "m", "inch"] = Field(
         default="mm", description="the unit of target positions"
     )
@@ -99,29 +102,30 @@ class LineProfile(Table):
         default="error", description='"error", or "position" where the reading is the position itself'
     )
     sense: Text | None = Field(
-        default=None, description="the sense of errors, one of " + ", ".join(f'"{s}"' for s in SENSES)
+        default=None,
+        description="the sign convention of errors, one of " + ", ".join(f'"{s}"' for s in SENSES),
     )
     component: Text | None = Field(
-        default=None, description='the ISO 230-1 name of what these files hold, such as "EXX"'
+        default=None, description='the ISO 230-1 name of the error in these files, such as "EXX"'
     )
     axis: Text | None = Field(
-        default=None, description="the name of the axis whose rows are taken, where a column names axes"
+        default=None, description="the axis whose rows are read, where a column names axes"
     )
     runs: Literal["column", "blank-line", "reversal", "one"] = Field(
         default="reversal",
-        description='how a new run shows: in a "column", by a "blank-line", where targets turn back '
-        '("reversal"), or not at all ("one")',
+        description='how a new run begins: in a "column", after a "blank-line", where targets turn back '
+        '("reversal"), or never ("one")',
     )
     directions: list[Direction] | None = Field(
         default=None, description="1 or -1 for each column of readings, where there are several"
     )
     forward: list[Text] = Field(
         default=["1", "+1", "+", "forward", "positive"],
-        description="texts in the direction column that mean: approached in +",
+        description="texts in the direction column that mean approached in +",
     )
     backward: list[Text] = Field(
         default=["-1", "-", "reverse", "backward", "negative"],
-        description="texts in the direction column that mean: approached in -",
+        description="texts in the direction column that mean approached in -",
     )
     columns: LineColumns | None = Field(default=None, description="the table [columns]")
     recording: RecordingTable | None = Field(
@@ -132,7 +136,7 @@ class LineProfile(Table):
     @classmethod
     def _known_sense(cls, value: str | None) -> str | None:
         if value is not None and value not in SENSES:
-            raise refusal(f'= "{value}" is no sense; expected one of {", ".join(SENSES)}')
+            raise refusal(f'= "{value}" is not a sign convention; expected one of {", ".join(SENSES)}')
         return value
 
     @field_validator("component")
@@ -141,11 +145,13 @@ class LineProfile(Table):
         if value is None:
             return None
         if value not in COMPONENTS:
-            raise refusal(f'= "{value}" is no ISO 230-1 name; expected such as EXX, EYX or EBX')
+            raise refusal(f'= "{value}" is not an ISO 230-1 name; expected a name such as EXX, EYX or EBX')
         unit = info.data.get("unit")
         if unit is not None and (unit in ANGULAR) != (value[1] in "ABC"):
             kind = "an angle" if value[1] in "ABC" else "a length"
-            raise refusal(f'= "{value}" is {kind}, which unit = "{unit}" does not fit; expected both alike')
+            raise refusal(
+                f'= "{value}" is {kind}, which unit = "{unit}" does not fit; expected both lengths or angles'
+            )
         return value
 
     @field_validator("columns", "recording")
@@ -153,22 +159,26 @@ class LineProfile(Table):
     def _fits(cls, value: LineColumns | RecordingTable | None, info: ValidationInfo) -> object:
         data = info.data
         if data.get("decimal") == "comma" and data.get("delimiter") == "comma":
-            raise refusal("cannot be told apart: commas stand between columns and in numbers")
-        if data.get("thousands") == data.get("decimal"):
-            raise refusal("cannot be read: the decimal mark and the mark of thousands are the same")
-        if data.get("holds") == "position" and data.get("unit") in ANGULAR:
             raise refusal(
-                'does not fit holds = "position": an angle is no position; expected holds = "error"'
+                "cannot be read, because commas are both between columns and in numbers; expected another "
+                "delimiter"
             )
+        if data.get("thousands") == data.get("decimal"):
+            raise refusal("cannot be read, because decimal and thousands are the same; expected two marks")
+        if data.get("holds") == "position" and data.get("unit") in ANGULAR:
+            raise refusal('does not fit holds = "position" with a unit of angle; expected holds = "error"')
         if data.get("holds") == "position" and "commanded-minus-actual" in (data.get("sense") or ""):
-            raise refusal("contradicts sense: a position minus its target is actual minus commanded")
+            raise refusal(
+                'contradicts sense, because a position minus its target is "actual-minus-commanded"; '
+                "expected that, or sense left out"
+            )
         if isinstance(value, LineColumns):
             several, signs = isinstance(value.value, list), data.get("directions")
             count = len(value.value) if isinstance(value.value, list) else 1
             if several and (signs is None or len(signs) != count or 0 in signs):
                 raise refusal("names several columns of readings; expected directions, 1 or -1 for each")
             if data.get("runs") == "column" and value.run is None and not several:
-                raise refusal('lacks run, but runs = "column"; name the column, or another way of runs')
+                raise refusal('lacks run, but runs = "column"; name the column, or change the value of runs')
         return value
 
 
@@ -179,7 +189,7 @@ def load_line_profile(path: PathLike) -> LineProfile:
 
 
 def read_line(path: PathLike, profile: LineProfile | None = None) -> Readings:
-    """The readings of one file: as `profile` says, else native CSV.
+    """The readings of one file, as `profile` describes it. Without a profile, native CSV.
 
     Raises InputError where the file is of an instrument whose format is not public, and ConfigError with
     every problem and its line.
@@ -191,15 +201,15 @@ def read_line(path: PathLike, profile: LineProfile | None = None) -> Readings:
         return read_rtx(path)
     if ending in WITHOUT_GRAMMAR:
         raise InputError(
-            f"is {WITHOUT_GRAMMAR[ending]} by its name, and no grammar of that format is public; export the "
-            "readings as text and describe its columns with a profile (--profile)",
+            f"is {WITHOUT_GRAMMAR[ending]} by its name, and that format is not public; export the readings "
+            "as text and describe its columns with a profile (--profile)",
             file=str(path),
         )
     return parse_readings(read_bytes(path), str(path))
 
 
 def read_profiled(path: PathLike, profile: LineProfile) -> Readings:
-    """The readings of a text file, or of a dynamic recording, as a profile says. Raises as `read_line`."""
+    """The readings of a text file or a dynamic recording, by a profile. Raises as `read_line`."""
     data = read_bytes(path)
     if profile.recording is not None:
         recording = parse_rtx(data, str(path))
@@ -212,11 +222,11 @@ def read_profiled(path: PathLike, profile: LineProfile) -> Readings:
 
 
 def parse_line(data: bytes, file: str, profile: LineProfile) -> Readings:
-    """Readings from the bytes of a text file, as a profile with [columns] says."""
+    """Readings from the bytes of a text file, by a profile with [columns]."""
     if profile.columns is None:
         raise InputError("the profile has no table [columns]; expected target and value in it", file=file)
     header, rows = _lines(decoded(data, file), profile)
-    hint = "; are header_lines and delimiter right?"
+    hint = "; check header_lines and delimiter of the profile"
     cells = {key: place_in(header, column, file, hint) for key, column in _wanted(profile.columns)}
     values = [key for key in cells if key.startswith("value")]
     table: list[tuple[int, float, list[float], float, int]] = []
@@ -237,7 +247,7 @@ def parse_line(data: bytes, file: str, profile: LineProfile) -> Readings:
             number = _number(_cell(row, cells["run"]), profile)
             run = number if isinstance(number, float) else 0.0
             if run != int(run) or run < 1:
-                wrong.append(f'run = "{_cell(row, cells["run"])}"; expected a whole number from 1')
+                wrong.append(f'run = "{_cell(row, cells["run"])}"; expected an integer from 1')
         if "direction" in cells:
             text = _cell(row, cells["direction"])
             sign = _sign(text, profile)
@@ -285,8 +295,8 @@ def _wanted(columns: LineColumns) -> Iterator[tuple[str, str | int]]:
             yield key, column
 
 
-def _cell(row: Sequence[str], place: int) -> str:
-    return row[place] if place < len(row) else ""
+def _cell(row: Sequence[str], column: int) -> str:
+    return row[column] if column < len(row) else ""
 
 
 def _number(cell: str, profile: LineProfile) -> float | str:
@@ -302,9 +312,9 @@ def _number(cell: str, profile: LineProfile) -> float | str:
     if not cell:
         return "is empty; leave the row out where the reading is missing"
     if re.fullmatch(r"[-+]?[\d.,' ]+", cell):
-        kept = f'decimal = "{profile.decimal}" and thousands = "{profile.thousands}"'
-        return f'"{cell}" does not fit {kept}; set them'
-    return f'"{cell[:40]}" is no number'
+        marks = f'decimal = "{profile.decimal}" and thousands = "{profile.thousands}"'
+        return f'"{cell}" does not fit {marks}; correct these keys of the profile'
+    return f'"{cell[:40]}" is not a number'
 
 
 def _sign(text: str, profile: LineProfile) -> int:
@@ -338,7 +348,7 @@ def _readings(
             block = np.zeros(len(table))
         if "direction" not in cells:
             direction = trend(target, block, line, file)
-            notes.append("the direction of a run is that in which its targets follow each other")
+            notes.append("the direction of a run is that of its targets in their order")
         run = block.astype(np.int64) if "run" in cells else counted(block, direction)
     value = value * UNITS[profile.unit]
     if profile.holds == "position":
@@ -349,7 +359,8 @@ def _readings(
     )  # fmt: skip
 
 
-def _in_sense(found: Readings, profile: LineProfile) -> Readings:
-    """In the contract's sense where the profile states the file's, and with its component."""
-    known = found if profile.sense is None else found.with_sense(profile.sense)
+def _in_sense(readings: Readings, profile: LineProfile) -> Readings:
+    """Readings with the component of the profile, as actual minus commanded where the profile states its sign
+    convention."""
+    known = readings if profile.sense is None else readings.with_sense(profile.sense)
     return replace(known, component=profile.component or known.component)

@@ -1,4 +1,4 @@
-"""The files of a plan of measurements yet to be taken: measurements.toml and CSV files to fill in."""
+"""The files of a plan of future measurements: measurements.toml and CSV files to fill in."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLAN = "measurements.toml"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pass:
-    """One run of the machine: axis positions (n, 3) and the wait after each, words on its set-up; `rows` are
+    """One run of the machine: axis positions (n, 3), the wait after each, and words on its set-up. `rows` are
     the points of `source` in the order of visiting. `repeats` runs are needed."""
 
     name: str
@@ -62,8 +62,8 @@ def plan_files(
 
 
 def _rows(state: State, planned: Planned, passes: Sequence[Pass]) -> Index:
-    """The readings in the order of visiting; where others of its kind see the same points one after another,
-    in that of the first one; without a pass of their own as they stand."""
+    """The readings in the order of visiting. Without a pass of its own, an observation has the order of the
+    first one of its kind, or else its own order."""
     same = [s.observation.source for s in planned.states if type(s) is type(state)]
     for source in (state.observation.source, same[0]):
         runs = [run.rows for run in passes if run.source == source]

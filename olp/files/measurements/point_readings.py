@@ -1,13 +1,13 @@
-"""Points and lengths for a calibration: where the axes were commanded, and what an instrument saw there.
+"""Points and lengths for a calibration: commanded axis positions, and what an instrument read there.
 
     # tool_mm = [0.0, 0.0, -120.0]
     X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm
     100,200,-300,5321.4021,887.1120,-411.9034
 
-The instrument's frame is its own. Columns tool_X_mm, tool_Y_mm, tool_Z_mm hold the vector from the gauge
-point to the reflector where it differs from point to point. Lengths from a station have one column length_mm
-in place of the measured ones, a polar station distance_mm, azimuth_deg and elevation_deg, directions from
-pods azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
+The instrument frame is unknown. Columns tool_X_mm, tool_Y_mm, tool_Z_mm hold the vector from the gauge point
+to the reflector where it differs from point to point. Other instruments have other columns instead of the
+measured ones. Lengths from a station: length_mm. A polar station: distance_mm, azimuth_deg and elevation_deg.
+Directions from pods: azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
 """
 
 from __future__ import annotations
@@ -30,21 +30,20 @@ AXIS = tuple(f"{axis}_mm" for axis in AXES)
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
 LENGTH = ("length_mm",)
 POLAR = ("distance_mm", "azimuth_deg", "elevation_deg")
-#: Actual minus commanded, in place of measured places.
+#: Actual minus commanded, instead of measured positions.
 DEVIATION = tuple(f"deviation_{axis}_um" for axis in AXES)
 TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)
 
 
 def directions(pods: int) -> tuple[str, ...]:
-    """The columns of angles of so many pods."""
+    """The columns of angles of a number of pods."""
     return tuple(f"{angle}_{k + 1}_deg" for k in range(pods) for angle in ("azimuth", "elevation"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointReadings:
-    """(n, 3) columns in mm, `measured` (n, k) as in the file; `tool_mm` is None where the file has no such
-    columns. `row` (n,) is the line of each point, `keys` what the file states in comments, each with its
-    line."""
+    """(n, 3) columns in mm, and `measured` (n, k) as in the file. `tool_mm` is None where the file has no
+    such columns. `row` (n,) is the line of each point. `keys` are the comments, each with its line."""
 
     file: str
     axis_mm: Array
@@ -55,8 +54,8 @@ class PointReadings:
 
 
 def read_point_readings(path: PathLike, measured: tuple[str, ...] = MEASURED) -> PointReadings:
-    """The points of a file, or its lengths (`measured` = LENGTH). Raises InputError where it cannot be read,
-    ConfigError with every problem."""
+    """The points of a file, or its lengths (`measured` = LENGTH). Raises InputError where the file cannot be
+    read, ConfigError with every problem."""
     return parse_point_readings(read_bytes(path), str(path), measured)
 
 

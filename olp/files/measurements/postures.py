@@ -18,18 +18,23 @@ from olp.files.write import PathLike
 
 
 class PostureKeys(Table):
-    """What a file of postures says about itself."""
+    """What a file of postures states about itself."""
 
     sigma_um: NotNegative = Field(
         default=0.0, description="the standard uncertainty of one coordinate of a posture in um"
     )
-    point: Text | None = Field(default=None, description="words on what was touched, kept for the report")
+    point: Text | None = Field(
+        default=None, description="a description of the point that was touched, for the report"
+    )
 
 
 def read_postures(path: PathLike, tools: Mapping[int, Tool] | None = None) -> Postures:
-    """Columns `X_mm,Y_mm,Z_mm,tool[,TX_mm,TY_mm,TZ_mm][,A_deg,B_deg,C_deg]`: axis positions, the name of the
-    tool, its nominal vector in the frame of the head, and the turn Rz(C) Ry(B) Rx(A) of the head. Without
-    TX_mm to TZ_mm, tools are numbers of `tools`. Raises InputError, ConfigError."""
+    """Read columns `X_mm,Y_mm,Z_mm,tool[,TX_mm,TY_mm,TZ_mm][,A_deg,B_deg,C_deg]`.
+
+    They hold axis positions, the name of the tool, its nominal vector in the frame of the head, and the
+    rotation Rz(C) Ry(B) Rx(A) of the head. Without TX_mm to TZ_mm, tools are numbers of `tools`. Raises
+    InputError, ConfigError.
+    """
     vector, turn = ("TX_mm", "TY_mm", "TZ_mm"), ("A_deg", "B_deg", "C_deg")
     columns, keys = read_columns(path, PostureKeys, ("X_mm", "Y_mm", "Z_mm"), (*vector, *turn), ("tool",))
     number, n = columns.number, len(columns.line)

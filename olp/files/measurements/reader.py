@@ -1,8 +1,9 @@
 """Reads the measurements of a calibration: a plan (olp-measurements-1), or files that describe themselves.
 
-A plan is a TOML file, named in the call or standing in a folder as `measurements.toml`. In a folder without
-one, every CSV file says in comments `# key = value` what it holds. What a line of the plan and its file both
-state must agree; [defaults] fill in what neither does. Nothing about a sense, a place or a lever is assumed.
+A plan is a TOML file, named in the call or found in a folder as `measurements.toml`. In a folder without
+one, every CSV file states in comments `# key = value` what it holds. A line of the plan and its file must
+agree in the keys that both state. [defaults] apply to keys that neither states. No sign convention, position
+or tool vector is ever assumed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Plan
 from olp.files.measurements.instruments.registry import INSTRUMENTS, rank_of
-from olp.files.measurements.lines_said import as_line, stated_of, word
+from olp.files.measurements.line_merging import as_line, stated_of, word
 from olp.files.measurements.readings import check_component, parse_readings
 from olp.files.measurements.schemas import MeasurementsFile, SquareTable
 from olp.files.measurements.stated import stated_keys
@@ -29,12 +30,13 @@ from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
 
+#: The name of the plan in a folder.
 PLAN = "measurements.toml"
 
 
 @dataclass(slots=True)
 class _Gathered:
-    """What the files said so far, and what is wrong with them."""
+    """The contents of the files read so far, and what is wrong with them."""
 
     chain: str | None
     observations: list[Observation] = field(default_factory=list)
@@ -45,54 +47,52 @@ class _Gathered:
     map: MapWish | None = None
 
     def state(self, key: str, value: Any, file: str, line: int | None) -> None:
-        """Take what holds for the whole calibration; two files must not contradict each other."""
+        """Take a value for the whole calibration. Two files must not contradict each other."""
         known = self.whole.setdefault(key, (value, file))
         if known[0] != value:
-            sentence = f"{key} = {word(value)}, but {known[1]} says {word(known[0])}"
+            sentence = f"{key} = {word(value)}, but {known[1]} says {word(known[0])}; expected the same"
             self.errors.append(config_error([(line, sentence)], file))
 
 
 def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> Measurements:
     """All readings of plans, folders and self-describing files together.
 
-    With `chain` what is said of moving tables is checked against it. Raises InputError where a file cannot
-    be read, and ConfigError with every problem of all files.
+    With `chain`, keys about moving tables are checked against it. Raises InputError where a file cannot be
+    read, and ConfigError with every problem of all files.
     """
-    found = _Gathered(chain)
+    gathered = _Gathered(chain)
     for source in sources:
         path = FilePath(source)
         if path.is_dir():
             if (path / PLAN).is_file():
-                _plan(path / PLAN, found)
+                _plan(path / PLAN, gathered)
             else:
-                _folder(path, found)
+                _folder(path, gathered)
         elif path.suffix.lower() == ".toml":
-            _plan(path, found)
+            _plan(path, gathered)
         else:
-            _alone(path, found)
-    if not found.errors:
-        found.errors += _undefined_squares(found)
-        found.errors += [
-            config_error(
-                [(None, f"{key} is stated nowhere; expected it in the plan or in a file")], "measurements"
-            )
+            _alone(path, gathered)
+    if not gathered.errors:
+        gathered.errors += _undefined_squares(gathered)
+        gathered.errors += [
+            config_error([(None, f"{key} is missing; expected it in the plan or in a file")], "measurements")
             for key in ("machine", "measured", "temperature_degC")
-            if key not in found.whole
+            if key not in gathered.whole
         ]
-    if found.errors:
-        problems = tuple(text for error in found.errors for text in str(error).split("\n"))
+    if gathered.errors:
+        problems = tuple(text for error in gathered.errors for text in str(error).split("\n"))
         raise ConfigError("; ".join(problems), problems=problems)
-    x, y, z = (tuple(sorted(found.periods[axis])) for axis in AXES)
+    x, y, z = (tuple(sorted(gathered.periods[axis])) for axis in AXES)
     return Measurements(
-        machine=found.whole["machine"][0],
-        observations=tuple(sorted(found.observations, key=rank_of)),
-        squares=tuple(found.squares.values()),
+        machine=gathered.whole["machine"][0],
+        observations=tuple(sorted(gathered.observations, key=rank_of)),
+        squares=tuple(gathered.squares.values()),
         periods_mm=(x, y, z),
-        temperature_degC=found.whole["temperature_degC"][0],
-        active_during_measurement=found.whole.get("active_during_measurement", (frozenset(), ""))[0],
-        measured=found.whole["measured"][0],
-        chain=found.chain,
-        map=found.map,
+        temperature_degC=gathered.whole["temperature_degC"][0],
+        active_during_measurement=gathered.whole.get("active_during_measurement", (frozenset(), ""))[0],
+        measured=gathered.whole["measured"][0],
+        chain=gathered.chain,
+        map=gathered.map,
     )
 
 
@@ -113,7 +113,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             for table in (t for instrument in INSTRUMENTS for t in stated.get(instrument.key, ())):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
-            # The loader says what is wrong with it.
+            # The loader reports what is wrong with it.
             continue
     return tuple(str(name) for name in names)
 
@@ -121,104 +121,111 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
 # -- plans -----------------------------------------------------------------------------------------------
 
 
-def _plan(path: FilePath, found: _Gathered) -> None:
-    values, places = read_toml(read_bytes(path), str(path))
+def _plan(path: FilePath, gathered: _Gathered) -> None:
+    values, key_lines = read_toml(read_bytes(path), str(path))
     try:
-        plan = validate(MeasurementsFile, values, places, str(path))
+        plan = validate(MeasurementsFile, values, key_lines, str(path))
     except ConfigError as error:
-        found.errors.append(error)
+        gathered.errors.append(error)
         return
     for name in ("machine", "measured", "temperature_degC", "active_during_measurement"):
-        found.state(name, getattr(plan, name), str(path), line_of((name,), places))
+        gathered.state(name, getattr(plan, name), str(path), line_of((name,), key_lines))
     if plan.chain is not None:
-        found.state("chain", plan.chain, str(path), line_of(("chain",), places))
-        if found.chain is not None and found.chain != plan.chain:
-            sentence = f'chain = "{plan.chain}", but the machine file says "{found.chain}"'
-            found.errors.append(config_error([(line_of(("chain",), places), sentence)], str(path)))
-        found.chain = found.chain or plan.chain
+        gathered.state("chain", plan.chain, str(path), line_of(("chain",), key_lines))
+        if gathered.chain is not None and gathered.chain != plan.chain:
+            sentence = (
+                f'chain = "{plan.chain}", but the machine file says "{gathered.chain}"; expected the same'
+            )
+            gathered.errors.append(config_error([(line_of(("chain",), key_lines), sentence)], str(path)))
+        gathered.chain = gathered.chain or plan.chain
     if plan.map is not None:
-        found.map = MapWish(plan.map.noise, plan.map.within_um * MM_PER_UM)
+        gathered.map = MapWish(plan.map.noise, plan.map.within_um * MM_PER_UM)
     for axis in AXES:
-        found.periods[axis].update(getattr(plan.periods_mm, axis))
+        gathered.periods[axis].update(getattr(plan.periods_mm, axis))
     problems: list[Problem] = []
     for index, square in enumerate(plan.squares):
-        if square.name in found.squares:
+        if square.name in gathered.squares:
             key: Path = ("squares", index, "name")
-            problems.append((line_of(key, places), f'{dotted(key)} = "{square.name}" is defined twice'))
-        found.squares[square.name] = _square(square)
-    problems += _readings(plan, path, places, found)
+            problems.append(
+                (
+                    line_of(key, key_lines),
+                    f'{dotted(key)} = "{square.name}" is defined twice; expected it once',
+                )
+            )
+        gathered.squares[square.name] = _square(square)
+    problems += _readings(plan, path, key_lines, gathered)
     if problems:
-        found.errors.append(config_error(problems, str(path)))
+        gathered.errors.append(config_error(problems, str(path)))
 
 
 def _readings(
-    plan: MeasurementsFile, path: FilePath, places: Mapping[Path, int], found: _Gathered
+    plan: MeasurementsFile, path: FilePath, key_lines: Mapping[Path, int], gathered: _Gathered
 ) -> Iterator[Problem]:
-    """Takes the readings of all tables, and yields what is wrong with the tables."""
-    whole = Plan(path, plan.defaults, plan.vertical, found.chain)
+    """Take the readings of all tables, and yield what is wrong with the tables."""
+    whole = Plan(path, plan.defaults, plan.vertical, gathered.chain)
     for instrument in INSTRUMENTS:
         for index, table in enumerate(getattr(plan, instrument.key)):
             key: Path = (instrument.key, index)
             file: str | None = getattr(table, "file", None)
             try:
-                found.observations.append(instrument.read(table, whole))
+                gathered.observations.append(instrument.read(table, whole))
             except ConfigError as error:
                 if error.file not in (None, str(path)):
-                    found.errors.append(error)
+                    gathered.errors.append(error)
                     continue
                 name = dotted(key) if file is None else f"{dotted(key)} ({file})"
-                yield from ((line_of(key, places), f"{name}: {text}") for text in error.problems)
+                yield from ((line_of(key, key_lines), f"{name}: {text}") for text in error.problems)
             except InputError as error:
                 sentence = f'{dotted(key)}.file = "{file}": {error.message}'
-                yield line_of((*key, "file"), places), sentence
+                yield line_of((*key, "file"), key_lines), sentence
 
 
 # -- files that describe themselves ----------------------------------------------------------------------
 
 
-def _folder(folder: FilePath, found: _Gathered) -> None:
+def _folder(folder: FilePath, gathered: _Gathered) -> None:
     files = sorted(folder.glob("*.csv"))
     if not files:
         sentence = f"holds neither {PLAN} nor CSV files; expected one of them"
-        found.errors.append(ConfigError(sentence, file=str(folder)))
+        gathered.errors.append(ConfigError(sentence, file=str(folder)))
     for path in files:
-        _alone(path, found)
+        _alone(path, gathered)
 
 
-def _alone(path: FilePath, found: _Gathered) -> None:
+def _alone(path: FilePath, gathered: _Gathered) -> None:
     try:
         data = read_bytes(path)
         keys = dict(stated_keys(decoded(data, str(path))))
         readings = parse_readings(data, str(path))
-        stated, places = stated_of(keys, str(path))
+        stated, key_lines = stated_of(keys, str(path))
         if stated.component is None:
-            sentence = 'does not say what it holds; expected a comment such as # component = "EXX", or a plan'
+            sentence = 'states no component; expected a comment such as # component = "EXX", or a plan'
             raise ConfigError(sentence, file=str(path))
         check_component(readings, stated.component)
-        line = as_line(readings, stated.component, stated, "Z", found.chain, str(path))
+        line = as_line(readings, stated.component, stated, "Z", gathered.chain, str(path))
     except ConfigError as error:
-        found.errors.append(error)
+        gathered.errors.append(error)
         return
-    found.observations.append(line)
+    gathered.observations.append(line)
     for key in ("machine", "measured", "temperature_degC", "active_during_measurement"):
         if getattr(stated, key) is not None:
-            found.state(key, getattr(stated, key), str(path), places.get(key))
-    found.periods[stated.component[2]].update(stated.period_mm)
+            gathered.state(key, getattr(stated, key), str(path), key_lines.get(key))
+    gathered.periods[stated.component[2]].update(stated.period_mm)
     if stated.square is not None and stated.square_sigma_urad is not None:
         deviation = (stated.square_error_urad or 0.0) * RAD_PER_URAD
         square = Square(stated.square, deviation, stated.square_sigma_urad * RAD_PER_URAD)
-        if found.squares.setdefault(stated.square, square) != square:
-            sentence = f'square "{stated.square}" is stated otherwise in another file'
-            found.errors.append(config_error([(places.get("square"), sentence)], str(path)))
+        if gathered.squares.setdefault(stated.square, square) != square:
+            sentence = f'square "{stated.square}" has other values in another file; expected the same'
+            gathered.errors.append(config_error([(key_lines.get("square"), sentence)], str(path)))
 
 
 def _square(table: SquareTable) -> Square:
     return Square(table.name, table.error_urad * RAD_PER_URAD, table.sigma_urad * RAD_PER_URAD)
 
 
-def _undefined_squares(found: _Gathered) -> Iterator[ConfigError]:
-    for line in found.observations:
-        if isinstance(line, Line) and line.square is not None and line.square not in found.squares:
+def _undefined_squares(gathered: _Gathered) -> Iterator[ConfigError]:
+    for line in gathered.observations:
+        if isinstance(line, Line) and line.square is not None and line.square not in gathered.squares:
             yield ConfigError(
                 f'square "{line.square}" is not defined; expected a table [[squares]] with its sigma_urad or '
                 "square_sigma_urad in the file",

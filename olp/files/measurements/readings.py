@@ -1,5 +1,6 @@
-"""Readings of one component along one line, as every reader of an instrument's file returns them; and the
-native CSV of such readings.
+"""Readings of one component along one line, and their native CSV.
+
+Every reader of an instrument's file returns such readings.
 
     # component = "EXX"
     # line_mm = { Y = 700.0, Z = -600.0 }
@@ -8,8 +9,8 @@ native CSV of such readings.
     0,1,1,0.0
     100,1,1,3.2
 
-Rows stand in the order of time. A comment `# key = value` says something about the file, in the words of a
-table [[lines]] of a plan (`olp.files.measurements.reader`); any other comment is only read by people.
+Rows are in the order of time. A comment `# key = value` states a key of a table [[lines]] of a plan
+(`olp.files.measurements.reader`). The program ignores any other comment.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
 
-#: What a file may state, and the factor that makes it actual minus commanded of the tool relative to the
-#: workpiece. A table that moves by +1 um too much carries the workpiece along: the tool is 1 um behind.
+#: Sign conventions of files, each with the factor to actual minus commanded of the tool relative to the
+#: workpiece. A table that moves 1 um too far in + takes the workpiece along: the tool is then 1 um behind.
 SENSES: Mapping[str, float] = MappingProxyType(
     {
         "actual-minus-commanded": 1.0,
@@ -54,6 +55,7 @@ UNITS: Mapping[str, float] = MappingProxyType(
         "mm/m": 1e-3,
     }
 )
+#: Units of angles.
 ANGULAR = frozenset({"rad", "mrad", "urad", "arcsec", "um/m", "mm/m"})
 
 _HEADER = ("target_mm", "run", "direction")
@@ -62,14 +64,13 @@ _VALUES = {"value_um": "um", "value_urad": "urad"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
-    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad in the sense of the file
-    until `with_sense` makes it that of the contract; runs from 1, directions +1 or -1 (from which side the
-    target was approached).
+    """(n,) columns in the order of time: axis positions in mm, errors in mm or rad, runs from 1, and
+    directions +1 or -1 of the approach. Errors have the sign convention of the file until `with_sense`.
 
-    `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name or
-    None where the file does not tell; `angular` says that values are in rad, None where the file does not
-    tell. `keys` is what the file states about itself, each with its line; `notes` are sentences on what the
-    reader assumed. `sense_known` says that the values are in the contract's sense.
+    `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name,
+    None where the file does not state it. `angular` says that values are in rad, None where the file does not
+    state it. `keys` are the comments of the file, each with its line. `notes` are sentences on what the
+    reader assumed. `sense_known` says that values are actual minus commanded.
     """
 
     file: str
@@ -85,7 +86,7 @@ class Readings:
     sense_known: bool = False
 
     def with_sense(self, sense: str) -> Readings:
-        """The same in the contract's sense, for values stated in `sense`, a key of SENSES."""
+        """The same as actual minus commanded. `sense`, a key of SENSES, is the sign convention so far."""
         return Readings(
             self.file, self.target_mm, self.value * SENSES[sense], self.run, self.direction, self.line,
             self.component, self.angular, self.keys, self.notes, sense_known=True,
@@ -93,7 +94,7 @@ class Readings:
 
 
 def read_readings(path: PathLike) -> Readings:
-    """The readings of a native CSV file, in the sense that the file is written in.
+    """The readings of a native CSV file, in the sign convention of the file.
 
     Raises InputError where it cannot be read, and ConfigError with every problem and its line.
     """
@@ -129,12 +130,12 @@ def check_component(readings: Readings, component: str) -> None:
     """Raise ConfigError where the file names another component, or holds lengths for an angle."""
     if readings.component is not None and readings.component != component:
         line = readings.keys["component"][1] if "component" in readings.keys else None
-        sentence = f"the file says {readings.component}, the plan {component}; expected one of the two"
+        sentence = f"the file says {readings.component}, but the plan {component}; expected the same"
         raise config_error([(line, sentence)], readings.file)
     if readings.angular is not None and readings.angular != (component[1] in "ABC"):
-        found, wanted = ("angles", "lengths") if readings.angular else ("lengths", "angles")
+        held, wanted = ("angles", "lengths") if readings.angular else ("lengths", "angles")
         raise ConfigError(
-            f"{component} is read in {wanted}, and the file holds {found}; is it another component?",
+            f"the file holds {held}, but {component} is read in {wanted}; expected another component or file",
             file=readings.file,
         )
 
@@ -154,15 +155,15 @@ def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:
-    value, said = finite(cell), None
+    value, problem = finite(cell), None
     if math.isnan(value):
-        wrong = "is empty" if not cell else f'= "{cell}" is no finite number'
-        said = f"{name} {wrong}; leave the row out where the reading is missing"
+        wrong = "is empty" if not cell else f'= "{cell}" is not a finite number'
+        problem = f"{name} {wrong}; leave the row out where the reading is missing"
     elif name == "direction" and value not in (1.0, -1.0):
-        said = f"direction = {cell}; expected 1 (approached in +) or -1"
+        problem = f"direction = {cell}; expected 1 (approached in +) or -1"
     elif name == "run" and (value != int(value) or value < 1):
-        said = f"run = {cell}; expected a whole number from 1"
-    return value, said
+        problem = f"run = {cell}; expected an integer from 1"
+    return value, problem
 
 
 _WANTED = Wanted(

@@ -1,8 +1,8 @@
 """Dynamic recordings of Renishaw's CARTO and XL-80 (.rtx): header lines, then samples as doubles.
 
-The layout is known from a public reader (`HEADER::`, lines `Key: value`, `Data:`, little-endian float64,
-`EOF::`), not from the maker; the file names neither the unit of samples nor the positions of the axis, so
-both have to be stated.
+The layout is known from a public reader, not from the maker: `HEADER::`, lines `Key: value`, `Data:`,
+little-endian float64, `EOF::`. The file names neither the unit of samples nor the positions of the axis, so
+a profile has to state both.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ RTX = ".rtx"
 MARK = b"HEADER::"
 _DATA = b"Data:\r\n"
 _END = b"EOF::"
+#: Bytes of the header, at most.
 _MOST_HEADER = 1 << 16
-#: samples at rest differ from the first or last one by less than this share of the travel
+#: Samples at rest differ from the first or last one by less than this share of the travel.
 _REST = 1e-4
 
 
@@ -44,7 +45,7 @@ class RecordingTable(Table):
         default=None, description="the axis position of the last sample, in mm; sweep only"
     )
     every: Annotated[int, Field(ge=1)] = Field(
-        default=1, description="of so many samples one is kept, the mean of them"
+        default=1, description="the number of samples that are averaged to one reading"
     )
 
 
@@ -59,12 +60,12 @@ class Recording:
 
 
 def read_rtx(path: PathLike, unit: str | None = None) -> Readings:
-    """Refuses a recording that comes without a profile, once its bytes are known to be sound.
+    """Refuses a recording without a profile, after a check of its bytes.
 
-    Raises InputError: the file states neither its unit nor where the axis stood.
+    Raises InputError, because the file states neither its unit nor the positions of the axis.
     """
     recording = parse_rtx(read_bytes(path), str(path))
-    what = "where the axis stood" if unit else "its unit, nor where the axis stood"
+    what = "the positions of the axis" if unit else "its unit and the positions of the axis"
     raise InputError(
         f"is a dynamic recording of {len(recording.samples)} samples, and does not state {what}; give a "
         "profile with unit and the table [recording]",
@@ -80,16 +81,17 @@ def parse_rtx(data: bytes, file: str) -> Recording:
         )
     start = data.find(_DATA, 0, _MOST_HEADER)
     if start < 0:
-        raise InputError('has no line "Data:" after its header; is the file whole?', file=file)
+        raise InputError('has no line "Data:" after its header; copy the file again', file=file)
     keys: dict[str, str] = {}
     for number, line in enumerate(data[len(MARK) : start].decode("utf-8", "replace").split("\r\n"), 1):
         key, mark, value = line.partition(":")
         if line.strip() and not mark:
-            raise InputError(f'"{line[:40]}" is no line "Key: value"', file=file, line=number)
+            sentence = f'"{line[:40]}" is not a line of the header; expected "Key: value"'
+            raise InputError(sentence, file=file, line=number)
         if mark:
             keys[key.strip()] = value.strip()
     body = data[start + len(_DATA) :]
-    # The end mark stands behind a whole number of samples; what looks like it inside them is no end.
+    # The end mark follows the last sample. The same bytes inside a sample are not the end.
     tail = body.rstrip(b"\r\n")
     if not tail.endswith(_END):
         raise InputError('does not end with "EOF::"; the recording is cut off, copy it again', file=file)
@@ -98,11 +100,12 @@ def parse_rtx(data: bytes, file: str) -> Recording:
         raise InputError(f"holds {len(body)} bytes of samples; expected a multiple of 8", file=file)
     samples = np.frombuffer(body, "<f8").astype(np.float64)
     if len(samples) < 2 or not np.isfinite(samples).all():
-        raise InputError(f"holds {len(samples)} samples, or one is no number; expected 2 or more", file=file)
+        sentence = f"holds {len(samples)} samples, or one is not a number; expected 2 or more"
+        raise InputError(sentence, file=file)
     stated = _number(keys, "Sample no", file)
     if stated is not None and int(stated) != len(samples):
         raise InputError(
-            f'holds {len(samples)} samples, its header says "Sample no: {int(stated)}"; it is cut off',
+            f'holds {len(samples)} samples, but its header says "Sample no: {int(stated)}"; copy it again',
             file=file,
         )
     rate = _number(keys, "Actual sample rate", file) or _number(keys, "Sample rate", file)
@@ -116,27 +119,29 @@ def line_of_recording(
 ) -> Readings:
     """One run from a recording: its samples in `unit`, at the axis positions that `layout` states.
 
-    A sweep takes positions in time: the middle part, where the axis moves, is laid from start to end at
-    constant feed. With `holds` "position" the errors of a sweep are departures from constant feed, so that
-    neither scale nor slow curve are in them: it shows cyclic errors and no others. Raises InputError.
+    A sweep takes samples in time. Its middle part, where the axis moves, is spread from start to end at
+    constant feed. With `holds` "position" the errors of a sweep are deviations from constant feed. They hold
+    neither scale nor slow curve, only cyclic errors. Raises InputError.
     """
     file, value = recording.file, recording.samples * UNITS[unit]
     notes = ["the unit and the positions of this recording are those of the profile"]
     if layout.motion == "triggered":
         if not layout.step_mm:
-            raise InputError('[recording] motion = "triggered" lacks step_mm, the travel a sample', file=file)
+            sentence = '[recording] motion = "triggered" lacks step_mm; expected the travel per sample'
+            raise InputError(sentence, file=file)
         target = layout.start_mm + layout.step_mm * np.arange(len(value))
         value = value - target if holds == "position" else value
     else:
         if layout.end_mm is None or layout.end_mm == layout.start_mm:
-            raise InputError('[recording] motion = "sweep" lacks end_mm, where the sweep ends', file=file)
+            sentence = '[recording] motion = "sweep" lacks end_mm; expected the end of the sweep'
+            raise InputError(sentence, file=file)
         if holds == "position":
             part = _moving(value, file)
             value = value[part]
             target = np.linspace(layout.start_mm, layout.end_mm, len(value), dtype=np.float64)
             slope, rest = np.polyfit(target, value, 1)
             value = np.asarray(value - slope * target - rest, dtype=np.float64)
-            notes.append("errors are departures from constant feed: scale and slow curve are not in them")
+            notes.append("errors are deviations from constant feed: scale and slow curve are not in them")
         else:
             target = np.linspace(layout.start_mm, layout.end_mm, len(value), dtype=np.float64)
     group = layout.every
@@ -152,13 +157,13 @@ def line_of_recording(
 
 
 def _moving(position: Array, file: str) -> slice:
-    """The samples between the two rests of a sweep."""
+    """The samples of a sweep between rest at its start and rest at its end."""
     travel = abs(position[-1] - position[0])
     if travel == 0.0:
         raise InputError("the recorded position does not change; expected a sweep", file=file)
-    away = np.flatnonzero(np.abs(position - position[0]) > _REST * travel)
-    short = np.flatnonzero(np.abs(position - position[-1]) > _REST * travel)
-    return slice(max(int(away[0]) - 1, 0), min(int(short[-1]) + 2, len(position)))
+    started = np.flatnonzero(np.abs(position - position[0]) > _REST * travel)
+    moving = np.flatnonzero(np.abs(position - position[-1]) > _REST * travel)
+    return slice(max(int(started[0]) - 1, 0), min(int(moving[-1]) + 2, len(position)))
 
 
 def _number(keys: Mapping[str, str], key: str, file: str) -> float | None:

@@ -1,4 +1,4 @@
-"""The keys of a plan of measurements (olp-measurements-1): its own, and a list of tables an instrument."""
+"""The keys of a plan of measurements (olp-measurements-1): its own, and one list of tables per instrument."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class SquareTable(Table):
     name: Text = Field(description="the name that lines use")
     error_urad: float = Field(
         default=0.0,
-        description="by how much the angle between its legs, both along + of their axes, is more than 90 "
-        "degrees, in urad",
+        description="the deviation of the angle between its legs, both along + of their axes, in urad; + "
+        "above 90 degrees",
     )
     sigma_urad: Positive = Field(description="the standard uncertainty of that angle, in urad")
 
@@ -26,10 +26,10 @@ class SquareTable(Table):
 class MapKeys(Table):
     noise: Literal["learnt", "stated"] = Field(
         default="learnt",
-        description='"learnt" (the readings scale the stated uncertainties) or "stated" (they are as stated)',
+        description='"learnt" (the readings scale the stated uncertainties) or "stated" (used as stated)',
     )
     within_um: Positive = Field(
-        default=0.2, description="what interpolation between the nodes of the map may lose at most, in um"
+        default=0.2, description="the largest error of interpolation between the nodes of the map, in um"
     )
 
 
@@ -40,7 +40,7 @@ class PeriodsTable(Table):
 
 
 class PlanFile(Table):
-    """What a plan says beside the tables of instruments."""
+    """The keys of a plan beside the tables of instruments."""
 
     schema_: Literal["olp-measurements-1"] = Field(
         alias="schema", description='the format, "olp-measurements-1"'
@@ -48,12 +48,13 @@ class PlanFile(Table):
     machine: Text = Field(description="the name in the machine file")
     chain: Chain | None = Field(
         default=None,
-        description='the order of axes from workpiece to tool, such as "FXYZ"; the machine file says it too',
+        description='the order of axes from workpiece to tool, such as "FXYZ"; as in the machine file',
     )
     measured: datetime.date = Field(description="the date of measuring, such as 2026-05-14, without quotes")
     temperature_degC: float = Field(description="the temperature of the scales while measuring, in degC")
     vertical: Literal["X", "Y", "Z"] = Field(
-        default="Z", description='the axis along gravity, "Z" if left out: a level sees no turn about it'
+        default="Z",
+        description='the axis along gravity, "Z" if left out; a level does not read rotations about it',
     )
     active_during_measurement: IsoNames = Field(
         default=frozenset(),
@@ -61,16 +62,17 @@ class PlanFile(Table):
     )
     defaults: LineKeys = Field(
         default_factory=LineKeys,
-        description="the table [defaults]: what holds for lines that do not say it",
+        description="the table [defaults]: the keys of lines that do not state them",
     )
     periods_mm: PeriodsTable = Field(
-        default_factory=PeriodsTable, description="the table [periods_mm]: where cyclic errors are looked for"
+        default_factory=PeriodsTable,
+        description="the table [periods_mm]: the periods of cyclic errors to be fitted",
     )
     squares: list[SquareTable] = Field(default=[], description="tables [[squares]]")
 
 
 def _tables() -> dict[str, Any]:
-    """The lists of tables, those without a file of readings first."""
+    """The lists of tables, those of instruments without a file of readings first."""
     ordered = sorted(INSTRUMENTS, key=lambda instrument: "file" in instrument.table.model_fields)
     return {
         instrument.key: (list[instrument.table], Field(default=[], description=instrument.words))  # type: ignore[name-defined]
@@ -90,5 +92,5 @@ class MeasurementsFile(_Tables):
     """olp-measurements-1: the readings of one calibration, and how each was taken."""
 
     map: MapKeys | None = Field(
-        default=None, description="the table [map]: errors that no rigid bodies make are to be mapped"
+        default=None, description="the table [map]: asks for a map of errors beyond the rigid-body model"
     )

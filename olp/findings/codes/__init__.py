@@ -1,1 +1,1 @@
-"""The codes of findings, one table of data a topic."""
+"""The codes of findings, one table of data per topic."""

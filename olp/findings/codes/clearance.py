@@ -13,9 +13,9 @@ RULES = (
         "OLP701",
         "contact",
         Severity.ERROR,
-        "Tool or holder touches a mesh of the job where it must not: a fixture or the machine at any time, "
-        "the workpiece in a rapid, or with what does not cut.",
-        "Look at the line and the place named; change the approach, the stickout or the set-up.",
+        "Tool or holder touches a mesh of the job where it must not. A fixture or the machine must never be "
+        "touched. The workpiece may be touched only in a feed move, and only by what cuts.",
+        "Look at the line and the position named. Change the approach, the stickout or the set-up.",
         "`G0 X200` at Z5 through a clamp that is 20 mm high.",
     ),
     _rule(
@@ -30,9 +30,9 @@ RULES = (
         "OLP703",
         "clearance not checked",
         Severity.WARNING,
-        "Moves were left out of the check of clearance: the position of an axis is not known there, or the "
-        "tool in the spindle has no length.",
+        "The check of clearance left out moves. The position of an axis is unknown there, or the tool in "
+        "the spindle has no length.",
         "Give start_mm in the job file, command all axes in the first rapid, and give Z_mm of the tool.",
-        "`T9 M6` with a tool that stands in no table.",
+        "`T9 M6`, and no table [tools.9].",
     ),
 )

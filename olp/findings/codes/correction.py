@@ -1,4 +1,4 @@
-"""The rules of a correction: what it reached, what it left, and what it was computed with."""
+"""The rules of a correction: its result, its residual, and the inputs that it was computed with."""
 
 from __future__ import annotations
 
@@ -13,35 +13,36 @@ RULES = (
         "OLP101",
         "above tolerance",
         Severity.ERROR,
-        "The written program, read back and run through the error model, leaves the nominal path by more "
-        "than the tolerance plus what rounding to the last digit explains.",
-        "Raise --tolerance-um, let the machine take more digits (least_increment_mm), or look at the listed "
-        "blocks.",
+        "The written program, read back and run through the error model, deviates from the nominal path at "
+        "these lines. The deviation exceeds the tolerance plus what rounding to the last digit explains.",
+        "Look at the listed blocks. Raise --tolerance-um, or give a smaller least_increment_mm if the "
+        "control takes more digits.",
         "A hand-edited corrected program: `G1 X100.050` where X100.012 was written.",
     ),
     _rule(
         "OLP102",
-        "moves passed uncorrected",
+        "moves left uncorrected",
         Severity.WARNING,
-        "These moves were written as they were: the error there depends on an axis that has not been "
-        "commanded yet, or the control moves by itself (G53, G28, G30), or the section is switched off.",
+        "These moves were written unchanged. The error there depends on an axis without a commanded "
+        "position, the control moves by itself (G53, G28, G30), or the section is switched off.",
         "Give start_mm in the job file, or command all axes in the first rapid.",
-        "`G0 X10` as the first move, while nobody has commanded Y and Z.",
+        "`G0 X10` as the first move, before Y and Z are commanded.",
     ),
     _rule(
         "OLP103",
-        "lost motion unknown",
+        "side of the backlash unknown",
         Severity.INFO,
-        "Until an axis has moved by its lost motion in one direction, nobody knows on which flank it rests.",
-        "Approach the first point from a known side; the spread is at most half the lost motion.",
+        "An axis rests on a known side of its backlash only after it has moved by that amount in one "
+        "direction. At these lines the side is still unknown.",
+        "Approach the first point from a known side. The deviation is at most half the backlash.",
         "`[backlash] X_um = 4.0` and a program that begins with `G1 X10`.",
     ),
     _rule(
         "OLP104",
         "block moves another axis",
         Severity.INFO,
-        "A block that also moves a rotary or other axis is corrected at its end only and never split; the "
-        "other axis' words are carried untouched.",
+        "A block that also moves a rotary or other axis is corrected at its end only and never split. The "
+        "words of the other axis are kept as written.",
         "Split the block in the source where the path between its ends matters.",
         "`G1 X10 Y20 A90` in a long block.",
     ),
@@ -49,8 +50,8 @@ RULES = (
         "OLP105",
         "canned cycle corrected per hole",
         Severity.WARNING,
-        "A canned cycle moves straight along the tool axis, so it can be exact at one depth only; here the "
-        "rest of the stroke leaves the nominal path by more than the tolerance.",
+        "A canned cycle moves straight along the tool axis, so it can be exact at one depth only. The rest "
+        "of this stroke deviates from the nominal path by more than the tolerance.",
         "Write the cycles out as plain moves with --expand-cycles.",
         "`G81 Z-80 R2` where the column leans by 3 um over 80 mm.",
     ),
@@ -58,25 +59,25 @@ RULES = (
         "OLP106",
         "orientation not corrected",
         Severity.INFO,
-        "A machine with three linear axes cannot turn its tool; the angular errors of the axes remain in the "
+        "A machine with three linear axes cannot turn its tool. The angular errors of the axes stay in the "
         "orientation of the tool.",
-        "Nothing in the program can mend it; the largest angle is in the report.",
+        "The program cannot correct this. The report states the largest angle.",
         "EAX of 200 urad and a face mill of 40 mm radius: 8 um at its rim.",
     ),
     _rule(
         "OLP107",
         "nothing to prove",
         Severity.WARNING,
-        "No move of the program was corrected at a known position, so the proof says nothing.",
-        "Look whether this is the program that you meant; command all axes, or give start_mm in the job "
-        "file.",
+        "No move of the program was corrected at a known position, so the proof is empty.",
+        "Check that this is the program that you meant. Command all axes, or give start_mm in the job file.",
         "A program of nothing but G53 moves.",
     ),
     _rule(
         "OLP401",
         "calibration expired",
         Severity.WARNING,
-        "The date given is later than valid_until of the calibration.",
+        "The date given is later than valid_until of the calibration. Without valid_until, the calibration "
+        "is older than calibration_days of [check].",
         "Measure the machine again.",
         "`--date 2027-06-01`, and `valid_until = 2027-05-14`.",
     ),
@@ -100,8 +101,9 @@ RULES = (
         "OLP404",
         "compensated by the control",
         Severity.INFO,
-        "These errors are left to the control, which corrects them already.",
-        "Nothing, as long as the control's tables stay active.",
+        "The control corrects these errors already (compensated_by_controller), so the program leaves them "
+        "to it.",
+        "Nothing to do while the control's tables stay active.",
         'compensated_by_controller = ["EXX"].',
     ),
 )

@@ -1,4 +1,4 @@
-"""The rules of what a program says: path modes, units, offsets, and what was told from its text."""
+"""The rules of what a program says: path modes, units, offsets, and what was detected from its text."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RULES = (
         "OLP201",
         "path mode without tolerance",
         Severity.WARNING,
-        "In G64 without P the control rounds corners as far as its acceleration asks for, which can be a "
+        "In G64 without P the control rounds corners as far as its acceleration requires, which can be a "
         "millimetre.",
         "Use G64 P<tolerance> Q0, or G61 where exact stops are affordable.",
         "`G64` alone in the first line of a LinuxCNC program.",
@@ -22,7 +22,8 @@ RULES = (
         "OLP202",
         "path tolerance larger than the correction",
         Severity.WARNING,
-        "The control may leave the programmed path by more than the whole correction, which then is lost.",
+        "The control may leave the programmed path by more than the whole correction. The correction then "
+        "has no effect.",
         "Use a path tolerance well below the correction.",
         "`G64 P0.5` on a machine whose largest error is 0.04 mm.",
     ),
@@ -30,15 +31,16 @@ RULES = (
         "OLP203",
         "path mode merges blocks",
         Severity.WARNING,
-        "G64 P without Q0 lets the control merge short blocks and spend the whole tolerance on smooth paths.",
-        "Add Q0 to keep P as a bound at corners only.",
+        "G64 P without Q0 lets the control merge short blocks and use the whole path tolerance to smooth "
+        "them.",
+        "Add Q0, so that P bounds the deviation at corners only.",
         "`G64 P0.01`, where LinuxCNC takes Q = P.",
     ),
     _rule(
         "OLP301",
         "units assumed",
         Severity.INFO,
-        "The program states neither G20 nor G21; millimetres were assumed.",
+        "The program states neither G20 nor G21. Millimetres were assumed.",
         "State G21 (or G20) at the start of the program.",
         "`G90 G54` and no G21 before `G0 X10`.",
     ),
@@ -55,7 +57,8 @@ RULES = (
         "OLP303",
         "touch-off assumed",
         Severity.INFO,
-        "The work offset is taken as touched off on the raw machine, so the touched point keeps its place.",
+        "The work offset counts as touched off on the uncompensated machine, so the correction leaves the "
+        "touched point where it is.",
         'State set_by = "true" where the part was located by other means.',
         "`[work_offsets.G54]` with X_mm, Y_mm, Z_mm and nothing else.",
     ),
@@ -63,71 +66,72 @@ RULES = (
         "OLP304",
         "block delete",
         Severity.INFO,
-        "Blocks under `/` were taken as executed; the program was proved with them left out too.",
-        "Nothing, where both positions of the switch are meant.",
+        "Blocks under `/` were taken as executed. The program was proved with them left out too.",
+        "Nothing to do where both positions of the switch are meant.",
         "`/G1 X100`.",
     ),
     _rule(
         "OLP305",
         "contour taken as tool path",
         Severity.WARNING,
-        "Under G41/G42 the control offsets the contour by the tool radius; the correction was computed on "
+        "Under G41/G42 the control offsets the contour by the tool radius. The correction was computed on "
         "the contour.",
-        "Program the tool path where the radius is large against the change of the error.",
+        "Program the tool path where the error changes noticeably over the tool radius.",
         "`olp correct part.nc --contour` with `G41 D1` in the program.",
     ),
     _rule(
         "OLP306",
-        "cutting at an uncorrected place",
+        "feed move from an uncorrected position",
         Severity.WARNING,
-        "A feed move starts where a rapid ended uncorrected, so its beginning leaves the nominal path.",
+        "A feed move starts where a rapid ended uncorrected, so its beginning deviates from the nominal "
+        "path.",
         "Command all axes in rapids first, or give start_mm in the job file.",
         "`G0 X10`, then `G1 X50 F600`, with Y and Z unknown at the G0.",
     ),
     _rule(
         "OLP331",
-        "told from the text",
+        "detected from the text",
         Severity.INFO,
-        "The file does not state this; it was told from its rows or taken from the machine file.",
-        "Look whether it is so; state it in the header, or in a profile (--profile).",
+        "The file does not state this. It was detected from its rows or taken from the machine file.",
+        "Check that it is right. State it in the header, or in a profile (--profile).",
         "`10;20;30` as the first row: the delimiter is a semicolon, the columns are X, Y and Z.",
     ),
     _rule(
         "OLP332",
         "orientation changes",
         Severity.WARNING,
-        "Three linear axes cannot turn the tool: orientations are carried as they are, and the lever of the "
-        "tool is taken as the same all along.",
+        "Three linear axes cannot turn the tool. Orientations are kept as written, and the correction uses "
+        "one tool vector for all rows.",
         "Correct lists of one orientation at a time, each with the tool vector that it has there.",
         "A column C that goes from 0 to 90 degrees.",
     ),
     _rule(
         "OLP333",
-        "between places of a list",
+        "deviation between positions of a list",
         Severity.INFO,
-        "A list says where the machine goes and not how. If it goes straight, its errors bend the way "
-        "between two corrected places by more than the tolerance.",
-        'State joined = "lines" and insert = true in the profile, if the machine goes straight and rows may '
-        "be inserted.",
+        "A list states positions and not how the machine moves between them. On straight moves the errors "
+        "would bend the path between two corrected positions by more than the tolerance.",
+        'State joined = "lines" and insert = true in the profile, if the machine moves straight and rows '
+        "may be inserted.",
         "Two tag points 2 m apart on a machine whose straightness is 5 um.",
     ),
     _rule(
         "OLP412",
         "thermal compensation in the program",
         Severity.WARNING,
-        "The program switches on a compensation of the control's own for temperature (TECOMP, TEMPR). Where "
-        "the calibration was measured without it, or the job states temperatures too, expansion is corrected "
-        "twice.",
+        "The program switches on the control's own compensation for temperature (TECOMP, TEMPR). Expansion "
+        "is corrected twice where the calibration was measured without it, or the job states temperatures "
+        "too.",
         "State in active_during_measurement what was on while measuring, and leave temperatures_degC out of "
-        "the job, or switch the control's compensation off.",
+        "the job. Or switch the control's compensation off.",
         "`TECOMP/ON,0.0000105` in a DMIS program.",
     ),
     _rule(
         "OLP413",
-        "sense of arcs assumed",
+        "direction of arcs assumed",
         Severity.WARNING,
-        "CIRCLE statements of this form (NX) are read as turning right-handed about their normal, and no "
-        "joint of the program tells whether they do: along the other part of the circle errors differ.",
+        "CIRCLE statements of this form (NX) are read as right-handed about their normal, and nothing in "
+        "the program confirms it. Along the other part of the circle the errors differ.",
         "Compare one arc with the simulation of the CAM system (olp view), or have it write GOTOs for arcs.",
         "`CIRCLE/0,0,0,0,0,-1,5,0.06,0.5,10,0` behind a corner.",
     ),

@@ -24,12 +24,14 @@ NAN = float("nan")
 _BLOCK = re.compile(rb"(?i)\s*(?:[A-Z]\s*[=+-]?\s*[\d.]+\s*|\([^)]*\)\s*)+\Z")
 _MOVING = re.compile(rb"(?i)[GXYZUVWABC]\s*[=+-]?\s*[\d.]|M\s*(?:98|6|06)\b|[PL]\s*\d")
 _OFF = frozenset((b"OFF", b"NOMORE"))
-#: words of CYCLE that state something and begin none
+#: words of CYCLE that set values and begin no cycle
 _CYCLE_MESSAGE = frozenset((b"INIT", b"CLEAR", b"PARAM", b"AVOID"))
-#: how far a direction may be from length 1
+#: how far the length of a direction may be from 1
 UNIT = 1e-3
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+#: mm per minute of one unit of a feed per minute
 _PER_MINUTE = {b"MMPM": 1.0, b"IPM": MM_PER_INCH, b"PERMIN": 1.0}
+#: mm per turn of one unit of a feed per turn
 _PER_TURN = {b"MMPR": 1.0, b"IPR": MM_PER_INCH, b"PERREV": 1.0}
 
 
@@ -45,12 +47,12 @@ class Cycle:
 
 
 class Events:
-    """State of one reading of one program, and a handler for each statement that changes it. `_resolve` gives
-    the points before an event their places; a reading has its own."""
+    """The state while one program is read, and a handler for each statement that changes it. `_resolve`, which
+    the reader defines, turns the points before an event into positions."""
 
     def __init__(self, data: bytes, setup: Setup, dialect: Dialect, options: Options, words: bool) -> None:
         self.data, self.setup, self.options = data, setup, options
-        self.out = StatementCollector(data, dialect, keep_words=words)
+        self.collector = StatementCollector(data, dialect, keep_words=words)
         self.table = FrameTable(setup)
         self.start = [NAN if p is None else p for p in setup.job.start_mm]
         self.position = list(self.start)
@@ -68,13 +70,13 @@ class Events:
         self.direction: Statement | None = None
         self.ended = 0
         self.feed_mm_s = NAN
-        self.feed_said = (0, -1)
+        self.feed_stated = (0, -1)
         self.rapid: list[int] = []
         self.driven: dict[int, ArcForm] = {}
         self.arcs: list[tuple[int, ArcForm]] = []
         self.onward = 0
         self.back: list[int] = []
-        self.unsure: int | None = None
+        self.unconfirmed: int | None = None
         self.points: Points
         self.done = 0
         self._handlers: dict[bytes, Callable[[Statement, int], None]] = {
@@ -91,14 +93,14 @@ class Events:
         """The number of the move that a point becomes."""
         if self.cycle is not None:
             self._resolve(row)
-        return self.out.moves + row - self.done
+        return self.collector.moves + row - self.done
 
     def _unknown(self, statement: Statement, row: int) -> None:
-        """A move of the control's own: no position is known after it."""
+        """A move that the control makes by itself: no position is known after it."""
         self._resolve(row)
         self.position = [NAN] * 3
-        if self.out.moves:
-            self.out.put_lone(
+        if self.collector.moves:
+            self.collector.put_lone(
                 Kind.RAPID,
                 Flag.PASS | Flag.CONTROL,
                 statement.line,
@@ -113,12 +115,12 @@ class Events:
         name = self.setup.machine.default_work_offset
         if self.system not in self.systems:
             self.systems.append(self.system)
-        place = self.systems.index(self.system) + 1
-        own = f"CSYS{place}"
-        if place > 1 or self.setup.work_offset(own) is not None:
+        count = self.systems.index(self.system) + 1
+        own = f"CSYS{count}"
+        if count > 1 or self.setup.work_offset(own) is not None:
             name = own
         work = self.table.work_offset(
-            name, line, "the program" if place == 1 else f"coordinate system {place} of the program"
+            name, line, "the program" if count == 1 else f"coordinate system {count} of the program"
         )
         length = tool_vector = ZERO
         touched = None
@@ -130,7 +132,7 @@ class Events:
                 length = tool.length_mm
                 if tool.set_by == "touch" and tool.touched_at_mm is not None:
                     touched = (tool.touched_at_mm, tool_vector)
-        # an axis that was never said is the machine's own
+        # an axis that was never stated is the Z axis of the machine
         self.up = UP if self.axis == UP else turned(turn_of(work.rotation_deg), self.axis)
         return self.table.index(
             work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=tool_vector,
@@ -139,31 +141,31 @@ class Events:
 
     def _feed(self, statement: Statement, row: int) -> None:
         self.feed_mm_s = feed_of(statement, self.unit_mm, self.turns_s)
-        said = next((f for f in statement.fields() if f.number is not None), None)
-        self.feed_said = statement.line, -1 if said is None else self.out.word(said)
-        self.out.put_feed(self._move(row), self.feed_mm_s, *self.feed_said)
+        value = next((f for f in statement.fields() if f.number is not None), None)
+        self.feed_stated = statement.line, -1 if value is None else self.collector.word(value)
+        self.collector.put_feed(self._move(row), self.feed_mm_s, *self.feed_stated)
 
     def _units(self, statement: Statement, row: int) -> None:
         self._resolve(row)
-        said = [f.text for f in statement.fields()]
-        if said[:1] == [b"MM"]:
+        words = [f.text for f in statement.fields()]
+        if words[:1] == [b"MM"]:
             self.unit_mm = 1.0
-        elif said[:1] in ([b"INCH"], [b"INCHES"], [b"IN"]):
+        elif words[:1] in ([b"INCH"], [b"INCHES"], [b"IN"]):
             self.unit_mm = MM_PER_INCH
         else:
-            raise ProgramError("UNITS names no unit that is read; expected MM or INCH", line=statement.line)
+            raise ProgramError("UNITS names a unit that is not read; expected MM or INCH", line=statement.line)
         self.unit_stated = True
 
     def _circle(self, statement: Statement, row: int) -> None:
-        form = (movarc if statement.head()[1] == b"MOVARC" else circle)(statement, self.out)
+        form = (movarc if statement.head()[1] == b"MOVARC" else circle)(statement, self.collector)
         if self.arcs and self.arcs[-1][0] == row:
-            raise ProgramError("an arc follows an arc without a GOTO between them", line=statement.line)
+            raise ProgramError("an arc follows an arc without a GOTO between them; expected a GOTO to the end of the first", line=statement.line)
         self.arcs.append((row, form))
 
     def _tlon(self, statement: Statement, row: int) -> None:
         if self.direction is None:
-            raise ProgramError("TLON follows no INDIRV, so its direction is not known", line=statement.line)
-        form = directed(self.driven.pop(statement.line), self.direction, self.out)
+            raise ProgramError("no INDIRV comes before TLON, so its direction is not known; expected one before each TLON", line=statement.line)
+        form = directed(self.driven.pop(statement.line), self.direction, self.collector)
         self.direction = None
         self.arcs.append((row, form))
 
@@ -199,9 +201,9 @@ class Events:
     def _cycle_of(self, fields: Sequence[Field]) -> Cycle:
         after: dict[bytes, float] = {}
         for word, number in itertools.pairwise(fields):
-            found = number.number
-            if word.number is None and found is not None:
-                after.setdefault(word.text, found[0] / 10.0 ** found[1])
+            pair = number.number
+            if word.number is None and pair is not None:
+                after.setdefault(word.text, pair[0] / 10.0 ** pair[1])
 
         def length(*names: bytes) -> float | None:
             return next((abs(after[n]) * self.unit_mm for n in names if n in after), None)
@@ -215,11 +217,11 @@ class Events:
         )
 
     def _cutcom(self, statement: Statement, row: int) -> None:
-        said = {f.text for f in statement.fields()}
-        if said & {b"LEFT", b"RIGHT", b"ON"} and not self.options.contour:
+        words = {f.text for f in statement.fields()}
+        if words & {b"LEFT", b"RIGHT", b"ON"} and not self.options.contour:
             raise ProgramError(
-                "CUTCOM (cutter compensation) makes the path inside the control; send the path of the tool's "
-                "centre, or take the points as that path with --contour",
+                "CUTCOM (cutter compensation) makes the path inside the control; "
+                "send the path of the tool's centre, or take the points as that path with --contour",
                 line=statement.line,
             )
 
@@ -227,25 +229,25 @@ class Events:
         self._resolve(row)
         numbers = [f.number for f in statement.fields()]
         if len(numbers) != 3 or None in numbers:
-            raise ProgramError("TLAXIS is read with three numbers only", line=statement.line)
+            raise ProgramError("TLAXIS is read with three numbers only: the direction from tip to gauge point", line=statement.line)
         x, y, z = (n[0] / 10.0 ** n[1] for n in numbers if n is not None)
         size = (x * x + y * y + z * z) ** 0.5
         if not abs(size - 1.0) < UNIT:
-            raise ProgramError("TLAXIS is no direction of length 1", line=statement.line)
+            raise ProgramError(f"TLAXIS has length {size:.6g}; expected a direction of length 1", line=statement.line)
         self.axis = axis_of(x / size, y / size, z / size)
 
     def _csys(self, statement: Statement, row: int) -> None:
         values = []
         for field in statement.fields():
-            found = field.number
-            if found is None:
+            pair = field.number
+            if pair is None:
                 if field.text in (b"OFF", b"NOMORE"):
                     continue
                 raise ProgramError(
-                    f"a coordinate system is named {shown(field.text)}; expected its numbers",
+                    f"the coordinate system is given by the name {shown(field.text)}; expected its numbers",
                     line=statement.line,
                 )
-            values.append(round(found[0] / 10.0 ** found[1], 9) + 0.0)
+            values.append(round(pair[0] / 10.0 ** pair[1], 9) + 0.0)
         key: object = tuple(values)
         if key == _IDENTITY or not any(values) or key == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
             key = None
@@ -256,11 +258,11 @@ class Events:
             self.system = system
 
     def _tracut(self, statement: Statement, row: int) -> None:
-        said = [f.text for f in statement.fields()]
-        if said not in ([], [b"NOMORE"], [b"OFF"]):
+        words = [f.text for f in statement.fields()]
+        if words not in ([], [b"NOMORE"], [b"OFF"]):
             raise ProgramError(
-                "TRACUT transforms points in the APT processor; send its output (CLDATA), or state the "
-                "transform as a frame of the job",
+                "TRACUT transforms points in the APT processor; "
+                "send its output (CLDATA), or state the transform as a frame of the job",
                 line=statement.line,
             )
 
@@ -268,15 +270,15 @@ class Events:
         self._resolve(row)
         numbers = [f.number for f in statement.fields()][:3]
         if len(numbers) != 3 or None in numbers:
-            raise ProgramError("FROM has no three numbers", line=statement.line)
-        place = np.array([n[0] / 10.0 ** n[1] for n in numbers if n is not None]) * self.unit_mm
+            raise ProgramError("FROM needs three numbers", line=statement.line)
+        point = np.array([n[0] / 10.0 ** n[1] for n in numbers if n is not None]) * self.unit_mm
         number = self._frame(statement.line)
         frame = self.table.frames[number]
-        place = place if frame.turn is None else np.array(frame.turn) @ place
-        self.position = (place + np.array(frame.offset_mm)).tolist()
+        point = point if frame.turn is None else np.array(frame.turn) @ point
+        self.position = (point + np.array(frame.offset_mm)).tolist()
         self.home = list(self.position)
-        if self.out.moves:
-            self.out.put_lone(Kind.RAPID, Flag.PASS, statement.line, number, self.position)
+        if self.collector.moves:
+            self.collector.put_lone(Kind.RAPID, Flag.PASS, statement.line, number, self.position)
         else:
             self.start = list(self.position)
 
@@ -287,7 +289,7 @@ class Events:
         self._resolve(row)
         self.position = list(self.home)
         number = self._frame(statement.line)
-        self.out.put_lone(Kind.RAPID, Flag.PASS, statement.line, number, self.position)
+        self.collector.put_lone(Kind.RAPID, Flag.PASS, statement.line, number, self.position)
 
     def _spindle(self, statement: Statement, row: int) -> None:
         numbers = [f.number for f in statement.fields() if f.number is not None]
@@ -303,16 +305,16 @@ class Events:
             seconds = number[0] / 10.0 ** number[1] / self.turns_s if self.turns_s else 0.0
         else:
             seconds = number[0] / 10.0 ** number[1]
-        self.out.pauses.append((self._move(row), max(seconds, 0.0)))
+        self.collector.pauses.append((self._move(row), max(seconds, 0.0)))
 
     def _rest(self, statement: Statement, row: int) -> None:
-        self.out.pauses.append((self._move(row), 0.0))
+        self.collector.pauses.append((self._move(row), 0.0))
 
     def _insert(self, statement: Statement, row: int) -> None:
-        said = re.sub(rb"(?i)\A\s*INSERT\s*/?", b"", statement.text)
-        if _BLOCK.match(said) and _MOVING.search(said):
+        block = re.sub(rb"(?i)\A\s*INSERT\s*/?", b"", statement.text)
+        if _BLOCK.match(block) and _MOVING.search(block):
             raise ProgramError(
-                "INSERT hands the control a block that may move the machine; leave it to the post-processor",
+                "INSERT gives the control a block that may move the machine; leave such blocks to the post-processor",
                 line=statement.line,
             )
 
@@ -325,14 +327,14 @@ class Events:
 
 
 def feed_of(statement: Statement, unit_mm: float, turns_s: float) -> float:
-    """mm/s of a FEDRAT; NaN where it says none that is a speed."""
+    """mm/s of a FEDRAT; NaN where it states no speed."""
     value, words = NAN, set()
     for field in statement.fields():
-        found = field.number
-        if found is None:
+        pair = field.number
+        if pair is None:
             words.add(field.text)
         elif value != value:
-            value = found[0] / 10.0 ** found[1]
+            value = pair[0] / 10.0 ** pair[1]
     for name, scale in _PER_MINUTE.items():
         if name in words:
             return value * (unit_mm if name == b"PERMIN" else scale) / 60.0

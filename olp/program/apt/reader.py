@@ -1,8 +1,8 @@
 """Reads APT and cutter-location data: statements to a nominal toolpath and the words that can be edited.
 
-The way of a chunk: lines of plain GOTOs in columns and all other statements one by one (`statement_lexer`),
-then the events between the points in their order, and stretches of points between changes of frame at once.
-Nothing here knows an error model.
+A chunk is read in steps: plain GOTOs in columns, all other statements one by one (`text.statements`); then the
+events between the points in their order, and the points between two changes of frame at once. Nothing here
+knows an error model.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 NAN = float("nan")
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
 _CREO = re.compile(rb"\$\$->\s*([A-Z_]+)\s*/?")
-#: so many joints that turn right back are no accident
+#: so many joints in the opposite direction are no coincidence
 _SEVERAL = 3
 _RAPID = frozenset((b"RAPID", b"RAPID/"))
 
 
 def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
-    right."""
+    correctly."""
     return _Reader(data, setup, dialect, options, words).run()
 
 
 class _Reader(Events):
-    """One reading of one program."""
+    """Reads one program."""
 
     def run(self) -> Program:
         for chunk in chunks(self.data):
@@ -50,49 +50,49 @@ class _Reader(Events):
         self._judge_turns()
         x, y, z = self.start
         end = self.ended or self.data.count(b"\n") + 1
-        return self.out.program(self.table.frames, (x, y, z), end, b"RAPID")
+        return self.collector.program(self.table.frames, (x, y, z), end, b"RAPID")
 
     # -- one chunk -----------------------------------------------------------------------------------
 
     def _chunk(self, chunk: Chunk) -> None:
-        out = self.out
-        out.begin(chunk)
+        collector = self.collector
+        collector.begin(chunk)
         if self.ended:
-            out.finish()
+            collector.finish()
             return
         events: list[Statement] = []
         alone: list[Point] = []
-        carry = 0
-        for found in chunk.statements(_FREE):
-            if found.line <= carry:
+        last_line = 0
+        for item in chunk.statements(_FREE):
+            if item.line <= last_line:
                 continue
-            if isinstance(found, Comment):
-                if found.text.lstrip()[:4] == b"$$->":
-                    statement = self._creo(chunk, found)
-                    carry = found.line + statement.lines - 1
-                    events.append(statement)
+            if isinstance(item, Comment):
+                if item.text.lstrip()[:4] == b"$$->":
+                    system = self._creo(chunk, item)
+                    last_line = item.line + system.lines - 1
+                    events.append(system)
                 continue
-            text = found.text.strip().upper()
-            if text[:2] in (b"GO", b"TL") and (point := self._point(found, text)) is not None:
+            text = item.text.strip().upper()
+            if text[:2] in (b"GO", b"TL") and (point := self._point(item, text)) is not None:
                 alone.append(point)
             if text[:4] != b"GOTO":
-                events.append(found)
+                events.append(item)
             if text[:4] == b"FINI":
                 break
-        self.points = out.points(chunk, alone)
+        self.points = collector.points(chunk, alone)
         self.done = 0
         upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
         for statement, row in zip(events, upto, strict=True):
             self._event(statement, row)
             if self.ended:
-                out.finish()
+                collector.finish()
                 return
         self._resolve(len(self.points))
-        # what was said of the point behind the last one holds for the first of the next chunk
+        # what was stated for the point after the last one holds for the first of the next chunk
         count = len(self.points)
         self.rapid = [row - count for row in self.rapid]
         self.arcs = [(row - count, form) for row, form in self.arcs]
-        out.finish()
+        collector.finish()
 
     def _event(self, statement: Statement, row: int) -> None:
         text = statement.text.strip().upper()
@@ -109,16 +109,16 @@ class _Reader(Events):
         handler = self._handlers.get(first)
         if first == b"RAPID":
             self._resolve(row)
-            raise ProgramError("RAPID says more than one knows; expected RAPID alone", line=statement.line)
+            raise ProgramError("RAPID has words that are not read; expected RAPID alone", line=statement.line)
         if label:
-            what = TABLE.get(first, (Support.REFUSED, "assigns what is not read"))[1]
+            what = TABLE.get(first, (Support.REFUSED, "is an assignment that is not read"))[1]
             raise ProgramError(
                 f"{shown(label)} = {shown(first)} {what or 'is not read'}", line=statement.line
             )
         if handler is not None:
             handler(statement, row)
             return
-        support, why = TABLE.get(first, (Support.REFUSED, "is no statement that olp knows, and may move"))
+        support, why = TABLE.get(first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine"))
         if first == b"TLON":
             self._tlon(statement, row)
         if first in (b"TLON", b"GODLTA"):
@@ -133,7 +133,7 @@ class _Reader(Events):
         _, major = statement.head()
         line = statement.line
         if major.startswith(b"TLON"):
-            self.driven[line], fields = tlon(statement, self.out)
+            self.driven[line], fields = tlon(statement, self.collector)
             return Point(line, statement.begin, statement.end, fields)
         if major not in (b"GOTO", b"GODLTA"):
             return None
@@ -160,7 +160,7 @@ class _Reader(Events):
     # -- stretches of points -------------------------------------------------------------------------
 
     def _resolve(self, upto: int) -> None:
-        """Positions, kinds and arcs of the points up to `upto`, which have one frame but for tool axes."""
+        """Positions, kinds and arcs of the points up to `upto`, which have one frame except for tool axes."""
         a, self.done = self.done, max(upto, self.done)
         if upto <= a:
             return
@@ -168,9 +168,9 @@ class _Reader(Events):
         part = slice(a, upto)
         line = points.line[part]
         if not self.unit_stated:
-            self.out.remarks.setdefault("unit", (int(line[0]), "the program states no unit"))
+            self.collector.remarks.setdefault("unit", (int(line[0]), "the program states no unit"))
         frame, tilting, up = self._frames(points, part)
-        offset, turn = self._places(frame)
+        offset, turn = self._offset_and_turn(frame)
         value = points.value[part] * self.unit_mm
         value = value if turn is None else value @ turn.T
         incremental = points.incremental[part]
@@ -189,60 +189,60 @@ class _Reader(Events):
         self.arcs = [(row, form) for row, form in self.arcs if row >= upto]
         if self.cycle is not None:
             if arcs:
-                raise ProgramError("an arc stands under a CYCLE", line=int(line[arcs[0][0]]))
+                raise ProgramError("an arc is not read while a CYCLE is in force; end the cycle with CYCLE/OFF", line=int(line[arcs[0][0]]))
             self._holes(self.cycle, line, frame, end, slot, begin, stop, up)
         else:
             if arcs:
                 rows = np.array([row for row, _ in arcs])
                 if (kind[rows] == Kind.RAPID).any() or (flag[rows] & ~np.uint8(Flag.INCREMENTAL)).any():
                     bad = rows[(kind[rows] == Kind.RAPID) | (flag[rows] != 0)][0]
-                    raise ProgramError("an arc at rapid, or with another tool axis", line=int(line[bad]))
+                    raise ProgramError("an arc is at rapid, or its tool axis changes, which is not read", line=int(line[bad]))
                 start = np.where(rows[:, None] > 0, end[np.maximum(rows - 1, 0)], np.array(self.position))
-                found = resolved(
+                geometry = resolved(
                     [form for _, form in arcs], start, end[rows], line[rows], self.unit_mm,
                     offset if offset.ndim == 1 else offset[rows], turn,
                 )  # fmt: skip
-                self._check_turns(arcs, found, start, end, rows, kind)
-                kind[rows] = np.where(found.sweep > 0, Kind.ARC_CCW, Kind.ARC_CW)
-                self.out.put_arcs(rows + self.out.moves, found.centre, found.plane, found.sweep)
+                self._check_turns(arcs, geometry, start, end, rows, kind)
+                kind[rows] = np.where(geometry.sweep > 0, Kind.ARC_CCW, Kind.ARC_CW)
+                self.collector.put_arcs(rows + self.collector.moves, geometry.centre, geometry.plane, geometry.sweep)
                 for row, form in arcs:
-                    self.out.arcs[row + self.out.moves] = form.text
-            self.out.put_stated_moves(kind, flag, line, frame, end, slot, begin, stop)
+                    self.collector.arcs[row + self.collector.moves] = form.text
+            self.collector.put_stated_moves(kind, flag, line, frame, end, slot, begin, stop)
         self.position = end[-1].tolist()
 
     def _check_turns(
-        self, arcs: Sequence[tuple[int, ArcForm]], found: Resolved, start: Array, end: Array, rows: Index,
+        self, arcs: Sequence[tuple[int, ArcForm]], geometry: Resolved, start: Array, end: Array, rows: Index,
         kind: npt.NDArray[np.uint8],
     ) -> None:  # fmt: skip
-        """What the joints of arcs with straight moves before them tell of the sense of turning."""
+        """What the joints of arcs with straight moves before them show of the direction of turning."""
         before = np.where(rows[:, None] > 1, end[np.maximum(rows - 2, 0)], np.array(self.position))
         straight = (rows > 0) & (kind[np.maximum(rows - 1, 0)] == Kind.LINE) & ~np.isin(rows - 1, rows)
-        told = np.where(straight, joints(found, start, before), 0)
-        for (_, form), way in zip(arcs, told.tolist(), strict=True):
-            if form.way is not None or form.angle_rad is not None:
+        directions = np.where(straight, joints(geometry, start, before), 0)
+        for (_, form), direction in zip(arcs, directions.tolist(), strict=True):
+            if form.begins is not None or form.angle_rad is not None:
                 continue
-            if not form.sure and self.unsure is None:
-                self.unsure = form.line
-            if way > 0:
+            if not form.confirmed and self.unconfirmed is None:
+                self.unconfirmed = form.line
+            if direction > 0:
                 self.onward += 1
-            elif way < 0:
+            elif direction < 0:
                 self.back.append(form.line)
 
     def _judge_turns(self) -> None:
-        """Refuse a program whose arcs turn back where they should go on; remark one that does not tell."""
+        """Refuse a program whose arcs turn back where they should go on; remark one that shows neither."""
         if len(self.back) >= _SEVERAL and len(self.back) > 2 * self.onward:
             raise ProgramError(
-                "the arc turns right back where the move before it should go on: its normal seems to be "
+                "the arc begins in the direction opposite to the move before it: its normal seems to be "
                 "left-handed, which is not read",
                 line=self.back[0],
             )
-        doubt = self.unsure if self.unsure is not None else next(iter(self.back), None)
+        doubt = self.unconfirmed if self.unconfirmed is not None else next(iter(self.back), None)
         if doubt is not None and not self.onward:
-            self.out.remarks["arcs"] = (doubt, "arcs are taken as right-handed about their normals")
+            self.collector.remarks["arcs"] = (doubt, "arcs are taken as right-handed about their normals")
 
     def _frames(self, points: Points, part: slice) -> tuple[Index, Mask, Array]:
-        """Of each point: the number of its frame, whether the tool turns on the way to it, and the direction
-        (n, 3) from tip to gauge point as the machine sees it."""
+        """Of each point: the number of its frame, whether the tool turns on the move to it, and the direction
+        (n, 3) from tip to gauge point in machine coordinates."""
         direction, line = points.direction[part], int(points.line[part][0])
         count = len(direction)
         turning = np.zeros(count, bool)
@@ -253,16 +253,16 @@ class _Reader(Events):
         size = np.sqrt((direction * direction).sum(axis=1))
         wrong = stated & ~(np.abs(size - 1.0) < UNIT)
         if wrong.any():
-            at = int(np.flatnonzero(wrong)[0])
+            bad = int(np.flatnonzero(wrong)[0])
             raise ProgramError(
-                f"the tool axis has length {size[at]:.6g}; expected a direction of length 1",
-                line=int(points.line[part][at]),
+                f"the tool axis has length {size[bad]:.6g}; expected a direction of length 1",
+                line=int(points.line[part][bad]),
             )
         held = np.maximum.accumulate(np.where(stated, np.arange(count), -1))
         axes = np.where((held >= 0)[:, None], (direction / size[:, None])[held], np.array(self.axis))
         before = np.vstack((np.array(self.axis), axes[:-1]))
         turning = (axes != before).any(axis=1)
-        if not self.out.moves:
+        if not self.collector.moves:
             turning[0] = False
         unique, which = np.unique(axes, axis=0, return_inverse=True)
         which = which.reshape(-1)
@@ -275,7 +275,7 @@ class _Reader(Events):
         self.axis = axis_of(x, y, z)
         return number_of[which], turning, up[which]
 
-    def _places(self, frame: Index) -> tuple[Array, Array | None]:
+    def _offset_and_turn(self, frame: Index) -> tuple[Array, Array | None]:
         frames = self.table.frames
         first = frames[int(frame[0])]
         turn = None if first.turn is None else np.array(first.turn)
@@ -295,40 +295,40 @@ class _Reader(Events):
         self, cycle: Cycle, line: Index, frame: Index, end: Array, slot: Index, begin: Index,
         stop: Index, ups: Array,
     ) -> None:  # fmt: skip
-        """Places of holes: to the clearance above the place, which the statement says, down, and up."""
-        out = self.out
-        at = np.array(self.position)
+        """Moves of holes: to the clearance above the stated point, down, and up."""
+        collector = self.collector
+        tip = np.array(self.position)
         for i in range(len(line)):
-            where, up = int(line[i]), ups[i]
+            line_of, up = int(line[i]), ups[i]
             x, y, z = (up * (cycle.clear_mm or 0.0)).tolist()
             own = self.table.lifted(int(frame[i]), (x, y, z)) if cycle.clear_mm else int(frame[i])
-            at = end[i] + up * (cycle.clear_mm or 0.0)
+            tip = end[i] + up * (cycle.clear_mm or 0.0)
             stroke = cycle.depth_mm is not None and cycle.clear_mm is not None
             flag = np.array([Flag.CYCLE if stroke else 0], np.uint8)
-            out.put_stated_moves(
-                np.array([Kind.RAPID], np.uint8), flag, [where], [own], at[None],
+            collector.put_stated_moves(
+                np.array([Kind.RAPID], np.uint8), flag, [line_of], [own], tip[None],
                 slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip
-            out.put_feed(out.moves, cycle.feed_mm_s, where)
+            collector.put_feed(collector.moves, cycle.feed_mm_s, line_of)
             if cycle.depth_mm is not None and cycle.clear_mm is not None:
-                out.strokes.append((out.moves - 1, out.moves))
-                out.put_lone(Kind.LINE, Flag.CYCLE, where, own, end[i] - up * cycle.depth_mm)
-                at = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
-                out.put_lone(Kind.RAPID, Flag.CYCLE, where, own, at)
-        out.put_feed(out.moves, self.feed_mm_s, *self.feed_said)
-        end[-1] = at
+                collector.strokes.append((collector.moves - 1, collector.moves))
+                collector.put_lone(Kind.LINE, Flag.CYCLE, line_of, own, end[i] - up * cycle.depth_mm)
+                tip = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
+                collector.put_lone(Kind.RAPID, Flag.CYCLE, line_of, own, tip)
+        collector.put_feed(collector.moves, self.feed_mm_s, *self.feed_stated)
+        end[-1] = tip
 
     # -- events --------------------------------------------------------------------------------------
 
     def _creo(self, chunk: Chunk, comment: Comment) -> Statement:
-        """What Creo says in a comment, which goes on where its line ends with `$`."""
+        """The statement that Creo writes in a comment, which goes on where its line ends with `$`."""
         text, last = comment.text.rstrip(), comment.line - 1 - chunk.first_line
         lines = 1
-        said = _CREO.match(text.upper())
+        match = _CREO.match(text.upper())
         while text.endswith(b"$") and last + 1 < len(chunk.line_start):
             last, lines = last + 1, lines + 1
             text = text[:-1] + chunk.raw(last).rstrip()
-        known = said is not None and said[1] == b"CSYS"
+        known = match is not None and match[1] == b"CSYS"
         body = text[text.find(b"/") :] if known else b"/1,0,0,0,0,1,0,0,0,0,1,0"
         statement = Statement(comment.line, comment.begin, comment.end, b"$$" + body, None, lines)
         return (
@@ -336,10 +336,10 @@ class _Reader(Events):
         )
 
 
-def _summed(value: Array, place: Array, incremental: Mask, at: Sequence[float]) -> Array:
+def _summed(value: Array, point: Array, incremental: Mask, start: Sequence[float]) -> Array:
     """(n, 3) ends of points, some of them distances, from `at`."""
     order = np.arange(len(value))
     total = np.cumsum(np.where(incremental[:, None], value, 0.0), axis=0)
     source = np.maximum.accumulate(np.where(~incremental, order, -1))
-    from_point = place[source] + (total - total[source])
-    return np.asarray(np.where((source >= 0)[:, None], from_point, np.array(at) + total), float)
+    from_point = point[source] + (total - total[source])
+    return np.asarray(np.where((source >= 0)[:, None], from_point, np.array(start) + total), float)

@@ -9,12 +9,14 @@ from collections.abc import Mapping
 
 from olp.program.dialect import Support
 
-_C, _R, _X = Support.CORRECTED, Support.READ, Support.UNCHANGED
+_C = Support.CORRECTED
+_R = Support.READ
+_X = Support.UNCHANGED
 _NO = Support.REFUSED
 
 _CONTOUR = "drives the tool along geometry that only an APT processor knows; send its output (CLDATA)"
 _LOGIC = "branches or repeats; send the output of the APT processor (CLDATA)"
-_TURNS = "turns the part or the head, and where the part is after that is not known"
+_TURNS = "turns the part or the head, and the position of the part afterwards is not known"
 _GEOMETRY = "defines geometry; send the output of the APT processor (CLDATA), which has points"
 _CYCLE = "is a path that the control makes itself"
 
@@ -25,8 +27,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVARC": (_C, "arc to the next GOTO: centre, normal, radius, ANGLE (Autodesk)"),
     b"TLON": (_C, "arc of CATIA: INDIRV, TLON,GOFWD/(CIRCLE…),ON,(LINE…)"),
     b"INDIRV": (_R, "the direction in which the next TLON begins"),
-    b"FROM": (_R, "where the tool stands; passes as it is"),
-    b"GOHOME": (_R, "goes where FROM was; passes as it is"),
+    b"FROM": (_R, "where the tool is; left uncorrected"),
+    b"GOHOME": (_R, "goes to the point of FROM; left uncorrected"),
     b"RAPID": (_R, "for the next GOTO only"),
     b"FEDRAT": (_R, "MMPM, IPM, MMPR, IPR, in either order"),
     b"UNITS": (_R, "MM or INCH"),
@@ -35,7 +37,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"LOAD": (_R, "LOAD/TOOL: as LOADTL"),
     b"TOOLNO": (_R, "as LOADTL"),
     b"TURRET": (_R, "as LOADTL"),
-    b"CYCLE": (_R, "the GOTOs under it are places of holes: corrected where the tool meets the part"),
+    b"CYCLE": (_R, "the GOTOs under it are positions of holes: corrected where the tool meets the part"),
     b"CUTCOM": (_R, "LEFT and RIGHT are refused, unless --contour says that points are the tool's path"),
     b"MULTAX": (_R, "points carry a tool axis"),
     b"TLAXIS": (_R, "the tool axis from here on"),
@@ -44,11 +46,11 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"ORIGIN": (_R, "a coordinate system: a frame of the job"),
     b"$$-> CSYS": (_R, "Creo's coordinate system, in a comment: a frame of the job"),
     b"TRACUT": (_R, "NOMORE only"),
-    b"COPY": (_NO, "repeats moves in other places from the same text; send the output of the APT processor"),
-    b"SPINDL": (_R, "the spindle, for feeds by turns"),
+    b"COPY": (_NO, "repeats moves at other positions from the same text; send the output of the APT processor"),
+    b"SPINDL": (_R, "the spindle, for feeds per turn"),
     b"DELAY": (_R, "a dwell in seconds"),
-    b"STOP": (_R, "rests"),
-    b"OPSTOP": (_R, "rests"),
+    b"STOP": (_R, "the motion rests"),
+    b"OPSTOP": (_R, "the motion rests"),
     b"RETRCT": (_R, "a move of the control: positions are unknown until the next GOTO"),
     b"GOCLER": (_R, "a move of the control: positions are unknown until the next GOTO"),
     b"FINI": (_R, "the end"),

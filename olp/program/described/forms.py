@@ -1,9 +1,8 @@
-"""Forms of statements: a small language that says how a statement is written, and what its fields are.
+"""Forms of statements: a small language for how a statement is written, and what its fields are.
 
-`LMOVE TRANS({x}, {y}, {z} [, {a}, {b}, {c}])` reads: the words, the marks, numbers where `{x}` and the others
-stand, and an optional part in brackets. Blanks in a text are free around marks; between words there is at
-least one. `<MOVE|MOVES>` is either word, `...` whatever follows. `{target}`, `{frame}` and `{word}` are
-names.
+`LMOVE TRANS({x}, {y}, {z} [, {a}, {b}, {c}])` means: the words, the marks, numbers for `{x}` and the others,
+and an optional part in brackets. Blanks are free around marks; between words there is at least one.
+`<MOVE|MOVES>` is either word, `...` whatever follows. `{target}`, `{frame}` and `{word}` are names.
 """
 
 from __future__ import annotations
@@ -36,58 +35,58 @@ class Form:
 
 
 def form(text: str, *, ignore_case: bool) -> Form:
-    """The form that a text says. Raises ConfigError."""
-    out: list[str] = []
+    """The form that a text states. Raises ConfigError where it is not a form."""
+    pieces: list[str] = []
     fields: list[str] = []
     depth, first = 0, ""
     before = "start"
     blank = False
-    for found in _TOKEN.finditer(text):
-        kind = found.lastgroup if found.lastgroup != "name" else "field"
+    for token in _TOKEN.finditer(text):
+        kind = token.lastgroup if token.lastgroup != "name" else "field"
         if kind == "blank":
             blank = True
             continue
-        said = found[0]
+        token_text = token[0]
         wordy = kind in ("field", "word", "either")
         if kind in ("open", "close"):
             depth += 1 if kind == "open" else -1
             if depth < 0:
                 break
-            out.append(r"(?:\s*" if kind == "open" else ")?")
+            pieces.append(r"(?:\s*" if kind == "open" else ")?")
             before = "mark" if kind == "open" else "close"
             blank = False
             continue
         if before != "start":
-            # inside a word nothing may stand between its parts; around marks blanks are free
+            # no blank inside a word; around marks blanks are free
             apart = wordy and before == "wordy"
-            out.append((r"\s+" if blank else "") if apart else r"\s*")
-        out.append(_piece(kind or "", found, fields, text))
+            pieces.append((r"\s+" if blank else "") if apart else r"\s*")
+        pieces.append(_piece(kind or "", token, fields, text))
         if before == "start" and kind == "word":
-            first = said
+            first = token_text
         before = "wordy" if wordy else "mark"
         blank = False
     if depth:
-        raise ConfigError(f'the form "{text}" has a bracket without its other one')
+        raise ConfigError(f'the form "{text}" has an opening or closing bracket without the other')
     if len(set(fields)) < len(fields):
         raise ConfigError(f'the form "{text}" has a field twice')
     flags = re.IGNORECASE if ignore_case else 0
     return Form(
         text,
-        re.compile(r"\s*" + "".join(out) + r"\s*", flags),
+        re.compile(r"\s*" + "".join(pieces) + r"\s*", flags),
         first.upper() if ignore_case else first,
         frozenset(fields),
     )
 
 
-def _piece(kind: str, found: re.Match[str], fields: list[str], text: str) -> str:
+def _piece(kind: str, token: re.Match[str], fields: list[str], text: str) -> str:
     """The pattern of one part of a form."""
     if kind == "rest":
         return r".*"
     if kind == "either":
-        return "(?:" + "|".join(re.escape(word.strip()) for word in found[0][1:-1].split("|")) + ")"
+        return "(?:" + "|".join(re.escape(word.strip()) for word in token[0][1:-1].split("|")) + ")"
     if kind != "field":
-        return re.escape(found[0])
-    name = found["name"]
+        return re.escape(token[0])
+    name = token["name"]
     if name not in (*NUMBERS, *NAMES):
         raise ConfigError(
             f'the form "{text}" has a field {{{name}}}; expected one of {", ".join((*NUMBERS, *NAMES))}'

@@ -16,9 +16,9 @@ _NO_DIGITS = str.maketrans("", "", "0123456789.")
 #: what a statement may do, and what becomes of it
 DOES = {
     "line": (Support.CORRECTED, "a straight move"),
-    "rapid": (Support.CORRECTED, "a move whose way is not stated; corrected at its end"),
+    "rapid": (Support.CORRECTED, "a move whose path is not stated; corrected at its end"),
     "point": (Support.CORRECTED, "a named position; corrected where moves use it"),
-    "away": (Support.READ, "moves the machine where the text does not say"),
+    "away": (Support.READ, "moves the machine to a position that the text does not state"),
     "tool": (Support.READ, "the tool from here on"),
     "frame": (Support.READ, "the frame from here on"),
     "unit": (Support.READ, "the unit from here on"),
@@ -63,24 +63,24 @@ class UserDialect(Dialect):
 
     @property
     def numbered(self) -> frozenset[str] | None:
-        """The words, without digits, that forms begin with which ask for digits of their own; None where such
-        a form may begin with anything. Lines that begin with others say the same with other numbers."""
-        found: set[str] = set()
+        """The first words, without digits, of forms that have digits outside their fields; None where such a
+        form may begin with anything. Lines with other first words keep their meaning with other numbers."""
+        words: set[str] = set()
         for rule in self.statements:
             text = _FIELD.sub("", rule.form.text)
             if any(letter.isdigit() for letter in text):
                 begin = _BEGIN.match(rule.form.text)
                 if begin is None:
                     return None
-                found |= {
+                words |= {
                     word.strip().upper().translate(_NO_DIGITS) for word in begin[0].strip("<>").split("|")
                 }
-        return frozenset(found)
+        return frozenset(words)
 
     def rows(self) -> Sequence[Row]:
-        out = []
+        rows = []
         for rule in self.statements:
             support, usual = DOES[rule.does]
             where = f" (in {rule.inside})" if rule.inside else ""
-            out.append(Row(rule.form.text + where, support, rule.why or usual))
-        return [*out, Row("any other statement", Support.REFUSED, "it may move the machine")]
+            rows.append(Row(rule.form.text + where, support, rule.why or usual))
+        return [*rows, Row("any other statement", Support.REFUSED, "it may move the machine")]

@@ -1,7 +1,7 @@
-"""The lines of a text in a described language: statements with their places, and lines that are alike.
+"""The lines of a text in a described language: statements with their positions, and lines that are similar.
 
-Lines are alike where they differ in the digits of their numbers only. What the first of them says, the others
-say with other numbers, so a program of many moves is matched with its forms once for each kind of line.
+Lines are similar where they differ in the digits of their numbers only. What the first of them states, the
+others state with other numbers. So a program of many moves is matched with its forms once per kind of line.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from olp.program.text.numbers import LONGEST
 
 _DIGITS = b"0123456789."
 _POW10 = 10.0 ** np.arange(19)
-#: a number of such size and digits is exact
+#: a mantissa below this is exact as a double
 _MOST = 10**15
 _PRIMES = np.array([3, 1_000_003, 998_244_353, 2_147_483_647, 4_294_967_291, 67_280_421_310_721], np.uint64)
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A statement: its first line from 1, its text without comment, and where each character is in the
-    bytes."""
+    """A statement: its first line from 1, its text without comment, and where each of its lines begins: in
+    the text, and in the bytes."""
 
     number: int
     text: str
-    at: tuple[tuple[int, int], ...]
+    starts: tuple[tuple[int, int], ...]
     begin: int
     end: int
 
     def place(self, index: int) -> int:
-        for first, start in reversed(self.at):
+        for first, start in reversed(self.starts):
             if index >= first:
                 return start + index - first
         return self.begin
@@ -48,7 +48,7 @@ class Text:
 
     (n,) `start`, `end` of lines without their ends; (m,) `first`..`last` bytes of numbers with their
     `mantissa` and `decimals`, and where each stands in its line without digits, `offset`; (n + 1,) `token`
-    leads from line to numbers; (n,) `plain`: all numbers of the line are numbers, and no byte of it is odd.
+    leads from line to numbers; (n,) `plain`: each number of the line was read as one.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -64,9 +64,9 @@ class Text:
         bad = np.bincount(owner[~good], minlength=len(self.start))
         self.count: list[int] = np.diff(self.token).tolist()
         self.plain: list[bool] = (bad == 0).tolist()
-        # one number for the places of all numbers of a line
-        place = np.arange(len(owner)) - self.token[owner]
-        mixed = (self.offset.astype(np.uint64) + np.uint64(1)) * _PRIMES[place % len(_PRIMES)]
+        # one value for the positions of all numbers of a line
+        rank = np.arange(len(owner)) - self.token[owner]
+        mixed = (self.offset.astype(np.uint64) + np.uint64(1)) * _PRIMES[rank % len(_PRIMES)]
         total = np.concatenate((np.zeros(1, np.uint64), np.cumsum(mixed, dtype=np.uint64)))
         self.places: list[int] = (total[self.token[1:]] - total[self.token[:-1]]).tolist()
         self.keys = self._keys()
@@ -85,27 +85,27 @@ class Text:
         return np.asarray(self.mantissa / _POW10[self.decimals], float)
 
     def statement(self, line: int, dialect: UserDialect) -> tuple[Line | None, int]:
-        """The statement that begins in a line, None for none, and the line behind it."""
-        text, at, first = "", [], line
+        """The statement that begins in a line, None for none, and the line after it."""
+        text, starts, first = "", [], line
         while line < len(self.keys):
             start, end = int(self.start[line]), int(self.end[line])
             code = _without_comment(self.data[start:end].decode("latin-1"), dialect)
             kept = code.rstrip()
             goes_on = bool(dialect.continuation) and kept.endswith(dialect.continuation)
-            at.append((len(text), start))
+            starts.append((len(text), start))
             text += kept[: -len(dialect.continuation)] + " " if goes_on else code
             line += 1
             if not goes_on:
                 break
         begin, stop = int(self.start[first]), int(self.end[line - 1])
-        return (Line(first + 1, text, tuple(at), begin, stop) if text.strip() else None), line
+        return (Line(first + 1, text, tuple(starts), begin, stop) if text.strip() else None), line
 
 
 @dataclass(frozen=True, slots=True)
 class SameForm:
-    """A line whose moves say all in numbers: which of its numbers (from 0) are X, Y and Z, the orientation,
-    the speed (-1: none); `label` is how many of them its label has. The statement begins `gap` bytes behind
-    the last of these, or that far into the line, and ends `rest` bytes behind its last number."""
+    """A line that states its move in numbers: which of its numbers (from 0) are X, Y and Z, the orientation,
+    the speed (-1: none); `label` is how many of them its label has. The statement begins `gap` bytes after
+    the last of these, or that far into the line, and ends `rest` bytes after its last number."""
 
     rule: Rule
     count: int
@@ -120,9 +120,9 @@ class SameForm:
 
 
 def same_form_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match[str]) -> SameForm | None:
-    """What the lines that are like this one say; None where more than numbers of named fields could
-    differ."""
-    if len(line.at) > 1 or rule.does not in ("line", "rapid") or rule.incremental or rule.enters is not None:
+    """What the lines that are similar to this one state; None where more than the numbers of named fields
+    could differ."""
+    if len(line.starts) > 1 or rule.does not in ("line", "rapid") or rule.incremental or rule.enters is not None:
         return None
     index = line.number - 1
     if not text.plain[index]:
@@ -130,8 +130,8 @@ def same_form_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match
     tokens = range(int(text.token[index]), int(text.token[index + 1]))
     spans = {
         (line.begin + match.start(name), line.begin + match.end(name)): name
-        for name, said in match.groupdict().items()
-        if said is not None
+        for name, value in match.groupdict().items()
+        if value is not None
     }
     if not all(name in NUMBERS for name in spans.values()):
         return None
@@ -159,15 +159,15 @@ def same_form_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match
 
 def _tokens(text: Bytes) -> tuple[Index, Index, Index, npt.NDArray[np.int8], Mask]:
     """First and last byte, mantissa and decimals of the numbers of a text, and whether each is one."""
-    # of the characters of numbers that the lexer knows, these two part them here
+    # the lexer counts these two as characters of numbers; here they separate numbers
     parted = np.where((text == 44) | (text == 47), np.uint8(32), text)
     compact, begin, end = runs(parted)
     sign = (text == 43) | (text == 45)
-    said = _within((text >= 48) & (text <= 57), begin, end) > 0
-    begin, end = begin[said], end[said]
+    has_digit = _within((text >= 48) & (text <= 57), begin, end) > 0
+    begin, end = begin[has_digit], end[has_digit]
     good = (_within(text == 46, begin, end) <= 1) & (_within(sign, begin, end) <= sign[begin])
     good &= end - begin <= LONGEST
-    # one odd number, as in a comment, would have all of them read one by one
+    # malformed numbers, as in a comment, are left out: one of them would make the lexer read all singly
     step = np.zeros(len(text) + 1, np.int8)
     step[begin[good]] += 1
     step[end[good]] -= 1
@@ -183,11 +183,11 @@ def _tokens(text: Bytes) -> tuple[Index, Index, Index, npt.NDArray[np.int8], Mas
 
 
 def _within(what: Mask, begin: Index, end: Index) -> Index:
-    """(n,) how many bytes from `begin` up to `end` are so; stretches are apart and none is empty."""
+    """(n,) how many bytes from `begin` up to `end` are set; the stretches do not overlap, and none is empty."""
     if not len(begin):
         return np.zeros(0, np.int64)
     edges = np.column_stack((begin, end)).ravel()
-    # a last stretch that ends with the text has no bytes behind it
+    # a last stretch that ends with the text has no bytes after it
     padded = np.append(what.view(np.uint8), np.uint8(0))
     return np.asarray(np.add.reduceat(padded, edges, dtype=np.int32)[::2], np.int64)
 

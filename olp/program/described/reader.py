@@ -1,6 +1,6 @@
 """Reads programs in languages that a file describes.
 
-Nothing is guessed: a statement that no form of the dialect matches refuses the program with its line.
+Nothing is guessed: a statement that no form of the dialect matches is an error with its line.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _FIRST = re.compile(r"\s*([\w.$#%]*)")
 
 @dataclass(slots=True)
 class _Point:
-    """A named position: its numbers, and where they stand; `twice` where the text says it again."""
+    """A named position: its numbers, and their words; `twice` is the line that defines it again."""
 
     line: int
     slots: tuple[int, ...]
@@ -48,33 +48,33 @@ class _Point:
 def read_described(
     data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
 ) -> Program:
-    """Read a program. Raises ProgramError with the line of the first statement that cannot be read right."""
+    """Read a program. Raises ProgramError with the line of the first statement that cannot be read correctly."""
     assert isinstance(dialect, UserDialect)
     return _Reader(data, setup, dialect).run(words=words)
 
 
 @dataclass(slots=True)
-class _Alike:
-    """A stretch of lines (from 0) that are like others before them, and which."""
+class _SimilarLines:
+    """A stretch of lines (from 0) that are similar to others before them, and the form of each."""
 
     line: list[int]
-    kin: list[SameForm]
+    form: list[SameForm]
 
 
-_Item = tuple[Line, Rule, "re.Match[str]"] | _Alike
+_Item = tuple[Line, Rule, "re.Match[str]"] | _SimilarLines
 
 
 def _turn(fields: Mapping[str, str | None]) -> tuple[float, ...]:
-    """The orientation that a statement says."""
-    return tuple(float(said) for a in _TURNS if (said := fields.get(a)))
+    """The orientation that a statement states."""
+    return tuple(float(number_text) for a in _TURNS if (number_text := fields.get(a)))
 
 
 class _Reader:
-    """One reading of one program."""
+    """Reads one program."""
 
     def __init__(self, data: bytes, setup: Setup, dialect: UserDialect) -> None:
         self.data, self.setup, self.dialect = data, setup, dialect
-        self.out = Moves()
+        self.moves = Moves()
         self.numbered = dialect.numbered
         self.points: dict[str, _Point] = {}
         self.section = ""
@@ -89,20 +89,20 @@ class _Reader:
         self.known_frames: dict[tuple[str, int | None, float], int] = {}
         self.position: list[float] = [NAN if v is None else v for v in setup.job.start_mm]
         self.turns: dict[tuple[float, ...], int] = {}
-        #: how many parts the text has had, and where the first moves stand
+        #: how many parts the text has had, and the part and the line of the first move
         self.sections = 0
         self.moved: tuple[int, int] | None = None
 
     def run(self, *, words: bool) -> Program:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise ProgramError(
-                "the text is UTF-16; expected one byte a character; save it as plain text", line=1
+                "the text is UTF-16; expected one byte per character; save it as plain text", line=1
             )
         text = Text(self.data)
-        found = self._matched(text)
+        items = self._matched(text)
         unit = self.unit
-        for item in found:
-            if isinstance(item, _Alike):
+        for item in items:
+            if isinstance(item, _SimilarLines):
                 continue
             line, rule, match = item
             if rule.does == "point":
@@ -110,71 +110,71 @@ class _Reader:
             elif rule.does == "unit":
                 self.unit = rule.unit
         self.unit = unit
-        for item in found:
-            if isinstance(item, _Alike):
-                self._alike(text, item)
+        for item in items:
+            if isinstance(item, _SimilarLines):
+                self._put_similar(text, item)
             else:
                 self._statement(*item)
         return self._program(words=words)
 
     def _matched(self, text: Text) -> list[_Item]:
-        """Statements with their rules, and stretches of lines that are alike, in order."""
-        found: list[_Item] = []
+        """Statements with their rules, and stretches of similar lines, in order."""
+        items: list[_Item] = []
         known: dict[str, dict[bytes, SameForm | None]] = {}
-        open_: _Alike | None = None
+        open_: _SimilarLines | None = None
         plain, count, places, keys = text.plain, text.count, text.places, text.keys
         here = known.setdefault(self.section, {})
-        at = 0
-        while at < len(keys):
-            kin = here.get(keys[at])
-            if kin is not None and plain[at] and kin.count == count[at] and kin.places == places[at]:
+        index = 0
+        while index < len(keys):
+            form = here.get(keys[index])
+            if form is not None and plain[index] and form.count == count[index] and form.places == places[index]:
                 if open_ is None:
-                    open_ = _Alike([], [])
-                    found.append(open_)
-                open_.line.append(at)
-                open_.kin.append(kin)
-                at += 1
+                    open_ = _SimilarLines([], [])
+                    items.append(open_)
+                open_.line.append(index)
+                open_.form.append(form)
+                index += 1
                 continue
-            line, behind = text.statement(at, self.dialect)
+            line, behind = text.statement(index, self.dialect)
             if line is not None:
                 open_ = None
                 bare, rule, match = self._rule(line)
-                found.append((bare, rule, match))
-                if keys[at] not in here and rule.enters is None and self._varies(match):
-                    here[keys[at]] = same_form_of(text, line, bare, rule, match)
+                items.append((bare, rule, match))
+                if keys[index] not in here and rule.enters is None and self._varies(match):
+                    here[keys[index]] = same_form_of(text, line, bare, rule, match)
                 here = known.setdefault(self.section, {})
-            at = behind
-        return found
+            index = behind
+        return items
 
     def _varies(self, match: re.Match[str]) -> bool:
-        """Whether other numbers in this statement make the same statement."""
+        """Whether the statement keeps its meaning with other numbers."""
         first = _FIRST.match(match[0])
         word = (first[1] if first else "").upper().translate(_NO_DIGITS)
         return self.numbered is not None and word not in self.numbered
 
-    def _alike(self, text: Text, found: _Alike) -> None:
-        """Moves of lines that are alike, all at once."""
-        lines, which = np.array(found.line), np.array([id(kin) for kin in found.kin])
+    def _put_similar(self, text: Text, similar: _SimilarLines) -> None:
+        """Put the moves of similar lines, all at once."""
+        lines, which = np.array(similar.line), np.array([id(form) for form in similar.form])
         count = len(lines)
         pick = np.zeros((count, 3), np.int64)
         feed, says = np.full(count, NAN), np.zeros(count, bool)
         begin, end = np.zeros(count, np.int64), np.zeros(count, np.int64)
         kind = np.zeros(count, np.uint8)
         token, value = text.token[lines], text.value
-        for name, kin in {id(kin): kin for kin in found.kin}.items():
+        for name, form in {id(form): form for form in similar.form}.items():
             rows = np.flatnonzero(which == name)
             first = token[rows]
-            assert (text.offset[first[:, None] + np.arange(kin.count)] == np.array(kin.offset)).all()
-            pick[rows] = first[:, None] + np.array(kin.xyz)
-            before = text.last[first + kin.label - 1] if kin.label else text.start[lines[rows]]
-            begin[rows], end[rows] = before + kin.gap, text.last[first + kin.count - 1] + kin.rest
-            kind[rows] = Kind.LINE if kin.rule.does == "line" else Kind.RAPID
-            if kin.speed >= 0:
+            assert (text.offset[first[:, None] + np.arange(form.count)] == np.array(form.offset)).all()
+            pick[rows] = first[:, None] + np.array(form.xyz)
+            before = text.last[first + form.label - 1] if form.label else text.start[lines[rows]]
+            begin[rows], end[rows] = before + form.gap, text.last[first + form.count - 1] + form.rest
+            kind[rows] = Kind.LINE if form.rule.does == "line" else Kind.RAPID
+            if form.speed >= 0:
                 says[rows] = True
-                unit = kin.rule.speed_unit or self.dialect.speed_unit
-                feed[rows] = value[first + kin.speed] * (MM_S[unit] if unit is not None else NAN)
-            if kin.turn:
-                turn = value[first[:, None] + np.array(kin.turn)]
+                unit = form.rule.speed_unit or self.dialect.speed_unit
+                feed[rows] = value[first + form.speed] * (MM_S[unit] if unit is not None else NAN)
+            if form.turn:
+                turn = value[first[:, None] + np.array(form.turn)]
                 for row in (0, int((turn != turn[0]).any(axis=1).argmax())):
                     self.turns.setdefault(tuple(turn[row].tolist()), int(lines[rows[row]]) + 1)
         source = np.maximum.accumulate(np.where(says, np.arange(count), -1))
@@ -185,18 +185,18 @@ class _Reader:
     def _put_all(
         self, text: Text, line: Index, kind: npt.NDArray[np.uint8], pick: Index, bounds: Index, feed: Array
     ) -> None:
-        """Moves of one frame: (n,) lines from 1, (n, 3) the numbers of the text that say each."""
+        """Put moves of one frame: (n,) lines from 1, (n, 3) the numbers of the text that state each."""
         first, count = int(line[0]), len(line)
         unit_mm = self._unit_mm(first)
         frame = self._frame(first, unit_mm)
         self._note_move(first)
         where = self.table.frames[frame]
-        said = text.value[pick] * unit_mm
-        turned = said if where.turn is None else said @ np.array(where.turn).T
+        stated = text.value[pick] * unit_mm
+        turned = stated if where.turn is None else stated @ np.array(where.turn).T
         places = turned + np.array(where.offset_mm)
-        self.out.put_all(
+        self.moves.put_all(
             kind=kind, flag=np.zeros(count), line=line, frame=np.full(count, frame), end=places,
-            slot=self.out.said + np.arange(3 * count), bounds=bounds, feed=feed,
+            slot=self.moves.number_count + np.arange(3 * count), bounds=bounds, feed=feed,
             spans=np.column_stack((text.first[pick.ravel()], text.last[pick.ravel()])),
         )  # fmt: skip
         self.position = places[-1].tolist()
@@ -224,9 +224,8 @@ class _Reader:
             bare = replace(line, begin=line.place(start), end=line.place(last - 1) + 1)
             return bare, rule, match
         raise ProgramError(
-            f"`{text.strip()[:60]}` is no statement that the dialect {dialect.name} knows, and it may move "
-            "the "
-            "machine; describe it in the dialect file, or take it out",
+            f"`{text.strip()[:60]}` is not a statement of the dialect {dialect.name}, and may move the machine; "
+            "describe it in the dialect file, or take it out",
             line=line.number,
         )
 
@@ -254,15 +253,15 @@ class _Reader:
             self._move(line, rule, match)
 
     def _speed(self, rule: Rule, fields: Mapping[str, str | None]) -> float:
-        """A speed in mm/s, NaN where it is none in a unit of speed."""
+        """A speed in mm/s, NaN where it has no unit of speed."""
         unit = rule.speed_unit or self.dialect.speed_unit
-        said = fields.get("speed")
-        return float(said) * MM_S[unit] if said is not None and unit is not None else NAN
+        speed = fields.get("speed")
+        return float(speed) * MM_S[unit] if speed is not None and unit is not None else NAN
 
     @staticmethod
     def _integer(line: Line, text: str) -> int:
         if not text.isdigit():
-            raise ProgramError(f"tool {text} is no tool number; expected a whole number", line=line.number)
+            raise ProgramError(f"tool {text} is not a tool number; expected an integer", line=line.number)
         return int(text)
 
     def _unit_mm(self, line: int) -> float:
@@ -276,11 +275,11 @@ class _Reader:
     # -- positions -----------------------------------------------------------------------------------
 
     def _slots(self, line: Line, match: re.Match[str]) -> tuple[list[int], list[float]]:
-        """Words and values of the axes that a statement says; -1 and NaN where it leaves one out."""
+        """Words and values of the axes that a statement states; -1 and NaN where it leaves one out."""
         slots, values = [], []
         for axis in _AXES:
-            said = match.groupdict().get(axis)
-            if said is None:
+            digits = match.groupdict().get(axis)
+            if digits is None:
                 slots.append(-1)
                 values.append(NAN)
                 continue
@@ -288,9 +287,9 @@ class _Reader:
             form = number(self.data[start:end])
             if form is None:
                 raise ProgramError(
-                    f"the number {said} goes on in another line; write it in one", line=line.number
+                    f"the number {digits} goes on in another line; write it in one line", line=line.number
                 )
-            slots.append(self.out.number(start, end))
+            slots.append(self.moves.number(start, end))
             values.append(form.value)
         return slots, values
 
@@ -330,54 +329,53 @@ class _Reader:
         self._put(line, kind, flag, end, tuple(slots), inline=inline, frame=frame)
 
     def _end(self, frame: int, values: list[float], *, incremental: bool) -> list[float]:
-        """Where a move ends, as axis positions; an axis that is left out stays."""
+        """Where a move ends, as axis positions; an axis that is left out does not move."""
         where = self.table.frames[frame]
-        left = [v != v for v in values]
+        omitted = [v != v for v in values]
         if incremental:
             step = replace(where, offset_mm=ZERO).placed_mm([0.0 if v != v else v for v in values])
             return [p + s for p, s in zip(self.position, step, strict=True)]
-        if any(left):
+        if any(omitted):
             now = where.tip_mm(np.array([self.position]) - np.array(where.length_mm))[0] / where.unit_mm
             values = [float(n) if v != v else v for n, v in zip(now, values, strict=True)]
             if where.turn is None:
                 placed = where.placed_mm(values)
-                return [p if gone else q for p, q, gone in zip(self.position, placed, left, strict=True)]
+                return [p if gone else q for p, q, gone in zip(self.position, placed, omitted, strict=True)]
         return list(where.placed_mm(values))
 
     def _target(self, line: Line, text: str) -> _Point:
         point = self.points.get(self._name(text))
         if point is None:
             raise ProgramError(
-                f"the position {text} is not in this text; put its definition in, or correct the list of "
-                "positions that holds it",
+                f"the position {text} is not defined in this text; "
+                "add its definition, or correct the list of positions that has it",
                 line=line.number,
             )
         if point.twice:
             raise ProgramError(
-                f"the position {text} is defined in line {point.line} and again in line {point.twice}, so "
-                "which "
-                "one holds here depends on the run; give each its own name",
+                f"the position {text} is defined twice, in lines {point.line} and {point.twice}, "
+                "so which one holds here depends on the run; give each its own name",
                 line=line.number,
             )
         return point
 
     def _frame(self, line: int, unit_mm: float) -> int:
         key = (self.frame_name, self.tool, unit_mm)
-        found = self.known_frames.get(key)
-        if found is None:
-            found = frame_index(self.table, self.setup, self.frame_name, self.tool, unit_mm, line)
-            self.known_frames[key] = found
-        return found
+        index = self.known_frames.get(key)
+        if index is None:
+            index = frame_index(self.table, self.setup, self.frame_name, self.tool, unit_mm, line)
+            self.known_frames[key] = index
+        return index
 
     def _note_move(self, line: int) -> None:
-        """A move stands here: in which part of the text, and in a frame that something has named or not."""
+        """Note a move: in which part of the text it is, and whether a statement has named its frame."""
         first = self.moved = self.moved or (self.sections, line)
         if not self.framed and self.assumed is None:
             self.assumed = line
         if first[0] != self.sections:
             raise ProgramError(
-                f"moves stand in two parts of this text, here and from line {first[1]} on, and which of them "
-                "runs when is not known; give each part a file of its own",
+                f"this text has moves in two parts, here and from line {first[1]} on, "
+                "and their order is not known; put each part into its own file",
                 line=line,
             )
 
@@ -386,7 +384,7 @@ class _Reader:
         frame: int | None = None,
     ) -> None:  # fmt: skip
         self.position = list(end)
-        self.out.put(
+        self.moves.put(
             kind=int(kind), flag=int(flag), line=line.number,
             frame=self._frame(line.number, self._unit_mm(line.number)) if frame is None else frame, end=end,
             slot=slots, bounds=(line.begin, line.end) if inline else (-1, -1), feed=self.feed,
@@ -396,7 +394,7 @@ class _Reader:
     # -- the end -------------------------------------------------------------------------------------
 
     def _program(self, *, words: bool) -> Program:
-        out, data = self.out, self.data
+        moves, data = self.moves, self.data
         remarks = []
         if self.assumed is not None:
             remarks.append(
@@ -406,6 +404,6 @@ class _Reader:
             remarks.append(
                 ("turning", list(self.turns.values())[1], "the orientation changes from move to move")
             )
-        return out.program(
+        return moves.program(
             data, self.dialect, self.setup, self.table.frames, remarks, decimal=b".", words=words
         )

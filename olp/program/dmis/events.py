@@ -15,7 +15,9 @@ from olp.program.statement_rows import Points, StatementCollector
 from olp.program.text.statements import Statement, shown
 
 NAN = float("nan")
+#: mm per unit of length
 _UNITS = {b"MM": 1.0, b"CM": 10.0, b"M": 1000.0, b"INCH": MM_PER_INCH}
+#: mm/s per unit of speed
 _SPEEDS = {b"MMPS": 1.0, b"MPM": 1000.0 / 60.0, b"IPS": MM_PER_INCH, b"IPM": MM_PER_INCH / 60.0,
            b"MPMM": 1000.0 / 60.0, b"MMPM": 1.0 / 60.0}  # fmt: skip
 _LABEL = re.compile(rb"(?i)\A\s*([A-Z]+)\s*\(\s*([^()]*?)\s*\)\s*\Z")
@@ -24,12 +26,12 @@ MACHINE_FRAME = "MCS"
 
 
 class Events:
-    """State of one reading of one program, and a handler for each statement that changes it. `_resolve` gives
-    the points before an event their places; a reading has its own."""
+    """The state while one program is read, and a handler for each statement that changes it. `_resolve`, which
+    the reader defines, turns the points before an event into positions."""
 
     def __init__(self, data: bytes, setup: Setup, dialect: Dialect, words: bool) -> None:
         self.data, self.setup = data, setup
-        self.out = StatementCollector(data, dialect, keep_words=words)
+        self.collector = StatementCollector(data, dialect, keep_words=words)
         self.table = FrameTable(setup)
         self.start = [NAN if p is None else p for p in setup.job.start_mm]
         self.unit_mm, self.unit_stated = 1.0, False
@@ -55,11 +57,11 @@ class Events:
             b"RMEAS": self._meas, b"ENDMES": self._endmes, b"FROM": self._from, b"GOHOME": self._gohome,
             b"IF": self._branch, b"ELSE": self._branch, b"ELSEIF": self._branch, b"ENDIF": self._branch,
             b"DO": self._branch, b"ENDDO": self._branch, b"MACRO": self._macro, b"ENDMAC": self._endmac,
-            b"CALL": self._call, b"ENDFIL": self._endfil, b"DECL": self._carry, b"RAPID": self._carry,
+            b"CALL": self._call, b"ENDFIL": self._endfil, b"DECL": self._unchanged, b"RAPID": self._unchanged,
         }  # fmt: skip
 
     def _frame(self, line: int) -> int:
-        what = "the machine's own frame" if self.datum == MACHINE_FRAME else f"the datum D({self.datum})"
+        what = "the frame of the machine" if self.datum == MACHINE_FRAME else f"the datum D({self.datum})"
         name = next(
             (n for n in (*self.setup.job.work_offsets, *self.setup.machine.work_offsets)
              if n.upper() == self.datum.upper()),
@@ -72,7 +74,7 @@ class Events:
         elif self.setup.machine.default_tool:
             tool = self.setup.machine.default_tool
             tool_vector = tool_vector_of(self.setup, tool, line)
-        # the control counts its axes at the end of the ram: the tip is there plus the offset of the stylus
+        # the control counts its axes at the end of the ram: the tip is at that point plus the offset of the stylus
         x, y, z = (0.0 - v for v in tool_vector)
         return self.table.index(
             work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), tool_vector=tool_vector
@@ -82,35 +84,35 @@ class Events:
         stated = self.setup.stylus(name)
         if stated is not None:
             return stated
-        found = self.defined.get(name)
-        if found is None:
+        defined = self.defined.get(name)
+        if defined is None:
             raise ProgramError(
-                f'the stylus {name} is selected, and its offset is said nowhere; give [styli."{name}"] '
+                f'the stylus {name} is selected, and its offset is not stated; give [styli."{name}"] '
                 "offset_mm = [x, y, z] in the job or machine file, end of the ram to centre of the tip",
                 line=line,
             )
-        return found
+        return defined
 
     def _unknown(self, statement: Statement, row: int) -> None:
-        """Behind this nobody knows where the machine stands."""
+        """After this statement the position of the machine is not known."""
         self._resolve(row)
-        if self.out.moves:
-            self.out.put_lone(
+        if self.collector.moves:
+            self.collector.put_lone(
                 Kind.RAPID, Flag.PASS | Flag.CONTROL, statement.line, len(self.table.frames) - 1, [NAN] * 3
             )
         else:
             self.start = [NAN] * 3
 
     def _settled(self, statement: Statement) -> None:
-        """What changes the state has to happen on every way through the program."""
+        """Refuse a change of the state that does not happen in every run of the program."""
         if self.nesting:
             raise ProgramError(
-                f"{shown(statement.head()[1])} stands inside {shown(self.nesting[-1])}, so whether it counts "
-                "is known at run time only",
+                f"{shown(statement.head()[1])} is inside {shown(self.nesting[-1])}, "
+                "so whether it holds is known at run time only; move it before or after",
                 line=statement.line,
             )
 
-    def _carry(self, statement: Statement, label: bytes, row: int) -> None:
+    def _unchanged(self, statement: Statement, label: bytes, row: int) -> None:
         return
 
     def _units(self, statement: Statement, label: bytes, row: int) -> None:
@@ -119,20 +121,20 @@ class Events:
         fields = statement.fields()
         unit = _UNITS.get(fields[0].text) if fields else None
         if unit is None:
-            what = "UNITS names no unit that is read; expected MM, CM, M or INCH"
+            what = "UNITS names a unit that is not read; expected MM, CM, M or INCH"
             raise ProgramError(what, line=statement.line)
         self.unit_mm, self.unit_stated = unit, True
 
     def _snsdef(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()
-        at = next((i for i, f in enumerate(fields) if f.text == b"CART"), -1)
-        fixed = any(f.text == b"FIXED" for f in fields[:at])
-        numbers = [f.number for f in fields[at + 1 : at + 4]]
+        cart = next((i for i, f in enumerate(fields) if f.text == b"CART"), -1)
+        fixed = any(f.text == b"FIXED" for f in fields[:cart])
+        numbers = [f.number for f in fields[cart + 1 : cart + 4]]
         name = _name(label)
         if name is None:
             return
         self.defined[name] = None
-        if at > 0 and fixed and len(numbers) == 3 and None not in numbers:
+        if cart > 0 and fixed and len(numbers) == 3 and None not in numbers:
             x, y, z = (n[0] / 10.0 ** n[1] * self.unit_mm for n in numbers if n is not None)
             self.defined[name] = (x, y, z)
 
@@ -151,7 +153,7 @@ class Events:
         name = _name(label)
         if name is None:
             raise ProgramError(
-                f"{shown(statement.head()[1])} makes no datum D(), so its frame has no name",
+                f"{shown(statement.head()[1])} has no label D(), so its frame has no name; expected D(name) = …",
                 line=statement.line,
             )
         self._settled(statement)
@@ -160,14 +162,14 @@ class Events:
 
     def _recall(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()
-        found = _LABEL.match(fields[0].text) if fields else None
-        if found is None or found[1] not in (b"D", b"DA"):
-            if found is not None and found[1] in (b"S", b"SA", b"RT"):
-                raise ProgramError("RECALL is read for datums only", line=statement.line)
+        match = _LABEL.match(fields[0].text) if fields else None
+        if match is None or match[1] not in (b"D", b"DA"):
+            if match is not None and match[1] in (b"S", b"SA", b"RT"):
+                raise ProgramError("RECALL is read for datums only: D() or DA()", line=statement.line)
             return
         self._settled(statement)
         self._resolve(row)
-        self.datum = found[2].decode("latin-1")
+        self.datum = match[2].decode("latin-1")
 
     def _mode(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()
@@ -180,7 +182,7 @@ class Events:
         if any(f.text == b"OFF" for f in fields[:1]):
             return
         name = shown(statement.head()[1])
-        self.out.remarks.setdefault("thermal", (statement.line, f"{name} makes the control compensate"))
+        self.collector.remarks.setdefault("thermal", (statement.line, f"{name} makes the control compensate"))
 
     def _feed(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()
@@ -189,18 +191,18 @@ class Events:
         if fields and fields[0].text in self.speed and numbers:
             self.speed[fields[0].text] = numbers[0][0] / 10.0 ** numbers[0][1] * unit
         if fields and fields[0].text == b"MESVEL":
-            self.out.put_feed(self.out.moves + row - self.done, self.speed[b"MESVEL"], statement.line)
+            self.collector.put_feed(self.collector.moves + row - self.done, self.speed[b"MESVEL"], statement.line)
 
     def _meas(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is not None:
-            raise ProgramError("MEAS stands inside MEAS; expected ENDMES first", line=statement.line)
+            raise ProgramError("MEAS is inside MEAS; expected ENDMES before it", line=statement.line)
         self.feature = (statement.line, False)
 
     def _endmes(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is None:
-            raise ProgramError("ENDMES ends no MEAS", line=statement.line)
+            raise ProgramError("ENDMES has no MEAS before it", line=statement.line)
         if not self.feature[1]:
-            # the control goes to points of its own
+            # the control chooses the points itself
             self._unknown(statement, row)
         self.feature = None
 
@@ -218,13 +220,13 @@ class Events:
             self.nesting.append(word)
         elif word in (b"ENDIF", b"ENDDO"):
             if not self.nesting or self.nesting[-1] != word[3:]:
-                raise ProgramError(f"{shown(word)} ends nothing", line=statement.line)
+                raise ProgramError(f"{shown(word)} has no {shown(word[3:])} before it", line=statement.line)
             self.nesting.pop()
 
     def _macro(self, statement: Statement, label: bytes, row: int) -> None:
         name = _name(label)
         if name is None:
-            return  # WinWerth heads its programs so
+            return  # WinWerth begins its programs with such a line
         self._resolve(row)
         self.macro = name
         self.macros.add(name.upper())
@@ -240,7 +242,7 @@ class Events:
         fields = statement.fields()
         name = next((n for f in fields if (n := _name(f.text)) is not None), None)
         if name is None or name.upper() not in self.macros:
-            raise ProgramError("CALL runs what is not in this program, and may move", line=statement.line)
+            raise ProgramError("CALL runs a macro that is not in this program and may move the machine; put the macro into this program", line=statement.line)
 
     def _endfil(self, statement: Statement, label: bytes, row: int) -> None:
         self._resolve(row)
@@ -251,6 +253,6 @@ class Events:
 
 
 def _name(label: bytes) -> str | None:
-    """What stands in the brackets of S(), D(), M()."""
-    found = _LABEL.match(label)
-    return found[2].decode("latin-1") if found else None
+    """The name in the brackets of S(), D(), M()."""
+    match = _LABEL.match(label)
+    return match[2].decode("latin-1") if match else None

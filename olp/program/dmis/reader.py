@@ -1,7 +1,7 @@
 """Reads DMIS part programs: motion statements to a nominal toolpath and the words that can be edited.
 
-Positioning (GOTO) and touching (PTMEAS) count at their ends alone: what is between them, the control decides.
-Feature nominals, tolerances and actuals are carried. Nothing here knows an error model.
+Only the ends of positioning (GOTO) and touching (PTMEAS) count: the control decides the path between them.
+Feature nominals, tolerances and actuals stay unchanged. Nothing here knows an error model.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _NO_TEXT = re.compile(rb"(?!)")
 
 def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
-    right."""
+    correctly."""
     return _Reader(data, setup, dialect, words).run()
 
 
 class _Reader(Events):
-    """One reading of one program."""
+    """Reads one program."""
 
     def run(self) -> Program:
         for chunk in chunks(self.data):
@@ -40,28 +40,28 @@ class _Reader(Events):
             raise ProgramError(f"{shown(self.nesting[-1])} has no end", line=max(self.data.count(b"\n"), 1))
         x, y, z = self.start
         end = self.ended or self.data.count(b"\n") + 1
-        return self.out.program(self.table.frames, (x, y, z), end, b"")
+        return self.collector.program(self.table.frames, (x, y, z), end, b"")
 
     def _chunk(self, chunk: Chunk) -> None:
-        out = self.out
-        out.begin(chunk)
+        collector = self.collector
+        collector.begin(chunk)
         events: list[Statement] = []
         alone: list[Point] = []
-        for found in () if self.ended else chunk.statements(_NO_TEXT):
-            if isinstance(found, Comment):
-                self._check_comment(chunk, found)
+        for item in () if self.ended else chunk.statements(_NO_TEXT):
+            if isinstance(item, Comment):
+                self._check_comment(chunk, item)
                 continue
-            if self._in_header(found):
+            if self._in_header(item):
                 continue
-            _, major = found.head()
+            _, major = item.head()
             if major in (b"GOTO", b"PTMEAS"):
-                point = self._point(found, major)
+                point = self._point(item, major)
                 alone.append(point)
                 if major == b"PTMEAS":
                     self.touches.add(point.line)
             if major != b"GOTO":
-                events.append(found)
-        self.points = out.points(chunk, alone)
+                events.append(item)
+        self.points = collector.points(chunk, alone)
         self.done = 0
         upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
         for statement, row in zip(events, upto, strict=True):
@@ -70,10 +70,10 @@ class _Reader(Events):
                 break
         if not self.ended:
             self._resolve(len(self.points))
-        out.finish()
+        collector.finish()
 
     def _in_header(self, statement: Statement) -> bool:
-        """The block BEGIN/CHFILE … END/CHFILE of WinWerth holds keys and values, no statements."""
+        """The block BEGIN/CHFILE … END/CHFILE of WinWerth has keys and values, no statements."""
         text = b"".join(statement.text.upper().split())
         was = self.header
         if text == b"BEGIN/CHFILE":
@@ -83,7 +83,7 @@ class _Reader(Events):
         return was or self.header
 
     def _check_comment(self, chunk: Chunk, comment: Comment) -> None:
-        """A comment that ends with `$` goes on: what follows has to be a comment too, or nobody can tell."""
+        """Refuse a line after a comment that ends with `$`, unless it is a comment too: it may belong to it."""
         if not comment.text.rstrip().endswith(b"$") or comment.text.strip() == b"$$":
             return
         line = comment.line - chunk.first_line
@@ -91,8 +91,8 @@ class _Reader(Events):
             after = chunk.raw(line).strip()
             if after and not after.startswith(b"$$"):
                 raise ProgramError(
-                    "the comment before ends with `$`, so this line may belong to it; take that `$` away, or "
-                    "put `$$` before this line",
+                    "the comment before ends with `$`, so this line may belong to it; "
+                    "take that `$` away, or put `$$` before this line",
                     line=comment.line + 1,
                 )
 
@@ -108,18 +108,18 @@ class _Reader(Events):
             return
         if first == b"PTMEAS":
             if self.feature is None:
-                raise ProgramError("PTMEAS stands outside MEAS and ENDMES", line=statement.line)
+                raise ProgramError("PTMEAS is outside MEAS and ENDMES; expected MEAS before it", line=statement.line)
             self.feature = (self.feature[0], True)
             return
         if label and b"/" not in statement.text:
             raise ProgramError(
-                f"{shown(label)} is assigned, and what depends on it is known at run time only",
+                f"{shown(label)} is assigned, and its effect is known at run time only",
                 line=statement.line,
             )
         known = TABLE.get(first)
         if known is None and not text:
             return
-        support, why = known or (Support.REFUSED, "is no statement that olp knows, and may move")
+        support, why = known or (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
         if support is Support.REFUSED:
             raise ProgramError(f"{shown(first)} {why}", line=statement.line)
 
@@ -132,15 +132,15 @@ class _Reader(Events):
         if fields and fields[0].text == b"CART":
             fields = fields[1:]
         elif major == b"PTMEAS" or (fields and fields[0].number is None):
-            said = shown(fields[0].text) if fields else "nothing"
+            first = shown(fields[0].text) if fields else "nothing"
             raise ProgramError(
-                f"{shown(major)}/{said} is not read; expected CART and x,y,z as numbers", line=statement.line
+                f"{shown(major)}/{first} is not read; expected CART and x,y,z as numbers", line=statement.line
             )
         bad = next((f for f in fields if f.number is None), None)
         if bad is not None:
             raise ProgramError(
-                f"{shown(major)} names {shown(bad.text) or 'nothing'} where a number is expected; its value "
-                "is known at run time only",
+                f"{shown(major)} has {shown(bad.text) or 'nothing'} where a number is expected; "
+                "its value is known at run time only",
                 line=statement.line,
             )
         if len(fields) not in ((3, 6) if major == b"PTMEAS" else (3,)):
@@ -162,7 +162,7 @@ class _Reader(Events):
         if wide.any():
             raise ProgramError("GOTO has 6 numbers; expected x,y,z", line=int(line[np.flatnonzero(wide)[0]]))
         if self.macro is not None:
-            raise ProgramError(f"the macro {self.macro} moves, which is not read", line=int(line[0]))
+            raise ProgramError(f"the macro {self.macro} moves the machine, which is not read; write its moves into the program", line=int(line[0]))
         number = self._frame(int(line[0]))
         frame = self.table.frames[number]
         value = self.points.value[part] * self.unit_mm
@@ -175,10 +175,8 @@ class _Reader(Events):
         if self.manual:
             flag |= np.uint8(Flag.PASS)
         if not self.unit_stated:
-            self.out.remarks.setdefault("unit", (int(line[0]), "the program states no UNITS"))
-        self.out.put_stated_moves(
+            self.collector.remarks.setdefault("unit", (int(line[0]), "the program states no UNITS"))
+        self.collector.put_stated_moves(
             kind, flag, line, np.full(len(line), number), end, self.points.slot[part],
             self.points.begin[part], self.points.end[part],
         )  # fmt: skip
-
-    # -- events --------------------------------------------------------------------------------------

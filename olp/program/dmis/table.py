@@ -9,32 +9,35 @@ from collections.abc import Mapping
 
 from olp.program.dialect import Support
 
-_C, _R, _X, _NO = Support.CORRECTED, Support.READ, Support.UNCHANGED, Support.REFUSED
+_C = Support.CORRECTED
+_R = Support.READ
+_X = Support.UNCHANGED
+_NO = Support.REFUSED
 
 _FEATURE = "nominals, tolerances and actuals are never edited"
-_RUN_TIME = "goes where only the run of the program decides"
+_RUN_TIME = "goes to a position that only the run of the program decides"
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"GOTO": (_C, "x,y,z or CART,x,y,z; POL and INCR are refused"),
     b"PTMEAS": (_C, "CART,x,y,z, with or without a direction, inside MEAS or RMEAS"),
     b"MEAS": (_R, "a feature is measured; without a PTMEAS the control makes its own points"),
-    b"RMEAS": (_R, "as MEAS; its points are corrected where they are nominally"),
+    b"RMEAS": (_R, "as MEAS; its points are corrected at their nominal positions"),
     b"ENDMES": (_R, ""),
-    b"FROM": (_R, "where GOHOME goes; passes as it is"),
-    b"GOHOME": (_R, "passes as it is"),
+    b"FROM": (_R, "where GOHOME goes; left uncorrected"),
+    b"GOHOME": (_R, "left uncorrected"),
     b"RAPID": (_R, "for the next GOTO"),
     b"UNITS": (_R, "MM, CM, M or INCH"),
-    b"SNSDEF": (_R, "FIXED,CART: the offset of the stylus, its lever"),
+    b"SNSDEF": (_R, "FIXED,CART: the offset of the stylus, its tool vector"),
     b"SNSLCT": (_R, "the stylus; its offset from the job, else from SNSDEF"),
     b"TRANS": (_R, "D() = …: a frame of the job, under the label of the datum"),
     b"ROTATE": (_R, "D() = …: a frame of the job, under the label of the datum"),
     b"DATSET": (_R, "D() = …: a frame of the job, under the label of the datum"),
     b"RECALL": (_R, "D(): a frame of the job, under the label of the datum"),
-    b"MODE": (_R, "what is said under MODE/MAN is left to the person"),
-    b"TECOMP": (_R, "thermal compensation is found and warned of"),
-    b"TEMPR": (_R, "thermal compensation is found and warned of"),
+    b"MODE": (_R, "points under MODE/MAN are left uncorrected: the operator moves the machine"),
+    b"TECOMP": (_R, "thermal compensation is detected, with a warning"),
+    b"TEMPR": (_R, "thermal compensation is detected, with a warning"),
     b"FEDRAT": (_R, "POSVEL and MESVEL in MMPS, MPM, IPS or IPM"),
-    b"IF": (_R, "points are corrected on both ways; frames and styli must not change there"),
+    b"IF": (_R, "points are corrected in both branches; frames and styli must not change there"),
     b"ELSE": (_R, ""),
     b"ELSEIF": (_R, ""),
     b"ENDIF": (_R, ""),
@@ -72,9 +75,9 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
         (_NO, _RUN_TIME),
     ),
     **dict.fromkeys(
-        (b"ASSIGN", b"OBTAIN", b"PROMPT"), (_X, "a motion that names what it sets is refused")
+        (b"ASSIGN", b"OBTAIN", b"PROMPT"), (_X, "a motion that uses the value is refused")
     ),
-    **dict.fromkeys((b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves what is not read")),
+    **dict.fromkeys((b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves an axis that is not read")),
 }  # fmt: skip
 
 #: majors of assignments that run and input statements make; their value is text or logic, never motion

@@ -18,12 +18,15 @@ from olp.core.units import MM_PER_INCH
 from olp.program.program import Program, Words
 
 _POW10 = 10.0 ** np.arange(19)
-_PER_MINUTE, _PER_TURN, _INVERSE = 940, 950, 930
+#: G codes of feed modes, ten times their number
+_PER_MINUTE = 940
+_PER_TURN = 950
+_INVERSE = 930
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scan:
-    """The words of a program that tell about time: `word` (k,) their indices, `line` (k,) counted from 1;
+    """The words of a program that concern time: `word` (k,) their indices, `line` (k,) counted from 1;
     the G codes among them once more, as ten times their number, in `code` and `code_line`."""
 
     program: Program
@@ -36,8 +39,8 @@ class Scan:
     @staticmethod
     def of(program: Program, words: Words, *, block_delete: bool) -> Scan:
         """The F, G, M and S words of the blocks that are carried out."""
-        found = [np.flatnonzero(words.letter == letter) for letter in b"FGMS"]
-        word = np.sort(np.concatenate(found))
+        by_letter = [np.flatnonzero(words.letter == letter) for letter in b"FGMS"]
+        word = np.sort(np.concatenate(by_letter))
         line = np.searchsorted(words.first_word, word, "right")
         active = line <= program.end_line
         if block_delete:
@@ -73,7 +76,7 @@ def lengths_mm(path: Toolpath) -> Array:
     """(n,) length of each move, along the arc where it is one; NaN from or to unknown positions."""
     start, end = path.starts_mm(), path.end_mm
     step = end - start
-    out = np.sqrt(np.einsum("ij,ij->i", step, step))
+    length = np.sqrt(np.einsum("ij,ij->i", step, step))
     arcs = path.arcs
     if len(arcs):
         rows = np.arange(len(arcs))
@@ -84,8 +87,8 @@ def lengths_mm(path: Toolpath) -> Array:
         a, b = start[arcs.move], end[arcs.move]
         radius = np.hypot(a[rows, first] - c0, a[rows, second] - c1)
         radius = 0.5 * (radius + np.hypot(b[rows, first] - c0, b[rows, second] - c1))
-        out[arcs.move] = np.hypot(radius * arcs.sweep_rad, b[rows, third] - a[rows, third])
-    return np.asarray(out, float)
+        length[arcs.move] = np.hypot(radius * arcs.sweep_rad, b[rows, third] - a[rows, third])
+    return np.asarray(length, float)
 
 
 def governing(scan: Scan) -> tuple[Index, Index]:
@@ -98,11 +101,11 @@ def governing(scan: Scan) -> tuple[Index, Index]:
     if not len(move):
         return move, move
     line = path.line[move].astype(np.int64)
-    mode, since = _modes(scan).at(line)
+    mode, since = _modes(scan).in_force(line)
     _, f_line = scan.of_letter(b"F")
     latest = np.searchsorted(f_line, line, "right") - 1
     inverse = mode == _INVERSE
-    # G93: a block's own; else since the mode began
+    # in G93 F counts in its own block only, else since the mode began
     needed = np.where(inverse, line, since)
     stated = (latest >= 0) & (np.append(f_line, -1)[latest] >= needed)
     _refuse(~stated, line, inverse)
@@ -111,18 +114,18 @@ def governing(scan: Scan) -> tuple[Index, Index]:
 
 
 def feeds(scan: Scan) -> Array:
-    """(n,) feed of each move in mm/s: inf for rapids, NaN for moves of the control's own and where the time
-    of G93 has no length. Raises ProgramError for a feed move without a feed, or one that cannot be read
-    right."""
+    """(n,) feed of each move in mm/s: inf for rapids, NaN for moves that the control makes by itself and
+    where the time of G93 has no length. Raises ProgramError for a feed move without a feed, or with one that
+    cannot be read correctly."""
     path = scan.program.toolpath
-    out = np.full(len(path), np.inf)
-    out[(path.flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
+    feed_mm_s = np.full(len(path), np.inf)
+    feed_mm_s[(path.flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
     move, latest = governing(scan)
     if not len(move):
-        return out
+        return feed_mm_s
     line = path.line[move].astype(np.int64)
     modes = _modes(scan)
-    mode, _ = modes.at(line)
+    mode, _ = modes.in_force(line)
     f_word, f_line = scan.of_letter(b"F")
     value, pointed = numbers(scan.words, f_word), scan.words.pointed[f_word]
     unit = _unit(scan, f_line)
@@ -136,8 +139,8 @@ def feeds(scan: Scan) -> Array:
     if inverse.any():
         feed[inverse] = value[latest[inverse]] / 60.0 * lengths_mm(path)[move[inverse]]
         feed[inverse & ~(feed > 0)] = np.nan
-    out[move] = feed
-    return out
+    feed_mm_s[move] = feed
+    return feed_mm_s
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +151,7 @@ class _Modes:
     code: Index
     since: Index
 
-    def at(self, line: Index) -> tuple[Index, Index]:
+    def in_force(self, line: Index) -> tuple[Index, Index]:
         here = np.searchsorted(self.line, line, "right") - 1
         return self.code[here], self.since[here]
 
@@ -174,15 +177,15 @@ def _unit(scan: Scan, line: Index) -> Array:
 
 
 def _spindle(scan: Scan, line: Index) -> Array:
-    """Turns a minute of the spindle: the S word in force on these lines."""
-    word, at = scan.of_letter(b"S")
+    """Turns of the spindle per minute: the S word in force on these lines."""
+    word, s_line = scan.of_letter(b"S")
     value = numbers(scan.words, word)
-    here = np.searchsorted(at, line, "right")
+    here = np.searchsorted(s_line, line, "right")
     turns = np.concatenate(([0.0], value))[here]
     bad = ~(turns > 0)
     if bad.any():
         raise ProgramError(
-            "G95 counts its feed by turns of the spindle, and no S word came before; give S or use G94",
+            "G95 states its feed per turn of the spindle, and no S word comes before; give S or use G94",
             line=int(line[np.flatnonzero(bad)[0]]),
         )
     surface = np.isin(scan.code, (960, 970))
@@ -191,8 +194,7 @@ def _spindle(scan: Scan, line: Index) -> Array:
         constant = mode[np.searchsorted(scan.code_line[surface], line, "right")]
         if constant.any():
             raise ProgramError(
-                "under G96 the turns of the spindle, which G95 needs for the feed, depend on a radius; "
-                "use G97 or G94",
+                "G95 needs the turns of the spindle, and under G96 these depend on a radius; use G97 or G94",
                 line=int(line[np.flatnonzero(constant)[0]]),
             )
     return turns
@@ -203,9 +205,9 @@ def _refuse(missing: Mask, line: Index, inverse: Mask) -> None:
         return
     i = int(np.flatnonzero(missing)[0])
     if inverse[i]:
-        raise ProgramError("in G93 each feed move needs an F word of its own", line=int(line[i]))
+        raise ProgramError("in G93 each feed move needs an F word in its own block; give F", line=int(line[i]))
     raise ProgramError(
-        "a feed move has no feed: no F word came since the feed mode (G93, G94, G95) was set; give F",
+        "a feed move has no feed: no F word comes after the feed mode (G93, G94, G95) was set; give F",
         line=int(line[i]),
     )
 
@@ -214,27 +216,27 @@ def _refuse_cycles(path: Toolpath, move: Index, inverse: Mask, line: Index) -> N
     bad = inverse & ((path.flag[move] & np.uint8(Flag.CYCLE)) != 0)
     if bad.any():
         raise ProgramError(
-            "in G93 a block has one time, and a canned cycle makes many moves; use G94",
+            "in G93 a block has one time, but a canned cycle makes many moves; use G94",
             line=int(line[np.flatnonzero(bad)[0]]),
         )
 
 
 def _check_values(scan: Scan, modes: _Modes, line: Index, value: Array, pointed: Mask, unit: Array) -> None:
-    """Refuse feeds that are not above zero, and those whose missing point leaves open what they are."""
+    """Refuse feeds that are not above zero, and those whose unit is open without a decimal point."""
     bad = ~(value > 0)
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         raise ProgramError(f"the feed F{value[i]:g} is not above zero", line=int(line[i]))
     if scan.program.calculator:
         return
-    # Fanuc counts whole mm/min; Haas asks its setting 77, and other units have increments of their own
-    mode, _ = modes.at(line)
+    # Fanuc counts whole mm/min; Haas follows its setting 77, and other units have their own increments
+    mode, _ = modes.in_force(line)
     plain = (mode == _PER_MINUTE) & (unit == 1.0) & scan.program.rs274.feed_without_point
     open_ = ~pointed & ~plain & (mode != _INVERSE)
     if open_.any():
         i = int(np.flatnonzero(open_)[0])
         raise ProgramError(
-            f"F{value[i]:g} has no decimal point, and what it counts depends on the control's settings; "
+            f"F{value[i]:g} has no decimal point, so its unit depends on the settings of the control; "
             'write a point, or state decimal_point = "calculator" in the machine file',
             line=int(line[i]),
         )

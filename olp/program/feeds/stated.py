@@ -1,4 +1,4 @@
-"""The feed of each move and the word that says it, whatever the dialect."""
+"""The feed of each move and the word that states it, in any dialect."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from olp.program.program import Program, Statements, Words
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeedWords:
-    """The (k,) words that say feeds and their lines, and of the m feed moves that one of them governs the
-    `move` and which word it is, `owner`."""
+    """The (k,) `word`s that state feeds and their `line`s; of the m feed moves that one of them governs, the
+    `move` and the index of its word, `owner`."""
 
     word: Index
     line: Index
@@ -31,19 +31,19 @@ def feed_words(program: Program, words: Words, *, block_delete: bool) -> FeedWor
         word, line = scan.of_letter(b"F")
         return FeedWords(word, line, *governing(scan))
     _stated(program, program.statements)
-    said = program.statements.feeds
+    stated = program.statements.feeds
     move = np.flatnonzero(program.toolpath.kind != Kind.RAPID)
-    latest = np.searchsorted(said.move, move, "right") - 1
-    own = said.word[latest] >= 0
-    # a word may count again behind a cycle, which has a feed of its own
-    word, first, which = np.unique(said.word, return_index=True, return_inverse=True)
+    latest = np.searchsorted(stated.move, move, "right") - 1
+    own = stated.word[latest] >= 0
+    # a word may hold again after a cycle, which has its own feed
+    word, first, which = np.unique(stated.word, return_index=True, return_inverse=True)
     none = int((word < 0).any())
-    return FeedWords(word[none:], said.line[first[none:]], move[own], which.reshape(-1)[latest[own]] - none)
+    return FeedWords(word[none:], stated.line[first[none:]], move[own], which.reshape(-1)[latest[own]] - none)
 
 
 def programmed(program: Program, *, block_delete: bool = False) -> Array:
-    """(n,) feed of each move in mm/s: inf for rapids, NaN for moves of the control's own and where it is not
-    known. Raises ProgramError for a feed move without a feed, UsageError for a program read without words."""
+    """(n,) feed of each move in mm/s: inf for rapids, NaN for moves that the control makes by itself and
+    where it is not known. Raises ProgramError for a feed move without a feed, UsageError for a program read without words."""
     if program.statements is not None:
         return _stated(program, program.statements)
     if program.words is None:
@@ -58,8 +58,8 @@ def _stated(program: Program, statements: Statements) -> Array:
     lacking &= ((path.flag & free) == 0) & ~(feed > 0)
     if lacking.any():
         raise ProgramError(
-            "a feed move has no feed that is a speed: none in a unit of speed, or a turn of a spindle whose "
-            "turns are said, came before it",
+            "a feed move has no feed that is a speed; give one in a unit of speed before it, "
+            "or one per turn and the turns of the spindle",
             line=int(path.line[np.flatnonzero(lacking)[0]]),
         )
     return feed

@@ -1,7 +1,6 @@
-"""What a program says about time: feeds, path modes, dwells and rests, beside the moves of its toolpath.
+"""What a program states about time: feeds, path modes, dwells and rests, beside the moves of its toolpath.
 
-A second look at the words of a program that has been read, for re-timing alone: reading for a correction does
-nothing for it. Sources: NIST IR 6556 (3.5, 3.8: order of execution, G93 to G95, G61 and G64), LinuxCNC's
+The words of a program that has been read are read again, for re-timing only: a correction does not need this. Sources: NIST IR 6556 (3.5, 3.8: order of execution, G93 to G95, G61 and G64), LinuxCNC's
 interpreter (tests/program/feeds/test_timing.py asks it), and the manuals of Fanuc, Haas and Grbl for what
 differs there.
 """
@@ -21,27 +20,28 @@ from olp.program.feeds.moves import Scan, numbers
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program, Statements
 
-#: How far a control may round corners where a program does not say: Grbl's default of $11, and what a person
-#: expects of a finishing cut.
+#: How far a control may round corners where a program does not state it, in mm: Grbl's default of $11, and
+#: usual for a finishing cut.
 BLEND_MM = 0.01
 
-#: M codes that take effect after the motion of their block, and those that do besides where stops are exact.
+#: ten times the M codes that take effect after the motion of their block
 _AFTER = (0, 10, 20, 300, 600)
+#: those that do so too on controls with exact stops
 _AFTER_EXACT = (50, 90)
 
 
 class PathControl(IntEnum):
-    """How a control passes from block to block."""
+    """How a control goes from block to block."""
 
-    BLEND = 0  #: G64: rounds corners within a tolerance
+    BLEND = 0  #: G64: rounds corners within a path tolerance
     EXACT_PATH = 1  #: G61 of RS-274: stays on the path, rests only where that has a corner
     EXACT_STOP = 2  #: G61.1, and G61 of ISO controls: rests at the end of each block
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mode:
-    """A path mode from its line on; `stated_mm` is the tolerance that the program gives for it, None where
-    it gives none."""
+    """A path mode from its line on; `stated_mm` is the path tolerance that the program gives, None where it
+    gives none."""
 
     line: int
     control: PathControl
@@ -50,10 +50,13 @@ class Mode:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timing:
-    """Of n moves: (n,) `feed_mm_s`, inf for rapids and NaN where the control moves by itself or a time has no
-    length; (n,) `control`, values of `PathControl`, and `blend_mm`, the tolerance of G64 where it is in force
-    (0 elsewhere). Of the n + 1 places before, between and after them: `rest` (n + 1,), whether the motion has
-    to rest there, and `dwell_s` (n + 1,), for how long at least."""
+    """The time of n moves.
+
+    (n,) `feed_mm_s`: inf for rapids, NaN where the control moves by itself or a time has no length. (n,)
+    `control`: values of `PathControl`. (n,) `blend_mm`: the path tolerance of G64 where it is in force, else 0.
+    Before, between and after the moves: `rest` (n + 1,), whether the motion has to rest there, and `dwell_s`
+    (n + 1,), for how long at least.
+    """
 
     feed_mm_s: Array
     control: npt.NDArray[np.uint8]
@@ -65,12 +68,12 @@ class Timing:
 def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool = False) -> Timing:
     """Feeds, path modes, rests and dwells of a program that was read with its words.
 
-    `blend_mm` is the tolerance where the path mode is G64 without one; `block_delete` as in the reading.
-    Raises ProgramError with its line for a feed move without a feed, and for a feed or a dwell that cannot
-    be read right; UsageError for a tolerance of nothing, and where the program was read without words.
+    `blend_mm` is the path tolerance where G64 states none; `block_delete` as in the reading. Raises
+    ProgramError with its line for a feed move without a feed, and for a feed or a dwell that cannot be read
+    correctly; UsageError for a tolerance that is not above zero, and where the program was read without words.
     """
     if not blend_mm > 0:
-        raise UsageError(f"the tolerance of G64 is {blend_mm:g} mm; expected a length above zero")
+        raise UsageError(f"the path tolerance of G64 is {blend_mm:g} mm; expected a length above zero")
     if program.words is None:
         raise UsageError("the program was read without its words; re-timing needs them")
     path = program.toolpath
@@ -87,20 +90,21 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
         rapids = np.flatnonzero(path.kind == Kind.RAPID)
         rest[rapids] = rest[rapids + 1] = True
     for hole in program.holes:
-        for at, seconds in hole.rests:
+        for moves, seconds in hole.rests:
             if not seconds >= 0:
-                raise ProgramError("a dwell cannot be negative", line=hole.line)
-            rest[hole.first + at] = True
-            dwell[hole.first + at] += seconds
+                raise ProgramError("a dwell is negative; expected zero or more", line=hole.line)
+            rest[hole.first + moves] = True
+            dwell[hole.first + moves] += seconds
     for column in (feed, control, blend, rest, dwell):
         column.setflags(write=False)
     return Timing(feed, control, blend, rest, dwell)
 
 
-def _of_statements(program: Program, said: Statements, feed: Array, blend_mm: float) -> Timing:
-    """Statements say no path mode: the control blends within the tolerance, but for its mode at the start."""
+def _of_statements(program: Program, statements: Statements, feed: Array, blend_mm: float) -> Timing:
+    """Timing of statements, which state no path mode: the control blends, unless its mode at the start is
+    G61.1."""
     count = len(program.toolpath)
-    rest, dwell = said.rest.copy(), said.dwell_s.copy()
+    rest, dwell = statements.rest.copy(), statements.dwell_s.copy()
     probes = np.flatnonzero(program.toolpath.kind == Kind.PROBE)
     rest[probes + 1] = True
     stops = any(mode.name == "G61.1" for mode in program.path_modes)
@@ -112,8 +116,8 @@ def _of_statements(program: Program, said: Statements, feed: Array, blend_mm: fl
 
 
 def path_modes(program: Program, *, block_delete: bool = False) -> tuple[Mode, ...]:
-    """The path modes of a program that was read with its words, in the order of lines; before the first one
-    the control blends, with a tolerance of its own. Statements say none: the machine file does."""
+    """The path modes of a program that was read with its words, in the order of lines. Before the first one
+    the control blends, with its own tolerance. Statements state no path mode: the machine file does."""
     if program.statements is not None:
         return tuple(Mode(m.line, PathControl.EXACT_STOP) for m in program.path_modes if m.name == "G61.1")
     assert program.words is not None
@@ -121,47 +125,47 @@ def path_modes(program: Program, *, block_delete: bool = False) -> tuple[Mode, .
 
 
 def _modes(program: Program, scan: Scan) -> tuple[Mode, ...]:
-    found = []
+    modes = []
     for mode in program.path_modes:
         code = mode.name.split()[0]
         if code == "G64":
             # P0 and less is no tolerance, as LinuxCNC's trajectory planner takes it
             stated = mode.tolerance_mm if mode.tolerance_mm is not None and mode.tolerance_mm > 0 else None
-            found.append(Mode(mode.line, PathControl.BLEND, stated))
+            modes.append(Mode(mode.line, PathControl.BLEND, stated))
         else:
             stop = code == "G61.1" or program.rs274.exact_stop
-            found.append(Mode(mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH))
+            modes.append(Mode(mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH))
     if program.rs274.exact_stop:
         # G62 and G63 end exact stop as G64 does
         lines = scan.code_line[np.isin(scan.code, (620, 630))].tolist()
-        found += [Mode(line, PathControl.BLEND) for line in lines]
-    return tuple(sorted(found, key=lambda mode: mode.line))
+        modes += [Mode(line, PathControl.BLEND) for line in lines]
+    return tuple(sorted(modes, key=lambda mode: mode.line))
 
 
 def _path_control(
     program: Program, modes: tuple[Mode, ...], blend_mm: float
 ) -> tuple[npt.NDArray[np.uint8], Array]:
-    """Per move its path mode and tolerance; a mode holds from its own block on."""
-    at = np.searchsorted(np.array([m.line for m in modes], np.int64), program.toolpath.line, "right")
-    control = np.array([PathControl.BLEND] + [m.control for m in modes], np.uint8)[at]
+    """Per move its path mode and path tolerance; a mode holds from its own block on."""
+    index = np.searchsorted(np.array([m.line for m in modes], np.int64), program.toolpath.line, "right")
+    control = np.array([PathControl.BLEND] + [m.control for m in modes], np.uint8)[index]
     stated = [blend_mm if m.stated_mm is None else m.stated_mm for m in modes]
-    blend = np.array([blend_mm, *stated], float)[at]
+    blend = np.array([blend_mm, *stated], float)[index]
     blend[control != PathControl.BLEND] = 0.0
     return control, blend
 
 
 def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
-    """Where the motion rests, and how long, for what stands in blocks: G4, G9, M and S words."""
+    """Where the motion rests, and how long, because of words in blocks: G4, G9, M and S."""
     line = program.toolpath.line
     rest = np.zeros(len(line) + 1, bool)
     dwell = np.zeros(len(line) + 1)
-    word, at = scan.of_letter(b"M")
+    word, m_line = scan.of_letter(b"M")
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
     along = np.isin(code, [10 * m for m in program.rs274.m_with_motion])
-    at, code = at[~along], code[~along]
+    m_line, code = m_line[~along], code[~along]
     late = np.isin(code, _AFTER + _AFTER_EXACT if program.rs274.exact_stop else _AFTER)
-    rest[np.searchsorted(line, at[late], "right")] = True
-    rest[np.searchsorted(line, at[~late], "left")] = True
+    rest[np.searchsorted(line, m_line[late], "right")] = True
+    rest[np.searchsorted(line, m_line[~late], "left")] = True
     rest[np.searchsorted(line, scan.of_letter(b"S")[1], "left")] = True
     if program.rs274.exact_stop:
         rest[np.searchsorted(line, scan.code_line[scan.code == 90], "right")] = True
@@ -174,7 +178,7 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
 
 
 def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
-    """Seconds of each G4 block: P, and where the control takes them X or U too."""
+    """Seconds of each G4 block: of P, and of X or U where the control takes these too."""
     words, axis_dwell = scan.words, program.rs274.axis_dwell
     first = words.first_word[pauses - 1].astype(np.int64)
     count = words.first_word[pauses] - first
@@ -185,11 +189,11 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     stated = np.bincount(owner, minlength=len(pauses))
     if (stated > 1).any():
         raise ProgramError(
-            "a dwell has two times in one block", line=int(pauses[np.flatnonzero(stated > 1)[0]])
+            "a dwell has two times in one block; expected one", line=int(pauses[np.flatnonzero(stated > 1)[0]])
         )
     if not axis_dwell and (stated == 0).any():
         raise ProgramError(
-            "a dwell G4 has no P word with its time", line=int(pauses[np.flatnonzero(stated == 0)[0]])
+            "a dwell G4 has no P word with its time; give P", line=int(pauses[np.flatnonzero(stated == 0)[0]])
         )
     number = numbers(words, word)
     pointed = words.pointed[word]
@@ -198,5 +202,5 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     bare = ~pointed & ((words.letter[word] == ord("P")) | (not program.calculator))
     seconds[owner] = np.where(bare & axis_dwell, number / 1000.0, number)
     if (seconds < 0).any():
-        raise ProgramError("a dwell cannot be negative", line=int(pauses[np.flatnonzero(seconds < 0)[0]]))
+        raise ProgramError("a dwell is negative; expected zero or more", line=int(pauses[np.flatnonzero(seconds < 0)[0]]))
     return seconds

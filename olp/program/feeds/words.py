@@ -1,8 +1,8 @@
-"""Feeds written back into a program: the numbers of F words that stand in it, and not a byte besides.
+"""Feeds written back into a program: only the numbers of its F words change.
 
 A feed is lowered by a share, so its unit (inches, G93 to G95) needs no conversion. An F word holds for all
-blocks until the next one: where these plan different feeds, the word takes the share that takes as long in
-all, or the least of theirs, which a single short block can make very low.
+blocks until the next one. Where these plan different feeds, the word takes the share with the same total
+time, or the least share of them, which a single short block can make very low.
 """
 
 from __future__ import annotations
@@ -20,21 +20,26 @@ from olp.program.program import Program, Words
 
 Shared = Literal["mean", "least"]
 
-#: a feed may be off by this share through rounding before it takes another decimal, and stays as it is where
-#: the planned one is that near
+#: a feed takes another decimal where rounding would change it by more than this share; it is not changed
+#: where the planned feed is within this share of it
 _COARSE = 0.01
+#: decimals of a written feed at most
 _MOST_DECIMALS = 6
-#: a line is counted as slower than its feed by more than this share
+#: a line counts as slower than its feed where it is slower by more than this share
 _SLOWER = 0.01
-#: what reading a number may add
+#: share by which a feed that is read back may exceed the written one
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeedsWritten:
-    """A text with other feeds: how many F `words` it has that are carried out, how many `changed`, how many
-    of these are `shared` by several lines; how many lines were planned `slower` than the feed that they have
-    now; and the lines of words that were `kept` because moves under them are not timed."""
+    """A text with other feeds.
+
+    `words` is the number of its F words that are carried out, `changed` how many of them were changed, and
+    `shared` how many of these several lines share. `slower` is the number of lines that were planned slower
+    than the feed that they have now. `kept` are the lines of words that stay because moves under them are not
+    timed.
+    """
 
     data: bytes
     words: int
@@ -58,19 +63,19 @@ def write_feeds(
 
     `line` (m,) are lines with feed moves, ascending; `planned_s` (m,) is what these moves take, and
     `programmed_s` what they would take at the programmed feed. Raises ProgramError with its line where a
-    feed cannot be written in the style of its word.
+    feed cannot be written in the form of its word.
     """
     words = program.words
     if words is None:
         raise CannotCompute("the program was read without its words, so none can be changed")
-    found = feed_words(program, words, block_delete=block_delete)
-    word, at, move, owner = found.word, found.line, found.move, found.owner
+    governed = feed_words(program, words, block_delete=block_delete)
+    word, word_line, move, owner = governed.word, governed.line, governed.move, governed.owner
     if not len(move):
         return FeedsWritten(program.data, len(word), 0, 0, 0, ())
     of_move = program.toolpath.line[move].astype(np.int64)
     untimed = np.bincount(owner, np.isnan(lengths_mm(program.toolpath)[move]), len(word)) > 0
     place = np.minimum(np.searchsorted(line, of_move), max(len(line) - 1, 0))
-    # a line whose moves are too short to be driven says nothing
+    # a line whose moves are too short to be planned does not count
     pair = np.unique(np.stack((owner, place))[:, line[place] == of_move], axis=1) if len(line) else None
     share = np.ones(len(word))
     count = np.zeros(len(word), np.int64)
@@ -93,23 +98,23 @@ def write_feeds(
         slower = int((programmed_s[place] / planned_s[place] < share[owner] * (1.0 - _SLOWER)).sum())
     parts, begin, changed, several = [], 0, 0, 0
     for k in np.flatnonzero(share < 1.0 - _COARSE).tolist():
-        text = _written(program, words, int(word[k]), float(share[k]), int(at[k]))
+        text = _written(program, words, int(word[k]), float(share[k]), int(word_line[k]))
         if text is None:
             continue
         start, end = int(words.number[word[k]]), int(words.end[word[k]])
         parts += [program.data[begin:start], text]
         begin, changed, several = end, changed + 1, several + int(count[k] > 1)
     data = b"".join([*parts, program.data[begin:]])
-    return FeedsWritten(data, len(word), changed, several, slower, tuple(np.unique(at[kept]).tolist()))
+    return FeedsWritten(data, len(word), changed, several, slower, tuple(np.unique(word_line[kept]).tolist()))
 
 
 def _written(program: Program, words: Words, word: int, share: float, line: int) -> bytes | None:
-    """The number of an F word times a share, in the style of the word; None where rounding undoes it."""
+    """The number of an F word times a share, in the form of the word; None where rounding gives the old one."""
     old = program.data[int(words.number[word]) : int(words.end[word])].replace(b" ", b"").replace(b"\t", b"")
     decimals = int(words.decimals[word])
     value = float(numbers(words, np.array([word]))[0])
     wanted = value * share
-    # without a point a number is whole, and must stay so where a point changes its meaning
+    # without a point a number is an integer, and has to remain one where a point changes its meaning
     free = bool(words.pointed[word]) or program.calculator
     while free and decimals < _MOST_DECIMALS and abs(round(wanted, decimals) - wanted) > _COARSE * wanted:
         decimals += 1
@@ -118,8 +123,8 @@ def _written(program: Program, words: Words, word: int, share: float, line: int)
         return None
     if not new > 0.0:
         raise ProgramError(
-            f"the planned feed {wanted:g} cannot be written in the style of F{value:g}; give that word a "
-            "decimal point",
+            f"the planned feed {wanted:g} cannot be written in the form of F{value:g}; "
+            "give that word a decimal point",
             line=line,
         )
     text = f"{new:.{decimals}f}"
@@ -144,9 +149,9 @@ def check_feeds(before: Program, after: Program, *, block_delete: bool = False) 
     )
     if same and before.words is not None and after.words is not None:
         first, second = (programmed(p, block_delete=block_delete) for p in (before, after))
-        # NaN, a feed that nobody knows, stays what it is
+        # NaN, a feed that is not known, has to remain NaN
         same = bool(((second <= first * (1.0 + _ROUNDING)) | (np.isnan(first) & np.isnan(second))).all())
     if not same:
         raise CannotCompute(
-            "the text with the planned feeds does not read back as the same moves; not written"
+            "the text with the planned feeds is not read back as the same moves; it is not written"
         )

@@ -1,6 +1,6 @@
-"""Reads the plain tables among lists of positions in columns: no quotes, no exponents, one number a cell.
+"""Reads the plain tables among lists of positions in columns: no quotes, no exponents, one number per cell.
 
-What it does not take, `pointlist` reads row by row, and says what is wrong with it.
+Other tables are read row by row (`reader`), which also says what is wrong with them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from olp.program.rs274.lexer import Bytes, blanked, numbers, runs
 from olp.program.text.delimited import DELIMITERS, Layout
 from olp.program.text.numbers import LONGEST
 
-#: Positions are smaller, and so many digits are exact.
+#: mantissas of positions are smaller, and below this they are exact as doubles
 _MOST = 10**15
 _POW10 = 10.0 ** np.arange(19)
 
@@ -44,7 +44,7 @@ class Columns:
 def columns(
     data: bytes, layout: Layout, header_line: int, xyz: list[int], others: list[int]
 ) -> Columns | None:
-    """The rows of a table behind its header, by the places of its columns; None where it is not plain."""
+    """The rows of a table after its header, by the indices of its columns; None where it is not plain."""
     if b'"' in data or data.count(b"\r") != data.count(b"\r\n") or not data:
         return None
     if data[:3] == b"\xef\xbb\xbf":
@@ -66,50 +66,50 @@ def columns(
     if spans is None:
         return None
     start, stop = spans[:, :3, 0], spans[:, :3, 1]
-    found = plain_numbers(text, start, stop, layout.decimal == "comma")
-    if found is None:
+    parsed = plain_numbers(text, start, stop, layout.decimal == "comma")
+    if parsed is None:
         return None
-    mantissa, decimals = found
+    mantissa, decimals = parsed
     return Columns(chosen + 1, begin, end, start, stop, mantissa, decimals, spans[:, 3:])
 
 
-def _begins(text: Bytes, at: Index, mark: bytes) -> Mask:
-    out = np.ones(len(at), bool)
+def _begins(text: Bytes, first: Index, mark: bytes) -> Mask:
+    same = np.ones(len(first), bool)
     padded = np.concatenate((text, np.zeros(len(mark) + 1, np.uint8)))
     for i, byte in enumerate(mark):
-        out &= padded[at + i] == byte
-    return out
+        same &= padded[first + i] == byte
+    return same
 
 
-def _forward(text: Bytes, at: Index, stop: Index) -> Index:
-    """The first place from `at` that holds no blank, `stop` where all do."""
-    at = at.copy()
-    todo = np.arange(len(at))
+def _forward(text: Bytes, position: Index, stop: Index) -> Index:
+    """The first byte from `position` that is no blank, `stop` where all are."""
+    position = position.copy()
+    todo = np.arange(len(position))
     while True:
-        todo = todo[at[todo] < stop[todo]]
-        todo = todo[text[at[todo]] <= 32]
+        todo = todo[position[todo] < stop[todo]]
+        todo = todo[text[position[todo]] <= 32]
         if not todo.size:
-            return at
-        at[todo] += 1
+            return position
+        position[todo] += 1
 
 
-def _backward(text: Bytes, at: Index, start: Index) -> Index:
-    """The place behind the last one before `at` that holds no blank, `start` where all do."""
-    at = at.copy()
-    todo = np.arange(len(at))
+def _backward(text: Bytes, position: Index, start: Index) -> Index:
+    """The byte after the last one before `position` that is no blank, `start` where all are."""
+    position = position.copy()
+    todo = np.arange(len(position))
     while True:
-        todo = todo[at[todo] > start[todo]]
-        todo = todo[text[at[todo] - 1] <= 32]
+        todo = todo[position[todo] > start[todo]]
+        todo = todo[text[position[todo] - 1] <= 32]
         if not todo.size:
-            return at
-        at[todo] -= 1
+            return position
+        position[todo] -= 1
 
 
 def _cells(text: Bytes, begin: Index, end: Index, layout: Layout, places: list[int]) -> Index | None:
     """(n, k, 2) the bytes of cells, without blanks around them; None where a row has too few, or empty
     ones."""
     mark = DELIMITERS[layout.delimiter]
-    out = np.zeros((len(begin), len(places), 2), np.int64)
+    spans = np.zeros((len(begin), len(places), 2), np.int64)
     if mark is None:
         dark = np.concatenate(([False], text > 32, [False]))
         edges = np.flatnonzero(dark[1:] != dark[:-1])
@@ -119,8 +119,8 @@ def _cells(text: Bytes, begin: Index, end: Index, layout: Layout, places: list[i
         if (count <= max(places)).any():
             return None
         for k, place in enumerate(places):
-            out[:, k, 0], out[:, k, 1] = first[base + place], last[base + place]
-        return out
+            spans[:, k, 0], spans[:, k, 1] = first[base + place], last[base + place]
+        return spans
     marks = np.append(np.flatnonzero(text == ord(mark)), len(text))
     base = np.searchsorted(marks, begin)
     count = np.searchsorted(marks, end) - base
@@ -129,11 +129,11 @@ def _cells(text: Bytes, begin: Index, end: Index, layout: Layout, places: list[i
     for k, place in enumerate(places):
         a = begin if place == 0 else marks[base + place - 1] + 1
         b = np.where(place < count, marks[np.minimum(base + place, len(marks) - 1)], end)
-        out[:, k, 0] = first_ = _forward(text, a, b)
-        out[:, k, 1] = last_ = _backward(text, b, first_)
+        spans[:, k, 0] = first_ = _forward(text, a, b)
+        spans[:, k, 1] = last_ = _backward(text, b, first_)
         if k < 3 and (first_ >= last_).any():
             return None
-    return out
+    return spans
 
 
 def plain_numbers(

@@ -1,4 +1,4 @@
-"""The dialect of lists of positions, and those whose layout is stated."""
+"""The dialect of lists of positions, and that of lists whose layout is stated."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ DIALECT = PointList(
 
 
 def with_layout(layout: Layout) -> PointList:
-    """The dialect of lists that are laid out so."""
+    """The dialect of lists with this layout."""
     comment = (layout.comment.encode() + b" ", b"")
     return replace(DIALECT, layout=layout, comment=comment, marks=layout.stamp)

@@ -1,7 +1,7 @@
-"""Reads a list of positions as a program: a row a place, in order, with whatever else the rows hold.
+"""Reads a list of positions as a program: one row per waypoint, in order, with other columns beside them.
 
-A list says where the machine goes, hardly ever how: so rows are way-points, and what lies between them is
-judged only where the layout says that they are joined by straight lines. Only X, Y and Z are ever edited.
+A list states where the machine goes, and rarely how. So rows are waypoints, and the path between them is
+judged only where the layout states that straight lines join them. Only X, Y and Z are ever edited.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from olp.program.frames import FrameTable
 from olp.program.places import frame_index
 from olp.program.pointlist.columns import columns
 from olp.program.program import Program
-from olp.program.text.delimited import AXES, MM_S, Layout, first_lines, stated_frame, told
+from olp.program.text.delimited import AXES, MM_S, Layout, detected_layout, first_lines, stated_frame
 from olp.program.text.numbers import Number, number
 from olp.program.text.rows import Cells
 from olp.program.verbatim import Moves
@@ -32,7 +32,7 @@ _SUPPORT = {
     "X": (Support.CORRECTED, ""),
     "Y": (Support.CORRECTED, ""),
     "Z": (Support.CORRECTED, ""),
-    "tool": (Support.READ, "the tool of the row: its lever"),
+    "tool": (Support.READ, "the tool of the row: its tool vector"),
     "A": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
     "B": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
     "C": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
@@ -46,13 +46,13 @@ _SUPPORT = {
     "line": (Support.UNCHANGED, ""),
     "any other column": (Support.UNCHANGED, ""),
     "comment": (Support.UNCHANGED, ""),
-    "a row that is no row of numbers": (Support.REFUSED, "it may be a place"),
+    "a row without numbers": (Support.REFUSED, "it may be a waypoint"),
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointList(Dialect):
-    """A list of positions; `layout` None: told from its first rows."""
+    """A list of positions; `layout` None: detected from its first rows."""
 
     layout: Layout | None = None
 
@@ -61,9 +61,9 @@ class PointList(Dialect):
 
 
 @dataclass(slots=True)
-class _Found:
+class _Rows:
     """Rows of a list: line, bytes, feed and numbers of each, as lists or columns, the `values` as written,
-    tools and orientations; and the line where each tool comes first."""
+    tools and orientations; and the first line of each tool."""
 
     line: Any = field(default_factory=list)
     bounds: Any = field(default_factory=list)
@@ -82,16 +82,16 @@ def read_list(
     """Read a list. Raises ProgramError with the line of what is wrong."""
     assert isinstance(dialect, PointList)
     try:
-        layout = dialect.layout or told(first_lines(data))
+        layout = dialect.layout or detected_layout(first_lines(data))
         if layout is None:
             raise ProgramError(
-                "does not tell which columns hold X, Y and Z; name them by name or number with --column X=.. "
+                "does not show which columns are X, Y and Z; give their names or numbers with --column X=.. "
                 "--column Y=.. --column Z=.., or give a profile with --profile"
                 if data.strip()
-                else "holds no positions; expected a row a place"
+                else "has no positions; expected one row per waypoint"
             )
         unit = layout.unit_mm
-        found = _rows(data, layout)
+        rows = _rows(data, layout)
     except InputError as error:
         raise ProgramError(error.message, line=error.line) from None
     frame_name = stated_frame(first_lines(data)) or layout.frame
@@ -99,41 +99,41 @@ def read_list(
     kind = Kind.LINE if layout.joined == "lines" else Kind.RAPID
     whole = kind is Kind.LINE and (not layout.insert or "t" in layout.columns)
     name = frame_name or setup.machine.default_work_offset
-    count = len(found.line)
-    index = {tool: frame_index(table, setup, name, tool, unit, line) for tool, line in found.tools.items()}
+    count = len(rows.line)
+    index = {tool: frame_index(table, setup, name, tool, unit, line) for tool, line in rows.tools.items()}
     frames = table.frames
     frame = np.zeros(count, np.int32)
     if len(index) > 1:
-        frame[:] = [index[tool] for tool in found.tool]
+        frame[:] = [index[tool] for tool in rows.tool]
     kinds = np.full(count, kind, np.uint8)
     kinds[:1] = Kind.RAPID
-    moves = Moves(plain=found.plain)
+    moves = Moves(plain=rows.plain)
     moves.put_all(
-        kind=kinds, flag=np.full(count, Flag.WHOLE if whole else 0), line=found.line, frame=frame,
-        end=_placed(frames, frame, np.array(found.values, float).reshape(-1, 3)),
-        slot=np.arange(3 * count), bounds=found.bounds, feed=found.feed, spans=found.spans,
+        kind=kinds, flag=np.full(count, Flag.WHOLE if whole else 0), line=rows.line, frame=frame,
+        end=_placed(frames, frame, np.array(rows.values, float).reshape(-1, 3)),
+        slot=np.arange(3 * count), bounds=rows.bounds, feed=rows.feed, spans=rows.spans,
     )  # fmt: skip
     return moves.program(
-        data, dialect, setup, frames, _remarks(layout, found, frame_name, setup),
+        data, dialect, setup, frames, _remarks(layout, rows, frame_name, setup),
         decimal=b"," if layout.decimal == "comma" else b".", words=words,
     )  # fmt: skip
 
 
 def _placed(frames: Sequence[Frame], index: npt.NDArray[np.int32], values: Array) -> Array:
     """(n, 3) axis positions of the numbers of rows (n, 3)."""
-    out = np.empty_like(values)
+    axis_mm = np.empty_like(values)
     for i, frame in enumerate(frames):
         rows = index == i
-        said = values[rows] * frame.unit_mm
-        turned = said if frame.turn is None else said @ np.array(frame.turn).T
-        out[rows] = turned + np.array(frame.offset_mm)
-    return out
+        stated = values[rows] * frame.unit_mm
+        turned = stated if frame.turn is None else stated @ np.array(frame.turn).T
+        axis_mm[rows] = turned + np.array(frame.offset_mm)
+    return axis_mm
 
 
 def _in_columns(
     data: bytes, layout: Layout, cells: Cells, xyz: list[int], tool: int | None, speed: int | None,
     turning: list[int],
-) -> _Found | None:  # fmt: skip
+) -> _Rows | None:  # fmt: skip
     """The rows of a plain table, None where it is not plain."""
     speed = speed if layout.speed_unit is not None else None
     others = [*turning, *(p for p in (tool, speed) if p is not None)]
@@ -142,32 +142,32 @@ def _in_columns(
         return None
     count = len(plain.line)
     texts = [[data[a:b] for a, b in plain.cells[:, k].tolist()] for k in range(len(others))]
-    found = _Found(values=plain.value)
-    rows = texts[: len(turning)]
-    for k, turn in enumerate(zip(*rows, strict=True) if rows else [()]):
-        found.turns.setdefault(tuple(t.decode("latin-1") for t in turn), int(plain.line[k]))
-    found.tools[None] = int(plain.line[0])
+    table = _Rows(values=plain.value)
+    orientations = texts[: len(turning)]
+    for k, turn in enumerate(zip(*orientations, strict=True) if orientations else [()]):
+        table.turns.setdefault(tuple(t.decode("latin-1") for t in turn), int(plain.line[k]))
+    table.tools[None] = int(plain.line[0])
     if tool is not None:
-        said = texts[len(turning)]
-        if not all(t.isdigit() for t in said):
+        tools = texts[len(turning)]
+        if not all(t.isdigit() for t in tools):
             return None
-        found.tool = [int(t) for t in said]
-        first = dict(zip(reversed(found.tool), reversed(plain.line.tolist()), strict=True))
-        found.tools = {t: first[t] for t in dict.fromkeys(found.tool)}
+        table.tool = [int(t) for t in tools]
+        first = dict(zip(reversed(table.tool), reversed(plain.line.tolist()), strict=True))
+        table.tools = {t: first[t] for t in dict.fromkeys(table.tool)}
     feed = np.full(count, np.nan)
     if speed is not None and layout.speed_unit is not None:
         known = [number(t, cells.decimal) for t in texts[-1]]
         if None in known:
             return None
         feed = np.array([k.value for k in known if k is not None]) * MM_S[layout.speed_unit]
-    found.line, found.feed = plain.line, feed
-    found.bounds = np.column_stack((plain.begin, plain.end))
-    found.spans = np.column_stack((plain.start.ravel(), plain.stop.ravel()))
-    found.plain = (plain.mantissa.ravel(), plain.decimals.ravel(), plain.start.ravel(), plain.stop.ravel())
-    return found
+    table.line, table.feed = plain.line, feed
+    table.bounds = np.column_stack((plain.begin, plain.end))
+    table.spans = np.column_stack((plain.start.ravel(), plain.stop.ravel()))
+    table.plain = (plain.mantissa.ravel(), plain.decimals.ravel(), plain.start.ravel(), plain.stop.ravel())
+    return table
 
 
-def _rows(data: bytes, layout: Layout) -> _Found:
+def _rows(data: bytes, layout: Layout) -> _Rows:
     cells = Cells(data, layout)
     places = [cells.place(axis) for axis in AXES]
     if None in places:
@@ -180,46 +180,46 @@ def _rows(data: bytes, layout: Layout) -> _Found:
     plain = _in_columns(data, layout, cells, xyz, tool, speed, turning)
     if plain is not None:
         return plain
-    found = _Found()
+    table = _Rows()
     values: list[tuple[float, ...]] = []
     for line, row in cells.rows():
-        # a row that is too short says so by its last column
+        # a row that is too short is an error of its last column
         numbers = [cells.number(row, p) for p in (xyz if max(xyz) < len(row) else [max(xyz)])]
-        wrong = next((said for said in numbers if isinstance(said, str)), None)
+        wrong = next((problem for problem in numbers if isinstance(problem, str)), None)
         if wrong is not None:
             raise InputError(wrong, line=line)
         text = cells.word(row, tool)
         if text and not text.isdigit():
             raise InputError(
-                f'"{text}" is no tool number; expected the number of a table [tools.N]', line=line
+                f'"{text}" is not a tool number; expected the number of a table [tools.N]', line=line
             )
-        said = cells.number(row, speed) if speed is not None else None
+        stated_speed = cells.number(row, speed) if speed is not None else None
         # a row without a speed keeps that of the row before
-        feed = said.value * factor if isinstance(said, Number) else feed
-        found.feed.append(feed)
+        feed = stated_speed.value * factor if isinstance(stated_speed, Number) else feed
+        table.feed.append(feed)
         known = [n for n in numbers if not isinstance(n, str)]
-        found.spans += [row[p] for p in xyz]
-        found.line.append(line)
-        found.bounds.append(cells.bounds)
+        table.spans += [row[p] for p in xyz]
+        table.line.append(line)
+        table.bounds.append(cells.bounds)
         values.append(tuple(n.value for n in known))
-        found.turns.setdefault(tuple(cells.text(row[p]) for p in turning if p < len(row)), line)
-        found.tool.append(int(text) if text else None)
-        found.tools.setdefault(found.tool[-1], line)
-    found.values = values
-    return found
+        table.turns.setdefault(tuple(cells.text(row[p]) for p in turning if p < len(row)), line)
+        table.tool.append(int(text) if text else None)
+        table.tools.setdefault(table.tool[-1], line)
+    table.values = values
+    return table
 
 
 def _remarks(
-    layout: Layout, found: _Found, frame_name: str | None, setup: Setup
+    layout: Layout, rows: _Rows, frame_name: str | None, setup: Setup
 ) -> list[tuple[str, int, str]]:
-    line = int(found.line[0]) if len(found.line) else 1
-    out = [("told", line, said) for said in layout.assumed]
+    line = int(rows.line[0]) if len(rows.line) else 1
+    remarks = [("told", line, assumption) for assumption in layout.assumed]
     if frame_name is None:
-        out.append(("told", line, f"positions are stated in {setup.machine.default_work_offset}"))
-    if len(found.turns) > 1:
-        out.append(("turning", list(found.turns.values())[1], "the orientation changes from row to row"))
+        remarks.append(("told", line, f"positions are stated in {setup.machine.default_work_offset}"))
+    if len(rows.turns) > 1:
+        remarks.append(("turning", list(rows.turns.values())[1], "the orientation changes from row to row"))
     if not layout.stamp:
-        out.append(("unmarked", line, "the profile allows no comment, so nothing marks the corrected list"))
+        remarks.append(("unmarked", line, "the profile allows no comment, so nothing marks the corrected list"))
     if layout.joined == "points":
-        out.append(("joined", line, "how the machine goes from row to row is not stated"))
-    return out
+        remarks.append(("joined", line, "how the machine goes from row to row is not stated"))
+    return remarks

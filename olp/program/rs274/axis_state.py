@@ -32,7 +32,9 @@ from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, Capture, PathMode, State
 
-TOOL_CHANGE, SET_TOOL = 60, 610
+#: ten times M6 and M61
+TOOL_CHANGE = 60
+SET_TOOL = 610
 
 #: RS-274's order of execution within a block; other codes come last.
 _RANK = {
@@ -54,8 +56,8 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What a block's events leave to its axis words: `consumed`, or `machine` coordinates (G53), or `home`,
-    the axes that G28/G30 send home after the intermediate point."""
+    """What the axis words of a block mean after its events: `consumed`, or `machine` coordinates (G53), or
+    `home`, the axes that G28/G30 send home after the intermediate point."""
 
     consumed: bool = False
     machine: bool = False
@@ -64,7 +66,7 @@ class Effect:
 
 @dataclass(slots=True, kw_only=True)
 class AxisState(State):
-    """The state whose position counts in axis positions, mm; it knows offsets, lengths and frames."""
+    """The state whose position is in axis positions, mm; it knows offsets, lengths and frames."""
 
     setup: Setup
     offsets: Offsets
@@ -101,15 +103,14 @@ class AxisState(State):
         if base is None:
             if work is None:
                 raise ProgramError(
-                    f"work offset {name} is used but not defined; give "
-                    f'[work_offsets."{name}"] '
+                    f'work offset {name} is used but not defined; give [work_offsets."{name}"] '
                     "in the machine or job file",
                     line=line,
                 )
             base = list(work.offset_mm)
         if work is not None and any(work.rotation_deg):
             raise ProgramError(
-                f"work offset {name} is rotated, which is not read yet in this dialect; "
+                f"work offset {name} is rotated, which is not read in this dialect; "
                 "state it with A_deg = B_deg = C_deg = 0",
                 line=line,
             )
@@ -140,8 +141,8 @@ class AxisState(State):
         return tool_vector_of(self.setup, number, line)
 
     def _touch(self, name: str, base: Sequence[float], line: int) -> Touch | None:
-        """Where a work offset was touched off. One that G10 L20 set at a point of another keeps that one's
-        part; one that G10 L2 changed keeps its own."""
+        """Where a work offset was touched off. One that G10 L20 sets takes over the point of the offset in
+        force; one that G10 L2 changes keeps its own point."""
         if name in self.inherited:
             return self.inherited[name]
         work = self._work_offset(name) or WorkOffset(name, (base[0], base[1], base[2]))
@@ -171,8 +172,7 @@ class AxisState(State):
     # -- values ------------------------------------------------------------------------------------
 
     def length_mm(self, word: Word) -> float:
-        """A length word in mm; without a decimal point it counts least increments where the control says
-        so."""
+        """A length word in mm; without a decimal point it counts least increments on some controls."""
         return word.value * self.word_scale(word.letter, word.pointed)
 
     def word_scale(self, letter: str, pointed: bool) -> float:
@@ -197,7 +197,7 @@ class AxisState(State):
     # -- events ------------------------------------------------------------------------------------
 
     def run(self, line: int, words: Sequence[Word], codes: Sequence[int], moves: int) -> Effect:
-        """Carry out the events of one block in the control's order and say what is left to its axis words."""
+        """Carry out the events of one block in the order of the control; returns what its axis words mean then."""
         by_letter = {w.letter: w for w in words}
         axis_words = [(i, by_letter[a]) for i, a in enumerate("XYZ") if a in by_letter]
         m_codes = [round(w.value * 10) for w in words if w.letter == "M"]
@@ -205,7 +205,7 @@ class AxisState(State):
             self.selected = self._integer(by_letter["T"], line)
         if TOOL_CHANGE in m_codes:
             if self.selected is None:
-                raise ProgramError("M6 changes to a tool, but no T word came before it", line=line)
+                raise ProgramError("M6 changes to a tool, but no T word comes before it; give T", line=line)
             self.spindle = self.selected
             self._tool(self.spindle, line, "M6")
         if SET_TOOL in m_codes and self.profile.m61_sets_tool:
@@ -220,7 +220,7 @@ class AxisState(State):
         return effect
 
     def may_move(self, m10: int) -> bool:
-        """M6, and M codes that are not known to leave the axes where they are."""
+        """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they are."""
         if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.m61_sets_tool):
             return False
         return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
@@ -263,14 +263,14 @@ class AxisState(State):
         return effect
 
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
-        """G4: ISO controls take its time from X, too; RS-274 from P alone, so that axis words still move."""
+        """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still move."""
         if not self.profile.axis_dwell:
             return Effect()
         if any(a in by_letter for a in "YZ") or any(
             w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
         ):
             raise ProgramError(
-                "a dwell and a motion stand in one block; give the dwell a block of its own", line=line
+                "a dwell and a motion are in one block; put the dwell into its own block", line=line
             )
         return Effect(consumed=True)
 
@@ -286,7 +286,7 @@ class AxisState(State):
         else:
             raise ProgramError(f"{name} needs an H word with the number of the tool length", line=line)
         if self.spindle is None and number:
-            # nothing tells which tool is in the spindle but the length that is called up for it
+            # only the length that is called up shows which tool is in the spindle
             self.length_tool = number
         vector = self._tool(number, line, name)
         if self.profile.lengths_along_z:
@@ -329,11 +329,11 @@ class AxisState(State):
         if kind not in (2, 20):
             what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
             raise ProgramError(
-                f"{what} writes the control's tables in a way that is not read; only L2 and L20 are",
+                f"{what} writes tables of the control, which is not read; expected L2 or L20",
                 line=line,
             )
         if "R" in by_letter and by_letter["R"].value != 0:
-            raise ProgramError("G10 R rotates the work offset, which is not read yet; use R0", line=line)
+            raise ProgramError("G10 R rotates the work offset, which is not read; use R0", line=line)
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
         if not 0 <= number <= self.profile.g10_offsets:
             raise ProgramError("G10 needs a P word with the number of a work offset, 1 for G54", line=line)
@@ -369,7 +369,7 @@ class AxisState(State):
             offsets.saved = list(offsets.shift)
 
     def _work_mm(self, name: str) -> list[float]:
-        """A work offset as the program has written it, else a copy of the setup's, else NaN."""
+        """A work offset as the program has written it, else that of the setup (a copy), else NaN."""
         work = self._work_offset(name)
         return self.offsets.written.get(name) or (list(work.offset_mm) if work is not None else [NAN] * 3)
 
@@ -385,7 +385,7 @@ class AxisState(State):
     @staticmethod
     def _integer(word: Word, line: int) -> int:
         if word.value != round(word.value) or word.value < 0:
-            raise ProgramError(f"{word.letter}{word.value:g} is not a whole number", line=line)
+            raise ProgramError(f"{word.letter}{word.value:g} is not an integer", line=line)
         return round(word.value)
 
     @staticmethod

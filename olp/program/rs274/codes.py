@@ -1,6 +1,6 @@
 """Which G codes change what: modal groups, frames, positions; ten times their number (G5.1 is 51).
 
-Reader and unroller take these sets alike. What a control has of them, and refuses, its profile says.
+The reader and the unroller use the same sets. The profile of a control says which of them it has or refuses.
 """
 
 from __future__ import annotations
@@ -12,15 +12,19 @@ SPLINES = frozenset({50, 51, 52, 53})
 LINEAR = frozenset({0, 10, 20, 30, 330})
 CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
 
-INCH, METRIC = 200, 210
-ABSOLUTE, INCREMENTAL = 900, 910
+INCH = 200
+METRIC = 210
+ABSOLUTE = 900
+INCREMENTAL = 910
 INVERSE_TIME = 930
-#: The level that a cycle returns to: G98 the one before the series, G99 its R.
-RETRACT_TO_INITIAL, RETRACT_TO_R = 980, 990
+#: A cycle returns to the level before its series.
+RETRACT_TO_INITIAL = 980
+#: A cycle returns to its R.
+RETRACT_TO_R = 990
 END_OF_CYCLES = 800
 
 #: Modal groups besides motion, by the field of `State` that holds their code. A control takes one code of a
-#: group in a block; of more, which the reader refuses, the unroller takes the last one here.
+#: group per block. The reader refuses two; the unroller takes the one that is last here.
 GROUPS: dict[str, tuple[int, ...]] = {
     "plane": (170, 180, 190),
     "distance": (INCREMENTAL, ABSOLUTE),
@@ -31,10 +35,14 @@ GROUPS: dict[str, tuple[int, ...]] = {
 UNITS = (INCH, METRIC)
 PATH_MODES = frozenset({610, 611, 640})
 
-DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE = 40, 100, 520, 920, 530
-#: To the reference positions, over the point that the axis words say.
+DWELL = 40
+WRITE_OFFSET = 100
+LOCAL_OFFSET = 520
+PRESET = 920
+MACHINE = 530
+#: To the reference positions, through the point that the axis words state.
 HOMES = frozenset({280, 300})
-#: G10 L2 and L20, G52, and the family of G92: what they write counts between axis and program positions.
+#: G10 L2 and L20, G52, and the family of G92: they write offsets between axis and program positions.
 SHIFTS = frozenset({LOCAL_OFFSET, PRESET, 921, 922, 923})
 #: Tool lengths from the table of tools, and G43.1 and G43.2.
 TABLE_LENGTHS = frozenset({430, 440, 490})

@@ -1,5 +1,5 @@
-"""What a reading collects, chunk by chunk: word, move and arc columns, holes and remarks; at its end the
-`Program` of them.
+"""What is collected while a program is read: word, move and arc columns, holes and remarks; at the end the
+`Program`.
 
 Nothing here interprets; indices of words count over the whole text (`Context.base` leads from a chunk there).
 """
@@ -16,10 +16,10 @@ from olp.program.rs274.lexer import WordChunk
 
 
 class Collector(PathColumns):
-    """The columns of one program on their way. Without `keep_words` those that only writing needs are left
+    """The columns of one program while it is read. Without `keep_words` those that only writing needs are left
     out.
 
-    `moves` and `word_count` count what came so far, `start` is the axis position before the first move.
+    `moves` and `word_count` count the moves and words so far, `start` is the axis position before the first move.
     `remarks` leads from a name to the first line of it and a text.
     """
 
@@ -51,7 +51,8 @@ class Collector(PathColumns):
         self.columns.put("arc_absolute", absolute, np.bool_)
 
     def program(self, state: AxisState, end_line: int) -> Program:
-        """All of it, with the frames and path modes of the final `state`. Takes the columns: once only."""
+        """The whole program, with the frames and path modes of the final `state`. Takes the columns: call it
+        once only."""
         return Program(
             data=self.data,
             dialect=state.profile,

@@ -4,19 +4,19 @@ Pure functions of numbers in program coordinates and program units. Codes are in
 G number (810 is G81). The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC
 carries it out (`NGC_CYCLES`); `ISO_CYCLES` are those of Fanuc and Haas controls, which differ here:
 
-- an initial level below R: LinuxCNC goes straight to R first; Fanuc positions in the plane at the level
-  where it stands, then goes to R.
-- a start at or below R in a series with G99: LinuxCNC rises to R, with G98 to the initial level, on its
-  diagonal way to the hole; Fanuc positions at the level where it stands.
+- an initial level below R: LinuxCNC goes straight to R first; Fanuc positions in the plane at its present
+  level, then goes to R.
+- a start at or below R in a series: LinuxCNC rises on the diagonal move to the hole, to R with G99, to the
+  initial level with G98. Fanuc positions at its present level.
 - tapping (G84, G74) and G89 feed up to R on Fanuc, then go to the initial level as a rapid; LinuxCNC
-  feeds all the way.
+  feeds up to the end.
 - pecks: the clearance is 0.010 inch (0.254 mm) in LinuxCNC and a parameter of the control on Fanuc
   (5114, 5115) and Haas (settings 22, 52). Pass it as `clearance`; where it is not known the end points
   of the hole hold and the pecks between them do not.
 
 Grbl has no canned cycles. G76 and G87 (orientation and shift of the spindle) and G88 (an operator moves
-the axes by hand) are refused, and so is tapping outside G17 on LinuxCNC, whose release 2.9 sends the feed
-strokes of G84 and G74 there along the wrong axes.
+the axes by hand) are refused. So is tapping outside G17 on LinuxCNC: its release 2.9 makes the feed strokes
+of G84 and G74 there along the wrong axes.
 """
 
 from __future__ import annotations
@@ -35,14 +35,15 @@ Spindle = Literal["", "stop", "reverse", "restore"]
 #: Axis numbers (first, second, tool axis) of a plane; X is 0.
 PLANES: dict[int, tuple[int, int, int]] = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
-#: The clearance between the bottom of the last peck and the end of the rapid that returns to it, in LinuxCNC.
+#: The clearance in LinuxCNC between the bottom of the last peck and the end of the rapid that returns to it.
 LCNC_CLEARANCE_MM = 0.254
+#: The same for programs in inches.
 LCNC_CLEARANCE_INCH = 0.010
 
 _TAPPING = frozenset({740, 840})
 _PECKING = frozenset({730, 830})
 _DWELL_NEEDED = frozenset({820, 860, 890})
-# A peck step far below the resolution of the numbers would never end.
+#: pecks of a hole at most: a step far below the resolution of the numbers would never end
 _MAX_PECKS = 100_000
 
 
@@ -51,7 +52,7 @@ class CycleRules:
     """How a control makes canned cycles.
 
     - `rises_first`: it leaves a level below R before it goes to the hole.
-    - `feeds_home`: G84, G74 and G89 feed all the way up, else to R only.
+    - `feeds_home`: G84, G74 and G89 feed up to the end, else to R only.
     - `taps_in_any_plane`: else G84 and G74 go along the wrong axes outside G17.
     - `taps_by_control`: it synchronises G84 and G74, so that plain moves cannot replace them.
     - `peck_by_parameter`: a parameter of the control gives the clearance of pecks.
@@ -137,7 +138,7 @@ def hole_moves(
 ) -> tuple[Stroke, ...]:
     """Strokes of one hole, in order; rapids of zero length are left out, a feed of zero length is not.
 
-    `start` is the position before the block, (x, y, z). `xy` is the place of the hole along the first and
+    `start` is the position before the block, (x, y, z). `xy` is the position of the hole along the first and
     second axis of the plane: (X, Y) in G17, (Z, X) in G18, (Y, Z) in G19. `r`, `z` and `initial_z` are
     absolute, along the tool axis; `initial_z` is the position on that axis before the first cycle of the
     series of contiguous cycles. `q` is the peck, `p` the dwell in s, `clearance` the distance kept above
@@ -212,7 +213,7 @@ def cycle_moves(
 
 @dataclass(slots=True)
 class _Hole:
-    """One hole on its way: the position, the strokes so far, and the values of the cycle."""
+    """One hole while its strokes are made: the position, the strokes so far, and the values of the cycle."""
 
     position: list[float]
     axes: tuple[int, int, int]
@@ -341,6 +342,6 @@ def _check(code: int, plane: int, r: float, z: float, q: float | None, p: float 
         if (r - z) / q > _MAX_PECKS:
             raise ProgramError(f"{name} with Q {q:g} makes more than {_MAX_PECKS} pecks; give a larger Q")
     if code in _DWELL_NEEDED and p is None:
-        raise ProgramError(f"{name} needs a dwell P; P0 is none")
+        raise ProgramError(f"{name} needs a dwell P; give P0 for none")
     if p is not None and p < 0:
-        raise ProgramError(f"{name} has a negative dwell P {p:g}")
+        raise ProgramError(f"{name} has a negative dwell P {p:g}; expected zero or more")

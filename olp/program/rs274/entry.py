@@ -1,4 +1,4 @@
-"""How a registered control is read and unrolled; what does it is loaded when it is first used."""
+"""How a registered control is read and unrolled; these modules are loaded when they are first used."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Lexer of word-address text (RS-274, ISO 6983 and kin): bytes to columns, one row a word.
+"""Lexer of word-address text (RS-274, ISO 6983 and similar): bytes to columns, one row per word.
 
 Bytes are never decoded. White space means nothing, also inside numbers; `(...)` and `;` start
 comments; `/` at the start of a block is block delete; a line that starts with `%` is a tape mark.
-A line that holds anything but words (letter, number) is *odd*: its words are dropped and its number
-is reported, so that the interpreter can decide whether it may be carried.
+A line with anything but words (letter, number) is *odd*: its words are dropped and its number is
+reported, so that the interpreter can decide whether the line may stay unchanged.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _POW10 = 10 ** np.arange(19, dtype=np.int64)
 class WordChunk:
     """Words of consecutive lines. Positions count from the start of the text, lines from 0 in the chunk.
 
-    `mantissa` / 10**`decimals` is the number as written; `pointed` tells whether it has a decimal point.
+    `mantissa` / 10**`decimals` is the number as written; `pointed` is whether it has a decimal point.
     `first_word[i]` is the index of line i's first word, with one extra entry for the end.
     `comments` are the positions where comments open.
     """
@@ -58,25 +58,25 @@ def chunks(data: bytes, size: int = CHUNK) -> Iterator[WordChunk]:
     """Lex a whole text, chunk by chunk, each ending at a line end."""
     text = np.frombuffer(data, np.uint8)
     lone_cr = b"\r" in data and data.count(b"\r") != data.count(b"\r\n")
-    at = line = 0
-    while at < len(data):
+    start = line = 0
+    while start < len(data):
         cut = len(data)
-        if at + size < len(data):
-            newline = data.find(b"\n", at + size)
+        if start + size < len(data):
+            newline = data.find(b"\n", start + size)
             if lone_cr:
-                ends = [p for p in (newline, data.find(b"\r", at + size)) if p >= 0]
+                ends = [p for p in (newline, data.find(b"\r", start + size)) if p >= 0]
                 newline = min(ends) if ends else -1
                 if newline >= 0 and data[newline : newline + 2] == b"\r\n":
                     newline += 1
             cut = newline + 1 if newline >= 0 else cut
-        chunk = lex(text[at:cut], at, line, lone_cr=lone_cr)
+        chunk = lex(text[start:cut], start, line, lone_cr=lone_cr)
         line += len(chunk.line_start)
-        at = cut
+        start = cut
         yield chunk
 
 
 def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = False) -> WordChunk:
-    """Lex whole lines; `offset` and `first_line` are where they stand in the text."""
+    """Lex whole lines; `offset` and `first_line` are where they begin in the text."""
     size = len(text)
     if lone_cr:
         text = text.copy()
@@ -150,7 +150,7 @@ def blanked(text: Bytes, keep: Mask) -> Bytes:
 
 
 def runs(text: Bytes) -> tuple[Bytes, Index, Index]:
-    """The text between two pads of line ends, and where runs of the characters of numbers begin and stop."""
+    """The text between two pads of line ends, and where runs of the characters of numbers begin and end."""
     compact = np.full(len(text) + 2 * _PAD + 1, 10, np.uint8)
     compact[_PAD : _PAD + len(text)] = text
     # '+' ',' '-' '.' '/' and digits; ',' and '/' make their line odd below
@@ -167,19 +167,19 @@ def _line_heads(text: Bytes, starts: Index, ends: Index, keep: Mask, deleted: Ma
     marks = []
     lines = np.searchsorted(ends, heads)
     previous = -1
-    for at, line in zip(heads.tolist(), lines.tolist(), strict=True):
-        if line == previous or keep[starts[line] : at].any():
+    for head, line in zip(heads.tolist(), lines.tolist(), strict=True):
+        if line == previous or keep[starts[line] : head].any():
             continue
         previous = line
-        if text[at] == 37:
+        if text[head] == 37:
             marks.append(line)
-            keep[at : ends[line]] = False
+            keep[head : ends[line]] = False
         else:
             deleted[line] = True
-            keep[at] = False
+            keep[head] = False
             # "/2": an optional switch number, only where a word follows it
-            if at + 1 < ends[line] and 49 <= text[at + 1] <= 57:
-                keep[at + 1] = False
+            if head + 1 < ends[line] and 49 <= text[head + 1] <= 57:
+                keep[head + 1] = False
     return np.array(marks, np.int64)
 
 
@@ -197,8 +197,8 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> Index:
         stop = np.where((text[opening] == 40) & (nearest < line_end), nearest + 1, line_end)
     if (opening[1:] < stop[:-1]).any():
         real, last = [], 0
-        for i, (at, to) in enumerate(zip(opening.tolist(), stop.tolist(), strict=True)):
-            if at >= last:
+        for i, (first, to) in enumerate(zip(opening.tolist(), stop.tolist(), strict=True)):
+            if first >= last:
                 real.append(i)
                 last = to
         opening, stop = opening[real], stop[real]
@@ -216,7 +216,7 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> Index:
 
 
 def _misplaced(body: Bytes, begin: Index, stop: Index, letter: Bytes) -> Index:
-    """Positions of anything that is not part of a word; `body` ends with a line end of its own."""
+    """Positions of anything that is not part of a word; `body` ends with an added line end."""
     alphabetic = (letter - np.uint8(65)) < 26
     symbols = body[:-1]
     separators = np.count_nonzero((symbols == 44) | (symbols == 47))

@@ -1,8 +1,8 @@
-"""What is in force on each line of a chunk: modal codes, the end of the program; and which lines are events,
-to be read one by one.
+"""What is in force on each line of a chunk: modal codes, the end of the program, and which lines are events,
+which are read one by one.
 
-All of it is found for a whole chunk at once. Refused here are lines that hold more than words, two codes of
-one modal group, and block delete that later blocks depend on.
+A whole chunk is read at once. Refused here are lines with more than words, two codes of one modal group, and
+block delete that later blocks depend on.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Context:
 
 
 class Modes:
-    """The codes in force, from chunk to chunk; those that end a chunk are kept in the `state`."""
+    """The codes in force, from chunk to chunk; those at the end of a chunk are kept in the `state`."""
 
     def __init__(self, state: AxisState, *, block_delete: bool, contour: bool) -> None:
         self._state = state
@@ -90,7 +90,7 @@ class Modes:
         for code, act in profile.codes.items():
             self._act[code] = act
         if contour:
-            self._act[list(CUTTER_COMPENSATION)] = Act.CARRY
+            self._act[list(CUTTER_COMPENSATION)] = Act.UNCHANGED
         self._m_event = np.ones(10_001, bool)
         self._m_event[[m * 10 for m in profile.harmless_m]] = False
         self._linear_motion = state.motion
@@ -105,8 +105,8 @@ class Modes:
         if ends.size and ends[0] < last:
             if chunk.deleted[ends[0]]:
                 raise ProgramError(
-                    "block delete decides here whether the program ends; expected one end for both switch "
-                    "positions",
+                    "the end of the program is under block delete; "
+                    "expected the same end for both positions of the switch",
                     line=chunk.first_line + int(ends[0]) + 1,
                 )
             last, self._ended = int(ends[0]) + 1, True
@@ -173,24 +173,24 @@ class Modes:
 
     def _motion(self, chunk: WordChunk, codes: Codes) -> Modal:
         chosen = codes.act == Act.MOTION
-        at, code = codes.line[chosen], codes.code[chosen]
+        line, code = codes.line[chosen], codes.code[chosen]
         if (code == 800).any():
-            # G80 may stand beside another motion code, which wins
-            beside = np.isin(at, at[1:][at[1:] == at[:-1]])
-            at, code = at[~(beside & (code == 800))], code[~(beside & (code == 800))]
+            # G80 may be beside another motion code, which then holds
+            beside = np.isin(line, line[1:][line[1:] == line[:-1]])
+            line, code = line[~(beside & (code == 800))], code[~(beside & (code == 800))]
         if self._cycles_apart:
-            # cycles are a group of their own: a lone G80 hands back to the last of G0 to G3
+            # cycles are a separate group: after G80 alone the last of G0 to G3 is in force again
             code = code.copy()
             for i, c in enumerate(code.tolist()):
                 if c == 800:
                     code[i] = -1 if self._linear_motion is None else self._linear_motion
                 elif c < 330:
                     self._linear_motion = c
-        return _in_force(chunk, at, code, self._state.motion)
+        return _in_force(chunk, line, code, self._state.motion)
 
 
 def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
-    """Refuse active lines that hold more than words."""
+    """Refuse active lines with more than words."""
     for line in chunk.odd.tolist():
         if not active[line]:
             continue
@@ -219,13 +219,13 @@ def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str
     bare = np.flatnonzero(~chunk.pointed & _LENGTHS[chunk.letter])
     if not bare.size:
         return context.value
-    out = context.value.copy()
+    numbers = context.value.copy()
     for letter in np.unique(chunk.letter[bare]).tolist():
         mine = bare[chunk.letter[bare] == letter]
-        out[mine] *= state.increment(chr(letter))
+        numbers[mine] *= state.increment(chr(letter))
     remarks.setdefault("increments", (context.number(int(chunk.line[bare[0]])), ""))
-    context.scaled[state.unit_mm] = out
-    return out
+    context.scaled[state.unit_mm] = numbers
+    return numbers
 
 
 def _modal(chunk: WordChunk, codes: Codes, which: Act, now: int | None) -> Modal:
@@ -233,14 +233,14 @@ def _modal(chunk: WordChunk, codes: Codes, which: Act, now: int | None) -> Modal
     return _in_force(chunk, codes.line[chosen], codes.code[chosen], now)
 
 
-def _in_force(chunk: WordChunk, at: Index, code: Index, now: int | None) -> Modal:
-    if (at[1:] == at[:-1]).any():
-        twice = int(at[1:][at[1:] == at[:-1]][0])
+def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> Modal:
+    if (lines[1:] == lines[:-1]).any():
+        twice = int(lines[1:][lines[1:] == lines[:-1]][0])
         raise ProgramError(
-            "two G codes of the same modal group stand in this block; a control takes one",
+            "two G codes of the same modal group are in this block; expected one",
             line=chunk.first_line + twice + 1,
         )
-    return modal(len(chunk.line_start), at, code, -1 if now is None else now)
+    return modal(len(chunk.line_start), lines, code, -1 if now is None else now)
 
 
 def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
@@ -254,8 +254,8 @@ def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
         while following < len(chunk.deleted) and chunk.deleted[following]:
             following += 1
         restated = (context.codes.line == following) & (context.codes.act == Act.MOTION)
-        for which, (mode, carry) in enumerate(pairs):
-            before = mode[line - 1] if line else carry
+        for which, (mode, last_mode) in enumerate(pairs):
+            before = mode[line - 1] if line else last_mode
             if mode[line] != before and not (which == 0 and restated.any()):
                 raise ProgramError(
                     "a block under block delete changes a modal code that later blocks depend on; "

@@ -1,7 +1,7 @@
 """Bulk reading of motion blocks: words of many lines to axis positions, arcs and slots at once.
 
-`Blocks` gathers the motion lines of one chunk; `fill` turns a stretch of them, over which nothing
-but modal motion happens, into positions. Omitted axes hold: that is a forward fill.
+`Blocks` are the motion lines of one chunk. `fill` turns a stretch of them that has only modal motion
+into positions. An omitted axis keeps its position: that is a forward fill.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ _POW10 = 10.0 ** np.arange(19)
 _AXIS_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"XYZ"):
     _AXIS_OF[_letter] = _i
-#: A B C U V W (and E of printers): axes that are carried
+#: A B C U V W (and E of printers): axes whose words stay unchanged
 _OTHER = np.zeros(256, bool)
 _OTHER[list(b"ABCUVWE")] = True
 _ARC_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"IJKRP"):
     _ARC_OF[_letter] = _i
 
-#: Largest mismatch of an arc's two radii that LinuxCNC accepts, in mm: both bounds must be exceeded to
-#: refuse.
+#: Largest mismatch of an arc's two radii that LinuxCNC accepts; it refuses an arc above both bounds.
 SPIRAL_ABSOLUTE_MM = 0.0283
+#: The same as a share of the radius.
 SPIRAL_RELATIVE = 0.001
 
 
@@ -38,12 +38,12 @@ def values(chunk: WordChunk) -> Array:
     return np.asarray(chunk.mantissa / _POW10[chunk.decimals], float)
 
 
-def modal(chunk_lines: int, lines: Index, codes: Index, carry: int) -> npt.NDArray[np.int16]:
-    """Per line the code in force: `codes` take effect on their own line."""
+def modal(chunk_lines: int, lines: Index, codes: Index, before: int) -> npt.NDArray[np.int16]:
+    """Per line the code in force, `before` until the first of `codes`, which take effect on their own line."""
     if not len(lines):
-        return np.full(chunk_lines, carry, np.int16)
+        return np.full(chunk_lines, before, np.int16)
     spans = np.diff(np.concatenate(([0], lines, [chunk_lines])))
-    return np.repeat(np.concatenate(([carry], codes)).astype(np.int16), spans)
+    return np.repeat(np.concatenate(([before], codes)).astype(np.int16), spans)
 
 
 @dataclass(slots=True, eq=False)
@@ -103,26 +103,26 @@ def _slots(
     names: bytes,
     rows: Index,
 ) -> Index:
-    """(rows, width) table of word indices; a letter that stands twice in one block is refused."""
+    """(rows, width) table of word indices; a letter that is twice in one block is refused."""
     slot = np.full((len(rows), width), -1, np.int64)
     flat = row_of[chunk.line[words]] * width + column[words]
     slot.reshape(-1)[flat] = words
     if np.count_nonzero(slot >= 0) != len(words):
         twice = int(np.flatnonzero(np.bincount(flat, minlength=slot.size) > 1)[0])
         raise ProgramError(
-            f"the word {chr(names[twice % width])} stands twice in this block",
+            f"the word {chr(names[twice % width])} is twice in this block; expected it once",
             line=int(rows[twice // width]) + chunk.first_line + 1,
         )
     return slot
 
 
 def fill(
-    slot: Index, value: Array, incremental: Mask | None, offset: Array, unit: Array | float, at: list[float]
+    slot: Index, value: Array, incremental: Mask | None, offset: Array, unit: Array | float, start: list[float]
 ) -> Array:
-    """(n, 3) axis positions of consecutive blocks from `at`; offsets (3,) or (n, 3), units scalar or (n,
+    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units scalar or (n,
     1)."""
     count = len(slot)
-    out = np.empty((count, 3))
+    end = np.empty((count, 3))
     order = np.arange(count)
     units = (
         np.broadcast_to(np.asarray(unit, float).reshape(-1, 1), (count, 1))[:, 0] if np.ndim(unit) else unit
@@ -137,7 +137,7 @@ def fill(
             if not given.all():
                 source = np.maximum.accumulate(np.where(given, order, -1))
                 column = column[source]
-                column[: int(np.searchsorted(source, 0))] = at[a]
+                column[: int(np.searchsorted(source, 0))] = start[a]
         else:
             anchor = given & ~incremental
             steps = np.where(given & incremental, column, 0.0)
@@ -145,9 +145,9 @@ def fill(
             total = np.cumsum(steps)
             first = int(np.searchsorted(source, 0))
             column = (column + shift)[source] + (total - total[source])
-            column[:first] = at[a] + total[:first]
-        out[:, a] = column
-    return out
+            column[:first] = start[a] + total[:first]
+        end[:, a] = column
+    return end
 
 
 def arc_geometry(
@@ -178,8 +178,8 @@ def arc_geometry(
     r0 = r1 = half = np.zeros(len(start))
     refuse(
         ~np.asarray(np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)),
-        "an arc starts or ends where an axis has not been commanded yet; command X, Y and Z first, or give "
-        "start_mm in the job file",
+        "an arc starts or ends where an axis has not been commanded yet; "
+        "command X, Y and Z first, or give start_mm in the job file",
     )
     s0, s1, e0, e1 = start[rows, first], start[rows, second], end[rows, first], end[rows, second]
     c0, c1, radius, turns = words[rows, first], words[rows, second], words[:, 3], words[:, 4]
@@ -194,7 +194,7 @@ def arc_geometry(
     )
     turns = np.where(np.isnan(turns), 1.0, turns)
     refuse(
-        (turns != np.rint(turns)) | (turns < 1), "P of an arc is its number of turns; expected a whole number"
+        (turns != np.rint(turns)) | (turns < 1), "P of an arc is its number of turns; expected an integer from 1"
     )
     base0, base1 = (np.where(absolute, offset[rows, f], s) for f, s in ((first, s0), (second, s1)))
     centre0, centre1 = np.nan_to_num(c0) + base0, np.nan_to_num(c1) + base1
@@ -218,8 +218,8 @@ def arc_geometry(
     refuse((r0 < 1e-9) | (r1 < 1e-9), "an arc has zero radius")
     refuse(
         np.abs(r0 - r1) > np.maximum(SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE * r1),
-        "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end, more than a control "
-        "accepts",
+        "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end; "
+        "a control does not accept this difference",
     )
     sweep = np.arctan2(e1 - centre1, e0 - centre0) - np.arctan2(s1 - centre1, s0 - centre0)
     sweep = np.where(clockwise, -sweep, sweep) % (2 * np.pi)

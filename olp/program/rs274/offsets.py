@@ -1,4 +1,4 @@
-"""What counts between program and axis positions, and what G52, G92 and G10 make of it.
+"""The offsets between program and axis positions, and how G52, G92 and G10 change them.
 
 axis position = program position + work offset + shift (G92) + local (G52) + tool length, in mm, axis by axis.
 """

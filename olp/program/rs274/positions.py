@@ -1,4 +1,4 @@
-"""Programs that go from position to position and wait there, in the words of a control."""
+"""Programs that go from position to position and wait there, for one control."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from olp.core.errors import CannotCompute
 from olp.core.units import AXES
 from olp.program.rs274.profiles.base import Profile
 
-#: Lines of comments are no longer than some controls take.
+#: Characters of a comment line at most: some controls take no more.
 _WIDTH = 68
 #: What every program sets first: mm, absolute, no cycle, no tool length, no cutter compensation.
 _MODES = "G21 G90 G94 G80 G40 G49"
@@ -24,7 +24,7 @@ def positions_program(
     """Rapids in machine coordinates (G53) through axis positions (n, 3), each with a dwell after it.
 
     A position is followed by no dwell where `dwell_s` (n,) is 0. `digits` are the decimals of words, `notes`
-    become comments. Z goes first to the height of the first position, alone: let that be a clear one. Raises
+    become comments. At first Z alone goes to the height of the first position, which has to be a clear one. Raises
     CannotCompute for a control that is not of this family.
     """
     if 530 not in profile.codes:
@@ -33,8 +33,8 @@ def positions_program(
     lines = [f"{opening}{line}{closing}" for note in notes for line in textwrap.wrap(_plain(note), _WIDTH)]
     lines.append(_MODES)
     before: list[str] = []
-    for place, wait in zip(np.round(positions_mm, digits).tolist(), dwell_s, strict=True):
-        words = [f"{axis}{value + 0.0:.{digits}f}" for axis, value in zip(AXES, place, strict=True)]
+    for position, wait in zip(np.round(positions_mm, digits).tolist(), dwell_s, strict=True):
+        words = [f"{axis}{value + 0.0:.{digits}f}" for axis, value in zip(AXES, position, strict=True)]
         if not before:
             lines.append(f"G53 G0 {words[2]}")
         if words != before:
@@ -48,5 +48,5 @@ def positions_program(
 
 
 def _plain(note: str) -> str:
-    """Without marks that would end a comment."""
+    """The note without marks that would end a comment."""
     return note.replace("(", "[").replace(")", "]").encode("ascii", "replace").decode()

@@ -1,9 +1,9 @@
 """Reads RS-274 and ISO 6983 text: bytes to a nominal toolpath and the words that can be edited.
 
-The way of a chunk of lines: lexer columns -> modal codes per line (`modes`) -> motion lines -> stretches
-between events, each resolved in bulk (`motion`), with the blocks that change frames (`axis_state`) or need
-the present position (`special_blocks`) carried out one by one. `collector` takes what comes of it. Nothing
-here knows an error model.
+A chunk of lines is read in steps: lexer columns, modal codes per line (`modes`), motion lines, and stretches
+between events, each resolved in bulk (`motion`). Blocks that change frames (`axis_state`) or need the present
+position (`special_blocks`) are carried out one by one. `collector` takes the results. Nothing here knows an
+error model.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.special_blocks import SpecialBlocks, event_block
 
-#: motion code to kind of move; 255 where it is not plain motion, the last entry standing for "none yet"
+#: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _ALONE = np.array(sorted(CYCLES | PROBES))
@@ -50,17 +50,17 @@ def read(
     data: bytes, setup: Setup, profile: Profile, options: Options | None = None, *, words: bool = True
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
-    right.
+    correctly.
 
     Without `words` the columns that only writing needs are left out. Payloads that the job gives by line
-    stand in the text of the result as comments (`directives`).
+    are comments in the text of the result (`directives`).
     """
     return _Reader(data, setup, profile, options or Options(), words).run()
 
 
 @dataclass(slots=True, eq=False)
 class _Rows:
-    """The motion lines of a chunk on their way: how many have a frame, how many a position."""
+    """The motion lines of a chunk while they are read: how many have a frame, how many a position."""
 
     blocks: Blocks
     frame: npt.NDArray[np.int32]
@@ -69,38 +69,38 @@ class _Rows:
 
 
 class _Reader:
-    """One reading of one program: takes its chunks in turn and shares them out."""
+    """Reads one program, chunk by chunk."""
 
     def __init__(self, data: bytes, setup: Setup, profile: Profile, options: Options, words: bool) -> None:
         self.data = data = with_payloads(data, setup.job.payloads, profile.comment)
         self.options = options
         self.state = AxisState.at_start(setup, profile)
         x, y, z = self.state.position
-        self.out = Collector(data, (x, y, z), keep_words=words)
+        self.collector = Collector(data, (x, y, z), keep_words=words)
         self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
         self.switches = Directives(data)
         self.payloads: dict[int, float] = {}
-        self.singles = SpecialBlocks(self.state, self.out, self.switches)
+        self.special_blocks = SpecialBlocks(self.state, self.collector, self.switches)
         self.end_line = 0
 
     def run(self) -> Program:
         data = self.data
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise ProgramError(
-                "the text is UTF-16; expected one byte a character; save it as plain text", line=1
+                "the text is UTF-16; expected one byte per character; save it as plain text", line=1
             )
         if data[:3] == b"\xef\xbb\xbf":
-            # a byte order mark is blank to the lexer, and stays where it is
+            # the lexer reads a byte order mark as blanks; it stays in the text
             data = b"   " + data[3:]
         for chunk in chunks(data):
             self._chunk(chunk)
-        return self.out.program(self.state, self.end_line)
+        return self.collector.program(self.state, self.end_line)
 
     # -- one chunk ---------------------------------------------------------------------------------
 
     def _chunk(self, chunk: WordChunk) -> None:
-        base = self.out.word_count
-        self.out.put_words(chunk)
+        base = self.collector.word_count
+        self.collector.put_words(chunk)
         self.payloads = self.switches.follow(chunk)
         last = self.modes.program_end(chunk)
         if not last:
@@ -124,46 +124,46 @@ class _Reader:
         alone = np.isin(context.motion[blocks.line], _ALONE)
         special = event.copy()
         special[blocks.line[alone]] = True
-        for at in np.flatnonzero(special).tolist():
-            upto = int(np.searchsorted(blocks.line, at))
-            here = upto < len(blocks) and blocks.line[upto] == at
+        for line in np.flatnonzero(special).tolist():
+            upto = int(np.searchsorted(blocks.line, line))
+            here = upto < len(blocks) and blocks.line[upto] == line
             self._assign(context, rows, upto)
-            if not event[at]:
+            if not event[line]:
                 self._alone(context, rows, upto, Effect())
                 continue
-            number, deleted = context.number(at), bool(chunk.deleted[at])
-            words, codes = event_block(context, at, state.profile)
+            number, deleted = context.number(line), bool(chunk.deleted[line])
+            words, codes = event_block(context, line, state.profile)
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
             if moved or any(c in _POSITION for c in codes):
                 self._resolve(context, rows, upto)
-            state.distance = int(context.distance[at])
-            state.payload_kg = self.payloads.get(at, state.payload_kg)
-            effect = state.run(number, words, codes, self.out.moves)
+            state.distance = int(context.distance[line])
+            state.payload_kg = self.payloads.get(line, state.payload_kg)
+            effect = state.run(number, words, codes, self.collector.moves)
             if moved:
-                self.singles.control_move(number, deleted=deleted)
+                self.special_blocks.control_move(number, deleted=deleted)
             if here and (alone[upto] or effect.home or effect.machine):
                 self._alone(context, rows, upto, effect)
             if effect.home:
                 state.forget(effect.home)
-                self.singles.control_move(number, deleted=deleted)
+                self.special_blocks.control_move(number, deleted=deleted)
         self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
 
     def _alone(self, context: Context, rows: _Rows, row: int, effect: Effect) -> None:
-        """A row that is carried out by itself, after those before it."""
+        """Carry out one row singly, after those before it."""
         self._resolve(context, rows, row)
         self._assign(context, rows, row + 1)
         rows.resolved = row + 1
         slot = rows.blocks.slot[row : row + 1]
-        self.singles.run(context, int(rows.blocks.line[row]), slot, int(rows.frame[row]), effect)
+        self.special_blocks.run(context, int(rows.blocks.line[row]), slot, int(rows.frame[row]), effect)
 
     def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
-        """Give the present frame to the rows that came since the last event."""
+        """Give the present frame to the rows since the last event."""
         if upto > rows.assigned:
             line = context.number(int(rows.blocks.line[rows.assigned]))
             rows.frame[rows.assigned : upto] = self.state.frame(line)
             if self.state.unit is None:
-                self.out.remarks.setdefault("unit", (line, "mm"))
+                self.collector.remarks.setdefault("unit", (line, "mm"))
             rows.assigned = upto
 
     def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:
@@ -182,7 +182,7 @@ class _Reader:
         incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
         offset, unit = self._offsets(frame)
-        value = scaled(context, state, self.out.remarks)
+        value = scaled(context, state, self.collector.remarks)
         slot = blocks.slot[a:upto]
         end = fill(slot, value, incremental if incremental.any() else None, offset, unit, state.position)
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
@@ -196,7 +196,7 @@ class _Reader:
         arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
         if arcs.stop > arcs.start:
             self._arcs(context, rows, arcs, a, end, value, offset, unit)
-        self.out.put_moves(kind, flag, number, frame, end, np.where(slot >= 0, slot + context.base, -1))
+        self.collector.put_moves(kind, flag, number, frame, end, np.where(slot >= 0, slot + context.base, -1))
         state.position[:] = end[-1].tolist()
 
     def _arcs(
@@ -231,7 +231,7 @@ class _Reader:
             line=line + (context.chunk.first_line + 1),
         )
         slot = np.where(words >= 0, words + context.base, -1)
-        self.out.put_worded_arcs(row + self.out.moves, centre, plane, sweep, slot, absolute)
+        self.collector.put_worded_arcs(row + self.collector.moves, centre, plane, sweep, slot, absolute)
 
     def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
         frames = self.state.frames
@@ -246,7 +246,7 @@ class _Reader:
 def _refuse_motion(code: int, line: int) -> None:
     if code in (-1, 800):
         raise ProgramError(
-            "axis words stand in a block, but no motion code is in force; expected G0, G1, G2 or G3",
+            "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
             line=line,
         )
     raise ProgramError(f"G{code / 10:g} is not read as motion", line=line)

@@ -1,5 +1,5 @@
-"""Blocks that are carried out one by one: canned cycles, probes, G53 moves, the way to G28's intermediate
-point and the moves of the control's own; and the checks of a block with an event.
+"""Blocks that are carried out one by one: canned cycles, probes, G53 moves, the move to the intermediate point
+of G28, and moves that the control makes by itself; and the checks of a block with an event.
 
 What an event does to frames and tools is in `axis_state`, the strokes of one hole are in `cycles`.
 """
@@ -41,25 +41,25 @@ _M_REFUSED = {
 }  # fmt: skip
 
 
-def event_block(context: Context, at: int, profile: Profile) -> tuple[list[Word], list[int]]:
-    """The words and event codes of a line of the chunk; refuses what cannot be read right."""
+def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Word], list[int]]:
+    """The words and event codes of a line of the chunk; refuses what cannot be read correctly."""
     chunk, codes = context.chunk, context.codes
-    span = range(int(chunk.first_word[at]), int(chunk.first_word[at + 1]))
+    span = range(int(chunk.first_word[line]), int(chunk.first_word[line + 1]))
     words = [
         Word(chr(chunk.letter[i]), float(context.value[i]), context.base + i, bool(chunk.pointed[i]))
         for i in span
     ]
-    mine = slice(np.searchsorted(codes.line, at), np.searchsorted(codes.line, at, "right"))
-    line = context.number(at)
-    events = _checked(codes.code[mine], codes.act[mine], words, profile, line)
+    mine = slice(np.searchsorted(codes.line, line), np.searchsorted(codes.line, line, "right"))
+    number = context.number(line)
+    events = _checked(codes.code[mine], codes.act[mine], words, profile, number)
     changes = set(events) - {DWELL, *HOMES, MACHINE} or any(
         w.letter == "M" and w.value in (6, 61) for w in words
     )
-    if chunk.deleted[at] and changes:
+    if chunk.deleted[line] and changes:
         raise ProgramError(
-            "a block under block delete changes offsets, units, path mode or the tool, so later blocks "
-            "depend on the switch; remove the `/`",
-            line=line,
+            "a block under block delete changes offsets, units, path mode or the tool, "
+            "so later blocks depend on the switch; remove the `/`",
+            line=number,
         )
     return words, events
 
@@ -67,7 +67,7 @@ def event_block(context: Context, at: int, profile: Profile) -> tuple[list[Word]
 def _checked(
     code: Index, act: npt.NDArray[np.int8], words: list[Word], profile: Profile, line: int
 ) -> list[int]:
-    """The event codes of a block; refuses those that cannot be read right."""
+    """The event codes of a block; refuses those that cannot be read correctly."""
     for c, a in zip(code.tolist(), act.tolist(), strict=True):
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
@@ -86,29 +86,29 @@ def _checked(
 
 
 class SpecialBlocks:
-    """Carries such blocks out: from the position in `state`, with their moves and holes put into `out`."""
+    """Carries these blocks out from the position in `state`, and puts their moves and holes into `collector`."""
 
-    def __init__(self, state: AxisState, out: Collector, switches: Directives) -> None:
+    def __init__(self, state: AxisState, collector: Collector, switches: Directives) -> None:
         self._state = state
-        self._out = out
+        self._collector = collector
         self._switches = switches
 
-    def run(self, context: Context, at: int, slot: Index, frame: int, effect: Effect) -> None:
-        """Carry out the motion on line `at` of the chunk, whose axis words are `slot` (1, 3), in this
+    def run(self, context: Context, row: int, slot: Index, frame: int, effect: Effect) -> None:
+        """Carry out the motion on line `row` of the chunk, whose axis words are `slot` (1, 3), in this
         frame."""
-        motion = int(context.motion[at])
+        motion = int(context.motion[row])
         if motion in CYCLES and not effect.home and not effect.machine:
-            self._cycle(context, at, frame, motion)
+            self._cycle(context, row, frame, motion)
         else:
-            self._move(context, at, slot, frame, motion, effect)
+            self._move(context, row, slot, frame, motion, effect)
 
     def control_move(self, line: int, *, deleted: bool) -> None:
-        """A move of the control's own: some axes are unknown after it."""
-        if not self._out.moves:
+        """A move that the control makes by itself: the position of some axes is not known after it."""
+        if not self._collector.moves:
             x, y, z = self._state.position
-            self._out.start = (x, y, z)
+            self._collector.start = (x, y, z)
             return
-        self._out.put_moves(
+        self._collector.put_moves(
             np.array([Kind.RAPID], np.uint8),
             np.array([Flag.PASS | Flag.CONTROL | _deleted(deleted)], np.uint8),
             np.array([line]),
@@ -118,21 +118,21 @@ class SpecialBlocks:
         )
 
     def _move(
-        self, context: Context, at: int, slot: Index, frame_index: int, motion: int, effect: Effect
+        self, context: Context, row: int, slot: Index, frame_index: int, motion: int, effect: Effect
     ) -> None:
-        """A probe, a G53 move or the way to G28's intermediate point."""
-        state, line = self._state, context.number(at)
+        """A probe, a G53 move or the move to the intermediate point of G28."""
+        state, line = self._state, context.number(row)
         frame = state.frames[frame_index]
-        incremental = bool(context.distance[at] == INCREMENTAL)
-        deleted = bool(context.chunk.deleted[at])
+        incremental = bool(context.distance[row] == INCREMENTAL)
+        deleted = bool(context.chunk.deleted[row])
         flag = _deleted(deleted)
         kind = Kind.RAPID
         offset = np.array(frame.offset_mm)
         if effect.machine:
             if incremental:
-                raise ProgramError("G53 names axis positions; expected G90, the block is in G91", line=line)
+                raise ProgramError("G53 takes axis positions, and the block is in G91; give G90", line=line)
             if motion not in (0, 10):
-                raise ProgramError("G53 goes with G0 or G1 only", line=line)
+                raise ProgramError("G53 takes G0 or G1 only; give one of them in the block", line=line)
             kind = Kind(motion // 10)
             flag |= Flag.PASS | Flag.MACHINE
             offset = np.zeros(3)
@@ -144,34 +144,34 @@ class SpecialBlocks:
             flag |= Flag.INCREMENTAL
         before = list(state.position)
         relative = np.array([True]) if incremental else None
-        value = scaled(context, state, self._out.remarks)
+        value = scaled(context, state, self._collector.remarks)
         end = fill(slot, value, relative, offset, frame.unit_mm, before)
-        self._out.put_moves(
+        self._collector.put_moves(
             np.array([kind], np.uint8), np.array([flag], np.uint8), np.array([line]),
             np.array([frame_index]), end, np.where(slot >= 0, slot + context.base, -1),
         )  # fmt: skip
         state.position[:] = end[0].tolist()
         if kind == Kind.PROBE:
-            # it may stop anywhere on its way
+            # it may stop anywhere on its path
             for i in range(3):
                 if state.position[i] != before[i]:
                     state.position[i] = NAN
             self.control_move(line, deleted=deleted)
 
-    def _cycle(self, context: Context, at: int, frame_index: int, code: int) -> None:
-        state, out, chunk, line = self._state, self._out, context.chunk, context.number(at)
+    def _cycle(self, context: Context, row: int, frame_index: int, code: int) -> None:
+        state, collector, chunk, line = self._state, self._collector, context.chunk, context.number(row)
         frame = state.frames[frame_index]
-        incremental = bool(context.distance[at] == INCREMENTAL)
-        plane = PLANE_OF[int(context.plane[at])]
+        incremental = bool(context.distance[row] == INCREMENTAL)
+        plane = PLANE_OF[int(context.plane[row])]
         first, second, third = PLANES[plane]
         words = {
-            chr(chunk.letter[i]): i for i in range(int(chunk.first_word[at]), int(chunk.first_word[at + 1]))
+            chr(chunk.letter[i]): i for i in range(int(chunk.first_word[row]), int(chunk.first_word[row + 1]))
         }
-        value = scaled(context, state, out.remarks)
+        value = scaled(context, state, collector.remarks)
         given = {letter: float(value[i]) for letter, i in words.items()}
         if "P" in given:
             given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
-        held = self._inherit(context, at, given, code, third, frame.unit_mm)
+        held = self._inherit(context, row, given, code, third, frame.unit_mm)
         series = state.series
         initial = NAN if series.initial is None else series.initial
         times = self._repeats(context, words, line)
@@ -191,18 +191,18 @@ class SpecialBlocks:
             )
         if any(np.isnan((*place, *state.position))):
             raise ProgramError(
-                "a canned cycle starts where an axis has not been commanded yet; command X, Y and Z first, "
-                "or give start_mm in the job file",
+                "a canned cycle starts where an axis has not been commanded yet; "
+                "command X, Y and Z first, or give start_mm in the job file",
                 line=line,
             )
         start = (state.position[0], state.position[1], state.position[2])
         exempt = Flag.PASS if self._switches.off(line) else Flag(0)
-        flag = Flag.CYCLE | _deleted(bool(chunk.deleted[at])) | exempt
+        flag = Flag.CYCLE | _deleted(bool(chunk.deleted[row])) | exempt
         for repeat in range(times):
             try:
                 strokes = hole_moves(
                     code, start=start, xy=(place[0], place[1]), r=r, z=z, q=held.get("Q"),
-                    p=held.get("P"), retract_to_r=bool(context.retract[at] == RETRACT_TO_R),
+                    p=held.get("P"), retract_to_r=bool(context.retract[row] == RETRACT_TO_R),
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
                 )  # fmt: skip
@@ -210,8 +210,8 @@ class SpecialBlocks:
                 raise ProgramError(error.message, line=line) from None
             moving = [s for s in strokes if s.kind in ("rapid", "feed")]
             count = len(moving)
-            begin = out.moves
-            out.put_moves(
+            begin = collector.moves
+            collector.put_moves(
                 np.array([Kind.RAPID if s.kind == "rapid" else Kind.LINE for s in moving], np.uint8),
                 np.full(count, flag, np.uint8),
                 np.full(count, line),
@@ -219,9 +219,9 @@ class SpecialBlocks:
                 np.array([s.point for s in moving], float).reshape(count, 3),
                 np.full((count, 3), -1),
             )
-            out.holes.append(
+            collector.holes.append(
                 Hole(
-                    line=line, first=begin, last=out.moves,
+                    line=line, first=begin, last=collector.moves,
                     words={letter: context.base + i for letter, i in words.items()}, plane=plane,
                     place_mm=(place[0], place[1]), r_mm=r, z_mm=z, initial_mm=initial,
                     incremental=incremental, repeat=repeat, repeats=times, series=series.count, code=code,
@@ -233,14 +233,14 @@ class SpecialBlocks:
         state.position[:] = list(start)
 
     def _inherit(
-        self, context: Context, at: int, given: dict[str, float], code: int, third: int, unit_mm: float
+        self, context: Context, row: int, given: dict[str, float], code: int, third: int, unit_mm: float
     ) -> dict[str, float]:
         """The words of a block and those inherited from its series, lengths in mm; a new series starts after
         any other move."""
         series, depth = self._state.series, "XYZ"[third]
-        previous = int(context.motion[at - 1]) if at else (self._state.motion or -1)
-        holes = self._out.holes
-        if not (previous in CYCLES and holes and holes[-1].last == self._out.moves):
+        previous = int(context.motion[row - 1]) if row else (self._state.motion or -1)
+        holes = self._collector.holes
+        if not (previous in CYCLES and holes and holes[-1].last == self._collector.moves):
             series.begin(self._state.position[third])
         elif previous != code:
             series.held = {}
@@ -248,7 +248,7 @@ class SpecialBlocks:
         missing = [letter for letter in ("R", depth) if letter not in series.held]
         if missing:
             raise ProgramError(
-                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=context.number(at)
+                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=context.number(row)
             )
         return {letter: value for letter, value in series.held.items() if value is not None}
 
@@ -258,20 +258,20 @@ class SpecialBlocks:
         times = 1 if word is None else round(float(context.value[word]))
         if times < 1:
             raise ProgramError(
-                "a canned cycle with zero repeats only stores values, which is not read yet", line=line
+                "a canned cycle with zero repeats only stores values, which is not read; give one repeat or more", line=line
             )
         return times
 
 
 def _rests(strokes: Sequence[Stroke]) -> tuple[tuple[int, float], ...]:
-    """Dwells and turns of the spindle in a hole: moves before each, seconds."""
-    out, moves = [], 0
+    """Dwells and reversals of the spindle in a hole: moves before each, seconds."""
+    rests, moves = [], 0
     for stroke in strokes:
         if stroke.kind in ("rapid", "feed"):
             moves += 1
         else:
-            out.append((moves, stroke.seconds))
-    return tuple(out)
+            rests.append((moves, stroke.seconds))
+    return tuple(rests)
 
 
 def _deleted(deleted: bool) -> Flag:

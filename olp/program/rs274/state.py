@@ -1,9 +1,8 @@
-"""The state of a control that carries out RS-274: the one model that reader and unroller follow a program by.
+"""The state of a control that carries out RS-274: the model that both reader and unroller follow.
 
-`State` holds what is in force: modal codes, units, the position, the series of canned cycles. In which
-coordinates the position counts, its two kinds say: axis positions in mm with all offsets known
-(`axis_state`, the reader), or program coordinates in program units, whose offsets nobody has to know
-(`flatten.state`, the unroller).
+`State` holds what is in force: modal codes, units, the position, the series of canned cycles. It has two
+kinds. The reader uses axis positions in mm, with all offsets known (`axis_state`). The unroller uses program
+coordinates in program units, which need no offsets (`flatten.state`).
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class PathMode:
-    """A change of path mode: the words as people name them, and the tolerance in mm (None: not stated)."""
+    """A change of path mode: its words, and the path tolerance in mm (None: not stated)."""
 
     line: int
     name: str
@@ -44,7 +43,7 @@ class PathMode:
 @dataclass(slots=True)
 class Series:
     """Canned cycles that follow one another: how many series there were, the level before this one (None:
-    not asked for yet), and the words that its blocks hand on, by upper-case letter."""
+    not needed yet), and the words that later blocks inherit, by upper-case letter."""
 
     count: int = 0
     initial: float | None = None
@@ -62,7 +61,7 @@ class Series:
 
 @dataclass(slots=True)
 class State:
-    """Mutable while one program is followed; one instance a reading.
+    """Mutable while one program is followed; one instance per program.
 
     `motion` to `feed_mode` are codes (`codes`), `motion` None where none is in force. `unit` is G20 or G21,
     None before either. `position` (3,) is NaN where it is not known.
@@ -100,13 +99,13 @@ class State:
         return MM_PER_INCH if self.unit == INCH else 1.0
 
     def take(self, codes: Iterable[int]) -> None:
-        """Put the modal codes of a block into force, all but its motion and its unit."""
+        """Put the modal codes of a block into force, except its motion and its unit."""
         for code, group in _GROUP_OF:
             if code in codes:
                 setattr(self, group, code)
 
     def in_force(self) -> set[int]:
-        """The modal codes in force, but for motion and unit; `take` brings them back."""
+        """The modal codes in force, except motion and unit; `take` restores them."""
         return {getattr(self, group) for group in GROUPS}
 
     def forget(self, axes: Iterable[int] = (0, 1, 2)) -> None:

@@ -1,4 +1,4 @@
-"""Columns that grow: one array each from the start, so that a long program leaves no chunks behind."""
+"""Columns that grow: each is one array from the start, so a long program leaves no small arrays in memory."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 
 class Columns:
-    """Named columns that are appended to and taken once. Pages that were never written cost no memory, so the
-    first guess of a length may be generous."""
+    """Named columns that are appended to and taken once. Memory that was never written costs nothing, so
+    `expected` may be too large."""
 
     def __init__(self, expected: int) -> None:
         self._expected = max(expected, 64)
@@ -24,17 +24,17 @@ class Columns:
         if array is None:
             array = self._arrays[name] = np.zeros((self._expected, *values.shape[1:]), kind)
             self._used[name] = 0
-        at = self._used[name]
-        if at + len(values) > len(array):
-            longer = np.zeros((2 * (at + len(values)), *array.shape[1:]), array.dtype)
-            longer[:at] = array[:at]
+        used = self._used[name]
+        if used + len(values) > len(array):
+            longer = np.zeros((2 * (used + len(values)), *array.shape[1:]), array.dtype)
+            longer[:used] = array[:used]
             array = self._arrays[name] = longer
-        array[at : at + len(values)] = values
-        self._used[name] = at + len(values)
+        array[used : used + len(values)] = values
+        self._used[name] = used + len(values)
 
     def take(self, name: str, kind: npt.DTypeLike, *width: int) -> npt.NDArray[Any]:
         """The column, read-only; empty where nothing was put."""
         array = self._arrays.pop(name, None)
-        out = np.zeros((0, *width), kind) if array is None else array[: self._used[name]]
-        out.setflags(write=False)
-        return out
+        column = np.zeros((0, *width), kind) if array is None else array[: self._used[name]]
+        column.setflags(write=False)
+        return column

@@ -1,7 +1,7 @@
-"""Tables of positions as text: how one is laid out, and what its first rows tell of that.
+"""Tables of positions as text: the layout of one, and how it is detected from its first rows.
 
-A layout is a value; files that people write make one (`olp.files.point_profile`), or the first rows of a
-table do (`told`), which then says in words what it took for granted. `olp.program.text.rows` reads the table.
+A layout is a value. It comes from a profile (`olp.files.point_profile`) or from the first rows of a table
+(`detected_layout`); then it says in words what it assumes. `olp.program.text.rows` reads the table.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ from olp.core.errors import InputError
 
 Delimiter = Literal["comma", "semicolon", "tab", "space"]
 
+#: mm per unit of length
 MM = {"mm": 1.0, "um": 1e-3, "m": 1e3, "inch": 25.4}
+#: seconds per unit of time
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+#: mm/s per unit of speed
 MM_S = {"mm/s": 1.0, "mm/min": 1 / 60, "m/s": 1e3, "m/min": 1e3 / 60, "inch/min": 25.4 / 60}
 #: "space" is any run of blanks
 DELIMITERS: dict[str, str | None] = {"comma": ",", "semicolon": ";", "tab": "\t", "space": None}
 
-#: what a column may hold, and the names by which a header says so (in lower case, without their unit)
+#: what a column may hold, and its names in a header (in lower case, without their unit)
 ROLES: dict[str, tuple[str, ...]] = {
     "X": ("x",),
     "Y": ("y",),
@@ -45,9 +48,9 @@ ROLES: dict[str, tuple[str, ...]] = {
 }
 AXES = ("X", "Y", "Z")
 
-#: Rows that are looked at to tell a layout.
+#: rows that a layout is detected from
 LOOK = 40
-#: bytes that hold them
+#: bytes that have these rows
 _HEAD = 1 << 16
 _FRAME = re.compile(r"[#/%;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -60,10 +63,10 @@ _MARKS = ("#", "//", "%")
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a table is laid out. `columns` leads from what a column holds (ROLES) to its name or its number
+    """The layout of a table. `columns` leads from what a column holds (ROLES) to its name or its number
     from 1. `unit` is that of X, Y and Z, None where nothing states it. `point` is what a row of measured
-    points states: a place on the surface or the centre of the tip. `assumed` says in words what was told from
-    the rows."""
+    points states: a point on the surface or the centre of the tip. `assumed` says in words what was
+    detected from the rows."""
 
     columns: Mapping[str, str | int]
     delimiter: Delimiter = "comma"
@@ -87,23 +90,22 @@ class Layout:
         """mm per unit of X, Y and Z. Raises InputError where nothing states the unit."""
         if self.unit is None:
             raise InputError(
-                "states no unit of X, Y and Z; name it in the header (X_mm or `X [inch]`), with --unit, or "
-                "with "
-                "the key unit of a profile"
+                "states no unit of X, Y and Z; give it in the header (X_mm or `X [inch]`), with --unit, "
+                "or with the key unit of a profile"
             )
         return MM[self.unit]
 
 
 def mapping(columns: Mapping[str, str | int]) -> Mapping[str, str | int]:
-    """Columns that nobody can change."""
+    """Columns as a mapping that cannot be changed."""
     return MappingProxyType(dict(columns))
 
 
-def told(lines: Sequence[str]) -> Layout | None:
-    """The layout that the first rows of a table suggest, None where they leave a choice.
+def detected_layout(lines: Sequence[str]) -> Layout | None:
+    """The layout that the first rows of a table show, None where they leave a choice.
 
-    A header that names X, Y and Z, with or without their unit; names and three numbers, as SpatialAnalyzer
-    writes them; or three numbers and nothing else.
+    The rows have a header that names X, Y and Z, with or without their unit; or names and three numbers, as
+    SpatialAnalyzer writes them; or three numbers and nothing else.
     """
     comment = next((m for m in _MARKS[1:] if any(line.lstrip().startswith(m) for line in lines)), "#")
     rows = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith(("#", comment))]
@@ -114,16 +116,16 @@ def told(lines: Sequence[str]) -> Layout | None:
     decimal: Literal["point", "comma"] = "point"
     if any(_COMMA_NUMBER.fullmatch(c) for row in cells for c in row):
         decimal = "comma"
-    said = [f"columns are separated by {delimiter}"]
+    assumed = [f"columns are separated by {delimiter}"]
     if decimal == "comma":
-        said.append("the decimal mark is a comma")
-    found = _named(cells[0])
-    if found is not None:
-        columns, unit = found
-        said.append(_columns_said(columns, unit))
+        assumed.append("the decimal mark is a comma")
+    named = _named(cells[0])
+    if named is not None:
+        columns, unit = named
+        assumed.append(_columns_text(columns, unit))
         speed = _SPEED.fullmatch(str(columns.get("speed", "")).lower())
         return Layout(
-            mapping(columns), delimiter, decimal, unit, comment=comment, assumed=tuple(said),
+            mapping(columns), delimiter, decimal, unit, comment=comment, assumed=tuple(assumed),
             speed_unit=None if speed is None else f"{speed[1]}/{speed[2]}",
         )  # fmt: skip
     number = [bool(_NUMBER.fullmatch(c.replace(",", "."))) for c in cells[0]]
@@ -131,20 +133,20 @@ def told(lines: Sequence[str]) -> Layout | None:
     if number == [True] * 3:
         columns = {"X": 1, "Y": 2, "Z": 3}
     text = next((i for i, is_number in enumerate(number) if is_number), 0)
-    # a point may be named by a number: what counts are three numbers at the end behind a word
+    # a point may be named by a number: the layout is three numbers at the end, after a word
     if text and all(number[text:]) and len(number) - 3 in (text, text + 1):
         x = len(number) - 2
         columns = {"X": x, "Y": x + 1, "Z": x + 2, "name": x - 1}
     if not columns:
         return None
-    said.append(_columns_said(columns, None))
+    assumed.append(_columns_text(columns, None))
     return Layout(
-        mapping(columns), delimiter, decimal, None, header=False, comment=comment, assumed=tuple(said)
+        mapping(columns), delimiter, decimal, None, header=False, comment=comment, assumed=tuple(assumed)
     )
 
 
 def first_lines(data: bytes) -> list[str]:
-    """The first rows of a text, to tell its layout from."""
+    """The first rows of a text, from which its layout is detected."""
     head = data[:_HEAD].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
     if len(data) > _HEAD:
         # the last line may be cut
@@ -160,14 +162,14 @@ def stated_frame(lines: Sequence[str], file: str = "") -> str | None:
         match = _FRAME.match(line)
         if match and stated not in (None, match[1]):
             raise InputError(
-                f"the frame is {match[1]} here and {stated} before; expected one frame a file",
+                f"the frame is {match[1]} here and {stated} before; expected one frame per file",
                 file=file or None, line=number,
             )  # fmt: skip
         stated = match[1] if match else stated
     return stated
 
 
-def _columns_said(columns: Mapping[str, str | int], unit: str | None) -> str:
+def _columns_text(columns: Mapping[str, str | int], unit: str | None) -> str:
     named = ", ".join(f"{role} in column {column}" for role, column in columns.items())
     return f"{named}; {f'in {unit}' if unit else 'no unit is stated'}"
 
@@ -188,7 +190,7 @@ def _split(row: str, delimiter: str) -> list[str]:
 
 def _named(header: Sequence[str]) -> tuple[dict[str, str | int], str | None] | None:
     """Columns whose names say what they hold, and the unit of X, Y and Z in them."""
-    found: dict[str, str | int] = {}
+    columns: dict[str, str | int] = {}
     units: set[str] = set()
     for role, names in ROLES.items():
         for cell in header:
@@ -197,8 +199,8 @@ def _named(header: Sequence[str]) -> tuple[dict[str, str | int], str | None] | N
                 continue
             if role in AXES and match[2]:
                 units.add(match[2])
-            found[role] = cell
+            columns[role] = cell
             break
-    if not set(AXES) <= found.keys() or len(units) > 1:
+    if not set(AXES) <= columns.keys() or len(units) > 1:
         return None
-    return found, next(iter(units), None)
+    return columns, next(iter(units), None)

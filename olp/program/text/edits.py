@@ -1,4 +1,4 @@
-"""Edits of a text: numbers replaced, words and blocks inserted, everything else carried byte for byte.
+"""Edits of a text: numbers replaced, words and blocks inserted, everything else kept byte for byte.
 
 An edit replaces `start`..`end` of the source by a prefix (from a short table) and a number. All edits of
 a stretch are rendered and spliced at once, in columns.
@@ -18,14 +18,14 @@ Bytes = npt.NDArray[np.uint8]
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
 #: four digits of text at a time
 _DIGITS = np.frombuffer("".join(f"{i:04d}" for i in range(10_000)).encode(), np.uint32).copy()
-#: a prefix without a number behind it
+#: mantissa of an edit that has a prefix and no number
 BARE = np.iinfo(np.int64).min
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edits:
     """(n,) columns. `mantissa` / 10**`decimals` is the number, BARE for none; `prefix` indexes a table of
-    bytes; `order` breaks ties between insertions at one place."""
+    bytes; `order` is that of insertions at one position."""
 
     start: Index
     end: Index
@@ -39,7 +39,7 @@ class Edits:
         """All edits in the order of the text."""
         columns = [np.concatenate([getattr(p, name) for p in parts]) for name in Edits.__slots__]
         start, end, order = columns[0], columns[1], columns[5]
-        # what is inserted at a place stands before what is replaced there
+        # what is inserted at a position comes before what is replaced there
         index = np.lexsort((order, end > start, start))
         return Edits(*(column[index] for column in columns))
 
@@ -69,22 +69,22 @@ class EditList:
 
 
 class Prefixes:
-    """A table of the few byte strings that stand before inserted numbers."""
+    """A table of the few byte strings that come before inserted numbers."""
 
     def __init__(self) -> None:
         self.table: list[bytes] = [b""]
         self._index: dict[bytes, int] = {b"": 0}
 
     def __call__(self, text: bytes) -> int:
-        found = self._index.get(text)
-        if found is None:
-            found = self._index[text] = len(self.table)
+        index = self._index.get(text)
+        if index is None:
+            index = self._index[text] = len(self.table)
             self.table.append(text)
-        return found
+        return index
 
 
 def splice(source: Bytes, offset: int, edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> Bytes:
-    """The text of `source` (which stands at `offset` of the whole) with its edits made."""
+    """The text of `source`, which begins at `offset` of the whole, with its edits made."""
     if not len(edits):
         return source
     text, length = render(edits, prefixes, leading_zero=leading_zero)
@@ -102,10 +102,10 @@ def splice(source: Bytes, offset: int, edits: Edits, prefixes: Prefixes, *, lead
     fresh = np.repeat(flags, runs)
     runs[1::2] = end - start
     removed = np.repeat(flags, runs)
-    out = np.zeros(total, np.uint8)
-    out[fresh] = text
-    out[~fresh] = source[~removed]
-    return out
+    spliced = np.zeros(total, np.uint8)
+    spliced[fresh] = text
+    spliced[~fresh] = source[~removed]
+    return spliced
 
 
 def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Bytes, Index]:
@@ -124,18 +124,18 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
     if slow.size:
         whole[slow] = fraction[slow] = decimals[slow] = 0
     widths = np.array([len(p) for p in prefixes.table], np.int64)
-    left = int(widths[edits.prefix].max()) + 1
+    lead = int(widths[edits.prefix].max()) + 1
     whole_groups = 1 if int(whole.max(initial=0)) < 10_000 else 2
     fraction_groups = 1 if int(decimals.max(initial=0)) <= 4 else 2
-    point = left + 4 * whole_groups
+    point = lead + 4 * whole_groups
     width = point + 1 + 4 * fraction_groups
     text = np.zeros((len(size), width), np.uint8)
     if whole_groups == 2:
         high = whole // 10_000
-        text[:, left : left + 4] = _DIGITS[high].view(np.uint8).reshape(-1, 4)
-        text[:, left + 4 : point] = _DIGITS[whole - high * 10_000].view(np.uint8).reshape(-1, 4)
+        text[:, lead : lead + 4] = _DIGITS[high].view(np.uint8).reshape(-1, 4)
+        text[:, lead + 4 : point] = _DIGITS[whole - high * 10_000].view(np.uint8).reshape(-1, 4)
     else:
-        text[:, left:point] = _DIGITS[whole].view(np.uint8).reshape(-1, 4)
+        text[:, lead:point] = _DIGITS[whole].view(np.uint8).reshape(-1, 4)
     text[:, point] = 46
     scaled = fraction * _POW10[np.maximum(4 * fraction_groups - decimals, 0)]
     if fraction_groups == 2:
@@ -177,17 +177,17 @@ def _with_slow(
     """Put in the rare numbers with more than eight digits on a side of the point."""
     stop = np.cumsum(length)
     pieces: list[Bytes] = []
-    at = 0
+    done = 0
     length = length.copy()
     for i in slow.tolist():
-        pieces.append(flat[at : int(stop[i] - length[i])])
+        pieces.append(flat[done : int(stop[i] - length[i])])
         word = prefixes.table[int(edits.prefix[i])] + number_text(
             int(edits.mantissa[i]), int(edits.decimals[i]), leading_zero=leading_zero
         )
         pieces.append(np.frombuffer(word, np.uint8))
-        at = int(stop[i])
+        done = int(stop[i])
         length[i] = len(word)
-    pieces.append(flat[at:])
+    pieces.append(flat[done:])
     return np.concatenate(pieces), length
 
 

@@ -1,4 +1,4 @@
-"""Numbers in a text: what one says, and another one written in the same form in its place."""
+"""Numbers in a text: the value and the form of one, and another value written in the same form."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
-#: Decimals beyond these say nothing that a double holds.
+#: Further decimals are below the resolution of a double.
 MOST_DECIMALS = 10
-#: Longer texts are no numbers.
+#: Characters of a number at most.
 LONGEST = 40
-#: No position is that large, whatever its unit.
+#: Positions are smaller than this in any unit.
 _MOST = 1e8
 _NUMBER = re.compile(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
 _BLANKS = b" \t"
@@ -43,12 +43,12 @@ class Number:
 
 
 def number(text: bytes, decimal: bytes = b".") -> Number | None:
-    """What a number says, None where the text is none, or where no position could be so large. `decimal` is
-    its decimal mark."""
-    found = _NUMBER.fullmatch(text)
-    if found is None or not (found[2] or found[4]) or (found[3] and found[3] != decimal):
+    """The number that a text is, None where it is none or too large for a position. `decimal` is its decimal
+    mark."""
+    match = _NUMBER.fullmatch(text)
+    if match is None or not (match[2] or match[4]) or (match[3] and match[3] != decimal):
         return None
-    sign, whole, mark, fraction, letter, exponent = found.groups(b"")
+    sign, whole, mark, fraction, letter, exponent = match.groups(b"")
     power = int(exponent or b"0")
     if abs(power) > 99 or len(text) > LONGEST:
         return None
@@ -63,8 +63,8 @@ def number(text: bytes, decimal: bytes = b".") -> Number | None:
 
 
 def written(form: Number, value: float, decimals: int | None = None, decimal: bytes = b".") -> bytes:
-    """A value in the form of a number: its sign, leading zeros, digits and exponent. `decimals` are more
-    digits where they are more than the number's own."""
+    """A value in the form of a number: its sign, leading zeros, digits and exponent. `decimals` count where
+    they are more than those of the form."""
     places = max(form.decimals, decimals or 0)
     if form.letter:
         text, power = _scientific(value, places)
@@ -97,8 +97,8 @@ def _scientific(value: float, places: int) -> tuple[str, int]:
 class Placing:
     """Where new numbers go so that columns of a text keep their edges.
 
-    A text is padded where numbers stand behind two blanks or more: then a shorter number gets blanks in
-    front, and a longer one takes some, as long as one is left.
+    A text is padded where numbers come after two blanks or more. Then a shorter number gets blanks before it,
+    and a longer one replaces blanks, but not the last one.
     """
 
     def __init__(self, data: bytes, start: Spans, end: Spans) -> None:
@@ -107,11 +107,11 @@ class Placing:
         blank = (text == 32) | (text == 9)
         first, last = np.ravel(start) + 2, np.ravel(end) + 2
         self.padded = bool((blank[first - 1] & blank[first - 2]).any())
-        # a column whose numbers all begin at once is one of left edges
+        # numbers before two blanks are in a column with a left edge
         self.trailing = not self.padded and bool(((text[last] == 32) & (text[last + 1] == 32)).any())
 
     def place(self, start: int, end: int, text: bytes) -> tuple[int, int, bytes]:
-        """Start, end and text of the edit that puts a number in the place of another."""
+        """Start, end and text of the edit that replaces a number by another."""
         more = len(text) - (end - start)
         if self.padded and more > 0:
             taken = min(more, max(self._gap(start) - 1, 0))
@@ -128,19 +128,19 @@ class Placing:
         return start, end, text
 
     def _gap(self, start: int) -> int:
-        at = start
-        while at and self.data[at - 1] in _BLANKS:
-            at -= 1
-        return start - at
+        position = start
+        while position and self.data[position - 1] in _BLANKS:
+            position -= 1
+        return start - position
 
 
 def spliced(data: bytes, edits: list[tuple[int, int, bytes]]) -> bytes:
-    """The text with edits (start, end, new bytes) made; none may overlap another. What is inserted at one
-    place comes in the order of the edits."""
-    out: list[bytes] = []
-    at = 0
+    """The text with edits (start, end, new bytes) made; none may overlap another. Insertions at one
+    position come in the order of the edits."""
+    pieces: list[bytes] = []
+    done = 0
     for start, end, text in sorted(edits, key=lambda edit: edit[:2]):
-        out += (data[at:start], text)
-        at = end
-    out.append(data[at:])
-    return b"".join(out)
+        pieces += (data[done:start], text)
+        done = end
+    pieces.append(data[done:])
+    return b"".join(pieces)

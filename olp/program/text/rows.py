@@ -1,8 +1,8 @@
 """Reads delimited tables: which lines hold data, and the cells of each.
 
-Tables that are only read become texts (`Form`); of those that are edited the bytes of each cell are kept
-(`Cells`), so that what nobody changes stays as it was. What columns a table needs, and what is said of
-numbers that are none, is known by whoever reads it.
+Tables that are only read become texts (`Form`). Of tables that are edited the bytes of each cell are kept
+(`Cells`), so that all other bytes stay unchanged. The caller decides which columns a table needs, and the
+message for a cell that is not a number.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ def decoded(data: bytes) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """How text becomes rows. `mark` stands between cells, None for any blanks; lines that begin with one of
-    `comments` hold no data, and what follows `remark` in a line is none. `loose` quotes may stand behind
-    blanks. `strict` lines end at line ends alone, others at whatever Unicode calls a break."""
+    """How text becomes rows. `mark` separates cells, None for any blanks. Lines that begin with one of
+    `comments` have no data, and neither has the rest of a line after `remark`. `loose` quotes may come after
+    blanks. `strict` lines end only at line ends, others at all line breaks of Unicode."""
 
     mark: str | None = ","
     comments: tuple[str, ...] = ("#",)
@@ -43,8 +43,8 @@ class Form:
 
     def lines(self, text: str) -> Iterator[tuple[int, str]]:
         """Every line and its number, from 1, without its end and without remarks."""
-        found = io.StringIO(text, newline=None) if self.strict else text.splitlines()
-        for index, line in enumerate(found, 1):
+        lines = io.StringIO(text, newline=None) if self.strict else text.splitlines()
+        for index, line in enumerate(lines, 1):
             whole = line.removesuffix("\n")
             yield index, whole if self.remark is None else whole.split(self.remark, 1)[0]
 
@@ -53,57 +53,58 @@ class Form:
         return bool(line.strip()) and not line.lstrip().startswith(self.comments)
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line, without blanks around them. Raises InputError where they are none."""
+        """The cells of a line, without blanks around them. Raises InputError where the line cannot be split."""
         if self.mark is None:
             return line.split()
         try:
             row = next(csv.reader([line], delimiter=self.mark, skipinitialspace=self.loose))
         except csv.Error as error:
-            raise InputError(f"is no table of comma-separated values ({error})") from None
+            raise InputError(f"is not a table of comma-separated values ({error})") from None
         return [cell.strip() for cell in row]
 
     def rows(self, text: str, behind: int = 0) -> Iterator[tuple[int, list[str]]]:
-        """Number and cells of each line that holds data, behind so many lines."""
+        """Number and cells of each line that has data, after the first `behind` lines."""
         for line, whole in self.lines(text):
             if line > behind and self.holds(whole):
                 yield line, self.cells(whole)
 
 
-#: CSV as instruments write it, and CSV as people do
+#: CSV as instruments write it
 CSV = Form()
+#: CSV as people write it
 LOOSE_CSV = Form(loose=True, strict=True)
 
 
 def form_of(layout: Layout) -> Form:
-    """The form of tables that are laid out so."""
+    """The form of tables with this layout."""
     return Form(DELIMITERS[layout.delimiter], (layout.comment, "#"), loose=True, strict=True)
 
 
 def place_of(column: str | int, header: Sequence[str]) -> int | None:
-    """The index of a column by its number from 1 or its name; None where no column bears the name."""
+    """The index of a column by its number from 1 or its name; None where no column has the name."""
     if isinstance(column, int):
         return column - 1
     return header.index(column) if column in header else None
 
 
 def no_number(place: int, cell: str, decimal: str) -> str:
-    """What is said of a cell that should hold a number."""
+    """The message for a cell that should be a number."""
     return f'column {place + 1} is "{cell[:40]}"; expected a number with a decimal {decimal}'
 
 
 class Cells:
-    """Rows of a table and where the cells of each are, as positions in the bytes of the text. Bytes are never
-    decoded but to compare names. Raises InputError for UTF-16."""
+    """Rows of a table and where the cells of each are, as positions in the bytes of the text. Bytes are
+    decoded only to compare names. Raises InputError for UTF-16."""
 
     def __init__(self, data: bytes, layout: Layout) -> None:
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise InputError("the text is UTF-16; expected one byte a character; save it as UTF-8", line=1)
+            raise InputError("the text is UTF-16; expected one byte per character; save it as UTF-8", line=1)
         self.data, self.layout = data, layout
         self.decimal = b"," if layout.decimal == "comma" else b"."
         mark = DELIMITERS[layout.delimiter]
         self._mark = None if mark is None else mark.encode()
         self._comments = (b"#", layout.comment.encode())
-        #: where the row that was last given begins and ends
+        #: where the last row that was read begins and ends
         self.bounds: Span = (0, 0)
         self.header: list[str] = []
         self.header_line = 0
@@ -137,8 +138,8 @@ class Cells:
         """The number in a cell of a row, or what is wrong with it."""
         if place >= len(row):
             return f"{len(row)} columns; expected at least {place + 1} between {self.layout.delimiter}s"
-        found = number(self.data[slice(*row[place])], self.decimal)
-        return no_number(place, self.text(row[place]), self.layout.decimal) if found is None else found
+        value = number(self.data[slice(*row[place])], self.decimal)
+        return no_number(place, self.text(row[place]), self.layout.decimal) if value is None else value
 
     def word(self, row: Sequence[Span], place: int | None) -> str:
         """The text of a cell of a row, nothing where there is none."""
@@ -156,12 +157,12 @@ class Cells:
         data, mark = self.data, self._mark
         spans = []
         if mark is None:
-            for found in re.finditer(rb"\S+", data[start:end]):
-                spans.append(self._bare(start + found.start(), start + found.end()))
+            for match in re.finditer(rb"\S+", data[start:end]):
+                spans.append(self._bare(start + match.start(), start + match.end()))
             return spans
-        at = start
+        begin = start
         while True:
-            stop = at
+            stop = begin
             while stop < end and data[stop : stop + 1] in (b" ", b"\t") and mark != b"\t":
                 stop += 1
             if data[stop : stop + 1] == b'"':
@@ -171,10 +172,10 @@ class Cells:
                 stop = end if closing < 0 else closing
             stop = data.find(mark, stop, end)
             stop = end if stop < 0 else stop
-            spans.append(self._bare(at, stop))
+            spans.append(self._bare(begin, stop))
             if stop >= end:
                 return spans
-            at = stop + 1
+            begin = stop + 1
 
     def _bare(self, start: int, end: int) -> Span:
         data = self.data
@@ -189,14 +190,14 @@ class Cells:
     def _lines(self) -> Iterator[tuple[int, int, int]]:
         """Number, start and end of the lines that are neither empty nor comments."""
         data = self.data
-        at = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+        begin = 3 if data[:3] == b"\xef\xbb\xbf" else 0
         ending = re.compile(rb"\r\n|\n|\r")
         number = 0
-        while at < len(data):
+        while begin < len(data):
             number += 1
-            found = ending.search(data, at)
-            stop, following = (len(data), len(data)) if found is None else found.span()
-            held = data[at:stop].strip()
+            match = ending.search(data, begin)
+            stop, following = (len(data), len(data)) if match is None else match.span()
+            held = data[begin:stop].strip()
             if held and not held.startswith(self._comments):
-                yield number, at, stop
-            at = following
+                yield number, begin, stop
+            begin = following

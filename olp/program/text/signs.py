@@ -1,4 +1,4 @@
-"""What texts of several dialects say, by which a dialect is detected."""
+"""Signs of a dialect in a text that several dialects share."""
 
 import re
 

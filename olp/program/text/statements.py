@@ -1,8 +1,8 @@
 """Lexer of statements, `[label =] MAJOR [/ minor, minor …]`, which APT and DMIS share.
 
 Bytes are never decoded. `$` at the end of a line joins the next line to it, also inside a token; `$$` starts
-a comment. Lines that say a plain point (`GOTO/x,y,z`, one line, no comment) are read in columns; all others
-become `Statement`s, one by one.
+a comment. Lines that state a plain point (`GOTO/x,y,z`, one line, no comment) are read in columns; all
+others become `Statement`s, one by one.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ Bytes = npt.NDArray[np.uint8]
 
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EDed][+-]?\d+)?\Z")
 _QUOTED = re.compile(rb"'[^'\r\n]*'")
-#: the last eight columns of a card: a number, perhaps behind letters
+#: the last eight columns of a card: a number, perhaps after letters
 _SEQUENCE = re.compile(rb"[A-Z]{0,4} *\d{1,8} *\Z")
 _CARD = re.compile(rb"(?m)^([^\r\n]{72})[^\r\n]{8}(?=\r?$)")
 _CONTINUED = re.compile(rb"\$[ \t]*\Z")
 _GROUPED = re.compile(rb"[()']")
 #: numbers of fewer digits are exact in any case
 _PLAIN_DIGITS = 13
-#: the most numbers that a plain point has: place and tool axis
+#: numbers of a plain point at most: position and tool axis
 _WIDEST = 6
 
 
 def shown(text: bytes) -> str:
-    """Words of a program, for a message."""
-    said = text.decode("ascii", "backslashreplace")
-    return "".join(c if c.isprintable() else "?" for c in said[:40])
+    """Words of a program in printable form, for a message."""
+    printable = text.decode("ascii", "backslashreplace")
+    return "".join(c if c.isprintable() else "?" for c in printable[:40])
 
 
 class Field(NamedTuple):
@@ -66,12 +66,12 @@ def number_of(text: bytes) -> tuple[int, int] | None:
     if not _NUMBER.match(text):
         return None
     body, _, power = text.upper().replace(b"D", b"E").partition(b"E")
-    found = slow_number(body)
-    if found is None or not power:
-        return found
+    pair = slow_number(body)
+    if pair is None or not power:
+        return pair
     if len(power) > 4:
         return None
-    mantissa, decimals = found[0], found[1] - int(power)
+    mantissa, decimals = pair[0], pair[1] - int(power)
     if abs(decimals) > 18:
         return None
     if decimals < 0:
@@ -82,7 +82,7 @@ def number_of(text: bytes) -> tuple[int, int] | None:
 @dataclass(slots=True, eq=False)
 class Statement:
     """One statement: `line` (from 1) and bytes `begin`..`end` of its first to its last line, its `text`
-    without comments and marks of continuation, and where each byte of that stands (None: from `begin` on)."""
+    without comments and marks of continuation, and where each byte of that is (None: from `begin` on)."""
 
     line: int
     begin: int
@@ -91,9 +91,9 @@ class Statement:
     where: list[int] | None = None
     lines: int = 1
 
-    def place(self, at: int) -> int:
-        """Where a byte of `text` stands in the program."""
-        return self.begin + at if self.where is None else self.where[at]
+    def place(self, index: int) -> int:
+        """Where a byte of `text` is in the program."""
+        return self.begin + index if self.where is None else self.where[index]
 
     def head(self) -> tuple[bytes, bytes]:
         """The label before an equals sign and the major word, in capitals, without blanks."""
@@ -104,16 +104,16 @@ class Statement:
         return label.strip().upper(), b" ".join(major.upper().split())
 
     def fields(self) -> list[Field]:
-        """The minor words behind the slash. Commas part them, and blanks between two numbers; a comma at the
-        end says nothing. Brackets hold a group together."""
-        at = self.text.find(b"/") + 1
-        if not at:
+        """The minor words after the slash. Commas separate them, and blanks between two numbers; a comma at the
+        end means nothing. Brackets keep a group together."""
+        begin = self.text.find(b"/") + 1
+        if not begin:
             return []
         text = self.text
-        if not _GROUPED.search(text, at):
-            return self._simple(at)
-        out, start, depth, quoted = [], at, 0, False
-        for i in range(at, len(text)):
+        if not _GROUPED.search(text, begin):
+            return self._simple(begin)
+        fields, start, depth, quoted = [], begin, 0, False
+        for i in range(begin, len(text)):
             c = text[i]
             if c == 39:
                 quoted = not quoted
@@ -124,17 +124,17 @@ class Statement:
             elif c == 41:
                 depth -= 1
             elif c == 44 and depth == 0:
-                out += self._parted(start, i)
+                fields += self._parted(start, i)
                 start = i + 1
         if text[start:].strip():
-            out += self._parted(start, len(text))
-        return out
+            fields += self._parted(start, len(text))
+        return fields
 
-    def _simple(self, at: int) -> list[Field]:
+    def _simple(self, position: int) -> list[Field]:
         """The minor words of a statement without brackets and quotes."""
-        out: list[Field] = []
+        fields: list[Field] = []
         begin, where = self.begin, self.where
-        pieces = self.text[at:].split(b",")
+        pieces = self.text[position:].split(b",")
         last = len(pieces) - 1
         for k, piece in enumerate(pieces):
             inner = piece.strip()
@@ -142,16 +142,16 @@ class Statement:
             if not inner and k == last:
                 break
             if not inner or b" " in inner or b"\t" in inner:
-                out += self._parted(at, at + size)
+                fields += self._parted(position, position + size)
             else:
-                start = at + piece.index(inner)
+                start = position + piece.index(inner)
                 stop = start + len(inner) - 1
                 if where is None:
-                    out.append(Field(inner.upper(), begin + start, begin + stop + 1))
+                    fields.append(Field(inner.upper(), begin + start, begin + stop + 1))
                 else:
-                    out.append(Field(inner.upper(), where[start], where[stop] + 1))
-            at += size + 1
-        return out
+                    fields.append(Field(inner.upper(), where[start], where[stop] + 1))
+            position += size + 1
+        return fields
 
     def _parted(self, a: int, b: int) -> list[Field]:
         """One minor word, or several numbers with blanks between them."""
@@ -171,8 +171,7 @@ class Chunk:
     text.
 
     `point` (m,) are the lines of plain points and `width` (m,) their numbers; `first` (m + 1,) leads to the
-    numbers: `mantissa` / 10**`decimals`, `start`, `end`. `others` are the lines, not blank, that are no plain
-    points.
+    numbers: `mantissa` / 10**`decimals`, `start`, `end`. `others` are the other lines that are not blank.
     """
 
     data: bytes
@@ -194,7 +193,7 @@ class Chunk:
         return self.data[int(self.line_start[line]) : int(self.line_end[line])]
 
     def statements(self, free: re.Pattern[bytes]) -> Iterator[Statement | Comment]:
-        """The statements and comments of the lines that are no plain points, in order. What begins as
+        """The statements and comments of the lines that are not plain points, in order. What begins as
         `free` says takes the rest of its line as text. Raises ProgramError for a `$` inside a statement."""
         lines = self.others.tolist()
         taken = -1
@@ -212,9 +211,9 @@ class Chunk:
                 taken = line
                 yield Statement(number, begin, begin + len(raw), raw)
             else:
-                found = self._joined(line)
-                taken = line + found.lines - 1
-                yield found
+                statement = self._joined(line)
+                taken = line + statement.lines - 1
+                yield statement
 
     def _joined(self, line: int) -> Statement:
         """A statement with its comment cut off and its further lines joined on."""
@@ -229,8 +228,8 @@ class Chunk:
             code = code[: mark.start()] if mark else code
             if b"$" in _QUOTED.sub(b"", code):
                 raise ProgramError(
-                    "a `$` stands inside a statement; expected it at the end of a line that goes on, or "
-                    "twice before a comment",
+                    "a `$` is inside a statement; expected it at the end of a line that goes on, "
+                    "or twice before a comment",
                     line=number + last - line,
                 )
             text += code
@@ -238,7 +237,7 @@ class Chunk:
             if mark is None:
                 break
             if last + 1 >= len(self.line_start):
-                raise ProgramError("the last line says with `$` that it goes on", line=number + last - line)
+                raise ProgramError("the last line ends with `$`, so it should go on; remove the `$`", line=number + last - line)
             last += 1
         end = int(self.line_end[last])
         return Statement(
@@ -258,12 +257,12 @@ class Comment:
 
 def _comment_at(raw: bytes) -> int:
     """Where the comment of a line opens, outside quotes; its length where there is none."""
-    at = raw.find(b"$$")
-    if at < 0:
+    start = raw.find(b"$$")
+    if start < 0:
         return len(raw)
     masked = _QUOTED.sub(lambda m: b"'" * len(m[0]), raw)
-    at = masked.find(b"$$")
-    return at if at >= 0 else len(raw)
+    start = masked.find(b"$$")
+    return start if start >= 0 else len(raw)
 
 
 def is_cards(data: bytes) -> bool:
@@ -277,29 +276,29 @@ def is_cards(data: bytes) -> bool:
 
 
 def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
-    """Lex a whole text, chunk by chunk, each ending at the end of a statement. The numbers of cards are blank
-    to it. Raises ProgramError for a text of two bytes a character."""
+    """Lex a whole text, chunk by chunk, each ending at the end of a statement. The numbers of cards are
+    read as blanks. Raises ProgramError for a text of two bytes per character."""
     if is_cards(data):
         data = _CARD.sub(rb"\1        ", data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise ProgramError("the text is UTF-16; expected one byte a character; save it as plain text", line=1)
+        raise ProgramError("the text is UTF-16; expected one byte per character; save it as plain text", line=1)
     if data[:3] == b"\xef\xbb\xbf":
-        # a byte order mark is blank to the lexer, and stays where it is
+        # the lexer reads a byte order mark as blanks; it stays in the text
         data = b"   " + data[3:]
     if b"\r" in data and data.count(b"\r") != data.count(b"\r\n"):
         data = data.replace(b"\r\n", b"\r\0").replace(b"\r", b"\n").replace(b"\n\0", b"\r\n")
     text = np.frombuffer(data, np.uint8)
-    at = line = 0
-    while at < len(data):
+    begin = line = 0
+    while begin < len(data):
         cut = len(data)
-        if at + size < len(data):
-            newline = data.find(b"\n", at + size)
-            while newline >= 0 and data[max(newline - 200, at) : newline].rstrip()[-1:] == b"$":
+        if begin + size < len(data):
+            newline = data.find(b"\n", begin + size)
+            while newline >= 0 and data[max(newline - 200, begin) : newline].rstrip()[-1:] == b"$":
                 newline = data.find(b"\n", newline + 1)
             cut = newline + 1 if newline >= 0 else cut
-        chunk = _lex(data, text[at:cut], at, line)
+        chunk = _lex(data, text[begin:cut], begin, line)
         line += len(chunk.line_start)
-        at = cut
+        begin = cut
         yield chunk
 
 
@@ -368,8 +367,8 @@ def _lex(data: bytes, text: Bytes, offset: int, first_line: int) -> Chunk:
 
 
 def _plain(text: Bytes, starts: Index, ends: Index, leading: Index) -> tuple[Mask, Index]:
-    """Lines that are `GOTO/` with numbers and nothing else, as far as their characters tell; where the slash
-    stands. A line behind one that ends with `$` is none."""
+    """Lines that may be `GOTO/` with numbers and nothing else, by their characters; where their slash is. A
+    line after one that ends with `$` is none."""
     lines = len(starts)
     size = len(text)
     upper = text & np.uint8(0xDF)
@@ -381,9 +380,9 @@ def _plain(text: Bytes, starts: Index, ends: Index, leading: Index) -> tuple[Mas
     for i, letter in enumerate(b"GOTO"):
         hot &= (padded[np.minimum(leading + i, size)] & 0xDF) == letter
     slashes = np.flatnonzero(text == 47)
-    place = np.searchsorted(slashes, starts)
-    hot &= np.searchsorted(slashes, ends) - place == 1
-    slash = np.append(slashes, size)[place]
+    rank = np.searchsorted(slashes, starts)
+    hot &= np.searchsorted(slashes, ends) - rank == 1
+    slash = np.append(slashes, size)[rank]
     # nothing but blanks between the word and its slash
     printed = np.cumsum(text > 32)
     inside = np.minimum(slash, size - 1)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 Format = Literal["svg", "png"]
 
-#: Sense of a component letter, the same colour and name for every axis.
-_SENSES = {
+#: Prefix and colour of a component by its letter, the same for every axis.
+_KINDS = {
     "X": ("EX", "tab:blue"),
     "Y": ("EY", "tab:orange"),
     "Z": ("EZ", "tab:green"),
@@ -27,6 +27,7 @@ _SENSES = {
     "B": ("EB", "tab:orange"),
     "C": ("EC", "tab:green"),
 }
+#: Points of a drawn curve.
 _POINTS = 400
 
 
@@ -48,10 +49,10 @@ def drawn(
     with matplotlib.rc_context(style):
         figure = Figure(figsize=size, layout="constrained")
         draw(figure)
-        out = io.BytesIO()
+        buffer = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(out, format=kind, dpi=160, metadata=metadata)
-    data = out.getvalue()
+        figure.savefig(buffer, format=kind, dpi=160, metadata=metadata)
+    data = buffer.getvalue()
     return data[data.index(b"<svg") :] if kind == "svg" else data
 
 
@@ -68,7 +69,7 @@ def calibration_curves(calibration: Calibration, kind: Format = "svg") -> bytes:
         figure = Figure(figsize=(11.0, 6.0), layout="constrained")
         plots = figure.subplots(2, 3, sharey="row", squeeze=False)
         for column, axis in enumerate(AXES):
-            for row, (senses, unit, scale) in enumerate(
+            for row, (kinds, unit, scale) in enumerate(
                 (("XYZ", "um", UM_PER_MM), ("ABC", "urad", 1.0 / RAD_PER_URAD))
             ):
                 plot = plots[row][column]
@@ -77,22 +78,22 @@ def calibration_curves(calibration: Calibration, kind: Format = "svg") -> bytes:
                 plot.set_ylabel(f"error in {unit}" if column == 0 else "")
                 plot.set_xlabel(f"{axis} in mm" if row == 1 else "")
                 plot.grid(color="0.9", linewidth=0.5)
-                for sense in senses:
-                    _draw(plot, calibration, axis, sense, scale)
+                for letter in kinds:
+                    _draw(plot, calibration, axis, letter, scale)
                 if plot.get_legend_handles_labels()[0]:
                     plot.legend(frameon=False, ncols=3, loc="best")
             plots[0][column].set_title(f"axis {axis}")
         title = f"{calibration.machine}: actual minus commanded, at the measuring lines"
         # a name may hold a $
         figure.suptitle(title, parse_math=False)
-        out = io.BytesIO()
+        buffer = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(out, format=kind, dpi=130, metadata=metadata)
-    return out.getvalue()
+        figure.savefig(buffer, format=kind, dpi=130, metadata=metadata)
+    return buffer.getvalue()
 
 
-def _draw(plot: Axes, calibration: Calibration, axis: str, sense: str, scale: float) -> None:
-    prefix, colour = _SENSES[sense]
+def _draw(plot: Axes, calibration: Calibration, axis: str, letter: str, scale: float) -> None:
+    prefix, colour = _KINDS[letter]
     name = prefix + axis
     for curve in calibration.curves_of(axis):
         if name not in curve.names:

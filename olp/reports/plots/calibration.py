@@ -1,5 +1,5 @@
-"""Plots of measured lines as a metrologist expects them: positioning after ISO 230-2, pitch, yaw and roll,
-bidirectional straightness, squareness pairs, reversal, circles, and what a fit left."""
+"""Plots of measured lines: positioning after ISO 230-2, pitch, yaw and roll, bidirectional straightness,
+squareness pairs, reversal, circles, and residuals of a fit."""
 
 from __future__ import annotations
 
@@ -25,11 +25,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Approached in + and in -, and the mean of both.
-UP, DOWN, MEAN = "#1f6fb2", "#c0453a", "0.15"
+#: Colour of readings approached in +.
+UP = "#1f6fb2"
+#: Colour of readings approached in -.
+DOWN = "#c0453a"
+#: Colour of the mean of both.
+MEAN = "0.15"
 _SIDES = {1: (UP, "+"), -1: (DOWN, "-")}
-#: What a turn is called by the axis that moves: roll about it, yaw about the vertical, pitch about the third.
+#: Index of the axis about which a component turns.
 _ABOUT = {"A": 0, "B": 1, "C": 2}
+#: Width of a plot in inches.
 _WIDTH = 7.4
 #: Component curves of this many points are smooth to the eye.
 _DENSE = 300
@@ -37,8 +42,8 @@ _DENSE = 300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """A line beside the curve that a fit made of it: (m,) positions of the curve, its value there and its
-    standard uncertainty, the readings (n,) brought to the same zero and slope, all in mm or rad."""
+    """A line and its fitted curve: (m,) positions of the curve, its value there and its standard uncertainty,
+    the readings (n,) with the same zero and slope, all in mm or rad."""
 
     line: Line
     position_mm: Array
@@ -80,7 +85,7 @@ def positioning(evaluation: Evaluation, kind: Format = "svg") -> bytes:
 
 
 def angles(evaluations: Sequence[Evaluation], vertical: str = "Z", kind: Format = "svg") -> bytes:
-    """Roll, pitch and yaw of one axis, a plot each, both directions."""
+    """Roll, pitch and yaw of one axis, one plot each, both directions."""
     return _stack("angles", evaluations, lambda name: name_of_turn(name, vertical), kind)
 
 
@@ -100,11 +105,11 @@ def _stack(name: str, evaluations: Sequence[Evaluation], words: Callable[[str], 
         for plot, evaluation in zip(plots, evaluations, strict=True):
             unit, scale = scale_of(evaluation.line)
             _both(plot, evaluation, scale)
-            found = evaluation.figures()
-            keys: list[str] = [key for key in ("E", "M", "B", "R") if key in found] or list(found)
-            said = ", ".join(f"{_symbol(key)} = {found[key] * scale:.2f}" for key in keys)
+            figures = evaluation.figures()
+            keys: list[str] = [key for key in ("E", "M", "B", "R") if key in figures] or list(figures)
+            values = ", ".join(f"{_symbol(key)} = {figures[key] * scale:.2f}" for key in keys)
             plot.set_title(
-                f"{evaluation.component}, {words(evaluation.component)}: {said} {unit}", loc="left"
+                f"{evaluation.component}, {words(evaluation.component)}: {values} {unit}", loc="left"
             )
             plot.set_ylabel(f"in {unit}")
         plots[-1].set_xlabel(f"{evaluations[0].component[2]} in mm")
@@ -141,8 +146,8 @@ def _both(plot: Axes, evaluation: Evaluation, scale: float) -> None:
 
 
 def _zero(evaluation: Evaluation) -> float:
-    """What the evaluation took from the readings of a straightness, besides its slope; of others, which have
-    no zero of their own, the mean of the first target."""
+    """The zero that the evaluation subtracts from the readings of a straightness, besides its slope; of other
+    quantities, which have no zero, the mean of the first target."""
     line = evaluation.line
     if line.quantity != "straightness":
         return float(evaluation.mean[0])
@@ -152,7 +157,7 @@ def _zero(evaluation: Evaluation) -> float:
 
 
 def _shift(evaluation: Evaluation) -> float:
-    """What a plot takes from the means of the evaluation."""
+    """The offset that a plot subtracts from the means of the evaluation."""
     return 0.0 if evaluation.line.quantity == "straightness" else float(evaluation.mean[0])
 
 
@@ -165,37 +170,38 @@ def _figures(side: Axes, plot: Axes, evaluation: Evaluation, unit: str, scale: f
     """Spans of A, E and M at the height of the plot, and all figures as a table."""
     side.set_axis_off()
     side.set(xlim=(0, 1), ylim=plot.get_ylim())
-    found = evaluation.figures()
+    figures = evaluation.figures()
     spans: list[tuple[str, Array]] = []
-    if "A" in found:
+    if "A" in figures:
         means = np.array([s.mean for s in evaluation.sides])
         spread = 2.0 * np.array([s.s for s in evaluation.sides])
         ends = np.array([(means - spread).min(), (means + spread).max()])
         spans = [("A", ends), ("E", np.array([means.min(), means.max()]))]
         spans.append(("M", np.array([evaluation.mean.min(), evaluation.mean.max()])))
     for k, (name, ends) in enumerate(spans):
-        at = 0.05 + 0.13 * k
+        x = 0.05 + 0.13 * k
         low, high = (ends - _shift(evaluation)) * scale
         side.annotate(
-            "", (at, low), (at, high), arrowprops={"arrowstyle": "<->", "color": "0.3", "linewidth": 0.8}
+            "", (x, low), (x, high), arrowprops={"arrowstyle": "<->", "color": "0.3", "linewidth": 0.8}
         )
-        side.text(at, high, name, ha="center", va="bottom", fontsize=8, fontweight="bold")
-    rows = "\n".join(f"{_symbol(key)} = {value * scale:.2f}" for key, value in found.items())
+        side.text(x, high, name, ha="center", va="bottom", fontsize=8, fontweight="bold")
+    rows = "\n".join(f"{_symbol(key)} = {value * scale:.2f}" for key, value in figures.items())
     side.text(0.46, 0.5, f"in {unit}\n{rows}", transform=side.transAxes, va="center", linespacing=1.5)
 
 
 def squareness(pair: Pair, kind: Format = "svg") -> bytes:
-    """Both straightness lines of a pair as read, with their slopes, and the sum that is the squareness."""
+    """Both straightness lines of a pair as measured, with their slopes, and the squareness, which is their
+    sum."""
     reading = pair.reading
 
     def draw(figure: Figure) -> None:
         plots = figure.subplots(1, 2)
         total = 0.0
         for plot, line in zip(plots, (pair.first, pair.second), strict=True):
-            found = slope_of(line)
-            total += found.slope
+            slope = slope_of(line)
+            total += slope.slope
             middle = line.target_mm.mean()
-            x = np.array(found.span_mm)
+            x = np.array(slope.span_mm)
             for d, (colour, sign) in _SIDES.items():
                 rows = line.direction == d
                 if rows.any():
@@ -204,10 +210,10 @@ def squareness(pair: Pair, kind: Format = "svg") -> bytes:
                         color=colour, markersize=3, alpha=0.5, markeredgewidth=0,
                         label=f"approached in {sign}",
                     )  # fmt: skip
-            plot.plot(x, found.slope * (x - middle) * UM_PER_MM, color=MEAN, linewidth=1.0, label="mean line")
+            plot.plot(x, slope.slope * (x - middle) * UM_PER_MM, color=MEAN, linewidth=1.0, label="mean line")
             plot.set_title(
-                f"{line.component}: slope {found.slope / RAD_PER_URAD:+.2f} urad "
-                f"($\\pm${2 * found.sigma / RAD_PER_URAD:.2f})"
+                f"{line.component}: slope {slope.slope / RAD_PER_URAD:+.2f} urad "
+                f"($\\pm${2 * slope.sigma / RAD_PER_URAD:.2f})"
             )
             plot.set(xlabel=f"{line.component[2]} in mm", ylabel=f"in {line.component[1]}, um")
             plot.grid(color="0.92", linewidth=0.5)
@@ -225,12 +231,12 @@ def squareness(pair: Pair, kind: Format = "svg") -> bytes:
     return drawn(f"squareness-{reading.component}", (_WIDTH, 2.9), draw, kind)
 
 
-def reversals(found: Sequence[Reversal], kind: Format = "svg") -> bytes:
-    """B at each target with its standard uncertainty doubled, and the one number of each line."""
+def reversals(measured: Sequence[Reversal], kind: Format = "svg") -> bytes:
+    """B at each target with twice its standard uncertainty, and the mean of each line."""
 
     def draw(figure: Figure) -> None:
-        plots = figure.subplots(1, len(found), squeeze=False)[0]
-        for plot, reversal in zip(plots, found, strict=True):
+        plots = figure.subplots(1, len(measured), squeeze=False)[0]
+        for plot, reversal in zip(plots, measured, strict=True):
             unit, scale = scale_of(reversal.line)
             plot.axhline(0.0, color="0.6", linewidth=0.6)
             plot.errorbar(
@@ -246,7 +252,7 @@ def reversals(found: Sequence[Reversal], kind: Format = "svg") -> bytes:
             plot.grid(color="0.92", linewidth=0.5)
             plot.legend(frameon=False, fontsize=7)
 
-    name = "-".join(r.line.component for r in found)
+    name = "-".join(r.line.component for r in measured)
     return drawn(f"reversals-{name}", (_WIDTH, 2.4), draw, kind)
 
 
@@ -273,12 +279,12 @@ def cyclic(separation: Separation, kind: Format = "svg") -> bytes:
         dense = np.linspace(0.0, longest, _DENSE)
         part = sum((h.at(dense) for h in waves), np.zeros(_DENSE))
         over.plot(dense, part * scale, color=MEAN, linewidth=1.0)
-        said = ", ".join(
+        amplitudes = ", ".join(
             f"{h.period_mm:g} mm: {h.amplitude * scale:.2f} $\\pm$ {2 * h.sigma_amplitude * scale:.2f} {unit}"
             for h in waves
         )
         over.set(xlabel=f"position modulo {longest:g} mm")
-        over.set_title(said, fontsize=7)
+        over.set_title(amplitudes, fontsize=7)
         for plot in (along, over):
             plot.grid(color="0.92", linewidth=0.5)
         along.legend(frameon=False, fontsize=7)
@@ -286,16 +292,16 @@ def cyclic(separation: Separation, kind: Format = "svg") -> bytes:
     return drawn(f"cyclic-{separation.line.component}", (_WIDTH, 2.4), draw, kind)
 
 
-def circle(found: CircleFit, kind: Format = "svg") -> bytes:
-    """Radial deviations of both directions, the centre taken out, and what the fit leaves of them."""
-    c = found.circles
+def circle(fit: CircleFit, kind: Format = "svg") -> bytes:
+    """Radial deviations of both directions with the centre removed, and their residuals."""
+    c = fit.circles
 
     def draw(figure: Figure) -> None:
-        seen = c.value - found.value[1] * np.cos(c.angle_rad) - found.value[2] * np.sin(c.angle_rad)
-        seen = seen - found.value[0]
-        for k, (title, value) in enumerate((("as read", seen), ("left by the fit", found.residual))):
+        reading = c.value - fit.value[1] * np.cos(c.angle_rad) - fit.value[2] * np.sin(c.angle_rad)
+        reading = reading - fit.value[0]
+        for k, (title, value) in enumerate((("as measured", reading), ("residual of the fit", fit.residual))):
             plot = figure.add_subplot(1, 2, k + 1, projection="polar")
-            top = max(float(np.abs(seen).max()), 1e-4) * UM_PER_MM
+            top = max(float(np.abs(reading).max()), 1e-4) * UM_PER_MM
             for d, name in ((1, "counter-clockwise"), (-1, "clockwise")):
                 for run in np.unique(c.run[c.direction == d]):
                     rows = (c.direction == d) & (c.run == run)
@@ -324,7 +330,7 @@ def circle(found: CircleFit, kind: Format = "svg") -> bytes:
 
 
 def fitted(lines: Sequence[Fitted], kind: Format = "svg") -> bytes:
-    """Readings of lines and the curve that the fit made of them, with its +-2 sigma band."""
+    """Readings of lines and their fitted curve, with its +-2 sigma band."""
 
     def draw(figure: Figure) -> None:
         for plot, item in zip(_grid(figure, len(lines)), lines, strict=False):
@@ -340,18 +346,18 @@ def fitted(lines: Sequence[Fitted], kind: Format = "svg") -> bytes:
     return drawn("fitted", _grid_size(len(lines)), draw, kind)
 
 
-def residuals(found: Sequence[tuple[Line, Array]], kind: Format = "svg") -> bytes:
-    """What a fit leaves of every line: the line and its residuals (n,) in mm or rad."""
+def residuals(lines: Sequence[tuple[Line, Array]], kind: Format = "svg") -> bytes:
+    """Residuals (n,) of a fit in mm or rad, of every line."""
 
     def draw(figure: Figure) -> None:
-        for plot, (line, residual) in zip(_grid(figure, len(found)), found, strict=False):
+        for plot, (line, residual) in zip(_grid(figure, len(lines)), lines, strict=False):
             unit, scale = scale_of(line)
             plot.axhline(0.0, color="0.5", linewidth=0.6)
             _readings(plot, line.target_mm, residual * scale, line.direction)
             rms = float(np.sqrt((residual**2).mean())) * scale
             plot.set_title(f"{line.component}: {rms:.2f} {unit} rms", loc="left", fontsize=7.5)
 
-    return drawn("residuals", _grid_size(len(found)), draw, kind)
+    return drawn("residuals", _grid_size(len(lines)), draw, kind)
 
 
 def _readings(plot: Axes, x: Array, value: Array, direction: Index) -> None:

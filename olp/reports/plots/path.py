@@ -12,24 +12,29 @@ from olp.comparison.path import Path
 from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
 from olp.reports.plots.base import drawn
+from olp.reports.report import SIDES
 from olp.uncertainty.spread import Confidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Colour of a group of runs.
 COLOURS = {"before": "#c0453a", "after": "#1f6fb2"}
+#: Colour of the nominal path.
 _NOMINAL = "#9aa3ab"
+#: Columns of a plot along the path.
 _COLUMNS = 900
+#: Most points that are drawn.
 _DRAWN = 30_000
-#: smallest deviation that a logarithmic axis shows
+#: Smallest deviation that a logarithmic axis shows, in um.
 _FLOOR_UM = 1e-2
 
 Runs = Mapping[str, Sequence[Run]]
 
 
 def picture(path: Path, runs: Runs) -> bytes:
-    """The path in plan view, coloured by its distance from the nominal one, before and after."""
+    """The path in plan view, coloured by its distance from the nominal one, uncorrected and corrected."""
 
     def draw(figure: Figure) -> None:
         from matplotlib.collections import LineCollection
@@ -52,7 +57,7 @@ def picture(path: Path, runs: Runs) -> bytes:
                     linewidths=1.1, rasterized=True,
                 )  # fmt: skip
                 plot.add_collection(pieces)
-            plot.set(aspect="equal", title=name, xlabel="X in mm", ylabel="Y in mm")
+            plot.set(aspect="equal", title=SIDES[name], xlabel="X in mm", ylabel="Y in mm")
             plot.autoscale_view()
         if pieces is not None:
             figure.colorbar(pieces, ax=list(plots), label="distance from the nominal path in um", shrink=0.8)
@@ -100,14 +105,14 @@ def along(path: Path, runs: Runs, tolerance_um: float | None) -> bytes:
                 size = run.deviation.across[run.counted] * UM_PER_MM
                 np.minimum.at(low, column, size)
                 np.maximum.at(high, column, size)
-            seen = np.isfinite(low)
+            filled = np.isfinite(low)
             bands = (
-                np.maximum(np.where(seen, low, np.nan), _FLOOR_UM),
-                np.maximum(np.where(seen, high, np.nan), _FLOOR_UM),
+                np.maximum(np.where(filled, low, np.nan), _FLOOR_UM),
+                np.maximum(np.where(filled, high, np.nan), _FLOOR_UM),
             )
             middle = (edges[1:] + edges[:-1]) / 2e3
             plot.fill_between(middle, *bands, color=COLOURS[name], alpha=0.35, linewidth=0, step="mid")
-            plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{name}, largest")
+            plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{SIDES[name]}, largest")
         _tolerance(plot, tolerance_um)
         plot.set_yscale("log")
         plot.set(xlabel="along the path in m", ylabel="distance in um", xlim=(0.0, path.length_mm / 1e3))
@@ -123,7 +128,7 @@ def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
 
 
 def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
-    """How many points are how far from the nominal path, before and after."""
+    """Histogram of the distances from the nominal path, uncorrected and corrected."""
 
     def draw(figure: Figure) -> None:
         plot = figure.subplots()
@@ -137,7 +142,7 @@ def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
         for name, size in sizes.items():
             count, _ = np.histogram(np.maximum(size, _FLOOR_UM * 1.001), edges)
             plot.stairs(count / len(size) * 100, edges, fill=True, alpha=0.35, color=COLOURS[name])
-            plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=name)
+            plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=SIDES[name])
         if tolerance_um is not None:
             plot.axvline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
         plot.set_xscale("log")
@@ -148,34 +153,35 @@ def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
     return drawn("histogram", (7.4, 2.2), draw)
 
 
-def bands(found: Confidence) -> bytes:
-    """Expected distance from the nominal place at way-points with its band, and the probability of being
-    within the tolerance, before and after, along the program; where points are many the least sure ones."""
+def bands(confidence: Confidence) -> bytes:
+    """Expected distance from the nominal point at waypoints with its band, and the probability of being
+    within the tolerance, uncorrected and corrected, along the program. Of many points the least probable ones
+    are shown."""
 
     def draw(figure: Figure) -> None:
         plot, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        step = np.sqrt((np.diff(found.points.axis_mm, axis=0) ** 2).sum(axis=1))
-        way = np.concatenate(([0.0], np.cumsum(step))) / 1e3
-        column = np.unique(np.linspace(0, len(way), _COLUMNS + 1).astype(int)[:-1])
-        middle = way[column]
+        step = np.sqrt((np.diff(confidence.points.axis_mm, axis=0) ** 2).sum(axis=1))
+        arc_m = np.concatenate(([0.0], np.cumsum(step))) / 1e3
+        column = np.unique(np.linspace(0, len(arc_m), _COLUMNS + 1).astype(int)[:-1])
+        middle = arc_m[column]
         for name, deviation, inside in (
-            ("before", found.points.before_mm, found.within_before),
-            ("after", found.points.after_mm, found.within_after),
+            ("before", confidence.points.before_mm, confidence.within_before),
+            ("after", confidence.points.after_mm, confidence.within_after),
         ):
             size = np.sqrt((deviation**2).sum(axis=1))
-            high = np.maximum.reduceat(size + found.band_mm, column) * UM_PER_MM
-            low = np.minimum.reduceat(np.maximum(size - found.band_mm, 0.0), column) * UM_PER_MM
+            high = np.maximum.reduceat(size + confidence.band_mm, column) * UM_PER_MM
+            low = np.minimum.reduceat(np.maximum(size - confidence.band_mm, 0.0), column) * UM_PER_MM
             colour = COLOURS[name]
             plot.fill_between(middle, low, high, color=colour, alpha=0.3, linewidth=0, step="mid")
             expected = np.maximum.reduceat(size, column) * UM_PER_MM
-            plot.plot(middle, expected, color=colour, linewidth=0.8, label=name)
+            plot.plot(middle, expected, color=colour, linewidth=0.8, label=SIDES[name])
             least = 100.0 * np.minimum.reduceat(inside, column)
             below.plot(middle, least, color=colour, linewidth=0.8, drawstyle="steps-mid")
-        _tolerance(plot, found.within_mm * UM_PER_MM)
+        _tolerance(plot, confidence.within_mm * UM_PER_MM)
         plot.set(ylabel="distance in um")
         plot.set_ylim(bottom=0.0)
-        below.set(xlabel="along the way-points in m", ylabel="within, %", ylim=(-3, 103))
-        below.set_xlim(0.0, max(float(way[-1]), 1e-6))
+        below.set(xlabel="along the waypoints in m", ylabel="within, %", ylim=(-3, 103))
+        below.set_xlim(0.0, max(float(arc_m[-1]), 1e-6))
         for part in (plot, below):
             part.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
@@ -195,7 +201,7 @@ def components(path: Path, runs: Runs) -> bytes:
                     rows = rows[:: max(len(rows) // _DRAWN, 1)]
                     value = getattr(run.deviation, side)[rows] * UM_PER_MM
                     plot.plot(run.pairing.s_mm[rows] / 1e3, value, ",", color=COLOURS[name], rasterized=True)
-                    plot.plot([], [], color=COLOURS[name], label=name)
+                    plot.plot([], [], color=COLOURS[name], label=SIDES[name])
             plot.set_ylabel(f"{side} in um")
             plot.grid(color="0.92", linewidth=0.5)
         plots[0].legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
@@ -219,7 +225,7 @@ def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
                     np.append(value, value[0]),
                     color=COLOURS[name],
                     linewidth=1.0,
-                    label=name,
+                    label=SIDES[name],
                 )
             plot.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color="0.4", linewidth=0.6)
             plot.set_ylim(-2.5 * top, 1.3 * top)
@@ -242,7 +248,9 @@ def diagonals(rows: Sequence[Mapping[str, Any]]) -> bytes:
             for name in ("before", "after"):
                 value = row[name]["deviation_um"]
                 share = np.linspace(0.02, 0.98, len(value)) * row["length_mm"]
-                plot.plot(share, value, ".-", color=COLOURS[name], linewidth=0.9, markersize=2.5, label=name)
+                plot.plot(
+                    share, value, ".-", color=COLOURS[name], linewidth=0.9, markersize=2.5, label=SIDES[name]
+                )
             plot.axhline(0.0, color="0.5", linewidth=0.5)
             plot.set(title=row["name"], xlabel="mm")
             plot.title.set_fontsize(8)

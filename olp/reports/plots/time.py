@@ -19,14 +19,17 @@ from olp.trajectory.usage import feeds_of_pieces
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+#: Colours of X, Y and Z.
 _COLOURS = ("tab:blue", "tab:orange", "tab:green")
+#: Names and units of the plots.
 _QUANTITIES = (("velocity", "mm/s"), ("acceleration", "mm/s2"), ("jerk", "mm/s3"))
-#: columns of the picture; where more happens than that, each shows what lies between its extremes
+#: Columns of the picture; of longer motions each column shows the range between its extremes.
 _COLUMNS = 1500
-#: places looked at in a piece
-_PLACES = 5
+#: Sampled instants of a piece.
+_INSTANTS = 5
+#: Pieces that are sampled at once, to bound memory.
 _BLOCK = 1 << 13
-#: pieces that are drawn as lines
+#: Most pieces that are drawn as lines.
 _FEW = 1000
 
 
@@ -34,7 +37,7 @@ def motion_plot(
     trajectory: Trajectory, route: Route, title: str, kind: Format = "svg", *,
     from_s: float = 0.0, to_s: float | None = None,
 ) -> bytes:  # fmt: skip
-    """The motion from `from_s` to `to_s`. Raises UsageError for a span with nothing in it.
+    """The motion from `from_s` to `to_s`. Raises UsageError for an empty span.
 
     The same trajectory gives the same bytes.
     """
@@ -81,14 +84,14 @@ def motion_plot(
         plots[3].set_xlim(from_s, end)
         # a name may hold a $
         figure.suptitle(title, parse_math=False)
-        out = io.BytesIO()
+        buffer = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(out, format=kind, dpi=130, metadata=metadata)
-    return out.getvalue()
+        figure.savefig(buffer, format=kind, dpi=130, metadata=metadata)
+    return buffer.getvalue()
 
 
 def _draw(plot: Axes, time: Array, state: Array, colour: str, label: str) -> None:
-    """A line (2 equal rows), or what lies between least and most."""
+    """A line (2 equal rows), or the band between least and most."""
     low, high = state
     if low is high or (low == high).all():
         plot.plot(time, low, color=colour, linewidth=0.9, label=label)
@@ -97,13 +100,13 @@ def _draw(plot: Axes, time: Array, state: Array, colour: str, label: str) -> Non
 
 
 def _states(trajectory: Trajectory, pieces: Index, from_s: float, to_s: float) -> tuple[Array, Array]:
-    """(n,) times and (n, 10) speed, velocities, accelerations and jerks in places of the pieces."""
+    """(n,) times and (n, 10) speed, velocities, accelerations and jerks at instants of the pieces."""
     motion = trajectory.motion
     begin = np.maximum(motion.start_s[pieces], from_s)
     width = np.minimum(motion.start_s[pieces + 1], to_s) - begin
-    time = begin[:, None] + width[:, None] * np.linspace(0.0, 1.0, _PLACES)
+    time = begin[:, None] + width[:, None] * np.linspace(0.0, 1.0, _INSTANTS)
     u = time - motion.start_s[pieces, None]
-    _, velocity, acceleration, jerk = motion.of(np.repeat(pieces, _PLACES), u.ravel())
+    _, velocity, acceleration, jerk = motion.of(np.repeat(pieces, _INSTANTS), u.ravel())
     speed = np.sqrt((velocity * velocity).sum(axis=1))
     return time.ravel(), np.column_stack((speed, velocity, acceleration, jerk))
 
@@ -127,7 +130,7 @@ def _bands(
         np.minimum.at(low, column, states)
         np.maximum.at(high, column, states)
     middle: Array = from_s + (np.arange(_COLUMNS, dtype=float) + 0.5) / scale
-    # columns inside a long piece have no place of their own
+    # columns inside a long piece have no sampled instant
     empty = np.flatnonzero(~np.isfinite(low[:, 0]))
     _, velocity, acceleration, jerk = trajectory.motion.at(middle[empty])
     speed = np.sqrt((velocity * velocity).sum(axis=1))

@@ -20,7 +20,7 @@ from olp.files.tables import read_curves
 from olp.files.write import write_files
 
 numbers = st.floats(-1.0, 1.0, allow_nan=False).map(lambda v: v + 0.0)
-#: what a person writes: at most 15 digits
+#: Numbers of at most 15 digits, as a person writes them.
 written = st.integers(-(10**9), 10**9).map(lambda n: n * 1e-6)
 
 
@@ -35,11 +35,11 @@ def curves(draw: st.DrawFn, axis: str) -> tuple[Curve, ...]:
     def values(group: list[str]) -> dict[str, list[float]]:
         return {name: draw(st.lists(numbers, min_size=n + 2, max_size=n + 2)) for name in group}
 
-    out = []
+    made = []
     for group in groups:
         if group:
             both = draw(st.booleans())
-            out.append(
+            made.append(
                 Curve(
                     axis,
                     np.array(position),
@@ -52,13 +52,13 @@ def curves(draw: st.DrawFn, axis: str) -> tuple[Curve, ...]:
                     draw(st.sampled_from(["linear", "pchip"])),
                 )
             )
-    return tuple(out)
+    return tuple(made)
 
 
 @st.composite
 def calibrations(draw: st.DrawFn) -> Calibration:
-    found = tuple(curve for axis in AXES for curve in draw(curves(axis)))
-    play = {c.axis for c in found if c.forward}
+    drawn = tuple(curve for axis in AXES for curve in draw(curves(axis)))
+    play = {c.axis for c in drawn if c.forward}
     x, y, z = (0.0 if axis in play else shifted(draw(written), -3) for axis in AXES)
     cyclic = tuple(
         Cyclic(name, draw(st.floats(0.1, 50.0)), shifted(draw(written), -3 if name[1] in AXES else -6), 0.3)
@@ -69,7 +69,7 @@ def calibrations(draw: st.DrawFn) -> Calibration:
         box_mm=np.array([[0.0, 100.0]] * 3),
         model=draw(st.sampled_from(["rigid-body", "huddersfield"])),
         datum_mm=draw(st.tuples(numbers, numbers, numbers)),
-        curves=found,
+        curves=drawn,
         squareness={name: shifted(draw(written), -6) for name in SQUARENESS},
         backlash_mm=(x, y, z),
         cyclic=cyclic,
@@ -81,8 +81,8 @@ def calibrations(draw: st.DrawFn) -> Calibration:
 
 
 def parts(calibration: Calibration) -> object:
-    """All that a calibration holds, as plain values; the own entry of a line counts nothing."""
-    found = []
+    """All that a calibration holds, as plain values, without the own entry of a line."""
+    listed = []
     for curve in calibration.curves:
         line = [
             v for a, v in zip(AXES, curve.line_mm or calibration.datum_mm, strict=True) if a != curve.axis
@@ -91,12 +91,12 @@ def parts(calibration: Calibration) -> object:
             {name: values.tolist() for name, values in getattr(curve, part).items()}
             for part in ("columns", "forward", "backward")
         ]
-        found.append((curve.axis, curve.position_mm.tolist(), columns, line, curve.tool_mm, curve.reference,
+        listed.append((curve.axis, curve.position_mm.tolist(), columns, line, curve.tool_mm, curve.reference,
                       curve.interpolation))  # fmt: skip
     names = ("machine", "model", "datum_mm", "backlash_mm", "cyclic", "thermal", "temperature_degC",
              "measured", "valid_until", "active_during_measurement")  # fmt: skip
     rest = {name: getattr(calibration, name) for name in names}
-    return found, calibration.box_mm.tolist(), dict(calibration.squareness), rest
+    return listed, calibration.box_mm.tolist(), dict(calibration.squareness), rest
 
 
 @pytest.mark.slow
@@ -131,7 +131,7 @@ def calibration(**options: object) -> Calibration:
     return Calibration(**(given | {"measured": datetime.date(2026, 5, 14)} | options))
 
 
-def test_uncertainties_stand_beside_their_columns(tmp_path: Path) -> None:
+def test_uncertainties_are_beside_their_columns(tmp_path: Path) -> None:
     target = tmp_path / "gantry.toml"
     files = calibration_files(calibration(), target, sigma={"ECX": np.array([1e-6, 2.5e-6])})
     assert [path.name for path in files] == ["gantry.toml", "gantry-x.csv"]
@@ -143,7 +143,7 @@ def test_uncertainties_stand_beside_their_columns(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "sigma", "found"),
+    ("options", "sigma", "message"),
     [
         ({"measured": None}, {}, "date of measuring"),
         ({}, {"EYY": np.zeros(2)}, "EYY fits no curve"),
@@ -152,7 +152,7 @@ def test_uncertainties_stand_beside_their_columns(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_written_is_refused(
-    options: dict[str, object], sigma: dict[str, np.ndarray], found: str
+    options: dict[str, object], sigma: dict[str, np.ndarray], message: str
 ) -> None:
-    with pytest.raises(ConfigError, match=found):
+    with pytest.raises(ConfigError, match=message):
         calibration_files(calibration(**options), Path("c.toml"), sigma=sigma)

@@ -1,4 +1,4 @@
-"""What every format of compensation tables must do; whatever is registered is judged, by its name or not."""
+"""What every format of compensation tables must do. Every registered format is judged."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ every_format = pytest.mark.parametrize("form", FORMATS.values(), ids=FORMATS)
 
 
 def everything(scale: float = 1.0) -> Calibration:
-    """All components, two of them in both directions, squareness, and a lost motion."""
+    """All components, two of them in both directions, squareness, and a backlash."""
     curves = []
     for k, name in enumerate(COMPONENTS, 1):
         values = scale * k * np.array([0.0, 1e-3, -1e-3, 2e-3]) * (1.0 if name[1] in AXES else 1e-2)
@@ -95,7 +95,7 @@ def test_once_read_its_bytes_come_back(form: Format) -> None:
 
 
 @every_format
-def test_its_sense_is_its_own_or_stated(form: Format) -> None:
+def test_its_sign_convention_is_its_own_or_stated(form: Format) -> None:
     exported, nothing = written(form, everything()), Given(machine="g", travel_mm=TRAVEL)
     if form.sense is not None:
         assert written(form, everything(), given_for(form, form.sense)).files == exported.files
@@ -110,34 +110,34 @@ def test_its_sense_is_its_own_or_stated(form: Format) -> None:
 @every_format
 def test_what_it_cannot_hold_is_a_finding(form: Format) -> None:
     exported = written(form, everything())
-    lost = {*COMPONENTS, *SQUARENESS} - exported.corrects
-    said = " ".join(f.message for f in exported.findings if f.code == "OLP871")
-    assert lost == {name for name in (*COMPONENTS, *SQUARENESS) if name in said}
-    motion = [
-        f for f in exported.findings if f.code in ("OLP871", "OLP875") and "lost motion of X" in f.message
+    omitted = {*COMPONENTS, *SQUARENESS} - exported.corrects
+    messages = " ".join(f.message for f in exported.findings if f.code == "OLP871")
+    assert omitted == {name for name in (*COMPONENTS, *SQUARENESS) if name in messages}
+    backlash = [
+        f for f in exported.findings if f.code in ("OLP871", "OLP875") and "backlash of X" in f.message
     ]
-    assert len(motion) == 1
+    assert len(backlash) == 1
     assert {name for name, value in numbers(reread(form, exported).calibration) if value} <= {
         *COMPONENTS, *SQUARENESS
-    } - lost  # fmt: skip
+    } - omitted  # fmt: skip
 
 
 @every_format
 def test_a_calibration_of_zeros_gives_a_table_of_zeros(form: Format) -> None:
-    found = reread(form, written(form, everything(0.0))).calibration
-    assert list(numbers(found)) and not any(value for _, value in numbers(found))
-    assert found.backlash_mm == (0.0, 0.0, 0.0)
-    moved = form.control(found, "FXYZ").offset(TRAVEL.T.copy(), np.zeros(3), np.ones((2, 3)))
+    read = reread(form, written(form, everything(0.0))).calibration
+    assert list(numbers(read)) and not any(value for _, value in numbers(read))
+    assert read.backlash_mm == (0.0, 0.0, 0.0)
+    moved = form.control(read, "FXYZ").offset(TRAVEL.T.copy(), np.zeros(3), np.ones((2, 3)))
     assert not moved.any()
 
 
 @every_format
-def test_its_control_takes_the_error_off(form: Format) -> None:
-    found = reread(form, written(form, everything())).calibration
-    at, still = np.array([[100.0, 100.0, 100.0]]), np.zeros((1, 3))
+def test_its_control_subtracts_the_error(form: Format) -> None:
+    read = reread(form, written(form, everything())).calibration
+    position_mm, still = np.array([[100.0, 100.0, 100.0]]), np.zeros((1, 3))
     moved, opposite = (
-        form.control(c, "FXYZ").offset(at, np.zeros(3), still)
-        for c in (found, reread(form, written(form, everything(-1.0))).calibration)
+        form.control(c, "FXYZ").offset(position_mm, np.zeros(3), still)
+        for c in (read, reread(form, written(form, everything(-1.0))).calibration)
     )
     assert np.abs(moved).max() > 1e-4
     assert np.allclose(moved, -opposite, atol=1e-5)
@@ -150,8 +150,8 @@ def test_what_is_no_table_is_refused(form: Format, data: bytes) -> None:
         form.read(Path(f"folder/g{form.ending}"), given_for(form), lambda path: data)
 
 
-def test_nobody_else_names_a_format() -> None:
-    """Names that dialects bear as well are not looked for."""
+def test_no_other_module_names_a_format() -> None:
+    """Names that are dialects too are not checked."""
     names = set(FORMATS) - set(DIALECTS)
     for path in PACKAGE.rglob("*.py"):
         if path.parent.name == "control_tables":

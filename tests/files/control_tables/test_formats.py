@@ -1,4 +1,4 @@
-"""Tables of controls: what is read, written and read again is the same, senses included."""
+"""Tables of controls: what is read, written and read again is the same, sign conventions included."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def tables(draw: st.DrawFn, key: str) -> str | Calibration:
 @pytest.mark.parametrize("key", FORMATS)
 def test_import_export_import_is_exact(key: str, sense: str) -> None:
     if key in ("linuxcnc", "klipper") and sense != FORMATS[key].sense:
-        pytest.skip("the sense is the format's")
+        pytest.skip("the format has its own sign convention")
 
     @settings(max_examples=25)
     @given(calibration=tables(key))
@@ -118,20 +118,20 @@ def test_import_export_import_is_exact(key: str, sense: str) -> None:
 
 
 @pytest.mark.parametrize("key", FORMATS)
-def test_values_keep_their_sense(key: str) -> None:
-    """What was put in comes out, and a table of the other sense is its negative."""
+def test_values_keep_their_sign(key: str) -> None:
+    """The values written are read back, and a table of the other sign convention is their negative."""
     name = {"klipper": None}.get(key, "EXX")
     curve = Curve("X", TRAVEL[0], {"EXX": [0.0, 0.125]}, interpolation="linear")
     calibration = Calibration(
         "g", TRAVEL, curves=(curve,) if name else (), squareness={"C0Y": 0.0 if name else -0.25}
     )
     exported = write_table(calibration, key, TARGET[key], stated(key))
-    found = again(key, exported, stated(key)).calibration
+    read = again(key, exported, stated(key)).calibration
     if name is None:
-        assert found.squareness["C0Y"] == -0.25
+        assert read.squareness["C0Y"] == -0.25
         assert exported.corrects == {"C0Y"}
         return
-    one = next(c for c in found.curves if "EXX" in c.names)
+    one = next(c for c in read.curves if "EXX" in c.names)
     assert one.mean("EXX").tolist() == [0.0, 0.125]
     assert "EXX" in exported.corrects
     if key != "linuxcnc":
@@ -156,14 +156,14 @@ def test_linuxcnc_types_hold_the_same_errors(picometres: list[int], kind: int) -
 
 
 def test_linuxcnc_rows_worked_by_hand() -> None:
-    """At 100 the axis stands at 100.002 forward and 99.999 reverse: trims -0.002 and +0.001."""
+    """At 100 the axis is at 100.002 forward and 99.999 reverse: trims -0.002 and +0.001."""
     ini = b"[TRAJ]\nLINEAR_UNITS=mm\n[JOINT_0]\nCOMP_FILE=x.comp\n[JOINT_2]\nBACKLASH=0.004\n"
     load = {Path("a.ini"): ini, Path("x.comp"): b"0 0 0\n100 100.002 99.999\n"}
-    found = read_table(Path("a.ini"), "linuxcnc", Given(travel_mm=TRAVEL), load.__getitem__).calibration
-    (curve,) = found.curves
+    read = read_table(Path("a.ini"), "linuxcnc", Given(travel_mm=TRAVEL), load.__getitem__).calibration
+    (curve,) = read.curves
     assert curve.forward["EXX"].tolist() == [0.0, 0.002] and curve.backward["EXX"].tolist() == [0.0, -0.001]
-    assert found.backlash_mm == (0.0, 0.0, 0.004)
-    written = write_table(found, "linuxcnc", Path("b.ini"), Given())
+    assert read.backlash_mm == (0.0, 0.0, 0.004)
+    written = write_table(read, "linuxcnc", Path("b.ini"), Given())
     assert written.files[Path("b-x.comp")] == b"0.0 0.0 0.0\n100.0 -0.002 0.001\n"
     assert b"BACKLASH = 0.004" in written.files[Path("b.ini")]
     assert written.corrects == {"EXX"}
@@ -188,12 +188,12 @@ Z Y EYY
 
 
 def test_isg_blocks_arguments_and_squareness() -> None:
-    found = read_table(Path("a.csv"), "isg", stated("isg"), lambda path: ISG.encode())
-    calibration = found.calibration
+    read = read_table(Path("a.csv"), "isg", stated("isg"), lambda path: ISG.encode())
+    calibration = read.calibration
     assert [sorted(c.names) for c in calibration.curves] == [["ECX", "EXX", "EYX"], ["EYY"]]
     assert calibration.squareness == {"C0Y": 2.2355737e-05, "B0Z": 0.0, "A0Z": -1e-6}
     assert calibration.box_mm.tolist() == [[0, 10], [0, 50], [-600, 10]]
-    assert [f.code for f in found.findings] == ["OLP872"] and "A0B" in found.findings[0].message
+    assert [f.code for f in read.findings] == ["OLP872"] and "A0B" in read.findings[0].message
 
 
 ETALON = """// head
@@ -210,11 +210,11 @@ Gridpoints = {
 
 
 def test_etalon_sections() -> None:
-    found = read_table(Path("a.txt"), "etalon", stated("etalon"), lambda path: ETALON.encode())
-    (curve,) = found.calibration.curves
+    read = read_table(Path("a.txt"), "etalon", stated("etalon"), lambda path: ETALON.encode())
+    (curve,) = read.calibration.curves
     assert curve.columns["EXY"].tolist() == [-0.001358635132, -0.000240680764]
-    assert found.calibration.squareness["C0Y"] == 0.000022355737
-    assert "C0B" in found.findings[0].message
+    assert read.calibration.squareness["C0Y"] == 0.000022355737
+    assert "C0B" in read.findings[0].message
 
 
 CEC = """%_N_NC_CEC_INI
@@ -237,8 +237,8 @@ M17
 def test_siemens_tables() -> None:
     names = {"X": "AX1", "Y": "AX2", "Z": "AX3"}
     state = stated("siemens-cec", names=names)
-    found = read_table(Path("a.mpf"), "siemens-cec", state, lambda path: CEC.encode())
-    (curve,) = found.calibration.curves
+    read = read_table(Path("a.mpf"), "siemens-cec", state, lambda path: CEC.encode())
+    (curve,) = read.calibration.curves
     assert curve.position_mm.tolist() == [-585.0, -527.0, -469.0]
     assert curve.forward["EZX"].tolist() == [-0.010, -0.020, -0.040]
     assert curve.backward["EZX"].tolist() == [0.0, 0.0, 0.0]
@@ -261,8 +261,8 @@ NR ACTIVE X      Y     Z
 def test_heidenhain_tables() -> None:
     files = {Path("d/a.cma"): CMA.encode(), Path("d/x.com"): COM.encode()}
     state = stated("heidenhain", sense="error")
-    found = read_table(Path("d/a.cma"), "heidenhain", state, files.__getitem__).calibration
-    table = {name: curve for curve in found.curves for name in curve.names}
+    read = read_table(Path("d/a.cma"), "heidenhain", state, files.__getitem__).calibration
+    table = {name: curve for curve in read.curves for name in curve.names}
     assert table["EXX"].forward["EXX"].tolist() == [0.001, 0.0]
     assert table["EXX"].backward["EXX"].tolist() == [0.003, 0.25]
     assert table["EZX"].columns["EZX"].tolist() == [0.002, -0.5]
@@ -279,8 +279,8 @@ kinematics: corexy
 
 def test_klipper_factors_of_its_own_manual() -> None:
     """The worked example: (100, 200, 50) is commanded as (103.308..., 199.328..., 50)."""
-    found = read_table(Path("p.cfg"), "klipper", stated("klipper"), lambda path: KLIPPER).calibration
-    offset = Shear(found).offset(np.array([[100.0, 200.0, 50.0]]), np.zeros(3), np.zeros((1, 3)))
+    read = read_table(Path("p.cfg"), "klipper", stated("klipper"), lambda path: KLIPPER).calibration
+    offset = Shear(read).offset(np.array([[100.0, 200.0, 50.0]]), np.zeros(3), np.zeros((1, 3)))
     assert np.allclose(offset[0], [3.30808952450865, -0.67168218343937, 0.0], atol=1e-12)
 
 
@@ -293,11 +293,11 @@ def test_klipper_factors_of_its_own_manual() -> None:
         ("linuxcnc", "0 0 0\n", "expected at least 2"),
         ("isg", "X EXX\n0 1\n1 x\n", "line 3"),
         ("isg", "X EXX\n0 1\n0 2\n", "line 3"),
-        ("isg", "0 1\n", "line 1: .* no header"),
+        ("isg", "0 1\n", "line 1: .* not a header"),
         ("isg", "X EYY\n0 1\n1 1\n", "no column Y"),
         ("isg", "Z X EXX\n0 0 1\n1 0 2\n", "line 3: EXX changes with Z"),
-        ("isg", "X EXX\n0 0\n9 1\n#\nX EXX\n0 0\n9 1\n", "line 5: EXX stands in two blocks"),
-        ("isg", "X EXX EXX\n0 0 1\n", "stands twice"),
+        ("isg", "X EXX\n0 0\n9 1\n#\nX EXX\n0 0\n9 1\n", "line 5: EXX is defined twice"),
+        ("isg", "X EXX EXX\n0 0 1\n", "defined twice"),
         ("isg", "// nothing\n", "no error of X, Y or Z"),
         ("etalon", "[EXX]\nGridpoints = {\n0 1\n", "line 1: .* not closed"),
         ("etalon", "[EXX]\nVALUE = 1\n", "no Gridpoints"),
@@ -305,11 +305,11 @@ def test_klipper_factors_of_its_own_manual() -> None:
         ("etalon", "[C0Y]\nVALUE = a\n", "line 2"),
         ("etalon", "[C0Y]\nGROSS = 1\n", "line 2: .* not understood"),
         ("klipper", "[skew_correction a]\nxy_skew = b\n", "line 2"),
-        ("klipper", "[skew_correction a]\nxyskew = 1\n", "no key"),
+        ("klipper", "[skew_correction a]\nxyskew = 1\n", "not a key"),
         ("klipper", "[printer]\n", "no section"),
         ("klipper", "[skew_correction a]\nxy_skew=1\n[skew_correction b]\nxy_skew=1\n", "sections a, b"),
         ("siemens-cec", CEC.replace("[0,1]", "[0,4]"), "row 1 is missing"),
-        ("siemens-cec", CEC.replace("=58", "=57"), "whole steps"),
+        ("siemens-cec", CEC.replace("=58", "=57"), "steps; expected an integer"),
         ("siemens-cec", CEC.replace("TABLE[0]=0", "TABLE[0]=2"), "line 12: MULT_BY_TABLE"),
         ("siemens-cec", CEC.replace("MODULO[0]=0", "MODULO[0]=1"), "line 13: IS_MODULO"),
         ("siemens-cec", CEC.replace("(AX1)", "(C1)"), "line 6: .*--axis-name"),
@@ -332,14 +332,14 @@ def test_a_wrong_table_is_refused_with_its_line(key: str, text: str, where: str)
 @settings(max_examples=60)
 @given(st.sampled_from(sorted(FORMATS)), st.sampled_from([ISG, ETALON, CEC, COM, CMA]), st.data())
 def test_no_text_makes_anything_but_a_refusal(key: str, text: str, data: st.DataObject) -> None:
-    at = data.draw(st.integers(0, len(text)))
+    start = data.draw(st.integers(0, len(text)))
     noise = data.draw(st.text(alphabet="0.1-e[]{}=$_#/*XYZ \n\t\x00é", max_size=8))
-    bytes_ = (text[:at] + noise + text[at + data.draw(st.integers(0, 5)) :]).encode()
+    bytes_ = (text[:start] + noise + text[start + data.draw(st.integers(0, 5)) :]).encode()
     with contextlib.suppress(OlpError):
         read_table(TARGET[key], key, stated(key, axis="X", kind=0), lambda path: bytes_)
 
 
-def test_what_has_to_be_stated_is_asked_for() -> None:
+def test_what_you_have_to_state_is_asked_for() -> None:
     for key in ("siemens-cec", "heidenhain"):
         with pytest.raises(UsageError, match="--sense"):
             read_table(TARGET[key], key, Given(), lambda path: b"")
@@ -353,24 +353,25 @@ def test_what_has_to_be_stated_is_asked_for() -> None:
         read_table(TARGET["klipper"], "klipper", Given(), lambda path: KLIPPER)
 
 
-def test_what_a_format_cannot_hold_is_said() -> None:
+def test_what_a_format_cannot_hold_is_a_finding() -> None:
     curve = Curve("X", TRAVEL[0], {"EXX": [0, 1e-3], "ECX": [0, 1e-5], "EYX": [0, 0]})
     calibration = Calibration(
         "g", TRAVEL, curves=(curve,), squareness={"C0Y": 1e-5}, backlash_mm=(0.004, 0.0, 0.0),
         cyclic=(Cyclic("EXX", 10.0, 1e-3),), thermal=Thermal((1e-5, 0.0, 0.0)),
     )  # fmt: skip
-    said = {}
+    texts = {}
     for key in FORMATS:
         findings = write_table(calibration, key, TARGET[key], stated(key)).findings
-        said[key] = " ".join(f"{f.code} {f.message}" for f in findings)
-        assert "no table holds what the calibration states of thermal" in said[key]
+        texts[key] = " ".join(f"{f.code} {f.message}" for f in findings)
+        assert "no table holds thermal of the calibration" in texts[key]
         # 200 or 256 rows cannot follow a pitch of 10 mm over 3 m; formats without a limit can
-        assert ("cyclic errors of EXX are not followed" in said[key]) == (key not in ("isg", "etalon")), key
-    assert "C0Y, ECX cannot be held" in said["linuxcnc"] and "OLP875" in said["linuxcnc"]
-    assert "ECX, EXX cannot be held" in said["klipper"] and "lost motion of X stays" in said["klipper"]
-    assert "ECX cannot be held" in said["siemens-cec"] and "OLP874" in said["siemens-cec"]
-    assert "lost motion of X stays" in said["isg"] and "cannot be held" not in said["isg"]
-    assert "ECX cannot be held" in said["heidenhain"] and "OLP875" in said["heidenhain"]
+        limited = key not in ("isg", "etalon")
+        assert ("the rows do not follow cyclic errors of EXX" in texts[key]) == limited, key
+    assert "cannot hold C0Y, ECX" in texts["linuxcnc"] and "OLP875" in texts["linuxcnc"]
+    assert "cannot hold ECX, EXX" in texts["klipper"] and "backlash of X stays" in texts["klipper"]
+    assert "cannot hold ECX" in texts["siemens-cec"] and "OLP874" in texts["siemens-cec"]
+    assert "backlash of X stays" in texts["isg"] and "cannot hold" not in texts["isg"]
+    assert "cannot hold ECX" in texts["heidenhain"] and "OLP875" in texts["heidenhain"]
 
 
 def test_verification_programs_say_what_an_instrument_must_show() -> None:
@@ -379,5 +380,5 @@ def test_verification_programs_say_what_an_instrument_must_show() -> None:
     for key, ending in (("siemens-cec", "mpf"), ("heidenhain", "h")):
         files = write_table(calibration, key, TARGET[key], stated(key)).files
         text = files[FOLDER / f"gantry-verify.{ending}"].decode()
-        assert "Z by -50.0 um" in text and "WRONG sense: it changes Z by -100.0 um" in text
+        assert "Z by -50.0 um" in text and "WRONG sign: it changes Z by -100.0 um" in text
         assert text.index("100.0000") < text.index("300.0000")

@@ -1,5 +1,5 @@
-"""LinuxCNC itself with an exported table: its drives are told what the model of the table predicts, and the
-judge's machine then stands where the prediction of the residual says."""
+"""LinuxCNC itself with an exported table: its drives get the commands that the model of the table predicts,
+and the judge's machine is then at the position of the predicted residual."""
 
 from __future__ import annotations
 
@@ -21,9 +21,11 @@ from olp.files.write import write_files
 
 pytestmark = [pytest.mark.oracle, pytest.mark.slow]
 
-#: what the control shows at rest, rounded to the nanometre, and on the move, where it ramps after the table
-AT_REST_MM, MOVING_MM = 2e-6, 3e-4
-#: cycles of 1 ms after a change of direction in which it goes from one side of the table to the other
+#: Difference to the table at rest: the control shows positions rounded to the nanometre.
+AT_REST_MM = 2e-6
+#: Difference to the table on the move, where the control ramps to it.
+MOVING_MM = 3e-4
+#: Cycles of 1 ms after a change of direction in which it ramps from one side of the table to the other.
 RAMP = 150
 
 
@@ -36,7 +38,7 @@ def test_without_a_table_the_drives_follow_the_command(tmp_path: Path) -> None:
 
 
 def program(machine_offset_mm: tuple[float, float, float]) -> bytes:
-    """There and back along each axis with rests, and slanted moves; in axis positions."""
+    """In both directions along each axis with rests, and slanted moves; in axis positions."""
     x, y, z = machine_offset_mm
     stops = [
         (700, 20, -30), (650, 20, -30), (20, 550, -30), (20, 500, -380), (20, 500, -40), (400, 300, -200),
@@ -63,8 +65,8 @@ def test_the_control_moves_as_the_table_predicts(kind: int, tmp_path: Path) -> N
     controller.require()
     recipe = Recipe(angular=False, squareness=False, directed="X", backlash_um={"Y": 8.0})
     machine = machines.random_machine(tmp_path / "machine", 5 + kind, recipe)
-    found = olp.export_table(machine, "linuxcnc", tmp_path / "table.ini", comp_type=kind)
-    write_files(found.files)
+    exported = olp.export_table(machine, "linuxcnc", tmp_path / "table.ini", comp_type=kind)
+    write_files(exported.files)
     setup = olp.load_setup(machine).machine
     travel = np.array([setup.axes[a].travel_mm for a in "XYZ"])
     table = read_table(tmp_path / "table.ini", "linuxcnc", Given(travel_mm=travel)).calibration
@@ -90,17 +92,17 @@ def test_the_control_moves_as_the_table_predicts(kind: int, tmp_path: Path) -> N
     step = np.abs(np.diff(shown[:, 1]))
     assert 5e-4 < step.max() < 6e-3
 
-    # the judge's machine under these drives stands where the predicted residual says
+    # the judge's machine under these drives is at the position of the predicted residual
     judge = JudgeModel(machine.parent)
-    at = np.flatnonzero(moved & still)[::40]
+    chosen = np.flatnonzero(moved & still)[::40]
     tool_vector = np.array([0.0, 0.0, -120.0])
-    tools = np.tile(tool_vector, (len(at), 1))
-    drives = run.motor[at]
-    really = drives - run.axis[at] + judge.error_mm(drives, tools, sign[at])
-    command = run.axis[at] + predicted[at]
+    tools = np.tile(tool_vector, (len(chosen), 1))
+    drives = run.motor[chosen]
+    actual = drives - run.axis[chosen] + judge.error_mm(drives, tools, sign[chosen])
+    command = run.axis[chosen] + predicted[chosen]
     calibration = load_calibration(machine.parent / "calibration.toml")
     model = build(calibration, setup.chain, outside="hold")
-    left = predicted[at] + model.error(command, tool_vector, sign[at])
-    assert np.abs(really - left).max() <= 1e-5
-    before = judge.error_mm(run.axis[at], tools, sign[at])
-    assert np.abs(before).max() > 0.01
+    residual = predicted[chosen] + model.error(command, tool_vector, sign[chosen])
+    assert np.abs(actual - residual).max() <= 1e-5
+    uncorrected = judge.error_mm(run.axis[chosen], tools, sign[chosen])
+    assert np.abs(uncorrected).max() > 0.01

@@ -28,10 +28,10 @@ def profile(**keys: object) -> LineProfile:
     return validate(LineProfile, HEAD | {"columns": COLUMNS} | keys, {}, "p.toml")
 
 
-def rows(found: object) -> list[tuple[float, int, int, float]]:
+def rows(readings: object) -> list[tuple[float, int, int, float]]:
     return list(
-        zip(found.target_mm.tolist(), found.run.tolist(), found.direction.tolist(),
-            np.round(found.value * 1e3, 9).tolist(), strict=True)
+        zip(readings.target_mm.tolist(), readings.run.tolist(), readings.direction.tolist(),
+            np.round(readings.value * 1e3, 9).tolist(), strict=True)
     )  # fmt: skip
 
 
@@ -45,10 +45,10 @@ def test_a_german_export_with_thousands_and_turns() -> None:
         "2.000,5;-3\n1.000,0;1\n0,0;0\nEnde der Messung\nx;y\n"
     )
     layout = profile(delimiter="semicolon", decimal="comma", thousands="point", header_lines=2, end="Ende")
-    found = parse_line(text.encode("utf-8-sig"), "a.txt", layout)
-    assert rows(found) == RUNS
-    assert found.line.tolist() == [4, 5, 6, 7, 8, 9]
-    assert found.angular is False and found.sense_known
+    readings = parse_line(text.encode("utf-8-sig"), "a.txt", layout)
+    assert rows(readings) == RUNS
+    assert readings.line.tolist() == [4, 5, 6, 7, 8, 9]
+    assert readings.angular is False and readings.sense_known
 
 
 def test_the_same_with_columns_for_run_and_direction_and_axis() -> None:
@@ -60,7 +60,7 @@ def test_the_same_with_columns_for_run_and_direction_and_axis() -> None:
     assert rows(parse_line(text.encode(), "a.txt", layout)) == RUNS
 
 
-def test_the_same_with_one_column_a_run_and_with_blank_lines() -> None:
+def test_the_same_with_one_column_per_run_and_with_blank_lines() -> None:
     wide = profile(delimiter="tab", directions=[1, -1], columns={"target": "Soll", "value": ["hin", "her"]})
     text = "Soll\thin\ther\n0\t0.5\t0\n1000\t1.5\t1\n2000.5\t-2\t-3\n"
     assert rows(parse_line(text.encode(), "a.txt", wide)) == RUNS
@@ -69,7 +69,7 @@ def test_the_same_with_one_column_a_run_and_with_blank_lines() -> None:
     assert rows(parse_line(text.encode(), "a.txt", blocks)) == RUNS
 
 
-def test_positions_and_senses_and_units_make_the_same_errors() -> None:
+def test_positions_and_signs_and_units_make_the_same_errors() -> None:
     positions = "\n".join(f"{q!r},{q + v * 1e-3!r}" for q, _, _, v in RUNS)
     layout = profile(header=False, unit="mm", holds="position", columns={"target": 1, "value": 2})
     assert rows(parse_line(positions.encode(), "a.txt", layout)) == RUNS
@@ -78,24 +78,24 @@ def test_positions_and_senses_and_units_make_the_same_errors() -> None:
         header=False, unit="nm", sense="commanded-minus-actual", position_unit="inch",
         columns={"target": 1, "value": 2},
     )  # fmt: skip
-    found = parse_line(other.encode(), "a.txt", layout)
-    assert np.allclose(found.value, [v * 1e-3 for *_, v in RUNS], atol=1e-12)
+    readings = parse_line(other.encode(), "a.txt", layout)
+    assert np.allclose(readings.value, [v * 1e-3 for *_, v in RUNS], atol=1e-12)
 
 
 @given(st.lists(st.integers(2, 6), min_size=1, max_size=6))
-def test_runs_up_and_down_are_told_apart(lengths: list[int]) -> None:
-    found, expected = [], []
+def test_runs_up_and_down_are_separated(lengths: list[int]) -> None:
+    sequence, expected = [], []
     for number, n in enumerate(lengths):
         targets = list(range(n))
-        found += targets if number % 2 == 0 else targets[::-1]
+        sequence += targets if number % 2 == 0 else targets[::-1]
         expected += [number] * n
-    # a shorter run begins at another place, which is where the way back begins as well
+    # a shorter run would begin at another position than the end of the run before
     if len(set(lengths)) == 1:
-        assert turns(np.array(found, float)).tolist() == expected
+        assert turns(np.array(sequence, float)).tolist() == expected
 
 
 @pytest.mark.parametrize(
-    ("text", "keys", "found"),
+    ("text", "keys", "parts"),
     [
         ("Soll,Abw\n0,1\n5,x\n7,\n", {}, ["line 3: column 2", "line 4: column 2: is empty"]),
         ("Soll;Abw\n0;1,5\n2;2\n", {"delimiter": "semicolon"}, ['column 2: "1,5" does not fit decimal']),
@@ -107,31 +107,31 @@ def test_runs_up_and_down_are_told_apart(lengths: list[int]) -> None:
         ("Sol,Abw\n0,1\n1,1\n", {}, ["did you mean Sol?"]),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(text: str, keys: dict[str, object], found: list[str]) -> None:
+def test_what_is_wrong_is_stated_with_its_line(text: str, keys: dict[str, object], parts: list[str]) -> None:
     with pytest.raises(InputError) as error:
         parse_line(text.encode(), "a.txt", profile(**keys))
-    for part in found:
+    for part in parts:
         assert part in str(error.value)
     assert str(error.value).startswith("a.txt")
 
 
 @pytest.mark.parametrize(
-    ("keys", "found"),
+    ("keys", "message"),
     [
-        ({"sense": "up"}, "no sense"),
+        ({"sense": "up"}, "not a sign convention"),
         ({"component": "EAX"}, "is an angle"),
-        ({"component": "EQX"}, "no ISO 230-1 name"),
-        ({"decimal": "comma"}, "commas stand between columns"),
+        ({"component": "EQX"}, "not an ISO 230-1 name"),
+        ({"decimal": "comma"}, "commas are both between columns and in numbers"),
         ({"decimal": "comma", "delimiter": "tab", "thousands": "comma"}, "are the same"),
-        ({"unit": "arcsec", "holds": "position"}, "no position"),
+        ({"unit": "arcsec", "holds": "position"}, "with a unit of angle; expected holds"),
         ({"columns": {"target": 1, "value": [2, 3]}}, "expected directions"),
         ({"runs": "column"}, "lacks run"),
         ({"unit": "ft"}, "unit"),
         ({"coulmns": {}}, "did you mean columns"),
     ],
 )
-def test_a_profile_that_says_two_things_is_refused(keys: dict[str, object], found: str) -> None:
-    with pytest.raises(ConfigError, match=found):
+def test_a_profile_that_says_two_things_is_refused(keys: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
         profile(**keys)
 
 
@@ -145,9 +145,9 @@ def rtx(samples: np.ndarray, **keys: object) -> bytes:
 
 def test_a_recording_holds_its_samples_whatever_their_bytes_are() -> None:
     samples = np.array([0.0, *np.frombuffer(b"EOF::\r\nADATA:\r\n\x01", "<f8")[:1], 1.5, -2.0])
-    found = parse_rtx(rtx(samples), "a.rtx")
-    assert found.samples.tolist() == samples.tolist()
-    assert found.period_s == 2e-5 and found.keys["Date"] == "10/02/2025 12:58:22"
+    recording = parse_rtx(rtx(samples), "a.rtx")
+    assert recording.samples.tolist() == samples.tolist()
+    assert recording.period_s == 2e-5 and recording.keys["Date"] == "10/02/2025 12:58:22"
 
 
 def test_a_sweep_at_constant_feed_shows_its_cyclic_error() -> None:
@@ -155,40 +155,40 @@ def test_a_sweep_at_constant_feed_shows_its_cyclic_error() -> None:
     position = moving + 2e-3 * np.sin(2 * np.pi * moving / 10.0)
     samples = np.concatenate([np.zeros(500), position, np.full(500, position[-1])])
     layout = RecordingTable(motion="sweep", start_mm=300.0, end_mm=400.0)
-    found = line_of_recording(parse_rtx(rtx(samples), "a.rtx"), layout, "mm", "position")
-    assert set(found.direction.tolist()) == {1}
-    fit = np.c_[np.sin(2 * np.pi * found.target_mm / 10.0), np.cos(2 * np.pi * found.target_mm / 10.0)]
-    amplitude = np.hypot(*np.linalg.lstsq(fit, found.value, rcond=None)[0])
+    readings = line_of_recording(parse_rtx(rtx(samples), "a.rtx"), layout, "mm", "position")
+    assert set(readings.direction.tolist()) == {1}
+    fit = np.c_[np.sin(2 * np.pi * readings.target_mm / 10.0), np.cos(2 * np.pi * readings.target_mm / 10.0)]
+    amplitude = np.hypot(*np.linalg.lstsq(fit, readings.value, rcond=None)[0])
     assert abs(amplitude - 2e-3) < 2e-5
 
 
-def test_triggered_samples_stand_where_the_profile_says(tmp_path: Path) -> None:
+def test_triggered_samples_are_at_the_positions_of_the_profile(tmp_path: Path) -> None:
     (tmp_path / "a.rtx").write_bytes(rtx(np.array([1.0, 2.0, 3.0, 4.0])))
     (tmp_path / "p.toml").write_text(
         'schema = "olp-line-profile-1"\nunit = "um"\nsense = "commanded-minus-actual"\ncomponent = "EXX"\n'
         '[recording]\nmotion = "triggered"\nstart_mm = 10.0\nstep_mm = -0.5\nevery = 2\n'
     )
-    found = read_line(tmp_path / "a.rtx", load_line_profile(tmp_path / "p.toml"))
-    assert rows(found) == [(9.75, 1, -1, -1.5), (8.75, 1, -1, -3.5)]
-    assert found.component == "EXX"
+    readings = read_line(tmp_path / "a.rtx", load_line_profile(tmp_path / "p.toml"))
+    assert rows(readings) == [(9.75, 1, -1, -1.5), (8.75, 1, -1, -3.5)]
+    assert readings.component == "EXX"
     with pytest.raises(InputError, match="dynamic recording"):
         read_line(tmp_path / "a.rtx")
 
 
 @pytest.mark.parametrize(
-    ("change", "found"),
+    ("change", "message"),
     [
         (lambda b: b[:-20] + b"EOF::\r\n", "multiple of 8"),
         (lambda b: b[:-7], "does not end"),
         (lambda b: b[:40], "Data"),
-        (lambda b: b.replace(b"Sample no: 3", b"Sample no: 4"), "cut off"),
+        (lambda b: b.replace(b"Sample no: 3", b"Sample no: 4"), "its header says .*copy it again"),
         (lambda b: b.replace(b"50000", b"fast"), "expected a number"),
         (lambda b: b.replace(b"Actual sample rate: 50000\r\n", b""), "sample rate"),
         (lambda b: b"X" + b, "HEADER::"),
     ],
 )
-def test_a_broken_recording_is_refused(change: object, found: str) -> None:
-    with pytest.raises(InputError, match=found):
+def test_a_broken_recording_is_refused(change: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         parse_rtx(change(rtx(np.arange(3.0))), "a.rtx")
 
 
@@ -204,6 +204,6 @@ def test_the_command_shows_what_is_understood(tmp_path: Path) -> None:
     shown = CliRunner().invoke(main, ["calibrate", "read", str(tmp_path / "a.csv")])
     assert shown.exit_code == 0, shown.output
     assert "1.250" in shown.stdout and "component EXX" in shown.stderr
-    said = CliRunner().invoke(main, ["calibrate", "read", str(tmp_path / "a.csv"), "--json"])
-    got = [row["value_um"] for row in json.loads(said.stdout)["readings"]]
+    as_json = CliRunner().invoke(main, ["calibrate", "read", str(tmp_path / "a.csv"), "--json"])
+    got = [row["value_um"] for row in json.loads(as_json.stdout)["readings"]]
     assert got == [1.25, -2.0] == (parse_readings(native, "a").value * 1e3).tolist()

@@ -1,1 +1,1 @@
-"""Instruments as files: one file each, its tables in a plan, its readings, both ways."""
+"""Instruments as files: one module each, which reads and writes its tables in a plan and its readings."""

@@ -17,7 +17,7 @@ from olp.files.write import PathLike
 
 
 class CircleKeys(Table):
-    """What a file of a ball-bar says about itself."""
+    """What a file of a ball-bar states about itself."""
 
     plane: Literal["XY", "YZ", "ZX"] = Field(description="the plane, first axis first: XY, YZ or ZX")
     radius_mm: Positive = Field(description="the nominal radius in mm")
@@ -31,8 +31,11 @@ class CircleKeys(Table):
 
 
 def read_circles(path: PathLike) -> Circles:
-    """Columns `angle_deg,run,direction,deviation_um`: the angle from the first axis of the plane toward the
-    second, direction 1 in that sense (counter-clockwise) or -1. Raises InputError, ConfigError."""
+    """Read columns `angle_deg,run,direction,deviation_um`. The angle counts from the first axis of the plane
+    toward the second. Direction is 1 that way (counter-clockwise), else -1.
+
+    Raises InputError, ConfigError.
+    """
     columns, keys = read_columns(path, CircleKeys, ("angle_deg", "run", "direction", "deviation_um"))
     sign = 1.0 if keys.sense == "longer-is-positive" else -1.0
     return Circles(
@@ -53,7 +56,7 @@ def read_circles(path: PathLike) -> Circles:
 class BallbarFiles(Instrument[InstrumentTable, Circles]):
     key = "ballbars"
     table = InstrumentTable
-    words = "tables [[ballbars]]: each the circles of a ball-bar about one centre"
+    words = "tables [[ballbars]]: the circles of a ball-bar about one centre each"
     gives = Circles
 
     def read(self, table: InstrumentTable, plan: Plan) -> Circles:

@@ -1,8 +1,8 @@
-"""How the readings of one instrument stand in files: its table in a plan, its own files, both ways.
+"""The readings of one instrument in files: its table in a plan and its own files, read and written.
 
-An instrument is one file: what it read as an `Observation` with its `State` (those of several instruments
-stand in `olp.calibration.observations`), the keys of its table, how that is read and, where a plan can ask
-for it, written. It is registered in `olp.files.measurements.instruments.registry`.
+An instrument is one module. It holds the keys of its table, and reads the table into an `Observation`. Where
+a plan can ask for the instrument, it also writes the table. Observations and their `State` are in
+`olp.calibration.observations`. `olp.files.measurements.instruments.registry` lists all instruments.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from olp.core.schema import Table
 from olp.files.measurements.line_keys import LineKeys
 from olp.files.measurements.point_readings import AXIS, TOOL, PointReadings
 
-#: um/m to 1
+#: um/m as a ratio.
 PER_UNIT = 1e-6
-#: 1 to um/m
+#: A ratio in um/m.
 UM_M = 1e6
 
 T = TypeVar("T", bound=Table)
@@ -34,7 +34,7 @@ Taken = TypeVar("Taken", bound=Observation)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """What a plan says for all its tables: its own path, [defaults], the axis along gravity and the chain."""
+    """What a plan states for all its tables: its path, [defaults], the axis along gravity and the chain."""
 
     path: Path
     defaults: LineKeys
@@ -47,8 +47,8 @@ class Plan:
 
 
 class Instrument(ABC, Generic[T, Taken]):
-    """`key` of its tables in a plan, the model of one and `words` on them for the schema; `gives` is the kind
-    of observation; `plans` says that files can be written for readings yet to be taken."""
+    """`key` of its tables in a plan, the model of one table, and `words` on them for the schema. `gives` is
+    the type of observation. `plans` says that files for future readings can be written."""
 
     key: ClassVar[str]
     table: ClassVar[type[Table]]
@@ -62,7 +62,7 @@ class Instrument(ABC, Generic[T, Taken]):
         every problem."""
 
     def asked(self, taken: Taken, name: str) -> list[str]:
-        """The lines of its table in a plan yet to be taken, whose file is `name`."""
+        """The lines of its table in a plan of future readings, whose file is `name`."""
         raise NotImplementedError
 
     def empty(self, taken: Taken, rows: Index) -> bytes:

@@ -17,10 +17,10 @@ from olp.files.write import PathLike
 
 
 class DiagonalKeys(Table):
-    """What a file of a laser along a diagonal says about itself."""
+    """What a file of a laser along a diagonal states about itself."""
 
-    start_mm: Triple = Field(description="the axis positions where it starts, [X, Y, Z] in mm")
-    end_mm: Triple = Field(description="the axis positions where it ends, [X, Y, Z] in mm")
+    start_mm: Triple = Field(description="the axis positions of its start, [X, Y, Z] in mm")
+    end_mm: Triple = Field(description="the axis positions of its end, [X, Y, Z] in mm")
     tool_mm: Triple = Field(description="the vector from the gauge point to the reflector, [X, Y, Z] in mm")
     sense: Sense = Field(description='"actual-minus-commanded" or "commanded-minus-actual"')
     sigma_um: NotNegative = Field(default=0.0, description="the standard uncertainty of one reading in um")
@@ -30,8 +30,8 @@ class DiagonalKeys(Table):
 
 
 def read_diagonal(path: PathLike) -> Diagonal:
-    """Columns `target_mm,run,direction,value_um`: the distance from the start, direction 1 away from it.
-    Raises InputError, ConfigError."""
+    """Read columns `target_mm,run,direction,value_um`: the distance from the start, and direction 1 away from
+    it. Raises InputError, ConfigError."""
     columns, keys = read_columns(path, DiagonalKeys, ("target_mm", "run", "direction", "value_um"))
     return Diagonal(
         keys.start_mm,
@@ -50,7 +50,7 @@ def read_diagonal(path: PathLike) -> Diagonal:
 class DiagonalFiles(Instrument[InstrumentTable, Diagonal]):
     key = "diagonals"
     table = InstrumentTable
-    words = "tables [[diagonals]]: each a laser along a face or body diagonal"
+    words = "tables [[diagonals]]: a laser along one face or body diagonal each"
     gives = Diagonal
 
     def read(self, table: InstrumentTable, plan: Plan) -> Diagonal:

@@ -8,8 +8,8 @@ from olp.core.errors import ConfigError
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.files.measurements.instruments.base import UM_M, Instrument, Plan
 from olp.files.measurements.line_keys import LineTable
+from olp.files.measurements.line_merging import as_line, merged, stated_of
 from olp.files.measurements.line_profile import load_line_profile, read_line
-from olp.files.measurements.lines_said import as_line, merged, stated_of
 from olp.files.measurements.readings import check_component
 from olp.files.toml_text import toml_lines
 
@@ -25,17 +25,17 @@ class LineFiles(Instrument[LineTable, Line]):
         path = plan.beside(table.file)
         profile = table.profile or plan.defaults.profile
         readings = read_line(path, load_line_profile(plan.beside(profile)) if profile else None)
-        stated, places = stated_of(readings.keys, str(path))
+        stated, key_lines = stated_of(readings.keys, str(path))
         component = table.component or stated.component or readings.component
         if component is None:
             raise ConfigError("component is missing; expected a name such as EXX in the plan or the file")
         check_component(readings, component)
-        said = merged(table, stated, plan.defaults, places, str(path))
+        keys = merged(table, stated, plan.defaults, key_lines, str(path))
         if readings.sense_known and table.sense is not None:
             raise ConfigError(
-                "sense is stated by the profile and by the line; expected it once", file=str(plan.path)
+                "sense is stated in the profile and in the plan; expected it once", file=str(plan.path)
             )
-        return as_line(readings, component, said, plan.vertical, plan.chain, str(path))
+        return as_line(readings, component, keys, plan.vertical, plan.chain, str(path))
 
     def asked(self, taken: Line, name: str) -> list[str]:
         angle = taken.quantity == "angle"

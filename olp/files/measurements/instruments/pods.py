@@ -30,11 +30,11 @@ class PodsTable(Table):
         description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
         "azimuth_1_deg, elevation_1_deg, azimuth_2_deg ..., relative to this file"
     )
-    pods: Annotated[int, Field(ge=1)] = Field(default=2, description="how many pods; 2 if left out")
+    pods: Annotated[int, Field(ge=1)] = Field(default=2, description="the number of pods; 2 if left out")
     sigma_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
     baselines: list[BaselineTable] = Field(
         default=[],
-        description="tables [[pods.baselines]]: known distances; without one nothing tells the scale",
+        description="tables [[pods.baselines]]: known distances; without one the scale is not observable",
     )
     tool_mm: Triple | None = Field(
         default=None,
@@ -46,7 +46,7 @@ class PodsTable(Table):
 class PodFiles(Instrument[PodsTable, Pods]):
     key = "pods"
     table = PodsTable
-    words = "tables [[pods]]: directions from places that nobody knows"
+    words = "tables [[pods]]: directions from unknown positions"
     gives = Pods
     plans = True
 
@@ -77,7 +77,7 @@ class PodFiles(Instrument[PodsTable, Pods]):
         return [
             "[[pods]]",
             *toml_lines({"file": name, "pods": taken.count, "sigma_urad": sigma_urad}),
-            "[[pods.baselines]]  # measure it: this is only where they are meant to stand",
+            "[[pods.baselines]]  # replace by the measured length; this one is planned",
             *toml_lines({"between": [i + 1, j + 1], "length_mm": round(length, 1),
                          "sigma_um": round(sigma * UM_PER_MM, 3)}),
         ]  # fmt: skip

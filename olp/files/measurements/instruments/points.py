@@ -23,8 +23,8 @@ class PointsTable(Table):
     sigma_um: Positive = Field(description="the standard uncertainty of a coordinate, in um")
     frame: Literal["unknown", "known"] = Field(
         default="unknown",
-        description='"unknown" (the instrument\'s own), or "known": measured_ columns are in the frame of '
-        "the machine, as TCP points are against a simulation model",
+        description='"unknown" (of the instrument), or "known": measured_ columns are in the frame of the '
+        "machine, as TCP points against a simulation model are",
     )
     tool_mm: Triple | None = Field(
         default=None,
@@ -39,7 +39,7 @@ class PointsTable(Table):
 class PointFiles(Instrument[PointsTable, Points]):
     key = "points"
     table = PointsTable
-    words = "tables [[points]]: each one set-up of a tracker"
+    words = "tables [[points]]: one set-up of a tracker each"
     gives = Points
     plans = True
 

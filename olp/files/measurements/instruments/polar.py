@@ -19,7 +19,9 @@ class PolarTable(Table):
         "azimuth_deg, elevation_deg, relative to this file"
     )
     sigma_distance_um: Positive = Field(description="the standard uncertainty of a distance, in um")
-    sigma_um_m: NotNegative = Field(default=0.0, description="what it grows by with the distance, in um/m")
+    sigma_um_m: NotNegative = Field(
+        default=0.0, description="the growth of that uncertainty with distance, in um/m"
+    )
     sigma_angle_urad: Positive = Field(description="the standard uncertainty of an angle, in urad")
     sigma_scale_um_m: NotNegative = Field(
         default=0.0, description="the standard uncertainty of the scale of all distances, in um/m"
@@ -34,7 +36,7 @@ class PolarTable(Table):
 class PolarFiles(Instrument[PolarTable, Points]):
     key = "polar"
     table = PolarTable
-    words = "tables [[polar]]: distances and two angles from one place that nobody knows"
+    words = "tables [[polar]]: distances and two angles from one unknown position"
     gives = Points
 
     def read(self, table: PolarTable, plan: Plan) -> Points:
@@ -44,7 +46,7 @@ class PolarFiles(Instrument[PolarTable, Points]):
         if len(short):
             raise config_error(
                 [
-                    (int(readings.row[k]), f"distance_mm = {distance[k]:g}; expected one above 0")
+                    (int(readings.row[k]), f"distance_mm = {distance[k]:g}; expected a distance above 0")
                     for k in short
                 ],
                 readings.file,

@@ -1,4 +1,4 @@
-"""All instruments whose readings a plan can name. A new one is one line here."""
+"""All instruments whose readings a plan can name. A new instrument is one line here."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from olp.files.measurements.instruments.polar import PolarFiles
 from olp.files.measurements.instruments.squareness import SquarenessTables
 from olp.files.measurements.instruments.stations import StationFiles
 
-#: In the order in which their readings enter an adjustment and stand in its report.
+#: In the order of their readings in an adjustment and in its report.
 INSTRUMENTS: tuple[Instrument[Any, Any], ...] = (
     LineFiles(),
     PointFiles(),
@@ -29,10 +29,10 @@ INSTRUMENTS: tuple[Instrument[Any, Any], ...] = (
 
 
 def rank_of(taken: Observation) -> int:
-    """The place of an observation among the others: that of the first instrument that gives its kind."""
+    """The rank of an observation among the others: that of the first instrument that gives its type."""
     return next(k for k, instrument in enumerate(INSTRUMENTS) if isinstance(taken, instrument.gives))
 
 
 def planner_of(taken: Observation) -> Instrument[Any, Any]:
-    """The instrument that writes a plan for an observation yet to be taken."""
+    """The instrument that writes a plan for a future observation."""
     return next(i for i in INSTRUMENTS if i.plans and isinstance(taken, i.gives))

@@ -1,4 +1,4 @@
-"""The table of a file that says in comments how it was taken."""
+"""The table of a file that states in comments how it was taken."""
 
 from __future__ import annotations
 
@@ -9,6 +9,6 @@ from olp.core.schema import Table, Text
 
 class InstrumentTable(Table):
     file: Text = Field(
-        description="the path of a CSV file that says in comments how it was taken, as "
+        description="the path of a CSV file that states in comments how it was taken, as "
         "`olp calibrate diagonals` and `olp calibrate ballbar` read it, relative to this file"
     )

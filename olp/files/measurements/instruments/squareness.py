@@ -12,7 +12,7 @@ from olp.core.machine import Vector
 from olp.core.schema import Interval, Position, Positive, Table, Triple
 from olp.core.units import AXES, RAD_PER_URAD
 from olp.files.measurements.instruments.base import Instrument, Plan
-from olp.files.measurements.lines_said import together
+from olp.files.measurements.line_merging import together
 
 _PLANES = {"C0Y": "XY", "B0Z": "XZ", "A0Z": "YZ"}
 
@@ -26,13 +26,13 @@ class SpanTable(Table):
 class SquarenessReadingTable(Table):
     component: Literal["C0Y", "B0Z", "A0Z"] = Field(description='"C0Y", "B0Z" or "A0Z"')
     value_urad: float = Field(
-        description="the squareness of the mean lines in urad, right-handed about the third axis: C0Y > 0: Y "
-        "leans to -X; B0Z > 0: Z leans to +X; A0Z > 0: Z leans to -Y"
+        description="the squareness of the mean lines in urad, right-handed about the third axis: Y leans to "
+        "-X for C0Y > 0, Z to +X for B0Z > 0, Z to -Y for A0Z > 0"
     )
     sigma_urad: Positive = Field(description="its standard uncertainty, in urad")
     line_mm: Position = Field(
         default_factory=Position,
-        description="where the axes stood while the others moved, { X = .., Y = .., Z = .. } in mm",
+        description="the positions of the axes while the others moved, { X = .., Y = .., Z = .. } in mm",
     )
     span_mm: SpanTable = Field(description="the lengths measured, { X = [0, 1000], Y = [0, 800] } in mm")
     tool_mm: Triple | None = Field(
@@ -55,7 +55,7 @@ class SquarenessTables(Instrument[SquarenessReadingTable, SquarenessReading]):
         problems = []
         if missing:
             names = ", line_mm.".join(missing)
-            problems.append(f"line_mm.{names} is missing; expected where the axes stood")
+            problems.append(f"line_mm.{names} is missing; expected the axis position in mm")
         if tool is None:
             problems.append("tool_mm is missing; expected [X, Y, Z] from the gauge point to the probe, in mm")
         if first is None or second is None:
@@ -64,6 +64,8 @@ class SquarenessTables(Instrument[SquarenessReadingTable, SquarenessReading]):
             )
         if problems or tool is None:
             raise ConfigError("; ".join(problems), problems=tuple(problems))
-        place: Vector = (line.X, line.Y, line.Z)
+        line_mm: Vector = (line.X, line.Y, line.Z)
         value, sigma = table.value_urad * RAD_PER_URAD, table.sigma_urad * RAD_PER_URAD
-        return SquarenessReading(table.component, value, place, (first, second), tool, sigma, str(plan.path))
+        return SquarenessReading(
+            table.component, value, line_mm, (first, second), tool, sigma, str(plan.path)
+        )

@@ -20,7 +20,9 @@ class StationTable(Table):
         "relative to this file"
     )
     sigma_um: Positive = Field(description="the standard uncertainty of a length, in um")
-    sigma_um_m: NotNegative = Field(default=0.0, description="what it grows by with the length, in um/m")
+    sigma_um_m: NotNegative = Field(
+        default=0.0, description="the growth of that uncertainty with length, in um/m"
+    )
     tool_mm: Triple | None = Field(
         default=None,
         description="the vector from the gauge point to the reflector, [X, Y, Z] in mm; or columns "
@@ -34,7 +36,7 @@ class StationTable(Table):
 class StationFiles(Instrument[StationTable, Lengths]):
     key = "stations"
     table = StationTable
-    words = "tables [[stations]]: lengths from places that nobody knows (multilateration)"
+    words = "tables [[stations]]: lengths from unknown positions (multilateration)"
     gives = Lengths
     plans = True
 

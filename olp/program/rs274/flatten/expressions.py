@@ -1,12 +1,12 @@
 """Expressions of parametric programs: `#1`, `#<name>`, `[ ]`, functions and operators.
 
-Two kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC evaluates it:
-`**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`; all from left to
-right; a sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. `MACRO_B` is Custom
-Macro B: `* / MOD AND`, then `+ - OR XOR`, then comparisons; FIX and FUP count by magnitude; a variable
-that was never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
+There are two kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC evaluates
+it. `**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`, all from left to
+right. A sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. `MACRO_B` is Custom Macro
+B: `* / MOD AND`, then `+ - OR XOR`, then comparisons. FIX and FUP count by magnitude. A variable that was
+never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
 
-Text is compact and lower case: the caller has taken out blanks and comments. Angles are in degrees.
+Text is compact and lower case: the caller has removed blanks and comments. Angles are in degrees.
 Every error is a ProgramError without a line, which the caller adds.
 """
 
@@ -20,12 +20,12 @@ from typing import Protocol
 
 from olp.core.errors import ProgramError
 
-#: LinuxCNC takes two numbers as equal, and a number as whole, within this.
+#: LinuxCNC takes two numbers as equal, and a number as an integer, within this.
 EQUAL_WITHIN = 1e-4
 
 
 class Parameters(Protocol):
-    """Where an expression finds its parameters; raises ProgramError for what is not knowable off line."""
+    """Where an expression finds its parameters; raises ProgramError for values that are not known off line."""
 
     def number(self, index: int) -> float | None:
         """Value of #index; None is a vacant variable."""
@@ -47,10 +47,9 @@ Binary = Callable[[float, float], float]
 
 @dataclass(frozen=True, slots=True)
 class Arithmetic:
-    """How a control evaluates expressions: the operators of each `level`, the loosest first, and what
-    `operators` and `functions` do; `angle` is that of rise and run (ATAN[y]/[x]), `single_atan` whether ATAN
-    takes one argument, too. With `exact` EQ and NE ask for the same number, and a vacant variable equals a
-    vacant one only."""
+    """How a control evaluates expressions. `levels` are the operators of each level, the loosest first.
+    `angle` is that of rise and run (ATAN[y]/[x]), `single_atan` whether ATAN takes one argument, too. With
+    `exact` EQ and NE compare exactly, and a vacant variable equals a vacant one only."""
 
     levels: tuple[tuple[str, ...], ...]
     operators: Mapping[str, Binary]
@@ -65,6 +64,7 @@ _UNSIGNED = re.compile(r"\d+\.?\d*|\.\d+")
 _FUNCTION = re.compile(r"(abs|acos|asin|atan|cos|exp|fix|fup|ln|round|rnd|sin|sqrt|sqr|tan|exists)(?=\[)")
 _OPERATOR = re.compile(r"\*\*|\*|/|\+|-|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 _COMPARISONS = ("eq", "ne", "gt", "ge", "lt", "le")
+#: levels of nesting in an expression at most
 _MAX_DEPTH = 60
 
 
@@ -72,7 +72,7 @@ def whole(value: float, what: str) -> int:
     """`value` as an integer where it is one within 1e-4; ProgramError otherwise."""
     nearest = math.floor(value + 0.5) if math.isfinite(value) else 0
     if not math.isfinite(value) or abs(value - nearest) > EQUAL_WITHIN:
-        raise ProgramError(f"{what} is {value:g}; expected a whole number")
+        raise ProgramError(f"{what} is {value:g}; expected an integer")
     return nearest
 
 
@@ -82,20 +82,20 @@ def filled(value: float | None) -> float:
 
 
 class Reader:
-    """Compiles the values of one line; `at` is the position in `text`."""
+    """Compiles the values of one line; `position` is the present position in `text`."""
 
-    def __init__(self, text: str, arithmetic: Arithmetic, at: int = 0) -> None:
+    def __init__(self, text: str, arithmetic: Arithmetic, position: int = 0) -> None:
         self.text = text
         self.arithmetic = arithmetic
-        self.at = at
+        self.position = position
         self._depth = 0
 
     def number(self) -> float | None:
-        """A plain number at this place, or None where something else stands; moves past it."""
-        match = _NUMBER.match(self.text, self.at)
+        """A plain number at this position, None where there is none; moves past it."""
+        match = _NUMBER.match(self.text, self.position)
         if match is None:
             return None
-        self.at = match.end()
+        self.position = match.end()
         return float(match.group())
 
     def value(self) -> Expression:
@@ -109,35 +109,35 @@ class Reader:
             self._depth -= 1
 
     def _value(self) -> Expression:
-        text, at = self.text, self.at
-        head = text[at : at + 1]
+        text, start = self.text, self.position
+        head = text[start : start + 1]
         if head in ("+", "-") and head:
-            self.at += 1
+            self.position += 1
             operand = self.value()
             return operand if head == "+" else _negated(operand)
         if head == "[":
             return self.bracket()
         if head == "#":
             return self.parameter()
-        plain = _UNSIGNED.match(text, at)
+        plain = _UNSIGNED.match(text, start)
         if plain:
-            self.at = plain.end()
+            self.position = plain.end()
             return _constant(float(plain.group()))
-        function = _FUNCTION.match(text, at)
+        function = _FUNCTION.match(text, start)
         if function:
-            self.at = function.end()
+            self.position = function.end()
             return self._call(function.group(1))
-        raise ProgramError(f"expected a number, a parameter or [expression] at {text[at : at + 12]!r}")
+        raise ProgramError(f"expected a number, a parameter or [expression] at {text[start : start + 12]!r}")
 
     def parameter_index(self) -> Callable[[Parameters], int | str]:
-        """Index (int) or name (str) of the parameter at this place, which starts with `#`."""
-        self.at += 1
-        if self.text.startswith("<", self.at):
-            end = self.text.find(">", self.at)
+        """Index (int) or name (str) of the parameter at this position, which starts with `#`."""
+        self.position += 1
+        if self.text.startswith("<", self.position):
+            end = self.text.find(">", self.position)
             if end < 0:
                 raise ProgramError("a parameter name has no closing '>'")
-            name = self.text[self.at + 1 : end]
-            self.at = end + 1
+            name = self.text[self.position + 1 : end]
+            self.position = end + 1
             return lambda _: name
         index = self.value()
         return lambda parameters: whole(filled(index(parameters)), "a parameter number")
@@ -166,37 +166,37 @@ class Reader:
         levels = self.arithmetic.levels
         if level == len(levels):
             return self.value()
-        left = self._level(level + 1)
+        value = self._level(level + 1)
         while True:
-            match = _OPERATOR.match(self.text, self.at)
+            match = _OPERATOR.match(self.text, self.position)
             if match is None or match.group() not in levels[level]:
-                return left
-            self.at = match.end()
-            left = self._joined(match.group(), left, self._level(level + 1))
+                return value
+            self.position = match.end()
+            value = self._joined(match.group(), value, self._level(level + 1))
 
-    def _joined(self, operator: str, left: Expression, right: Expression) -> Expression:
+    def _joined(self, operator: str, first: Expression, second: Expression) -> Expression:
         if self.arithmetic.exact and operator in ("eq", "ne"):
             same = operator == "eq"
-            return lambda p: float((left(p) == right(p)) is same)
+            return lambda p: float((first(p) == second(p)) is same)
         function = self.arithmetic.operators[operator]
 
         def joined(parameters: Parameters) -> float:
-            return _finite(function(filled(left(parameters)), filled(right(parameters))), operator)
+            return _finite(function(filled(first(parameters)), filled(second(parameters))), operator)
 
         return joined
 
     def _call(self, name: str) -> Expression:
         if name == "exists":
             self._expect("[")
-            if not self.text.startswith("#<", self.at):
+            if not self.text.startswith("#<", self.position):
                 raise ProgramError("EXISTS takes a named parameter, as in EXISTS[#<name>]")
             where = self.parameter_index()
             self._expect("]")
             return lambda parameters: float(parameters.exists(str(where(parameters))))
         argument = self.bracket()
         if name == "atan":
-            if self.text.startswith("/[", self.at):
-                self.at += 1
+            if self.text.startswith("/[", self.position):
+                self.position += 1
                 run = self.bracket()
                 angle = self.arithmetic.angle
                 return lambda p: angle(filled(argument(p)), filled(run(p)))
@@ -207,10 +207,10 @@ class Reader:
         return lambda p: _finite(function(filled(argument(p))), name)
 
     def _expect(self, character: str) -> None:
-        if not self.text.startswith(character, self.at):
-            found = self.text[self.at : self.at + 12]
-            raise ProgramError(f"expected {character!r} in an expression, found {found!r}")
-        self.at += 1
+        if not self.text.startswith(character, self.position):
+            rest = self.text[self.position : self.position + 12]
+            raise ProgramError(f"expected {character!r} in an expression, found {rest!r}")
+        self.position += 1
 
 
 def _constant(value: float) -> Expression:
@@ -223,7 +223,7 @@ def _negated(operand: Expression) -> Expression:
 
 def _finite(value: float, what: str) -> float:
     if not math.isfinite(value):
-        raise ProgramError(f"{what.upper()} gives a number without bound")
+        raise ProgramError(f"{what.upper()} gives a number that is not finite")
     return value
 
 
@@ -270,8 +270,8 @@ def _atan2_degrees(rise: float, run: float) -> float:
 def _atan2_of_positive(rise: float, run: float) -> float:
     if rise < 0:
         raise ProgramError(
-            "ATAN of a negative first argument is given in 0..360 or -180..180 as a parameter of the control "
-            "says, which is not known off line; write the angle with ACOS or ASIN"
+            "ATAN of a negative first argument is in 0..360 or -180..180, which a parameter of the control decides; "
+            "write the angle with ACOS or ASIN"
         )
     return math.degrees(math.atan2(rise, run))
 

@@ -12,16 +12,16 @@ from olp.program.rs274.flatten.expressions import Arithmetic
 class Language:
     """How the parametric programs of a control are read, and how plain blocks are written for it.
 
-    - `macro_b`: IF, WHILE, DO, END and GOTO steer the run without O-words, the right side of an assignment
+    - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, the right side of an assignment
       needs no brackets, and variables are numbered as in Macro B: #1 to #33 local, vacant until set.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are modal motion.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
       the local variables of its caller.
-    - `increments_open`: what a number without a point counts is not known off line, and so is what ROUND in a
-      word rounds to.
-    - Numbers are written with at most `decimals`, or with `all_digits` where that is asked for; `counts` are
-      letters of whole numbers, `points` whether others get a point.
+    - `increments_open`: the unit of a number without a point is not known off line, nor what ROUND in a word
+      rounds to.
+    - Numbers are written with at most `decimals`, or with `all_digits` where that is needed; `counts` are
+      letters of integers, `points` whether others get a point.
     """
 
     arithmetic: Arithmetic

@@ -1,7 +1,7 @@
 """Lines of a parametric program: one line of bytes compiled to words, assignments and a flow statement.
 
-Blanks mean nothing, also inside numbers; `(...)` and `;` start comments. Every word keeps its place in
-the bytes, so that a line is written back by splicing values into it.
+Blanks mean nothing, also inside numbers; `(...)` and `;` start comments. Every word keeps its position
+in the bytes, so that a line is written back by splicing values into it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _WITH_VALUE = frozenset({"if", "elseif", "while", "repeat"})
 class Word:
     """A letter and its value. `value` is None for a plain number, which `number` gives.
 
-    `start`, `value_start` and `end` are places in the raw line. `pointed`: the plain number has a point.
+    `start`, `value_start` and `end` are positions in the raw line. `pointed`: the plain number has a point.
     """
 
     letter: str
@@ -54,7 +54,7 @@ class Assignment:
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """A statement that steers the run. `label` is "" where an expression (`dynamic`) gives it.
+    """A statement that controls the run. `label` is "" where an expression (`dynamic`) gives it.
 
     Keywords are those of LinuxCNC's O-words, "program" for a header such as O1234, and of Macro B
     "when-goto", "when-then", "while-do", "do", "end" and "goto".
@@ -99,14 +99,14 @@ def compile_line(line: bytes, number: int, language: Language) -> Line:
     text, places, comments = _compact(raw)
     if text.startswith("%"):
         return Line(number, raw, eol, percent=True)
-    at = 0
+    start = 0
     deleted = text.startswith("/")
     if deleted:
-        at = 2 if text[1:2].isdigit() and text[2:3] else 1
+        start = 2 if text[1:2].isdigit() and text[2:3] else 1
     try:
-        return _compile(_Source(number, raw, eol, text, places, deleted, comments), at, language)
+        return _compile(_Source(number, raw, eol, text, places, deleted, comments), start, language)
     except ProgramError:
-        if "#" in text or "[" in text or text[at : at + 1] == "o":
+        if "#" in text or "[" in text or text[start : start + 1] == "o":
             raise
         return Line(number, raw, eol, deleted=deleted, opaque=True, comments=comments)
 
@@ -123,32 +123,32 @@ class _Source:
 
 
 def _compact(raw: bytes) -> tuple[str, list[int], tuple[bytes, ...]]:
-    """Lower-case text without blanks and comments, the places of its characters, and the comments."""
-    # Latin-1 keeps one character a byte, also in lower case.
+    """Lower-case text without blanks and comments, the positions of its characters, and the comments."""
+    # Latin-1 keeps one character per byte, also in lower case.
     source = raw.decode("latin-1")
     pieces: list[str] = []
     places: list[int] = []
     comments: list[bytes] = []
-    at = 0
+    done = 0
     for match in _SKIP.finditer(source):
-        pieces.append(source[at : match.start()])
-        places.extend(range(at, match.start()))
-        at = match.end()
+        pieces.append(source[done : match.start()])
+        places.extend(range(done, match.start()))
+        done = match.end()
         if match.group()[0] in "(;":
             comments.append(raw[match.start() : match.end()])
-    pieces.append(source[at:])
-    places.extend(range(at, len(source)))
+    pieces.append(source[done:])
+    places.extend(range(done, len(source)))
     return "".join(pieces).lower(), places, tuple(comments)
 
 
-def _compile(source: _Source, at: int, language: Language) -> Line:
+def _compile(source: _Source, begin: int, language: Language) -> Line:
     text = source.text
-    reader = Reader(text, language.arithmetic, at)
+    reader = Reader(text, language.arithmetic, begin)
     words: list[Word] = []
     assignments: list[Assignment] = []
     flow: Flow | None = None
-    while reader.at < len(text):
-        start = reader.at
+    while reader.position < len(text):
+        start = reader.position
         first = all(word.letter == "n" for word in words) and not assignments
         if text[start] == "#":
             assignments.append(_assignment(reader, source.places, language))
@@ -158,8 +158,8 @@ def _compile(source: _Source, at: int, language: Language) -> Line:
         elif first and language.macro_b:
             flow = _macro_b(reader, assignments, source.places, language)
         if flow is not None:
-            if reader.at < len(text):
-                rest = text[reader.at :]
+            if reader.position < len(text):
+                rest = text[reader.position :]
                 raise ProgramError(f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood")
             break
         words.append(_word(reader, source.places, language))
@@ -170,58 +170,58 @@ def _compile(source: _Source, at: int, language: Language) -> Line:
 
 
 def _word(reader: Reader, places: list[int], language: Language) -> Word:
-    text, start = reader.text, reader.at
+    text, start = reader.text, reader.position
     letter = _LETTER.match(text, start)
     if letter is None:
         raise ProgramError(f"expected a word at {text[start : start + 12]!r}")
-    at = letter.end()
-    literal = _LITERAL.match(text, at)
+    value_start = letter.end()
+    literal = _LITERAL.match(text, value_start)
     if literal and _PLAIN_END.match(text, literal.end()):
         number, value, pointed = float(literal.group()), None, "." in literal.group()
-        reader.at = literal.end()
+        reader.position = literal.end()
     else:
-        reader.at = at
+        reader.position = value_start
         number, value, pointed = 0.0, reader.value(), False
-        written = text[at : reader.at]
+        written = text[value_start : reader.position]
         if language.increments_open and ("round[" in written or "rnd[" in written):
             raise ProgramError(
                 "ROUND inside a word rounds to the least increment, which is not known here; "
                 "assign the rounded value to a variable first"
             )
-    return Word(letter.group(), number, value, pointed, places[start], places[at], places[reader.at - 1] + 1)
+    return Word(letter.group(), number, value, pointed, places[start], places[value_start], places[reader.position - 1] + 1)
 
 
 def _assignment(reader: Reader, places: list[int], language: Language) -> Assignment:
-    start = reader.at
+    start = reader.position
     target = reader.parameter_index()
-    if not reader.text.startswith("=", reader.at):
-        raise ProgramError("a parameter stands where a word is expected, without '='")
-    reader.at += 1
+    if not reader.text.startswith("=", reader.position):
+        raise ProgramError("a parameter without '=' is where a word is expected")
+    reader.position += 1
     value = reader.unbracketed() if language.macro_b else reader.value()
-    return Assignment(target, value, places[start], places[reader.at - 1] + 1)
+    return Assignment(target, value, places[start], places[reader.position - 1] + 1)
 
 
 def _o_word(reader: Reader) -> Flow:
     text = reader.text
-    reader.at += 1
+    reader.position += 1
     dynamic: Expression | None = None
     label = ""
-    static = _LABEL.match(text, reader.at)
+    static = _LABEL.match(text, reader.position)
     if static:
         label = static.group().strip("<>")
         if static.group()[0] != "<":
             label = str(int(label))
-        reader.at = static.end()
+        reader.position = static.end()
     else:
         dynamic = reader.value()
-    keyword = _KEYWORD.match(text, reader.at)
+    keyword = _KEYWORD.match(text, reader.position)
     if keyword is None:
-        if reader.at < len(text) or not label.isdigit():
-            raise ProgramError(f"O-word without a known keyword at {text[reader.at : reader.at + 12]!r}")
+        if reader.position < len(text) or not label.isdigit():
+            raise ProgramError(f"O-word without a known keyword at {text[reader.position : reader.position + 12]!r}")
         return Flow("program", label)
-    reader.at = keyword.end()
+    reader.position = keyword.end()
     values: list[Expression] = []
-    while text.startswith("[", reader.at):
+    while text.startswith("[", reader.position):
         values.append(reader.bracket())
     name = keyword.group()
     if name in _WITH_VALUE and len(values) != 1:
@@ -234,29 +234,29 @@ def _o_word(reader: Reader) -> Flow:
 def _macro_b(
     reader: Reader, assignments: list[Assignment], places: list[int], language: Language
 ) -> Flow | None:
-    text, at = reader.text, reader.at
-    if text.startswith("if[", at):
-        reader.at += 2
+    text, start = reader.text, reader.position
+    if text.startswith("if[", start):
+        reader.position += 2
         condition = reader.bracket()
-        if text.startswith("goto", reader.at):
-            reader.at += 4
+        if text.startswith("goto", reader.position):
+            reader.position += 4
             return Flow("when-goto", "", None, (condition, reader.value()))
-        if text.startswith("then", reader.at):
-            reader.at += 4
-            while text.startswith("#", reader.at):
+        if text.startswith("then", reader.position):
+            reader.position += 4
+            while text.startswith("#", reader.position):
                 assignments.append(_assignment(reader, places, language))
             return Flow("when-then", "", None, (condition,))
         raise ProgramError("IF is followed by neither GOTO nor THEN")
-    if text.startswith("while[", at):
-        reader.at += 5
+    if text.startswith("while[", start):
+        reader.position += 5
         condition = reader.bracket()
-        if not text.startswith("do", reader.at):
+        if not text.startswith("do", reader.position):
             raise ProgramError("WHILE is not followed by DO")
-        reader.at += 2
+        reader.position += 2
         return Flow("while-do", _number_label(reader), None, (condition,))
     for keyword in ("goto", "do", "end"):
-        if text.startswith(keyword, at):
-            reader.at += len(keyword)
+        if text.startswith(keyword, start):
+            reader.position += len(keyword)
             if keyword == "goto":
                 return Flow("goto", "", None, (reader.value(),))
             return Flow(keyword, _number_label(reader))

@@ -1,4 +1,4 @@
-"""Walks a parametric program in the order of its execution: flow, subprograms and their parameters."""
+"""Runs a parametric program in the order of its execution: flow, subprograms and their parameters."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from olp.program.rs274.flatten.lines import Flow, Line
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables, macro_arguments
 
-#: LinuxCNC allows 10 levels, Fanuc 4 to 10; more than this is a recursion without end.
+#: levels of subprograms at most: LinuxCNC allows 10, Fanuc 4 to 10; more is an endless recursion
 MAX_LEVEL = 50
 
-# LinuxCNC's turning cycles, which name a subprogram by Q.
+#: turning cycles of LinuxCNC, which name a subprogram by Q
 _PROFILE_CYCLES = {("g", code) for code in (70.0, 71.0, 71.1, 71.2, 72.0, 72.1, 72.2)}
 
 #: Writes one executed line, given the indices of the words to leave out; True where the program ends.
@@ -21,7 +21,7 @@ WriteBlock = Callable[[Line, Frame, frozenset[int]], bool]
 
 
 class Walk:
-    """Runs a program; hands every executed line to `write`."""
+    """Runs a program; gives every executed line to `write`."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Walk:
         visits = 0
         while self._frames:
             frame = self._frames[-1]
-            index = frame.at
+            index = frame.next_index
             try:
                 if index >= len(frame.unit.lines):
                     if len(self._frames) > 1:
@@ -59,10 +59,10 @@ class Walk:
                 visits += 1
                 if visits > self.limit:
                     raise ProgramError(
-                        f"the run visits more than {self.limit} blocks; a loop has no end, or raise the limit"
+                        f"the run visits more than {self.limit} blocks; end the loop that has no end, or raise the limit"
                     )
                 line = frame.unit.line(index)
-                frame.at += 1
+                frame.next_index += 1
                 if line.deleted and self.block_delete:
                     continue
                 if self._step(line, frame, index):
@@ -76,10 +76,10 @@ class Walk:
                 raise
 
     def _close_tape(self) -> None:
-        """The closing % of the main file is kept, whatever stands between it and the program's end."""
+        """The closing % of the main file is kept, whatever is between it and the end of the program."""
         main = self._frames[0]
         if self._percents == 1:
-            for i in range(main.at, len(self.main.lines)):
+            for i in range(main.next_index, len(self.main.lines)):
                 if self.main.lines[i].lstrip().startswith(b"%"):
                     self.write(self.main.line(i), main, frozenset())
                     return
@@ -117,7 +117,7 @@ class Walk:
         return False
 
     def _program(self, line: Line, frame: Frame) -> bool:
-        """A header such as O1234 is written at the start; met later, the program before it has no end."""
+        """A header such as O1234 is written at the start; a later one means that the program before has no end."""
         if len(self._frames) > 1:
             raise ProgramError(f"subprogram {frame.label} runs into the next program; M99 is missing")
         if self._headers:
@@ -129,23 +129,23 @@ class Walk:
         return filled(flow.values[0](self.variables)) != 0
 
     def _do_sub(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.at = frame.unit.following(index, flow.label, frozenset({"endsub"})) + 1
+        frame.next_index = frame.unit.following(index, flow.label, frozenset({"endsub"})) + 1
 
     def _do_if(self, flow: Flow, frame: Frame, index: int) -> None:
         frame.taken.discard(flow.label)
         while not self._true(flow):
             index = frame.unit.following(index, flow.label, frozenset({"elseif", "else", "endif"}))
-            frame.at = index + 1
-            found = frame.unit.line(index).flow
-            if found is None or found.keyword != "elseif":
+            frame.next_index = index + 1
+            next_flow = frame.unit.line(index).flow
+            if next_flow is None or next_flow.keyword != "elseif":
                 break
-            flow = found
+            flow = next_flow
         frame.taken.add(flow.label)
 
     def _do_elseif(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label not in frame.taken:
             raise ProgramError(f"{flow.keyword.upper()} without an IF with label {flow.label}")
-        frame.at = frame.unit.following(index, flow.label, frozenset({"endif"}))
+        frame.next_index = frame.unit.following(index, flow.label, frozenset({"endif"}))
 
     _do_else = _do_elseif
 
@@ -161,17 +161,17 @@ class Walk:
     def _do_while(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label in frame.dos:
             if self._true(flow):
-                frame.at = frame.dos[flow.label] + 1
+                frame.next_index = frame.dos[flow.label] + 1
             else:
                 del frame.dos[flow.label]
         elif self._true(flow):
             frame.loops[flow.label] = index
         else:
             frame.loops.pop(flow.label, None)
-            frame.at = frame.unit.following(index, flow.label, frozenset({"endwhile"})) + 1
+            frame.next_index = frame.unit.following(index, flow.label, frozenset({"endwhile"})) + 1
 
     def _do_endwhile(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.at = self._open(frame.loops, flow)
+        frame.next_index = self._open(frame.loops, flow)
 
     def _do_repeat(self, flow: Flow, frame: Frame, index: int) -> None:
         count = int(filled(flow.values[0](self.variables)) + 0.5)
@@ -179,25 +179,25 @@ class Walk:
             frame.counts[flow.label] = count
             frame.loops[flow.label] = index
         else:
-            frame.at = frame.unit.following(index, flow.label, frozenset({"endrepeat"})) + 1
+            frame.next_index = frame.unit.following(index, flow.label, frozenset({"endrepeat"})) + 1
 
     def _do_endrepeat(self, flow: Flow, frame: Frame, index: int) -> None:
         start = self._open(frame.loops, flow)
         frame.counts[flow.label] -= 1
         if frame.counts[flow.label] > 0:
-            frame.at = start + 1
+            frame.next_index = start + 1
         else:
             del frame.counts[flow.label], frame.loops[flow.label]
 
     def _do_break(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.at = frame.unit.following(index, flow.label, self._loop_end(flow, frame)) + 1
+        frame.next_index = frame.unit.following(index, flow.label, self._loop_end(flow, frame)) + 1
         for table in (frame.dos, frame.loops, frame.counts):
             table.pop(flow.label, None)
 
     def _do_continue(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label in frame.dos:
             raise ProgramError("CONTINUE within DO ... WHILE ends the loop in LinuxCNC 2.9; use IF")
-        frame.at = frame.unit.following(index, flow.label, self._loop_end(flow, frame))
+        frame.next_index = frame.unit.following(index, flow.label, self._loop_end(flow, frame))
 
     def _loop_end(self, flow: Flow, frame: Frame) -> frozenset[str]:
         if flow.label in frame.dos:
@@ -214,14 +214,14 @@ class Walk:
         if self._true(flow):
             frame.loops[flow.label] = index
         else:
-            frame.at = frame.unit.following(index, flow.label, frozenset({"end"})) + 1
+            frame.next_index = frame.unit.following(index, flow.label, frozenset({"end"})) + 1
 
     def _do_end(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.at = self._open(frame.loops, flow)
+        frame.next_index = self._open(frame.loops, flow)
 
     def _do_goto(self, flow: Flow, frame: Frame, index: int) -> None:
         number = whole(filled(flow.values[-1](self.variables)), "the block number of GOTO")
-        frame.at = frame.unit.block_number(number, index)
+        frame.next_index = frame.unit.block_number(number, index)
 
     def _do_when_goto(self, flow: Flow, frame: Frame, index: int) -> None:
         if self._true(flow):
@@ -238,7 +238,7 @@ class Walk:
         self._enter(Frame(unit, start + 1, label, arguments, {}, start=start + 1))
 
     def _do_endsub(self, flow: Flow, frame: Frame, index: int) -> None:
-        # RETURN may carry any label, as LinuxCNC takes it.
+        # RETURN may have any label, as in LinuxCNC.
         if len(self._frames) == 1 or (flow.keyword == "endsub" and flow.label != frame.label):
             raise ProgramError(f"{flow.keyword.upper()} with label {flow.label} outside of its SUB")
         value = flow.values[0](self.variables) if flow.values else None
@@ -255,7 +255,7 @@ class Walk:
         if label not in self._files:
             data = self._subprograms(label)
             if data is None:
-                raise ProgramError(f"subprogram {label} is not in the file, and no file of it was given")
+                raise ProgramError(f"subprogram {label} is not in the file, and no file for it was given")
             self._files[label] = Unit(data, self.language, label)
         unit = self._files[label]
         start = unit.definition(label, keyword)
@@ -276,13 +276,13 @@ class Walk:
         return frame
 
     def _calls(self, line: Line, frame: Frame, index: int) -> bool | None:
-        """Carry out M98, M97, M99 and G65; None where the line has none, else whether the run ends."""
+        """Carry out M98, M97, M99 and G65; None where the line has none of them, else whether the run ends."""
         codes = {(w.letter, w.number) for w in line.words if w.letter in "mg" and w.value is None}
         saves = self.language.saved_modes and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
         if saves and (len(self._frames) > 1 or ("m", 73.0) in saves):
-            raise ProgramError("M70, M72 and M73 act on a level of subprograms, which plain blocks lack")
+            raise ProgramError("M70, M72 and M73 act on a level of subprograms, which plain blocks do not have")
         if self.language.profile_cycles and codes & _PROFILE_CYCLES:
-            raise ProgramError("G70 to G72 take their profile from a subprogram, which plain blocks lack")
+            raise ProgramError("G70 to G72 take their profile from a subprogram, which plain blocks do not have")
         if ("g", 66.0) in codes or ("g", 66.1) in codes:
             raise ProgramError("G66 calls a macro after every move, which is not unrolled; call it with G65")
         if ("g", 65.0) in codes:
@@ -346,12 +346,12 @@ class Walk:
         self.write(line, frame, without)
         if frame.repeats > 0:
             frame.repeats -= 1
-            frame.at = frame.start
+            frame.next_index = frame.start
             return False
         target = self._word(line, "p")
         caller = self._leave()
         if target is not None:
-            caller.at = caller.unit.block_number(whole(target, "the block number P"), caller.at - 1)
+            caller.next_index = caller.unit.block_number(whole(target, "the block number P"), caller.next_index - 1)
         return False
 
     def _macro(self, line: Line, frame: Frame) -> None:

@@ -1,7 +1,7 @@
 """The state as the unroller follows it, in program coordinates and program units.
 
-It has no tables of offsets and tools: what changes them leaves the position unknown. Asking for what is not
-known refuses, not knowing it does not.
+It has no tables of offsets and tools: after a change of these the position is not known. This is an error only
+where the program needs the position.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ from olp.program.rs274.state import NAN, State
 Value = tuple[str, float | None]
 
 _MOTION = LINEAR | CYCLES | PROBES | {331, 760, END_OF_CYCLES, 870, 880}
-#: Between axis and program positions; these hold already for the move of their own block.
+#: Codes that change the frame and hold already for the move of their own block.
 _FRAMES = LENGTHS | WORK_OFFSETS
-#: After these the position is not known in program coordinates; G92 says it itself.
+#: After these the position is not known in program coordinates; G92 states it.
 _UNSETTING = (
     _FRAMES
     | (SHIFTS - {PRESET})
@@ -61,16 +61,16 @@ _UNSETTING = (
 )
 _ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
 _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
-#: Whose axis words are no motion, or not to where they say.
+#: Codes whose axis words are no motion, or a motion to another position.
 _NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, 650}
 _STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
-#: Words that a cycle takes for itself.
+#: Words that belong to a cycle.
 CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
 
 
 @dataclass(slots=True)
 class ProgramState(State):
-    """The state whose position counts in program coordinates."""
+    """The state whose position is in program coordinates."""
 
     compensated: bool = False
     odd_frame: bool = False
@@ -81,13 +81,13 @@ class ProgramState(State):
     saved: tuple[int | None, set[int], str] | None = None
     held_absolute: bool = True
 
-    def at(self, axis: int) -> float:
+    def position_of(self, axis: int) -> float:
         """Program position of an axis; ProgramError where it is not known."""
         value = self.position[axis]
         if math.isnan(value) or self.compensated:
             raise ProgramError(
-                f"the position of {AXES[axis]} is asked for and not known off line; "
-                f"command {AXES[axis]} in the program before"
+                f"the position of {AXES[axis]} is needed here and not known off line; "
+                f"command {AXES[axis]} before in the program"
             )
         return value
 
@@ -111,7 +111,7 @@ class ProgramState(State):
         if motion or codes & HOMES:
             self.series.begin(None)
         if motion:
-            # G80 beside another motion ends the cycle, and the other moves
+            # G80 beside another motion ends the cycle, and the other code is the motion
             self.motion = next(iter(motion - {END_OF_CYCLES} or motion))
         given = {AXES.lower().index(letter): value for letter, value in words if letter in ("x", "y", "z")}
         if PRESET in codes:
@@ -182,7 +182,7 @@ class ProgramState(State):
             self.unit = unit
 
     def _keep_modes(self, code: int) -> None:
-        """M70 saves the modes, M71 drops them, M72 brings them back."""
+        """M70 saves the modes, M71 drops them, M72 restores them."""
         if code == 70:
             self.saved = (self.unit, self.in_force(), self.path)
         elif code == 71:
@@ -210,14 +210,14 @@ class ProgramState(State):
             if letter in ("a", "b", "c", "u", "v", "w", "@", "^"):
                 raise ProgramError(f"a canned cycle moves {letter.upper()}, which is not understood")
             if letter == "m" and value in _STOPS:
-                raise ProgramError(f"M{value:g} in the block of a canned cycle; give it a block of its own")
+                raise ProgramError(f"M{value:g} in the block of a canned cycle; put it into its own block")
         codes = self._modes(words)
         if self.inverse_time or self.compensated or self.odd_frame:
-            raise ProgramError("a canned cycle in inverse time, cutter compensation or a turned frame")
+            raise ProgramError("a canned cycle is in inverse time, cutter compensation or a turned frame, which is not read; end these modes first")
         chosen = codes & CYCLES
         code = next(iter(chosen)) if chosen else self.motion
         if code is None:
-            raise ProgramError("a canned cycle without a code")
+            raise ProgramError("a canned cycle has no code; give one, such as G81")
         series = self.series
         if self.motion not in CYCLES:
             series.begin(None)
@@ -227,22 +227,22 @@ class ProgramState(State):
         given = {letter.upper(): value for letter, value in words if letter in CYCLE_WORDS}
         first, second, tool = PLANES[self.plane // 10]
         if series.initial is None:
-            series.initial = self.at(tool)
+            series.initial = self.position_of(tool)
         depth = AXES[tool]
         follows = self.profile.cycles.levels_follow_distance
         turned = follows and series.held and self.held_absolute is not self.absolute
         if turned and not {depth, "R"} <= given.keys():
-            raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth anew")
+            raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth again")
         self.held_absolute = self.absolute
         series.hold(given, depth)
         repeats = self._repeats(given)
         if repeats == 0:
             return ()
-        xy, step = self._place(given, first, second)
+        xy, step = self._hole_and_step(given, first, second)
         r, z = levels(
             self._needed("R"), self._needed(depth), absolute=self.absolute, initial_z=series.initial
         )
-        self.at(tool)
+        self.position_of(tool)
         strokes = cycle_moves(
             code,
             start=(self.position[0], self.position[1], self.position[2]),
@@ -264,39 +264,39 @@ class ProgramState(State):
         return strokes
 
     def _repeats(self, given: dict[str, float | None]) -> int:
-        # where a block has both, the unrolled one keeps them, and the reader takes the first
+        # where a block has both, both are kept in the unrolled block, and the reader takes the first
         for letter in reversed(self.profile.cycles.repeat_words):
             if letter in given:
                 count = whole(self._known(letter, given[letter]), f"the repeat count {letter}")
-                return count or self._none()
+                return count or self._no_repeats()
         return 1
 
-    def _none(self) -> int:
+    def _no_repeats(self) -> int:
         if not self.profile.cycles.stores:
             raise ProgramError("the cycle is repeated L0 times; expected L1 or more")
         return 0
 
-    def _place(
+    def _hole_and_step(
         self, given: dict[str, float | None], first: int, second: int
     ) -> tuple[tuple[float, float], tuple[float, float]]:
         xy, step = [0.0, 0.0], [0.0, 0.0]
         for i, axis in enumerate((first, second)):
             letter = AXES[axis]
             if letter not in given:
-                xy[i] = self.at(axis)
+                xy[i] = self.position_of(axis)
                 continue
             value = self._known(letter, given[letter])
             xy[i] = value
             if not self.absolute:
                 step[i] = value
-                xy[i] += self.at(axis)
+                xy[i] += self.position_of(axis)
         return (xy[0], xy[1]), (step[0], step[1])
 
     def _known(self, letter: str, value: float | None) -> float:
         if value is None:
             raise ProgramError(
-                f"{letter} has no decimal point: it counts in least increments or in whole units, "
-                "as a parameter of the control says; write the point"
+                f"{letter} has no decimal point, so a parameter of the control decides whether it counts "
+                "least increments or whole units; write the point"
             )
         return value
 

@@ -1,4 +1,4 @@
-"""One text of a parametric program, compiled as it is met, and the levels of a run through it."""
+"""One text of a parametric program, compiled line by line when first met, and the levels of a run."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Unit:
         self.ends_with_eol = data.endswith((b"\n", b"\r"))
         self._compiled: dict[int, Line] = {}
         self._flows: list[tuple[int, Flow]] | None = None
-        self._found: dict[tuple[int, str, frozenset[str]], int] = {}
+        self._next: dict[tuple[int, str, frozenset[str]], int] = {}
 
     def line(self, index: int) -> Line:
         if index not in self._compiled:
@@ -58,9 +58,9 @@ class Unit:
     def following(self, index: int, label: str, keywords: frozenset[str]) -> int:
         """Index of the next statement with this label, in the same subprogram; ProgramError if none."""
         key = (index, label, keywords)
-        if key not in self._found:
-            self._found[key] = self._search(index, label, keywords)
-        return self._found[key]
+        if key not in self._next:
+            self._next[key] = self._search(index, label, keywords)
+        return self._next[key]
 
     def _search(self, index: int, label: str, keywords: frozenset[str]) -> int:
         inner = ""
@@ -91,10 +91,10 @@ class Unit:
 
 @dataclass(slots=True)
 class Frame:
-    """One level of the run: where it stands, its local parameters and its open loops."""
+    """One level of the run: the index of its next line, its local parameters and its open loops."""
 
     unit: Unit
-    at: int
+    next_index: int
     label: str
     locals: dict[int, float | None]
     names: dict[str, float]

@@ -1,14 +1,13 @@
 """Unrolls a parametric RS-274 program into plain blocks: no variables, no flow, no subprograms.
 
-An evaluator of our own runs the program and writes each block that it meets with numbers for its
-expressions. The result is a plain program for the same control. It is NOT lossless: assignments, flow and
-the names of subprograms are gone, blocks of loops are repeated, and what follows the program's end is
-left out. Lines without a variable are copied byte for byte; a block number is kept on the first visit of
-its line only.
+The program is run here, and each block that is executed is written with numbers for its expressions. The
+result is a plain program for the same control. It is NOT lossless: assignments, flow and the names of
+subprograms are gone, blocks of loops are repeated, and text after the end of the program is left out. Lines
+without a variable are copied byte for byte; a block number is kept on the first visit of its line only.
 
-What the control alone knows is refused with the line that asks for it: probe results, tool tables, stored
-offsets, a position that the program has not commanded. Parameters that were never set are 0 in RS-274
-(#31 to #5060) and refused on a Fanuc (#100 and up keep values of earlier runs).
+A line that needs values which only the control knows is refused: probe results, tool tables, stored offsets,
+a position that the program has not commanded. Parameters that were never set are 0 in RS-274 (#31 to #5060)
+and refused on a Fanuc (#100 and up keep values of earlier runs).
 """
 
 from __future__ import annotations
@@ -52,13 +51,12 @@ def flatten(
 ) -> bytes:
     """Plain blocks of a program; see the module for what is kept.
 
-    `subprograms` gives the text of a program that
-    the file does not hold, by its number or lower-case name. `block_delete`: blocks with `/` are left out
-    (switch on); else they count as executed. `expand_cycles` writes canned cycles as G0, G1, G4 and spindle
-    blocks; `peck_clearance` (program units) is the control's clearance of G73 and G83, needed where a
-    parameter of the control says it. `limit` is the largest number of blocks that the run may visit.
-    Raises ProgramError with the line in the source (or in the subprogram, whose name it then gives as the
-    file).
+    `subprograms` gives the text of a program that the file does not have, by its number or lower-case name.
+    `block_delete`: blocks with `/` are left out (switch on); else they count as executed. `expand_cycles`
+    writes canned cycles as G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of
+    G73 and G83, needed where a parameter of the control sets it. `limit` is the largest number of blocks that
+    the run may visit. Raises ProgramError with the line in the source, or with the line in the subprogram and
+    its name as the file.
     """
     writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
     main = Unit(data, profile.language, file)
@@ -68,7 +66,7 @@ def flatten(
 
 
 def number_text(value: float, letter: str, language: Language, exact: bool = False) -> str:
-    """A number that came from an expression: 10 significant digits, and no more decimals than are taken.
+    """A number from an expression: 10 significant digits, and no more decimals than the control takes.
 
     `exact` gives all digits: the centre of an arc with R is the square root of a difference of its ends,
     which loses half of them. Where a number without a point counts least increments, lengths get one.
@@ -99,21 +97,21 @@ class _Flattener:
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
-        self._out: list[tuple[bytes, bytes]] = []
+        self._blocks: list[tuple[bytes, bytes]] = []
 
     def text(self, main: Unit) -> bytes:
-        """All blocks; lines that had no end of their own take the program's."""
-        eol = next((line_end for _, line_end in self._out if line_end), b"\n")
-        whole_text = b"".join(raw + (line_end or eol) for raw, line_end in self._out)
-        last = self._out[-1] if self._out else (b"", b"")
-        return whole_text[: -len(eol)] if self._out and not last[1] and not main.ends_with_eol else whole_text
+        """All blocks; lines without a line end take that of the program."""
+        eol = next((line_end for _, line_end in self._blocks if line_end), b"\n")
+        whole_text = b"".join(raw + (line_end or eol) for raw, line_end in self._blocks)
+        last = self._blocks[-1] if self._blocks else (b"", b"")
+        return whole_text[: -len(eol)] if self._blocks and not last[1] and not main.ends_with_eol else whole_text
 
     def block(self, line: Line, frame: Frame, without: frozenset[int]) -> bool:
         """Write one executed line, its words at indices `without` left out; True where the program ends."""
         seen = (frame.unit.key, line.number) in self._seen
         self._seen.add((frame.unit.key, line.number))
         if line.opaque:
-            self._out.append((line.raw, line.eol))
+            self._blocks.append((line.raw, line.eol))
             self.state.forget()
             return False
         values = [(word.letter, self._value(word)) for word in line.words]
@@ -159,7 +157,7 @@ class _Flattener:
             try:
                 self.state.cycle(active, self.peck_clearance or 1.0)
             except ProgramError:
-                # Only the position is lost; a block that asks for it refuses.
+                # Only the position is lost; a block that needs it is an error.
                 self.state.forget()
             return None
         if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
@@ -175,14 +173,14 @@ class _Flattener:
         self, line: Line, values: list[tuple[str, float | None]], cut: set[int], *, exact: bool
     ) -> None:
         if line.plain and not cut and line.flow is None:
-            self._out.append((line.raw, line.eol))
+            self._blocks.append((line.raw, line.eol))
             return
         # A flow statement has no word of its own: only comments and assignments are in the line.
         if line.flow is not None and line.flow.keyword != "program":
             if line.comments:
-                self._out.append((b" ".join(line.comments), line.eol))
+                self._blocks.append((b" ".join(line.comments), line.eol))
             return
-        pieces, at = [], 0
+        pieces, done = [], 0
         splices = [(a.start, a.end, b"") for a in line.assignments]
         for i, (word, (letter, value)) in enumerate(zip(line.words, values, strict=True)):
             if i in cut:
@@ -192,15 +190,15 @@ class _Flattener:
                 splices.append((word.value_start, word.end, text.encode()))
         for start, end, text_bytes in sorted(splices):
             inner = _COMMENT.findall(line.raw[start:end])
-            pieces += [line.raw[at:start], text_bytes, *inner]
+            pieces += [line.raw[done:start], text_bytes, *inner]
             if not text_bytes:
                 end += len(line.raw[end:]) - len(line.raw[end:].lstrip(b" \t"))
-            at = end
-        pieces.append(line.raw[at:])
+            done = end
+        pieces.append(line.raw[done:])
         rest = [word for i, word in enumerate(line.words) if i not in cut]
         if line.comments or any(word.letter != "n" for word in rest) or line.flow is not None:
             raw = b"".join(pieces)
-            self._out.append((raw.rstrip() if line.raw.rstrip() == line.raw else raw, line.eol))
+            self._blocks.append((raw.rstrip() if line.raw.rstrip() == line.raw else raw, line.eol))
 
     def _write_strokes(
         self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float, ...]]
@@ -208,16 +206,16 @@ class _Flattener:
         """Blocks of a cycle."""
         exact = self.cycles.exact_corners and self.state.path != "G61"
         lines: list[str] = []
-        at = list(before[2])
+        position = list(before[2])
         spindle = self.state.spindle
         for stroke in strokes:
             if stroke.kind in ("rapid", "feed"):
                 words = [
                     AXES[i] + number_text(v, "x", self.language)
                     for i, v in enumerate(stroke.point)
-                    if not math.isnan(v) and v != at[i]
+                    if not math.isnan(v) and v != position[i]
                 ]
-                at = list(stroke.point)
+                position = list(stroke.point)
                 if words:
                     lines.append(" ".join(["G0" if stroke.kind == "rapid" else "G1", *words]))
             elif stroke.kind == "dwell":
@@ -227,7 +225,7 @@ class _Flattener:
                 lines.append("M5")
             else:
                 if spindle not in (3, 4):
-                    raise ProgramError("the cycle turns the spindle, whose direction M3 or M4 has not set")
+                    raise ProgramError("the cycle reverses the spindle, whose direction M3 or M4 has not set; give M3 or M4 before")
                 lines.append(f"M{spindle if stroke.spindle == 'restore' else 7 - spindle}")
         if not lines:
             return
@@ -238,4 +236,4 @@ class _Flattener:
             lines.insert(0, "G61")
             lines.append(self.state.path)
         mark = b"/" if line.deleted else b""
-        self._out += [(mark + text.encode(), line.eol) for text in lines]
+        self._blocks += [(mark + text.encode(), line.eol) for text in lines]

@@ -1,4 +1,4 @@
-"""Parameters of a program while it is unrolled: local, common, named, and those the evaluator can know."""
+"""Parameters of a program while it is unrolled: local, common, named, and those known off line."""
 
 from __future__ import annotations
 
@@ -10,12 +10,17 @@ from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
 from olp.program.rs274.flatten.state import ProgramState
 
+#: largest local parameter of LinuxCNC
 _NGC_LOCAL = 30
+#: largest parameter that a program may use freely
 _NGC_FREE = 5060
+#: largest parameter
 _NGC_LAST = 5602
-# Turns DEBUG comments on and off, which moves nothing.
+#: turns DEBUG comments on and off, which moves nothing
 _DEBUG_SWITCH = 5599
+#: largest local variable of Macro B
 _MACRO_B_LOCAL = 33
+#: common variables are below this
 _MACRO_B_COMMON = 1000
 _ARGUMENT_NUMBERS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, *range(17, 27))
 _ARGUMENTS = dict(zip("abcijkdefhmqrstuvwxyz", _ARGUMENT_NUMBERS, strict=True))
@@ -24,7 +29,7 @@ _COUNT_ARGUMENTS = frozenset("dhmst")
 
 
 class Variables:
-    """Parameters of the run. What only the control knows raises ProgramError."""
+    """Parameters of the run. Values that only the control knows raise ProgramError."""
 
     def __init__(self, state: ProgramState) -> None:
         self.state = state
@@ -43,7 +48,7 @@ class Variables:
         if index <= _NGC_FREE:
             return self.common.get(index, 0.0)
         if 5420 <= index <= 5422:
-            return self.state.at(index - 5420)
+            return self.state.position_of(index - 5420)
         raise ProgramError(
             f"#{index} is kept by the control (probe result, offset, tool or position) and not known "
             "off line; use a free parameter (#31 to #5060)"
@@ -58,9 +63,9 @@ class Variables:
             return self.common[index]
         for base in (5001, 5041):
             if base <= index <= base + 2:
-                return self.state.at(index - base)
+                return self.state.position_of(index - base)
         raise ProgramError(
-            f"#{index} is not set by the program before and not known off line; assign it in the program"
+            f"#{index} is not set before in the program and not known off line; assign it in the program"
         )
 
     def named(self, name: str) -> float:
@@ -69,7 +74,7 @@ class Variables:
             return known()
         table = self.globals if name.startswith("_") else self.names
         if name not in table:
-            raise ProgramError(f"#<{name}> is not set by the program before and not known off line")
+            raise ProgramError(f"#<{name}> is not set before in the program and not known off line; assign it in the program")
         return table[name]
 
     def exists(self, name: str) -> bool:
@@ -81,7 +86,7 @@ class Variables:
     def _predefined(self, name: str) -> Callable[[], float] | None:
         state = self.state
         if name in ("_x", "_y", "_z"):
-            return lambda: state.at("xyz".index(name[1]))
+            return lambda: state.position_of("xyz".index(name[1]))
         if name in ("_metric", "_imperial"):
             return lambda: float((self._set(state.unit, name) == METRIC) is (name == "_metric"))
         if name in ("_absolute", "_incremental"):
@@ -94,7 +99,7 @@ class Variables:
 
     def _set(self, value: float | None, name: str) -> float:
         if value is None:
-            raise ProgramError(f"#<{name}> is asked for before the program sets it")
+            raise ProgramError(f"#<{name}> is used before the program sets it")
         return value
 
     def assign(self, target: int | str, value: float | None) -> None:
@@ -109,7 +114,7 @@ class Variables:
         elif 1 <= target <= _NGC_FREE or target == _DEBUG_SWITCH:
             self.common[target] = value
         else:
-            raise ProgramError(f"#{target} belongs to the control: no plain block does what setting it does")
+            raise ProgramError(f"#{target} belongs to the control, and no plain block has the effect of setting it")
 
     def _assign_macro_b(self, index: int, value: float | None) -> None:
         if 1 <= index <= _MACRO_B_LOCAL:
@@ -119,7 +124,7 @@ class Variables:
         elif index == 3000:
             raise ProgramError("the program stops here with an alarm of its own (#3000)")
         elif index not in (3003, 3004):
-            raise ProgramError(f"#{index} belongs to the control: no plain block does what setting it does")
+            raise ProgramError(f"#{index} belongs to the control, and no plain block has the effect of setting it")
 
 
 def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, float | None]]:
@@ -130,12 +135,12 @@ def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, flo
         if letter in _NOT_ARGUMENTS:
             continue
         if letter not in _ARGUMENTS:
-            raise ProgramError(f"G65 has the argument {letter.upper()}, which is no argument of a macro")
+            raise ProgramError(f"G65 has the argument {letter.upper()}, which is not an argument of a macro")
         value = word.number if word.value is None else word.value(variables)
         if word.value is None and not word.pointed and value != 0 and letter not in _COUNT_ARGUMENTS:
             raise ProgramError(
-                f"the argument {letter.upper()} has no decimal point: the control scales it by its least "
-                "increment; write the point"
+                f"the argument {letter.upper()} has no decimal point, so the control scales it by its least increment; "
+                "write the point"
             )
         index = _ARGUMENTS[letter]
         if letter in "ijk":

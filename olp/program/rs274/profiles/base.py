@@ -1,7 +1,7 @@
-"""What a profile of the RS-274 family is: what each word of a control means to the path.
+"""What a profile of the RS-274 family is: what each word of a control means for the path.
 
-One table per profile decides for the interpreter, the support matrix of `olp inspect` and the
-documentation alike. G codes are keyed by ten times their number (G5.1 is 51).
+The interpreter, the support matrix of `olp inspect` and the documentation use the same table of a
+profile. G codes are keyed by ten times their number (G5.1 is 51).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from olp.program.rs274.flatten.language import Language
 class Act(IntEnum):
     """What a G code does to the reading of a program."""
 
-    CARRY = 0  #: nothing: its bytes are carried
+    UNCHANGED = 0  #: nothing: its bytes are unchanged
     MOTION = 1
     PLANE = 2
     DISTANCE = 3
@@ -30,7 +30,7 @@ class Act(IntEnum):
     REFUSE = 8
 
 
-_SUPPORT = {Act.CARRY: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
+_SUPPORT = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,13 +38,13 @@ class Profile(Dialect):
     """One control's reading of word-address text.
 
     - `codes` and `refusals`: what becomes of each G code, and why it is refused; `harmless_m` are the M codes
-      that leave the axes where they are.
+      that move no axis.
     - `motion`, `initial_retract`: G codes that are in force at the start (None: none).
     - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
       100 mm/min all the same.
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
       `g10_adds`: in G91 G10 L2 adds to the offset.
-    - `cycles_apart`: canned cycles and G80 are a modal group of their own.
+    - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does;
       a G0 begins and ends at rest, and M5 and M9 come after the motion of their block.
@@ -52,7 +52,7 @@ class Profile(Dialect):
       the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
       G21. `m_with_motion`: M codes carried out along with the motion, without a rest.
-    - `cycles`, `language`: how canned cycles are made, and parametric programs are written.
+    - `cycles`, `language`: how canned cycles are made, and how parametric programs are written.
     - `written_ending`: the ending of files that are written for the control.
     """
 
@@ -90,7 +90,7 @@ class Profile(Dialect):
             Row(
                 f"G{code / 10:g}",
                 _SUPPORT.get(act, Support.READ),
-                self.refusals.get(code, "is no code of this control") if act is Act.REFUSE else "",
+                self.refusals.get(code, "is not a code of this control") if act is Act.REFUSE else "",
             )
             for code, act in sorted(self.codes.items())
         ]
@@ -105,24 +105,24 @@ REFUSALS: Mapping[int, str] = {
     60: "G6 is a spline block",
     70: "G7 (diameter mode) belongs to lathes",
     71: "G7.1 (cylindrical interpolation) moves a rotary axis",
-    101: "G10.1 is not known here",
+    101: "G10.1 is not known",
     120: "G12 (circular pocket or polar interpolation) is a cycle of the control",
     121: "G12.1 (polar interpolation) moves a rotary axis",
     130: "G13 is a cycle of the control",
-    160: "G16 (polar coordinates) is not read yet",
-    310: "G31 (skip) ends where a signal comes",
+    160: "G16 (polar coordinates) is not read",
+    310: "G31 (skip) ends where a signal arrives",
     330: "G33 cuts a thread, which a correction would distort",
     331: "G33.1 (rigid tapping) is synchronous with the spindle",
     434: "G43.4 (tool centre point control) needs rotary axes",
-    510: "G51 (scaling) is not read yet",
-    511: "G51.1 (mirror image) is not read yet",
+    510: "G51 (scaling) is not read",
+    511: "G51.1 (mirror image) is not read",
     650: "G65 calls a macro",
     660: "G66 calls a macro",
-    680: "G68 (rotation) is not read yet",
-    682: "G68.2 (tilted plane) is not read yet",
+    680: "G68 (rotation) is not read",
+    682: "G68.2 (tilted plane) is not read",
     760: "G76 threads or fine-bores, which a correction would distort",
     870: "G87 (back boring) moves off axis inside the control",
-    880: "G88 waits for a person inside the control",
+    880: "G88 waits for the operator inside the cycle",
     281: "G28.1 stores the present position, and no word of it can be edited",
     301: "G30.1 stores the present position, and no word of it can be edited",
     410: "G41 (cutter compensation) makes the path inside the control",
@@ -132,9 +132,9 @@ REFUSALS: Mapping[int, str] = {
 }
 
 
-def g_codes(*, carry: set[int], extra: dict[int, Act], without: Set[int] = frozenset()) -> dict[int, Act]:
-    """The table of a control: the usual codes, those whose bytes it carries, those it has besides or treats
-    in another way, without those it does not have."""
+def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = frozenset()) -> dict[int, Act]:
+    """The table of a control: the usual codes, those that stay `unchanged`, those with an `extra` or another
+    act, `without` those that it does not have."""
     codes = dict.fromkeys((0, 10, 20, 30, 800, *CYCLES, *PROBES), Act.MOTION)
     codes |= dict.fromkeys((330, 331, 760, 870, 880), Act.REFUSE)
     codes |= dict.fromkeys((170, 180, 190), Act.PLANE)
@@ -143,12 +143,12 @@ def g_codes(*, carry: set[int], extra: dict[int, Act], without: Set[int] = froze
     codes |= dict.fromkeys((980, 990), Act.RETRACT)
     codes |= dict.fromkeys((40, 100, 200, 210, 280, 300, 430, 490, 520, 530, 610, 640, 920), Act.EVENT)
     codes |= dict.fromkeys(range(540, 600, 10), Act.EVENT)
-    codes |= dict.fromkeys((400, 960, 970, *carry), Act.CARRY)
+    codes |= dict.fromkeys((400, 960, 970, *unchanged), Act.UNCHANGED)
     codes |= dict.fromkeys(REFUSALS, Act.REFUSE)
     codes |= extra
     return {code: act for code, act in codes.items() if code not in without}
 
 
-#: M codes of ISO 6983 that leave the axes where they are.
+#: M codes of ISO 6983 that move no axis.
 ISO_M = frozenset({0, 1, 2, 3, 4, 5, 7, 8, 9, 19, 30, 48, 49})
 ARC_DISTANCE: Mapping[int, Act] = dict.fromkeys((901, 911), Act.ARC_DISTANCE)

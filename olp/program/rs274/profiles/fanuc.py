@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from olp.program.rs274.profiles.base import Act, g_codes
-from olp.program.rs274.profiles.iso import ISO, ISO_CARRY, ISO_EXTRA
+from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
 DIALECT = replace(
     ISO,
     name="fanuc",
     title="Fanuc and compatible ISO controls (system A words of mills)",
-    codes=g_codes(carry={*ISO_CARRY, 51, 110}, extra={**ISO_EXTRA, 51: Act.CARRY}),
+    codes=g_codes(unchanged={*ISO_UNCHANGED, 51, 110}, extra={**ISO_EXTRA, 51: Act.UNCHANGED}),
     refusals={**ISO.refusals, 921: "G92.1 presets offsets that are not known off line"},
     harmless_m=ISO.harmless_m | {10, 11, 29, 13, 88, 89},
     feed_without_point=True,

@@ -21,7 +21,7 @@ DIALECT = Profile(
     title="Grbl 1.1 and its descendants",
     reader=read_blocks,
     unroller=unroll_blocks,
-    codes=g_codes(carry=set(), extra=_EXTRA, without=_LACKING),
+    codes=g_codes(unchanged=set(), extra=_EXTRA, without=_LACKING),
     refusals=REFUSALS,
     harmless_m=ISO_M | {56},
     motion=0,

@@ -7,18 +7,18 @@ from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
 
-#: G codes that mean nothing to the path on these controls.
-ISO_CARRY = frozenset({80, 90, 150, 500, 501, 620, 630, 670, 690, 691, 131, 231, 250})
+#: G codes without effect on the path on these controls.
+ISO_UNCHANGED = frozenset({80, 90, 150, 500, 501, 620, 630, 670, 690, 691, 131, 231, 250})
 #: G44 and G54.1; G92.1 needs offsets that are not known off line.
 ISO_EXTRA = {440: Act.EVENT, 541: Act.EVENT, 921: Act.REFUSE}
 
-#: The control that none of them is: each states its name, its codes, and where it differs.
+#: What they have in common; each control states its name, its codes, and where it differs.
 ISO = Profile(
     name="iso",
     title="ISO controls of mills",
     reader=read_blocks,
     unroller=unroll_blocks,
-    codes=g_codes(carry={*ISO_CARRY}, extra=ISO_EXTRA),
+    codes=g_codes(unchanged={*ISO_UNCHANGED}, extra=ISO_EXTRA),
     refusals=REFUSALS,
     harmless_m=ISO_M,
     initial_retract=980,

@@ -14,7 +14,7 @@ DIALECT = Profile(
     title="LinuxCNC and other RS274/NGC interpreters",
     reader=read_blocks,
     unroller=unroll_blocks,
-    codes=g_codes(carry={80}, extra={**_EVENTS, **ARC_DISTANCE}),
+    codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE}),
     refusals=REFUSALS,
     harmless_m=ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
     initial_retract=990,

@@ -1,0 +1,67 @@
+"""The commands of the papers run in the order of reading, in one folder, and show what comes out."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from docs.blocks import README, ROOT, blocks, papers, problems, run
+
+NEVER_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist")
+PAPERS = papers()
+#: What no shell of Windows understands.
+_OF_BASH = re.compile(r"\||<|>(?! \d)|\$|\bprintf\b|\bcat\b|\bexport\b|&&|/bin/|\\$", re.MULTILINE)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with nothing but the programs that ship."""
+    shutil.copytree(ROOT / "programs", tmp_path / "programs")
+    # what a reader of the how-to has left beside its measurements
+    for made in (tmp_path / "programs" / "gantry-lines").glob("calibration*"):
+        made.unlink()
+    return tmp_path
+
+
+def test_there_is_something_to_try() -> None:
+    kinds = [block.kind for found in PAPERS.values() for block in found]
+    assert kinds.count("sh") > 40
+    assert kinds.count("python") > 1
+
+
+@pytest.mark.slow
+def test_the_readme_runs_from_top_to_bottom(folder: Path) -> None:
+    assert list(problems(PAPERS["README"], folder)) == []
+
+
+@pytest.mark.slow
+def test_the_pages_run_in_the_order_of_reading(folder: Path) -> None:
+    pages = [found for name, found in PAPERS.items() if name != "README"]
+    assert [problem for found in pages for problem in problems(found, folder)] == []
+
+
+@pytest.mark.slow
+def test_set_up_from_nothing(tmp_path: Path) -> None:
+    """The commands of the README, in a copy of the checkout and an environment of their own."""
+    copy = tmp_path / "checkout"
+    shutil.copytree(ROOT, copy, ignore=NEVER_COPIED)
+    for name in (".gitignore", ".ci"):
+        source = ROOT / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, copy / name)
+    first, second = (block for block in blocks(README, "README") if block.set_up and block.kind == "sh")
+    code, text = run(first.body, copy, timeout_s=900.0)
+    assert code == 0, text
+    assert "What this proves" in text
+    assert (copy / "first-plate.ngc").stat().st_size > 0
+    code, text = run(second.body, copy, timeout_s=900.0)
+    assert code == 0, text
+    assert re.search(r"\d+ passed", text)
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_commands_of_one_shell_stand_beside_those_of_the_other(name: str) -> None:
+    for block in PAPERS[name]:
+        if block.kind == "sh" and _OF_BASH.search(block.body):
+            assert block.next_kind == "powershell", block.body
