@@ -69,7 +69,7 @@ def _table(names: Sequence[str], rows: Sequence[Summary]) -> Iterator[str]:
         else:
             header.append(_title(key))
             columns.append([_text(value) for value in values])
-    yield from table(header, zip(*columns, strict=True), left=1 + words)
+    yield from table(header, zip(*columns, strict=True), text_columns=1 + words)
 
 
 def _title(key: object) -> str:

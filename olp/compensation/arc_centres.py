@@ -35,7 +35,7 @@ class Arc:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArcRows:
-    """The same in columns."""
+    """Parts of arcs in columns."""
 
     row: Index
     move: Index

@@ -90,8 +90,7 @@ def subdivide_arcs(
         pieces = _divided(pieces.pick(~good), parts.astype(np.int64))
     if len(pieces):
         raise CannotCompute(
-            f"no division of this arc into up to 16 to the power {_DEEPEST} arcs meets the tolerance; "
-            "raise --tolerance-um",
+            "this arc exceeds the tolerance however finely it is divided into arcs; raise --tolerance-um",
             line=int(path.line[arcs.move[pieces.arc[0]]]),
         )
     arc = np.concatenate([p.arc for p in done])
@@ -133,9 +132,9 @@ def _starts(path: Toolpath, move: Index) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bend:
-    """How pieces of arcs are bent: nominal `point` and `command` (n, s, 3) at shares (s,) of the piece,
-    nominal `centre` (n, 3), `mismatch` (n,) of the nominal radii at both ends, `rigid` (n,): shifted, not
-    bent."""
+    """How pieces of arcs are bent: nominal `point` and `command` (n, s, 3) at shares (s,) of the piece.
+    `centre` (n, 3) is nominal, `mismatch` (n,) is that of the nominal radii at both ends. `rigid` (n,) pieces
+    are shifted, not bent."""
 
     point: Array
     command: Array

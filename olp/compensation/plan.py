@@ -18,9 +18,9 @@ from olp.errormodel.base import ErrorModel
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the plan must keep: tolerance of model and chords and the last digit written, in mm; whether
-    rapids are subdivided too, whether commands outside the calibrated box are refused, and whether a step may
-    be put before a move that is not split (to take up backlash)."""
+    """Limits of the plan: the numerical tolerance of model and chords and the last digit written, in mm.
+    `split_rapids`: rapids are subdivided too. `refuse_outside`: commands outside the calibrated box are
+    refused. `insert`: a step that takes up backlash may be put before a move that is not split."""
 
     tolerance_mm: float
     digit_mm: float = 0.0
@@ -31,10 +31,10 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """Rows in program order, one or more per move: (r,) `move`; (r, 3) `target_mm` where the tip has to be
-    (kept only where the model has backlash) and `command_mm` to get there; (r, 3) `raw` where the axis keeps
-    what the program says; (r,) `reach`, the share of the move that ends at the row; (r,) `take_up`: the
-    row only takes up backlash.
+    """Rows in program order, one or more per move. (r,) `move` is its index. (r, 3) `target_mm` is where the
+    tip has to be (kept only where the model has backlash), `command_mm` the command for it. (r, 3) `raw` is
+    True where the axis keeps the program's own command. (r,) `reach` is the share of the move that ends at
+    the row. (r,) `take_up` rows only take up backlash.
 
     `uncorrected` are moves that are left as they are for want of a position, `shift_mm` (frames, 3) the
     error that the touch-off of each frame holds.

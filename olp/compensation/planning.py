@@ -78,8 +78,8 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
             i = int(cutting[0])
             axes = " and ".join("XYZ"[a] for a in np.flatnonzero(unknown[i]))
             raise ProgramError(
-                f"the position of {axes} is not known at this feed move, and its correction needs it; command "
-                "all axes in a rapid first, or give start_mm in the job file",
+                f"the position of {axes} is not known at this feed move, and its correction needs it; "
+                "command all axes in a rapid first, or give start_mm in the job file",
                 line=int(path.line[i]),
             )
         raw[some] |= blind | unknown[some]

@@ -50,8 +50,8 @@ class Reversal:
 
 
 def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool) -> Plan:
-    """The plan with play: commands lead by half the backlash, and where an axis turns round in a feed
-    move, a row that only takes it up comes first; without `insert` not before moves that are never split.
+    """The plan with play: commands lead by half the backlash. Where an axis turns round in a feed move, a row
+    that only takes it up comes first; without `insert` not before moves that are never split.
 
     Where one axis turns, the straightness of another may jump with it, so that one turns too. The states are
     iterated until they agree.

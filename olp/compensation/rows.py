@@ -17,10 +17,10 @@ from olp.core.toolpath import Kind, Toolpath
 class Rows:
     """Consecutive rows of a plan, from row `first` of it on.
 
-    (r,) `move` and `flag` as in the plan and the path; `head` marks the row that keeps the text of its move,
-    `before` the rows that are put in front of it; `take_up` as in the plan, `arc` where the move is an arc.
-    (r, 3) `emitted`: axis positions in mm after each row as written, (3,) `entry` those before the first.
-    (r, 3) `write`: the number changes or is new, `mantissa` / 10**`decimals` is what is written.
+    (r,) `move`, `flag` and `take_up` are as in the plan and the path. `head` marks the row that keeps the
+    text of its move, `before` the rows that are put in front of it, `arc` moves along arcs. (r, 3) `emitted`
+    are axis positions in mm after each row as written, (3,) `entry` those before the first. (r, 3) `write`:
+    the number changes or is new, and `mantissa` / 10**`decimals` is written.
     """
 
     first: int

@@ -29,7 +29,7 @@ from olp.program.text.edits import Edits, Prefixes, splice
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What is to be written: the `plan` of a `program` that was read with its words, by a `model`; the
+    """What is to be written: the `plan` of a `program` that was read with its words, by a `model`. Also the
     numerical tolerance of the correction, the least increment of each axis, and the `stamp`, empty for
     none."""
 

@@ -11,7 +11,7 @@ OlpError
     └── NotInvertible
 
 Each holds its data and builds its message in `__str__`, as
-`file:line: what was found; what was expected; what to do`.
+`file:line: what is wrong; what was expected; what to do`.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class ProgramError(InputError):
 
 
 class AlreadyCorrected(ProgramError):
-    """The program carries the stamp of an earlier correction."""
+    """The program has the stamp of an earlier correction."""
 
 
 class OutsideBox(InputError):
@@ -95,7 +95,7 @@ class NotInvertible(CannotCompute):
 
 @contextlib.contextmanager
 def naming(file: str) -> Iterator[None]:
-    """Errors with a line that name no file are of this one; with "" they stay as they are."""
+    """Errors that have a line but no file get this file; with "" they are unchanged."""
     try:
         yield
     except OlpError as error:

@@ -12,6 +12,7 @@ Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
 
 #: Plane number to (first, second, third) axis, right-handed: G17, G18, G19.
 PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
+#: PLANES as an array, to be indexed by columns of planes.
 _AXES = np.array(PLANES)
 
 
@@ -43,8 +44,8 @@ def arms(point: Array, centre: Array, plane: Plane) -> tuple[Array, Array]:
 
 
 def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quarter: int) -> Array:
-    """(n,) share of each arc at which it first passes a multiple of a right angle, counted in `quarter`; NaN
-    where it does not."""
+    """(n,) share of each arc at which it first passes the angle of `quarter` right angles, and whole turns;
+    NaN where it does not."""
     along, across = arms(start, centre, plane)
     begin = np.arctan2(across, along)
     turn = np.mod((quarter * np.pi / 2 - begin) * np.sign(sweep), 2 * np.pi)
@@ -75,7 +76,7 @@ def arc_distance(
     s0, s1 = start[rows, first] - c0, start[rows, second] - c1
     p0, p1 = point[rows, first] - c0, point[rows, second] - c1
     angle = np.arctan2(p1, p0) - np.arctan2(s1, s0)
-    # the turn on which the point lies is the one that `near` says
+    # the point lies on the turn of share `near`
     guess = near * sweep
     angle = angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi))
     share = np.clip(angle / sweep, 0.0, 1.0)
@@ -83,8 +84,7 @@ def arc_distance(
     radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
     lead = (end[rows, third] - start[rows, third]) / sweep
     level = point[rows, third] - start[rows, third] - share * lead * sweep
-    # across a helix, which rises by `lead` per radian, a difference in level counts by the cosine of its
-    # pitch
+    # a helix rises by `lead` per radian; across it a difference in level counts by the cosine of its pitch
     return np.asarray(np.hypot(np.hypot(p0, p1) - radius, level * radius / np.hypot(radius, lead)), float)
 
 
@@ -104,7 +104,7 @@ def arc_directions(
 
 
 def rotation_matrix(angles_deg: tuple[float, float, float]) -> Array:
-    """(3, 3) rotation by A about X first, then B about Y, then C about Z, of axes that stay: Rz Ry Rx."""
+    """(3, 3) rotation by A about X first, then B about Y, then C about Z, of fixed axes: Rz Ry Rx."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(np.radians(angles_deg)), np.cos(np.radians(angles_deg))
     about_x = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     about_y = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))

@@ -31,8 +31,8 @@ _BLOCK = 8192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """Interpolation along one argument: in cell i the value is a polynomial of the share t in [0, 1] of the
-    cell, with coefficients `weights[i]` (degree + 1, window) times the values from node `first[i]` on."""
+    """Interpolation along one argument. In cell i the value is a polynomial of the share t in [0, 1] of the
+    cell. Its coefficients are `weights[i]` (degree + 1, window) times the values from node `first[i]` on."""
 
     knots: Array
     first: Index

@@ -1,7 +1,7 @@
 """Interpolation of many columns over one argument, and dense uniform tables for the hot path.
 
-`Interpolant` is the truth (piecewise linear or monotone cubic); `DenseTable` is its resampling for
-speed. Outside their range both hold the end value; who may leave the range asks `inside` first.
+`Interpolant` is exact (piecewise linear or monotone cubic); `DenseTable` is its resampling for speed.
+Outside their range both hold the end value; a caller that may leave the range asks `inside` first.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from olp.core.arrays import Array
 Column = Array | float
 Kind = Literal["linear", "pchip"]
 
-#: 64k cells of six columns are 6 MB an axis: still in the third-level cache, and 0.05 mm on 3 m.
+#: 64k cells of six columns are 6 MB per axis, which the third-level cache holds, and 0.05 mm on 3 m.
 MAX_CELLS = 65536
 #: Knots this close to a grid node count as lying on it.
 ON_GRID_MM = 1e-9
@@ -118,8 +118,8 @@ class DenseTable:
     over the cell (imaginary part), so one gather serves both; a constant column is a plain float.
 
     `nodes` is None for a uniform grid from `low` with `step`. Else it holds the nodes, the imaginary part is
-    the slope, and `step` is the widest cell; `guide` gives the cell at the start of each of many equal bins,
-    none of which holds two nodes (None: bisect).
+    the slope, and `step` is the widest cell. Then `guide` gives the cell at the start of each of many equal
+    bins, none of which holds two nodes (None: bisect).
     """
 
     low: float
@@ -163,7 +163,7 @@ class DenseTable:
         bin_position = q - self.low
         bin_position *= (len(self.guide) - 1) / (nodes[-1] - nodes[0])
         index = self.guide.take(bin_position.astype(np.intp), mode="clip")
-        # Rounding may name the bin before or after: one step either way mends it.
+        # Rounding may give the neighbouring bin: one step in either direction mends it.
         index -= nodes.take(index, mode="clip") > q
         index += nodes.take(index + 1, mode="clip") <= q
         np.clip(index, 0, self.count - 1, out=index)
@@ -179,9 +179,9 @@ def dense_table(
     """Resample the columns of `evaluate` (q (k,) -> (k, m)) from the first to the last of the
     strictly increasing `knots`.
 
-    Every knot becomes a node, so piecewise linear data stay exact; cells are as short as the column of
-    greatest curvature needs for its tolerance (error of linear interpolation: step^2 / 8 x curvature),
-    within MAX_CELLS. Knots on no common grid give a non-uniform table.
+    Every knot becomes a node, so piecewise linear data are exact. Within MAX_CELLS, cells are as short as the
+    column of greatest curvature needs for its tolerance (error of linear interpolation: step^2 / 8 x
+    curvature). Knots on no common grid give a non-uniform table.
     """
     needed = [math.sqrt(8.0 * t / c) for t, c in zip(tolerance, curvature, strict=True) if c > 0.0]
     fine = min(needed, default=math.inf)

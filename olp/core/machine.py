@@ -12,13 +12,15 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Vector = tuple[float, float, float]
+#: No tool, no offset: mm.
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 #: All 24 serial chains of three linear axes, workpiece to tool, with `F` the machine frame.
 CHAINS = frozenset("".join(p) for p in itertools.permutations("FXYZ"))
 
-#: ISO 230-1 names of the 18 component errors and 3 squareness errors.
+#: ISO 230-1 names of the 18 component errors.
 COMPONENTS = tuple(f"E{direction}{axis}" for axis in "XYZ" for direction in "XYZABC")
+#: ISO 230-1 names of the 3 squareness errors.
 SQUARENESS = ("C0Y", "B0Z", "A0Z")
 
 
@@ -26,8 +28,8 @@ SQUARENESS = ("C0Y", "B0Z", "A0Z")
 class Axis:
     """Limits of one linear axis: travel (min, max) in mm; mm/s, mm/s2, mm/s3.
 
-    `compliance_um_per_m_s2` is where the tool stands off its place relative to the workpiece, (X, Y, Z),
-    actual minus commanded, while the axis is accelerated by 1 m/s2.
+    `compliance_um_per_m_s2` is the displacement (X, Y, Z) of the tool relative to the workpiece, actual minus
+    commanded, while the axis is accelerated by 1 m/s2.
     """
 
     travel_mm: tuple[float, float]
@@ -42,9 +44,9 @@ class Axis:
 class WorkOffset:
     """A work offset such as G54.
 
-    `set_by` is "touch" (touched off on the raw machine, so the touched point keeps its place) or
-    "true" (located by other means). `touched_at_mm` is the axis position at the touch; an axis that
-    is None there takes its default, the offset plus the length of `touch_tool`; `touched_payload_kg` None is
+    `set_by` is "touch" (touched off on the uncompensated machine, so the touched point keeps its position)
+    or "true" (located by other means). `touched_at_mm` is the axis position at the touch. An axis that is
+    None there takes its default, the offset plus the length of `touch_tool`. `touched_payload_kg` None means
     the job's payload.
     """
 
@@ -69,9 +71,9 @@ class HolderPart:
 
 @dataclass(frozen=True, slots=True)
 class Sanity:
-    """What a check before deployment takes for sane: the largest correction, how far a tool may differ from
-    those measured with, temperatures from that of the calibration, the age of a calibration without an end
-    of its own, and the clearance of tool and holder."""
+    """Limits of a check before deployment: the largest correction, how far a tool may differ from those
+    measured with and temperatures from that of the calibration. Also the age of a calibration that states no
+    end of its validity, and the clearance of tool and holder."""
 
     largest_correction_mm: float = 1.0
     tool_within_mm: float = 100.0
@@ -82,13 +84,13 @@ class Sanity:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A row of the control's tool table, and the lever for angular errors.
+    """A row of the control's tool table, and the tool vector on which angular errors act.
 
-    `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to
-    minus the length; a negative Z length is a touch-off value and gives no lever. `set_by` "touch"
-    means that the length was set on the raw machine at axis position `touched_at_mm`.
-    `cutting_length_mm` counts from the tip up, None: all that the holder leaves free; `holder` is stacked
-    upwards and ends at the gauge point.
+    `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to minus the
+    length; a negative Z length is a touch-off value and gives no tool vector. `set_by` "touch" means that the
+    length was set on the uncompensated machine at axis position `touched_at_mm`. `cutting_length_mm` counts
+    from the tip up, None: all that the holder leaves free. `holder` is stacked upwards and ends at the gauge
+    point.
     """
 
     number: int
@@ -115,7 +117,7 @@ class Tool:
 class Machine:
     """A machine file: chain, limits, offsets, tools and what its control already corrects.
 
-    `decimal_point` tells what a length without a decimal point means to a control that makes a difference
+    `decimal_point` says what a length without a decimal point means to a control that makes a difference
     (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
@@ -158,14 +160,15 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What changes per job. `work_offsets` and `tools` override the machine's, one by one. `payloads` leads
-    from a line of the program, counted from 1, to the payload from there on. Temperatures of the structure's
-    sensors come from `sensors_degC`, settled, or from `sensor_log` at a time in it. `dialect` is that of the
-    program, None: what its text and the ending of its file say; `described` is a dialect that a file
-    describes (`olp.program.dialect.Dialect`)."""
+    """What changes per job. `part_tolerance_um` holds where a call gives none. `work_offsets` and `tools`
+    override the machine's, one by one. `payloads` leads from a line of the program, counted from 1, to the
+    payload from there on. Temperatures of the structure's sensors come from `sensors_degC`, settled, or from
+    `sensor_log` at a time in it. `dialect` is that of the program; None: it is detected from the text and the
+    ending of the file. `described` is a dialect that a file describes (`olp.program.dialect.Dialect`)."""
 
     program: str | None = None
     machine: str | None = None
+    part_tolerance_um: float | None = None
     start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
     payload_kg: float = 0.0
     payloads: Mapping[int, float] = field(default_factory=dict)

@@ -1,12 +1,12 @@
-"""How a long run tells how far it is."""
+"""How a long run reports its progress."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-#: called with what is being done and the share of the whole that is
+#: called with the name of the present step and the share of the whole that is done
 Progress = Callable[[str, float], None]
 
 
 def silent(what: str, share: float) -> None:
-    """The progress of a run that nobody watches."""
+    """Report no progress."""

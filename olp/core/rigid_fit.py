@@ -9,11 +9,12 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 
-#: A motion of the whole that moves the points across their path by less than this share of it: noise would
-#: come back a hundredfold.
+#: A motion that moves the points across their path by less than this share of it is not determined: noise
+#: would be amplified a hundredfold.
 _LOOSE = 1e-2
 #: Points that are narrower than this share of their length are on a line.
 _NARROW = 1e-3
+#: The six motions, in the order of the columns of the fit.
 _DOF = ("shift in X", "shift in Y", "shift in Z", "turn about X", "turn about Y", "turn about Z")
 
 
@@ -83,19 +84,19 @@ def fit_points(measured_mm: Array, nominal_mm: Array) -> Rigid:
 def fit_frame(measured_mm: Array, nominal_mm: Array) -> Rigid:
     """As `fit_points`; raises CannotCompute for fewer than three points, or where they lie on one line."""
     if len(measured_mm) < 3:
-        raise CannotCompute(f"{len(measured_mm)} points make no frame; measure at least three")
+        raise CannotCompute(f"a frame of {len(measured_mm)} points; expected at least three; measure more")
     spread = np.linalg.svd(nominal_mm - nominal_mm.mean(axis=0), compute_uv=False)
     if spread[1] <= _NARROW * spread[0]:
-        raise CannotCompute("the points of a frame lie on one line; measure at least one beside it")
+        raise CannotCompute("the points of a frame lie on one line; measure at least one point off that line")
     return fit_points(measured_mm, nominal_mm)
 
 
 def fit_path(measured_mm: Array, foot_mm: Array, along: Array) -> tuple[Rigid, tuple[str, ...]]:
     """One Gauss-Newton step of the transform that brings measured points (m, 3) onto their path.
 
-    Only distances across the path count: `foot_mm` (m, 3) are the places on it, `along` (m, 3) its unit
-    tangents there. Also returns the motions that the path does not determine, such as the shift along a
-    straight line; they stay zero.
+    Only distances across the path count: `foot_mm` (m, 3) are the nearest points of it, `along` (m, 3) its
+    unit tangents there. Also returns the motions that the path does not determine, such as the shift along a
+    straight line; they are zero.
     """
     centre = measured_mm.mean(axis=0)
     arm = measured_mm - centre

@@ -1,6 +1,6 @@
-"""What every table of a file is, positions of axes, and numbers with limits; as pydantic models.
+"""Tables of files, positions of axes, and numbers with limits, as pydantic models.
 
-Only what reads or writes files loads this, never `import olp`.
+Only modules that read or write files load this, never `import olp`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Table(BaseModel):
 
 
 class Position(Table):
-    """Axis positions in mm; an axis that is not named is not known."""
+    """Axis positions in mm; the position of an axis that is left out is not known."""
 
     X: float | None = Field(default=None, description="a position of axis X in mm")
     Y: float | None = Field(default=None, description="a position of axis Y in mm")

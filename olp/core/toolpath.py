@@ -30,11 +30,11 @@ class Kind(IntEnum):
 
 
 class Flag(IntFlag):
-    """What else is known of a move."""
+    """Properties of a move."""
 
     PASS = 1  #: never corrected: G53, G28, G30, a section switched off
     DELETED = 2  #: in a block that the block-delete switch removes
-    CYCLE = 4  #: made by a canned cycle: has no words of its own
+    CYCLE = 4  #: made by a canned cycle: has no words
     WHOLE = 8  #: never split: the block moves a rotary axis too
     INCREMENTAL = 16  #: its words are distances
     MACHINE = 32  #: G53: its words are axis positions
@@ -43,21 +43,21 @@ class Flag(IntFlag):
 
 
 def carried(tool_mm: Vector, payload_kg: float) -> Tool:
-    """A tool as error models take it: the payload is a fourth number where there is one."""
+    """A tool row for error models: the tool vector, and the payload as a fourth number where there is one."""
     return (*tool_mm, payload_kg) if payload_kg else tool_mm
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """How words became axis positions for a stretch of moves, and which tool was in the spindle.
+    """How words became axis positions for some moves, and which tool was in the spindle.
 
     Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
-    `length_mm`). `tool_mm` is the lever, gauge point to tip, `payload_kg` what the machine carries.
-    `touched` is (axis position, lever and payload) of the touch-off of the work offset on the raw machine,
-    None where it was located by other means; `tool_touched` likewise for the length of the active tool. In a
-    rotated frame the words are turned first, by the rows of `turn`, None where nothing turns: axis position =
-    `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is the part of the offset by which the tip stays off
-    the point that is said, as over a hole.
+    `length_mm`). `tool_mm` is the tool vector, gauge point to tip; `payload_kg` is what the machine carries.
+    `touched` is (axis position, tool vector and payload) of the touch-off of the work offset on the
+    uncompensated machine, None where it was located by other means. `tool_touched` is the same for the length
+    of the active tool. In a rotated frame the words are turned first, by the rows of `turn`, None where
+    nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is the part of the
+    offset by which the tip keeps off the programmed point, as over a hole.
     """
 
     unit_mm: float = 1.0
@@ -79,14 +79,14 @@ class Frame:
         return (x, y, z)
 
     def placed_mm(self, words: Sequence[float]) -> tuple[float, ...]:
-        """The axis position that three words say."""
+        """The axis position of three words."""
         position_mm = [w * self.unit_mm for w in words]
         if self.turn is not None:
             position_mm = [sum(r * v for r, v in zip(row, position_mm, strict=True)) for row in self.turn]
         return tuple(v + o for v, o in zip(position_mm, self.offset_mm, strict=True))
 
     def tip_mm(self, point: Array) -> Array:
-        """Places of the tip (n, 3) in this frame, from axis positions less the length."""
+        """Positions of the tip (n, 3) in this frame, from axis positions less the length."""
         away = point - np.array(self.origin_mm())
         return away if self.turn is None else np.asarray(away @ np.array(self.turn), float)
 
@@ -135,8 +135,8 @@ class Toolpath:
         return starts
 
     def reach_mm(self) -> tuple[Array, Array]:
-        """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, on the way there;
-        NaN where an axis is not known. Both ends of a line in a box hold all of it."""
+        """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, along it; NaN where
+        an axis is not known. A line lies in a box where both its ends do."""
         if not len(self.arcs):
             return self.end_mm, self.end_mm
         arcs, move = self.arcs, self.arcs.move
@@ -163,7 +163,7 @@ class Toolpath:
         return [f.tool_mm for f in self.frames]
 
     def per_frame(self, values: Sequence[Tool], first: int = 0, last: int | None = None) -> Array:
-        """One vector a frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
+        """One vector per frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
         if not values:
             return np.zeros(3)
         table = np.array(values, float)

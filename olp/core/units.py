@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 
+#: mm per inch, exactly.
 MM_PER_INCH = 25.4
+#: mm per um.
 MM_PER_UM = 1e-3
+#: rad per urad.
 RAD_PER_URAD = 1e-6
+#: um per mm.
 UM_PER_MM = 1e3
+#: Linear axes in the order of rows.
 AXES = "XYZ"
 
 #: Neighbours of a number that are tried until one reads back exactly.
@@ -18,8 +23,8 @@ _NEIGHBOURS = 3
 def shifted(number: float | str, exponent: int) -> float:
     """A number times ten to `exponent`, by its decimal digits: 0.1 um is 1e-4 mm, not a neighbour of it.
 
-    A text counts as it is written, so that every double can be written in another decimal unit and read back
-    exactly. Raises ValueError where the text is no number.
+    A text is taken by its digits as written, so that every double can be written in another decimal unit and
+    read back exactly. Raises ValueError where the text is not a number.
     """
     text = number if isinstance(number, str) else repr(float(number))
     value = float(text)

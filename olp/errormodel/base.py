@@ -3,9 +3,9 @@
 All positions are axis positions in mm, rows X, Y, Z; angles in rad, right-handed about +X, +Y, +Z.
 A model is a value: no state, no text, no files. A sum of models is a model (`olp.errormodel.total`).
 
-Play state: `play` is (n, 3) in [-1, 1] per axis. +1: the axis last moved in + and its lost motion is
-taken up; -1: the same in -; 0: unknown or in the middle. With a lost motion of b mm an axis adds
--b/2 * play to its own position. Without `play` models give the mean of both directions.
+Play state: `play` is (n, 3) in [-1, 1] per axis. It is +1 where the axis last moved in + and its backlash is
+taken up, -1 where the same holds in -, and 0 where it is unknown or in the middle. With a backlash of b mm an
+axis adds -b/2 * play to its own position. Without `play` models give the mean of both directions.
 
 A tool row is X, Y, Z of the tool vector in mm and, in a fourth column, the payload in kg; without that column
 the payload is 0. So the payload goes with the tool wherever a tool goes.
@@ -56,11 +56,11 @@ class ErrorModel(Protocol):
         ...
 
     def backlash_at(self, axis_mm: Array) -> Array | None:
-        """(n, 3) lost motion b of each axis at its position, None where no axis has any."""
+        """(n, 3) backlash b of each axis at its position in mm, None where no axis has any."""
         ...
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
         """(n,) upper bound in mm, anywhere in the box, of how far the error along a straight move by delta_mm
-        (n, 3) departs from the straight line between its values at both ends. It holds as well for every move
+        (n, 3) departs from the straight line between its values at both ends. It also holds for every move
         that is shorter along each axis."""
         ...

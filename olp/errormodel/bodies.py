@@ -1,4 +1,4 @@
-"""The three moving bodies of a chain: what each carries, and the lever on which its angles act."""
+"""The three moving bodies of a chain: what each carries, and the lever arm on which its angles act."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from olp.errormodel.components import AxisComponents
 from olp.errormodel.lever_arms import LeverArms, lever_arms_of
 from olp.errormodel.sources.squareness import shears
 
-#: Short forms of sine and cosine may miss this much, over the box and with this much tool.
+#: mm; short series of sine and cosine may be wrong by so much at the tip, anywhere in the box.
 TRIGONOMETRY_MM = 2e-11
+#: mm; the longest tool vector for which that holds, along each axis.
 TOOL_REACH_MM = 1000.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """Axis `axis` of the chain. `shear` (3,) times (q - datum) is its squareness; `levers` lists (rows,
-    lever). `sine_terms` 1 or 2: so many terms of the sine series (and cosine to second order) are exact to
-    TRIGONOMETRY_MM; 0: take sine and cosine themselves."""
+    """Axis `axis` of the chain. `shear` (3,) times (q - datum) is its squareness; `lever_arms` lists (rows,
+    lever arm). `sine_terms` 1 or 2: so many terms of the sine series (and cosine to second order) are exact
+    to TRIGONOMETRY_MM; 0: take sine and cosine themselves."""
 
     axis: int
     carries_workpiece: bool

@@ -14,7 +14,7 @@ def as_points(axis_mm: object, name: str = "axis_mm") -> Array:
     """Rows (n, 3) of float64, whatever the number type; raises UsageError on any other shape."""
     points = np.asarray(axis_mm, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise UsageError(f"{name} has shape {points.shape}; expected (n, 3), a row X, Y, Z per point")
+        raise UsageError(f"{name} has shape {points.shape}; expected (n, 3), one row X, Y, Z per point")
     return points
 
 
@@ -41,7 +41,7 @@ def payload_of(tool_mm: object) -> Array | float:
 class Boxed:
     """`box_mm` (3, 2). With `hold` a model is evaluated at the nearest point of the box. Without it the
     caller tests `inside`; outside its range a curve keeps its end value, so that iterations near a face
-    stay finite.
+    are finite.
     """
 
     box_mm: Array

@@ -35,11 +35,9 @@ def build(
         raise ConfigError(f"component '{unknown[0]}' to skip; expected ISO 230-1 names such as EXX or C0Y")
     if skip_components and any(m.kind == "total" for m in calibration.maps):
         raise ConfigError(
-            f'the control corrects {", ".join(sorted(skip_components))}, and a map of kind "total" holds '
-            f"them; they "
-            "cannot be taken out of it: switch the control's tables off, or measure the map with them on "
-            "and name "
-            "them in active_during_measurement"
+            f'a map of kind "total" also holds {", ".join(sorted(skip_components))}, which the control '
+            "corrects. Switch the tables of the control off, or measure the map with them on and name them "
+            "in active_during_measurement"
         )
     hold = outside == "hold"
     if calibration.model == "huddersfield":

@@ -1,4 +1,4 @@
-"""A calibration as values: what was measured, where, and in which sense. Base units: mm, rad, degC.
+"""A calibration as values: what was measured, where, and with which sign. Base units: mm, rad, degC.
 
 error = actual - commanded, tool relative to workpiece, right-handed, ISO 230-1 names. A file reader
 fills these types; relations between the parts are checked here and raise ConfigError.
@@ -35,11 +35,11 @@ Model = Literal["rigid-body", "huddersfield"]
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y, B0Z,
-    A0Z in rad, `backlash_mm` the constant lost motion per axis. Several curves of one axis hold different
-    components. `repeatability_mm` is the standard deviation of each axis at one place, None where nobody
-    stated it. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`, which was on the
-    machine while measuring. `more` holds key and values of each source without a field of its own. Raises
-    ConfigError with every problem found."""
+    A0Z in rad, `backlash_mm` the constant backlash per axis. Several curves of one axis hold different
+    components. `repeatability_mm` is the standard deviation of each axis at one position, None where it is
+    not stated. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`, which was on the
+    machine while measuring. `more` holds key and values of each source that has no field here. Raises
+    ConfigError with every problem."""
 
     machine: str
     box_mm: Array
@@ -100,11 +100,11 @@ class Calibration:
                 )
             if curve.forward and self.backlash_mm[j] != 0.0:
                 problems.append(
-                    f"backlash of axis {curve.axis} and a curve with a direction column; expected one of "
-                    "the two, or the lost motion counts twice"
+                    f"axis {curve.axis} has a backlash and a curve with a direction column; expected one of "
+                    "the two, or its backlash counts twice"
                 )
             for name in sorted(seen & set(curve.names)):
-                problems.append(f"{name} stands in two curves; expected each component once; merge the files")
+                problems.append(f"{name} is in two curves; expected each component once; merge the files")
             seen |= set(curve.names)
         return problems
 
@@ -117,9 +117,8 @@ class Calibration:
         totals = [m for m in self.maps if m.kind == "total"]
         if len(totals) > 1:
             problems.append(
-                f'{totals[1].name} is a second map of kind "total"; expected one, which is all that was '
-                f"measured; "
-                'give the others as kind = "residual"'
+                f'{totals[1].name} is a second map of kind "total"; expected one, as it is all that was '
+                'measured; give the others as kind = "residual"'
             )
         counted = [
             name
@@ -133,16 +132,14 @@ class Calibration:
         if totals and counted:
             problems.append(
                 f'{totals[0].name} is of kind "total", so it holds {", ".join(counted)} already; expected '
-                f"none of "
-                'them beside it, or kind = "residual" where the map is what they leave'
+                'none of them beside it, or kind = "residual" if the map is the residual beside them'
             )
         seen: dict[str, str] = {}
         for table in self.compliance:
             for name in sorted(set(table.names) & set(seen)):
                 problems.append(
-                    f"{name} stands in {seen[name]} and in {table.name}; expected each component once, or "
-                    f"the load "
-                    "counts twice"
+                    f"{name} is in {seen[name]} and in {table.name}; expected each component once, or the "
+                    "load counts twice"
                 )
             seen |= dict.fromkeys(table.names, table.name)
             problems += cover_problems(table.name, table.arguments, table.knots_mm, self.box_mm)
@@ -155,8 +152,7 @@ class Calibration:
             ]
             problems += [
                 f"the thermal structure holds {name}, and {name[2]}_scale_um_m_K expands the scale again; "
-                f"expected one "
-                f"of the two: the drift of {name} was read with the scale as it is"
+                f"expected one of the two, as the drift of {name} holds the expansion of the scale"
                 for name in self.structure.components()
                 if name in scales
             ]
@@ -164,9 +160,8 @@ class Calibration:
             bent = f"E{beam.direction[1]}{beam.axis}"
             if bent in seen:
                 problems.append(
-                    f"{bent} stands in {seen[bent]}, and a beam of axis {beam.axis} bends it too; "
-                    f"expected one of the "
-                    "two: what was measured holds the beam"
+                    f"{bent} is in {seen[bent]}, and a beam of axis {beam.axis} bends it too; expected one "
+                    "of the two, as what was measured holds the beam"
                 )
             problems += beam.problems(self.box_mm)
         if self.repeatability_mm is not None and not (
@@ -183,7 +178,7 @@ class Calibration:
         return tuple(curve for curve in self.curves if curve.axis == axis)
 
     def sources(self) -> Iterator[tuple[ErrorSource[Any, Any], Any]]:
-        """Every source with its values; one without a field is left out where nothing is stated of it."""
+        """Every source with its values; one without a field is left out where nothing is stated for it."""
         more = dict(self.more)
         for source in SOURCES:
             if source.field:
@@ -192,7 +187,7 @@ class Calibration:
                 yield source, more[source.key]
 
     def frame(self, chain: str, *, hold: bool = False) -> Frame:
-        """What the models of the sources count on, on a chain such as "FXYZ"."""
+        """What the models of the sources need, on a chain such as "FXYZ"."""
         frame = Frame(
             chain, self.datum_mm, self.box_mm, hold, self.payload_kg, tool_terms=self.model != "huddersfield"
         )

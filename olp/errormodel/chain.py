@@ -2,7 +2,7 @@
 
 A body of the tool side maps x to q + shear + E + S x with S = Rz Ry Rx. A body that carries the
 workpiece is the inverse of its table's motion: its own rotation comes last, S = Rx Ry Rz, and turns its
-coordinate too. Only departures from the nominal position are carried, so nothing cancels.
+coordinate too. Only departures from the nominal position are summed, so no digits cancel.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
 from olp.errormodel.lever_arms import CROSS
 
-#: A block's columns stay near the second-level cache (1 MB); measured best of 2k to 32k.
+#: Points at a time: about the size of the second-level cache (1 MB); measured best of 2k to 32k.
 BLOCK = 16384
-#: bounds of the chord are kept for this many spans of tool vectors
+#: Bounds of the chord are kept for so many spans of tool vectors.
 _KEPT = 64
 
 #: A turn about axis a moves coordinate p toward q: (p, q) by axis.
@@ -169,7 +169,7 @@ class RigidBody(Boxed):
         return error
 
     def _turn(self, body: Body, six: Six, position: list[Array], tool: list[Column], carried: Three) -> Three:
-        """(S - I)(lever + carried), each row with its own lever."""
+        """(S - I)(lever arm + carried), each row with its own lever arm."""
         angles = [(a, *_sine(angle, body.sine_terms)) for a, angle in enumerate(six[3:]) if angle is not None]
         if body.carries_workpiece:
             angles.reverse()
@@ -215,7 +215,7 @@ class RigidBody(Boxed):
 
 
 def _first_order(six: Six, lever_arms: list[tuple[tuple[int, ...], list[Column]]]) -> Three:
-    """E + eps x lever, each row with its own lever."""
+    """E + eps x lever arm, each row with its own lever arm."""
     value: Three = list(six[:3])
     for rows, lever_arm in lever_arms:
         for i, a, k, sign in CROSS:

@@ -1,9 +1,9 @@
-"""Upper bound of the departure from the chord for a rigid-body chain, in about 30 ns a point.
+"""Upper bound of the departure from the chord for a rigid-body chain, in about 30 ns per point.
 
-Per axis the bounds of its components are summed row by row with their largest levers, and the rows joined
-to one length. First-order cross terms: change of an angle times change of its lever / 4. All second-order
-terms (angle times displacement, products of angles) are covered by widening levers, slopes and
-translations by a multiple of the sum of all angles.
+Per axis the bounds of its components are summed row by row with their largest lever arms, and the rows joined
+to one length. First-order cross terms: change of an angle times change of its lever arm / 4. To cover all
+second-order terms (angle times displacement, products of angles), lever arms, slopes and translations are
+widened by a multiple of the sum of all angles.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from olp.core.arrays import Array
 from olp.errormodel.bodies import Body
 from olp.errormodel.chord import Variation, bins
 
+#: Moves at a time: the columns of one block fit in the second-level cache.
 _BLOCK = 8192
 
 
@@ -107,7 +108,7 @@ def _axis_bound(body: Body, reach: Array, extra: float, widened: float, lipschit
             rows[i].add(part, (reach[i, k] if i != a else 0.0) + widened)
             if i != a and moves[i][k]:
                 change[k].append(part.change)
-    # Second order: any angle meets any lever, and levers stretch with the error itself.
+    # Second order: any angle meets any lever arm, and lever arms stretch with the error itself.
     angular = [part.change for part in parts[3:] if part is not None and part.varies]
     stretch = (extra + 2.0 * lipschitz) * sum(angular, np.zeros(1)) if extra > 0.0 else None
     crosses: list[Array | None] = []
@@ -143,7 +144,7 @@ def _joined(rows: list[Array]) -> Array:
 
 
 def _reach(body: Body, box_mm: Array, tool: Array) -> Array:
-    """(3, 3) largest |coordinate k| of the lever of row i."""
+    """(3, 3) largest |coordinate k| of the lever arm of row i."""
     reach = np.zeros((3, 3))
     for members, lever_arm in body.lever_arms:
         reach[list(members)] = lever_arm.reach_mm(box_mm, tool)

@@ -14,8 +14,9 @@ from olp.errormodel.chord import Variation
 from olp.errormodel.lever_arms import DIRECTIONS
 from olp.errormodel.sources.cyclic import Cyclic, cyclic_value
 
-#: Resampling stays this close to the interpolated curve: a ten-thousandth of a micrometre, at 1 m too.
+#: mm; the largest error of resampling a curve of translations, a ten-thousandth of a micrometre.
 TABLE_MM = 1e-7
+#: rad; the same for angles: as much at a lever arm of 1 m.
 TABLE_RAD = 1e-10
 
 Six = tuple[Column | None, Column | None, Column | None, Column | None, Column | None, Column | None]
@@ -89,7 +90,7 @@ class AxisComponents:
         return contributions
 
     def backlash_at(self, q: Array) -> Column | None:
-        """Lost motion at q (n,): backward minus forward; None where the axis has none."""
+        """Backlash in mm at q (n,): backward minus forward; None where the axis has none."""
         if self.backlash_mm != 0.0:
             return self.backlash_mm
         slot = self.half[self.axis]

@@ -10,6 +10,7 @@ import numpy as np
 
 from olp.core.arrays import Array
 
+#: The shapes, in the order of the columns of `shapes`.
 SHAPES = ("offset", "growth", "bow")
 
 
@@ -22,8 +23,8 @@ def shapes(span_mm: tuple[float, float], q: Array) -> Array:
 
 def lagged(time_s: Array, temperature_degC: Array, lag_s: float) -> Array:
     """(n,) structure temperature behind a sensor (n,), exact for a sensor that changes linearly between its
-    readings; it starts settled. A negative lag is a lead: the sensor is behind its part by so much, and the
-    rise of the sensor over its own lag is added to it."""
+    readings; it starts settled. A negative lag is a lead: the sensor lags its part by so much. Then the rise
+    of the sensor over its lag is added to the sensor."""
     if lag_s == 0.0:
         return temperature_degC
     if lag_s < 0.0:

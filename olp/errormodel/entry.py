@@ -12,17 +12,17 @@ from olp.core.arrays import Array
 from olp.core.interpolation import Column
 
 Index = npt.NDArray[np.int32]
-#: What n positions take of one unknown each: its number and its weight.
+#: The number and the weight of one unknown at each of n positions.
 Slot = tuple[Index, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
     """Numbers of one kind: of component `name` at `position_mm` (n,) for "mean" and "half"; (sine, cosine) of
-    `period_mm` for "wave"; one number of a squareness, or of the lost motion of an axis.
+    `period_mm` for "wave"; one number of a squareness, or of the backlash of an axis.
 
-    `factor` (n, rank) and `rest` (n,), a standard uncertainty, in mm or rad. Whoever gathers entries checks
-    them (`Numbers.fits`).
+    `factor` (n, rank) and `rest` (n,), a standard uncertainty, in mm or rad. The caller that gathers entries
+    checks them (`Numbers.fits`).
     """
 
     kind: str
@@ -44,7 +44,7 @@ class Entry:
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisState:
     """Positions of one axis: (n,) `q` in mm and the play there, the axis's number, its datum in mm, and the
-    levers of its angles, (rows, arms)."""
+    lever arms of its angles, (rows, coordinates)."""
 
     axis: int
     q: Array
@@ -54,14 +54,14 @@ class AxisState:
 
 
 class Numbers:
-    """One kind of numbers, which a source registers: names that it may have, and how they act. What is not
-    said otherwise is one number that weighs 1 everywhere."""
+    """One kind of numbers, which a source registers: names that it may have, and how they act. The default is
+    one number of weight 1 everywhere."""
 
     kind: str
     names: tuple[str, ...]
 
     def count(self, entry: Entry) -> int:
-        """How many numbers there are, 0 where what the entry says of them is wrong."""
+        """How many numbers the entry has, 0 where its positions or its period are wrong."""
         return 1
 
     def fits(self, entry: Entry) -> bool:
@@ -81,7 +81,7 @@ class Numbers:
         yield np.zeros(len(q), np.int32), np.ones(len(q))
 
     def parts(self, entry: Entry) -> int:
-        """Into how many independent unknowns the rest falls."""
+        """How many independent unknowns `rest` stands for."""
         return len(entry.rest)
 
     def part_weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
@@ -95,8 +95,8 @@ def component_acts(name: str, side: Column, state: AxisState) -> Iterator[tuple[
     if d < 3:
         yield d, side
         return
-    # eps x lever: an angle about a moves row a - 1 by its arm along a + 1, and row a + 1 by minus that along
-    # a - 1
+    # eps x lever arm: an angle about a moves row a - 1 by its arm along a + 1, and row a + 1 by minus its arm
+    # along a - 1
     after, before = (d - 2) % 3, (d - 1) % 3
     for rows, arm in state.lever_arms:
         if before in rows:
@@ -106,7 +106,7 @@ def component_acts(name: str, side: Column, state: AxisState) -> Iterator[tuple[
 
 
 def alone(kind: str, name: str, sigma: Array | float, position_mm: Array | None = None) -> Entry:
-    """Numbers of which nothing but their standard uncertainty (n,) or one, in mm or rad, is known."""
+    """Numbers whose standard uncertainty alone is known, (n,) or one, in mm or rad."""
     rest = np.atleast_1d(np.asarray(sigma, float))
     positions = np.zeros(0) if position_mm is None else position_mm
     return Entry(kind, name, np.zeros((len(rest), 0)), rest, positions)

@@ -2,9 +2,9 @@
 
 Along a move by d the second derivative is sum_jk d_j d_k f_jk inside the cells, and the slope jumps by d_j
 times that of f_j where a face of a cell is crossed. The departure is the integral of a tent kernel against
-both (see `chord`): at most 1/8 of the first and 1/4 of the jumps. A function whose slope makes no more
-than L over the move departs by no more than L/2, and never by more than its whole span. All of them grow
-with each |d_j|, so that a bound holds for shorter moves too.
+both (see `chord`): at most 1/8 of the first and 1/4 of the jumps. A function that changes by no more than L
+over the move departs by no more than L/2, and never by more than its whole span. All of them grow with each
+|d_j|, so that a bound holds for shorter moves too.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from olp.errormodel.chord import UPPER_MM, bins
 class GridBound:
     """Bounds for the m columns of a grid whose argument k is axis `axes[k]`.
 
-    `second` holds (k, l, (m,) max |f_kl|), each pair once; `slope` (d, m) max |f_k|; `kinks` per argument
-    None or (bins, m), a quarter of the jumps that a move of a bin's length can cross; `span` (m,).
+    `second` holds (k, l, (m,) max |f_kl|), each pair once, and `slope` (d, m) max |f_k|. `kinks` are per
+    argument None or (bins, m), a quarter of the jumps that a move of a bin's length can cross. `span` is
+    (m,).
     """
 
     axes: tuple[int, ...]

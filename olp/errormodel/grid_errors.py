@@ -1,8 +1,8 @@
 """Component errors of one axis over a grid, to first order: by load (times a mass) or by temperature.
 
 E += w S and eps += w s at the axis positions of the grid, with w = m - m_cal of the payload in kg, or 1. The
-angles act on the levers of `levers`, as those of a curve that was measured on the same line do; products of
-these angles with other errors are left out (60 urad times 0.1 mm are 6 nm).
+angles act on `lever_arms`, as the angles of a curve that was measured on the same line. Products of these
+angles with other errors are left out (60 urad times 0.1 mm are 6 nm).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class GridBody:
         tool_terms: bool,
     ) -> GridBody:
         """`beside` are all tables of this axis that were measured together, this one included: a translation
-        holds what the angles did on its own line, whichever table they stand in."""
+        holds the effect of the angles on its own line, whichever table holds the angles."""
         order = chain.replace("F", "")
         after = order[order.index(table.axis) + 1 :]
         carries = chain.index(table.axis) < chain.index("F")
@@ -150,7 +150,7 @@ class GridBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridErrors(Boxed):
-    """The sum of several bodies; `name` stands before the component in the name of a contribution."""
+    """The sum of several bodies; `name` comes before the component in the name of a contribution."""
 
     name: str
     bodies: tuple[GridBody, ...]
@@ -170,7 +170,7 @@ class GridErrors(Boxed):
         apart: Sequence[ComponentTable] = (),
     ) -> GridErrors:
         """`mass_kg` is the payload of the calibration, None where the tables do not depend on a payload.
-        Those in `apart` are bodies of their own, such as beams, with levers of their own."""
+        Those in `apart` are separate bodies, such as beams, with separate lever arms."""
         bodies = [
             GridBody.of(
                 table, chain, datum_mm, mass_kg, [t for t in tables if t.axis == table.axis],

@@ -1,5 +1,5 @@
-"""Tables over a rectilinear grid of axis positions: component errors as values, and what every table is
-held to.
+"""Tables over a rectilinear grid of axis positions: component errors as values, and what is checked of every
+table.
 
 Base units: mm, rad, kg, degC. error = actual - commanded, tool relative to workpiece.
 """
@@ -21,7 +21,7 @@ from olp.core.grid_interpolation import Kind as Interpolation
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES, in_unit_text
 
-#: A table may miss a face of the box by rounding of its file, no more.
+#: mm; a table may miss a face of the box by the rounding of its file, no more.
 COVER_MM = 1e-6
 
 
@@ -56,14 +56,13 @@ def cover_problems(
         if x[0] > low + COVER_MM or x[-1] < high - COVER_MM:
             problems.append(
                 f"{label} runs from {x[0]:g} to {x[-1]:g} mm along {axis}; expected all of the box, "
-                f"{low:g} to "
-                f"{high:g} mm; measure the rest or make box_mm smaller"
+                f"{low:g} to {high:g} mm; measure the rest or make box_mm smaller"
             )
     return problems
 
 
 def grid_rows(arguments: Sequence[str], knots: Sequence[Array], columns: Mapping[str, Sequence[str]]) -> str:
-    """The text of a CSV file over a grid: the levels, then columns of cells, a row a node."""
+    """The text of a CSV file over a grid: the levels, then columns of cells, one row per node."""
     rows = [",".join([*(f"{a}_mm" for a in arguments), *columns])]
     levels = [[in_unit_text(v, 0) for v in k.tolist()] for k in knots]
     for number, place in enumerate(product(*levels)):

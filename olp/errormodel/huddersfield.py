@@ -4,9 +4,9 @@
     dY = EYX + EYY + EYZ - (EAX + EAY) z         - A0Z z
     dZ = EZX + EZY + EZZ + EAX y
 
-in ISO 230-1 names, right-handed; y and z count from where the curve was measured (default: the datum). The
-paper's own names read X_pitch = EBX, X_yaw = -ECX, X_roll = -EAX, Y_pitch = -EAY, Y_roll = EBY, and its
-squareness XY = -C0Y, XZ = B0Z, YZ = -A0Z; an importer turns them, nothing here knows them.
+in ISO 230-1 names, right-handed; y and z count from where the curve was measured (default: the datum). In the
+paper's names X_pitch = EBX, X_yaw = -ECX, X_roll = -EAX, Y_pitch = -EAY, Y_roll = EBY. Its squareness is
+XY = -C0Y, XZ = B0Z, YZ = -A0Z. An importer converts these names; nothing here uses them.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.chain import RigidBody
 
+#: The chain of the paper.
 CHAIN = "FXYZ"
 
 

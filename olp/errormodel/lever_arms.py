@@ -1,8 +1,8 @@
-"""The levers on which the angles of an axis act.
+"""The lever arms on which the angles of an axis act.
 
 Contribution of axis j: E_j(q) + eps_j(q) x [L_j(P, t) - L_j(P_line(q), t_line)] with L_j the tool vector plus
 the axes after j toward the tool, plus axis j itself where it carries the workpiece. Every translation
-component returns its measured value on its own line; so each row has a lever of its own.
+component returns its measured value on its own line; so each row has its own lever arm.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from olp.core.units import AXES
 #: Component errors of an axis in this order.
 DIRECTIONS = "XYZABC"
 
-#: The third coordinate: the lever of angle a on row i is coordinate _OTHER[i, a].
+#: The third coordinate: the lever arm of angle a on row i is coordinate _OTHER[i, a].
 _OTHER = {(i, a): 3 - i - a for i in range(3) for a in range(3) if i != a}
 
-#: First order: eps_a adds sign * eps_a * lever_k to row i, as (i, a, k, sign).
+#: First order: eps_a adds sign * eps_a * arm_k to row i, as (i, a, k, sign).
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 
 
@@ -67,12 +67,12 @@ LeverArms = tuple[tuple[tuple[int, ...], LeverArm], ...]
 def lever_arms_of(
     curves: Sequence[Measured], datum_mm: Vector, axis: str, after: str, carries: bool, tool_terms: bool
 ) -> LeverArms:
-    """The levers of what was measured of one axis, `after` it in the chain toward the tool."""
+    """The lever arms of what was measured of one axis; `after` are the axes behind it toward the tool."""
     holder = {name: curve for curve in curves for name in curve.names}
     default = curves[0] if len(curves) == 1 else None
 
     def lever_arm(sources: list[Measured | None]) -> LeverArm:
-        """Of one row, coordinate by coordinate from the curve it was measured with."""
+        """The lever arm of one row, coordinate by coordinate from the curve with which it was measured."""
         moves, offset = [False] * 3, [0.0] * 3
         for k, source in enumerate(sources):
             tool = source.tool_mm[k] if source is not None and tool_terms else 0.0
@@ -80,8 +80,8 @@ def lever_arms_of(
             table = own and carries and source is not None and source.reference == "table"
             moves[k] = AXES[k] in after or table
             line = source.line_mm if source is not None and not own else None
-            # On its own line an axis stands where it stands; seen from a reflector on its table, it has moved
-            # from the datum.
+            # On its own line an axis has no coordinate; seen from a reflector on its table, it has moved from
+            # the datum.
             stood_mm = (datum_mm if line is None else line)[k] if moves[k] else 0.0
             offset[k] = stood_mm + tool
         return LeverArm((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))

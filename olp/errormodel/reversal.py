@@ -1,12 +1,12 @@
-"""Lost motion as a play: where each axis lies in its backlash along a sequence of commands.
+"""Backlash as a play: where each axis lies in its backlash along a sequence of commands.
 
-With lost motion b the error of an axis follows e <- clip(e - dc, -b/2, +b/2), dc the change of command. In
-terms of play = -2 e / b this is play <- clip(play * b_before / b + 2 dc / b, -1, +1). For b <= 0 (a control
-that over-compensates, or an axis without lost motion) play is the sign of the last motion.
+With backlash b the error of an axis follows e <- clip(e - dc, -b/2, +b/2), dc the change of command. In terms
+of play = -2 e / b this is play <- clip(play * b_before / b + 2 dc / b, -1, +1). For b <= 0 (a control that
+over-compensates, or an axis without backlash) play is the sign of the last motion.
 
 Such maps p -> clip(m p + s, low, high) are closed under composition; a move longer than b maps all states to
-one. So a doubling scan over the few moves that do not is enough: its passes grow with the logarithm of
-the longest run of short moves.
+one. So a doubling scan over the few moves that do not is enough: the number of its passes grows with the
+logarithm of the longest run of short moves.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from olp.errormodel.boxed import as_points
 
 
 def plays(model: ErrorModel, axis_mm: Array) -> Array | None:
-    """(n, 3) play at successive commands (n, 3) from an unknown start; None where no axis has lost motion."""
+    """(n, 3) play at successive commands (n, 3) from an unknown start; None where no axis has backlash."""
     width = model.backlash_at(axis_mm)
     return None if width is None else play_states(axis_mm, width)
 
 
 def play_states(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> Array:
-    """(n, 3) play in [-1, 1] at each of successive commands axis_mm (n, 3) with lost motion (n, 3) or (3,).
+    """(n, 3) play in [-1, 1] at each of successive commands axis_mm (n, 3) with backlash (n, 3) or (3,).
 
     `start` (3,) is the play at the first command; None or NaN there: unknown. The middle of what is possible
     is returned: 0 until a motion narrows it. Raises UsageError for a wrong shape.
@@ -39,15 +39,15 @@ def play_states(axis_mm: Array, backlash_mm: Array, start: Array | None = None) 
 
 
 def play_interval(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> tuple[Array, Array]:
-    """Least and greatest possible play, both (n, 3); equal once the lost motion has been taken up.
+    """Least and greatest possible play, both (n, 3); equal once the backlash has been taken up.
 
     A NaN command (an axis whose position is not known) makes the state unknown there and at the next one; a
-    NaN lost motion counts as none.
+    NaN backlash counts as none.
     """
     commands = as_points(axis_mm)
     width = np.asarray(backlash_mm, dtype=np.float64)
     if width.shape not in ((3,), commands.shape):
-        raise UsageError(f"lost_motion_mm has shape {width.shape}; expected (3,) or {commands.shape}")
+        raise UsageError(f"backlash_mm has shape {width.shape}; expected (3,) or {commands.shape}")
     state = np.full(3, np.nan) if start is None else np.asarray(start, dtype=np.float64)
     if state.shape != (3,):
         raise UsageError(f"start has shape {state.shape}; expected (3,)")

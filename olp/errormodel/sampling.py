@@ -8,15 +8,14 @@ import numpy.typing as npt
 from olp.core.arrays import Array
 from olp.errormodel.base import ErrorModel
 
+#: Steps of one move, at most.
 MOST_STEPS = 1 << 18
-
-
-#: lengths that are tried for a move that needs no sample, in mm
+#: mm; lengths that are tried for a move that needs no sample.
 _LENGTHS = 2.0 ** np.arange(-12.0, 14.0, 0.25)
 
 
 def clear_length_mm(model: ErrorModel, tools_mm: Array, bend_mm: float) -> float:
-    """A length that a move may have along each axis at once, and the error bends by no more than `bend_mm`,
+    """A length up to which the error bends by no more than `bend_mm` over a move, along each axis at once and
     with any of the tools (k, 3); 0 where there is none."""
     span = np.stack([tools_mm.min(axis=0), tools_mm.max(axis=0)])
     bound = model.chord_bound(np.repeat(_LENGTHS, 2)[:, None] * np.ones(3), np.tile(span, (len(_LENGTHS), 1)))

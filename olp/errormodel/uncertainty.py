@@ -1,9 +1,9 @@
-"""How well the numbers of a calibration are known: their covariance, as a factor of few columns.
+"""The uncertainty of the numbers of a calibration: their covariance, as a factor of few columns.
 
 The numbers are the values of component errors at positions, half differences of directions, the sine and the
-cosine part of cyclic terms, squareness and lost motion. Their covariance is factor @ factor.T, and beside it
-the variance `rest`, of which only so much is known that it is independent between components, and between
-places of a curve that are farther apart than one of its `CELLS`. Terms: JCGM 100 (GUM).
+cosine part of cyclic terms, squareness and backlash. Their covariance is factor @ factor.T plus the variance
+`rest`. That is independent between components, and between positions of a curve that are farther apart than
+one of its `CELLS`; nothing more is known of it. Terms: JCGM 100 (GUM).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from olp.errormodel.sources.registry import NUMBERS
 
 #: What a report says of uncertainties from sigma columns.
 SIGMA_COLUMNS = (
-    "sigma columns: components are taken as independent of each other, and each curve as independent "
-    f"from one {CELLS}th of it to the next, so nothing of it cancels in a touch-off elsewhere"
+    "sigma columns: components are taken as independent of each other, and so is each "
+    f"{CELLS}th of a curve of the next, so a touch-off elsewhere cancels nothing of it"
 )
-#: Steel (and most glass scales are near it), for expansion that nobody has stated, per K.
+#: 1/K; steel, and most glass scales are near it. For expansion that is not stated.
 EXPANSION_PER_K = 11.5e-6
 #: Days of a year.
 YEAR = 365.25
@@ -33,12 +33,13 @@ YEAR = 365.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Uncertainty:
-    """The covariance of a calibration, and what else is stated of how well the machine is known.
+    """The covariance of a calibration, and other stated uncertainties of the machine.
 
-    `fingerprint` says of which calibration, `source` in words where it comes from, `dropped` what share of a
-    variance the factor leaves to `rest` at the most. `repeatability_mm` is the standard deviation of the
-    axes' own scatter, `growth_per_year` the share by which standard uncertainties grow in a year, and
-    `temperature_K` the standard uncertainty of the temperatures of scales and workpiece.
+    `fingerprint` identifies the calibration, and `source` says in words where the covariance comes from.
+    `dropped` is the largest share of a variance that the factor leaves to `rest`. `repeatability_mm` is the
+    standard deviation of the random part of the axes. `growth_per_year` is the share by which standard
+    uncertainties grow in a year, and `temperature_K` the standard uncertainty of the temperatures of scales
+    and workpiece.
     """
 
     entries: tuple[Entry, ...]
@@ -59,9 +60,12 @@ class Uncertainty:
         for entry in self.entries:
             key = (entry.kind, entry.name, entry.period_mm)
             if key in seen:
-                raise ConfigError(f"covariance of {entry.kind} {entry.name} is there twice; expected once")
+                raise ConfigError(f"covariance of {entry.kind} {entry.name} is defined twice; expected once")
             if entry.factor.shape[1] != self.rank:
-                raise ConfigError(f"covariance of {entry.kind} {entry.name}: its factor has another width")
+                raise ConfigError(
+                    f"covariance of {entry.kind} {entry.name}: its factor has {entry.factor.shape[1]} "
+                    f"columns; expected {self.rank}, as in the other entries"
+                )
             seen.add(key)
 
     @property
@@ -98,8 +102,8 @@ def _lines(calibration: Calibration) -> Iterator[str]:
 
 def of_sigmas(calibration: Calibration, sigmas: Mapping[str, Sigmas]) -> Uncertainty | None:
     """From standard uncertainties alone, by the key of their source, such as {"curves": {"EXX": ...},
-    "squareness": {"C0Y": ...}}: of components at the positions of their curve, of squareness and of lost
-    motion, mm or rad. None where there are none."""
+    "squareness": {"C0Y": ...}}: of components at the positions of their curve, of squareness and of backlash,
+    mm or rad. None where there are none."""
     entries = [
         entry
         for source, values in calibration.sources()

@@ -146,6 +146,7 @@ def _read_job(path: PathLike, read: Reader) -> tuple[Job, Mapping[Path, int]]:
         machine=beside(path, file.machine),
         dialect=None if own is not None else stated,
         described=own,
+        part_tolerance_um=file.part_tolerance_um,
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},

@@ -312,6 +312,10 @@ class JobFile(Table):
         default_factory=Position,
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
     )
+    part_tolerance_um: Positive | None = Field(
+        default=None,
+        description="the tolerance of the part, in um, where --part-tolerance-um is not given",
+    )
     payload_kg: NotNegative = Field(
         default=0.0, description="the payload on the machine at the start of the program, in kg"
     )

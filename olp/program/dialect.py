@@ -30,8 +30,8 @@ class Support(Enum):
 
     CORRECTED = "corrected"  #: its coordinates are edited
     READ = "read"  #: changes how later statements are understood; its bytes are unchanged
-    UNCHANGED = "carried"  #: means nothing to the path
-    REFUSED = "refused"  #: may move the machine in a way that is not read
+    UNCHANGED = "carried"  #: has no effect on the path
+    REFUSED = "refused"  #: may move the machine, and is not read
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class Dialect:
     """A dialect of programs.
 
     `reader` reads a text. Called with data, setup, this dialect, options, and `words` by keyword, it returns
-    a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is called
-    with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It is None
-    where the dialect has none.
+    a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is
+    called with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It
+    is None where the dialect has none.
 
     `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs

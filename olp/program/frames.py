@@ -141,7 +141,7 @@ class FrameTable:
 def _tilted(vector: Vector, axis: Vector, tool: int | None, line: int) -> Vector:
     if vector[0] or vector[1]:
         raise ProgramError(
-            f"tool {tool} is tilted, and its vector has X or Y, which the head turns in a way that is not known; "
+            f"tool {tool} is tilted and its vector has X or Y, and how the head turns these is not known; "
             "give its X and Y as 0",
             line=line,
         )

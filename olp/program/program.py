@@ -111,10 +111,10 @@ class Statements:
     after the moves. `feeds`: where feeds are stated. `arcs`: by move. `broken`: the marks of continuation
     inside words, by word.
 
-    `rapid` is the line that makes the next statement a rapid. `mark` joins lines, none of which becomes longer
-    than `width` bytes (0: no limit). `cards` have their numbers after that width, in the last eight columns.
-    `strokes` (k, 2): the moves to the hole and to its bottom. `decimal` is the decimal mark of texts whose
-    numbers keep their own form and column, empty for others.
+    `rapid` is the line that makes the next statement a rapid. `mark` joins lines, none of which becomes
+    longer than `width` bytes (0: no limit). `cards` have their numbers after that width, in the last eight
+    columns. `strokes` (k, 2): the moves to the hole and to its bottom. `decimal` is the decimal mark of texts
+    whose numbers keep their own form and column, empty for others.
     """
 
     begin: Small

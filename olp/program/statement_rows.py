@@ -231,7 +231,8 @@ class StatementCollector(PathColumns):
         return np.asarray(feed, float)
 
     def _words(self) -> Words:
-        """Words in the order of reading, which is not that of lines: so no index leads from lines to words."""
+        """Words in the order of reading, which is not that of lines: so no index leads from lines to
+        words."""
         take = self.columns.take
         start = take("word_start", np.int32)
         return Words(

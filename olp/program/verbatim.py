@@ -33,9 +33,9 @@ _KEPT: dict[str, tuple[Any, int]] = {
 class Moves:
     """Moves that are collected singly or many at once, and the numbers of the text by their bytes.
 
-    Each move has `kind`, `flag`, `line`, `frame`, `end`, `slot`, the bytes of its statement (-1, -1 where none
-    may be copied), and its feed. `plain` are mantissa, decimals, first byte and last byte of all numbers,
-    where they are known as columns.
+    Each move has `kind`, `flag`, `line`, `frame`, `end`, `slot`, the bytes of its statement (-1, -1 where
+    none may be copied), and its feed. `plain` are mantissa, decimals, first byte and last byte of all
+    numbers, where they are known as columns.
     """
 
     lists: dict[str, list[Any]] = field(default_factory=lambda: {name: [] for name in _KEPT})

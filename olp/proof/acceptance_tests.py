@@ -1,5 +1,5 @@
-"""Tests that a user can run next day, predicted from the error model: circles after ISO 230-4 and body
-diagonals after ISO 230-6, with the machine as it is and with corrected commands."""
+"""Acceptance tests that you can run later, predicted from the error model: circles after ISO 230-4 and body
+diagonals after ISO 230-6, on the uncompensated machine and with corrected commands."""
 
 from __future__ import annotations
 
@@ -13,12 +13,17 @@ from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 
-#: Radius of the circles at most, and their share of the shorter side of the calibrated box.
-_RADIUS_MM, _SHARE = 150.0, 0.4
-_PLACES = 720
+#: mm; radius of the circles, at most.
+_RADIUS_MM = 150.0
+#: Radius of the circles as a share of the shorter side of the calibrated box, at most.
+_SHARE = 0.4
+#: Points of a circle.
+_POINTS = 720
+#: Targets of a diagonal.
 _TARGETS = 21
-#: steps between targets of a diagonal, so that backlash is taken up as it would be
+#: Steps between targets of a diagonal, so that backlash is taken up as on the machine.
 _STEPS = 20
+#: The two axes of each circle.
 _PLANES = {"XY": (0, 1), "YZ": (1, 2), "ZX": (2, 0)}
 
 
@@ -36,7 +41,7 @@ def predicted(model: ErrorModel, tool_mm: Array, digit_mm: float) -> dict[str, A
 
 
 def _runs(model: ErrorModel, target: Array, tool: Array, digit: float) -> dict[str, Array]:
-    """Where the tip goes on targets (n, 3), commanded as they are and corrected."""
+    """Where the tip goes on targets (n, 3), with uncorrected and with corrected commands."""
     command = target
     for _ in range(2):
         # the side of the backlash depends on the corrected commands, and they on it
@@ -56,8 +61,8 @@ def _circle(model: ErrorModel, tool: Array, digit: float, plane: str) -> dict[st
     centre = box.mean(axis=1)
     side = float(np.diff(box, axis=1)[[first, second]].min())
     radius = min(_RADIUS_MM, round(_SHARE * side))
-    # a lap and a quarter: the first quarter takes up what is not known of the play
-    angle = 2.0 * np.pi * np.arange(_PLACES * 5 // 4) / _PLACES
+    # a lap and a quarter: the first quarter takes up the unknown play
+    angle = 2.0 * np.pi * np.arange(_POINTS * 5 // 4) / _POINTS
     result: dict[str, Any] = {"plane": plane, "radius_mm": radius, "centre_mm": centre.tolist()}
     radial: dict[str, list[Array]] = {"before": [], "after": []}
     for direction in (1.0, -1.0):
@@ -65,8 +70,8 @@ def _circle(model: ErrorModel, tool: Array, digit: float, plane: str) -> dict[st
         target[:, first] += radius * np.cos(direction * angle)
         target[:, second] += radius * np.sin(direction * angle)
         for name, actual in _runs(model, target, tool, digit).items():
-            lap = (actual - centre)[-_PLACES:, [first, second]]
-            order = np.argsort((direction * angle[-_PLACES:]) % (2 * np.pi))
+            lap = (actual - centre)[-_POINTS:, [first, second]]
+            order = np.argsort((direction * angle[-_POINTS:]) % (2 * np.pi))
             radial[name].append(_radial(lap, radius)[order])
     for name, (forward, backward) in radial.items():
         result[name] = {
@@ -86,8 +91,9 @@ def _radial(lap: Array, radius: float) -> Array:
 
 
 def _diagonals(model: ErrorModel, tool: Array, digit: float) -> dict[str, Any]:
-    """Deviation of positioning along the four body diagonals of the calibrated box, to and fro; systematic
-    deviation E and reversal B of each, and the largest of them (ISO 230-6, after ISO 230-2)."""
+    """Deviation of positioning along the four body diagonals of the calibrated box, in both directions.
+    Systematic deviation E and reversal error B of each, and the largest of them (ISO 230-6, after ISO
+    230-2)."""
     box = np.asarray(model.box_mm, float)
     rows = []
     worst: dict[str, dict[str, float]] = {}
@@ -101,11 +107,11 @@ def _diagonals(model: ErrorModel, tool: Array, digit: float) -> dict[str, Any]:
         for side, actual in _runs(model, target, tool, digit).items():
             moved = ((actual - target) @ along) * UM_PER_MM
             moved -= moved[0]
-            there, back = moved[: len(share)][::_STEPS], moved[len(share) - 1 :][::_STEPS][::-1]
+            forward, backward = moved[: len(share)][::_STEPS], moved[len(share) - 1 :][::_STEPS][::-1]
             # the turning point belongs to both directions, and the first one has no direction yet
-            both = np.stack((there[1:-1], back[1:-1]))
+            both = np.stack((forward[1:-1], backward[1:-1]))
             figures = {"E_um": float(np.ptp(both)), "B_um": float(np.abs(both[0] - both[1]).max())}
-            row[side] = figures | {"deviation_um": ((there + back) / 2).tolist()}
+            row[side] = figures | {"deviation_um": ((forward + backward) / 2).tolist()}
             kept = worst.setdefault(side, {"E_um": 0.0, "B_um": 0.0})
             for key, value in figures.items():
                 kept[key] = max(kept[key], value)

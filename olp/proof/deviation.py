@@ -1,8 +1,8 @@
 """How far the tip is from the nominal path: at the waypoints and between them.
 
-The actual path of a program is its commands plus the error model, sampled so finely that the model cannot
-hide anything between two samples. It is held against the nominal path move by move: `groups` tells
-which moves of the program belong to which nominal move.
+The actual path of a program is its commands plus the error model, sampled so finely that nothing of the model
+is missed between two samples. It is compared with the nominal path move by move: `groups` says which moves of
+the program belong to which nominal move.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 #: enough for deviations, which are small, and half the memory
 Single = npt.NDArray[np.float32]
 
+#: nominal moves at a time, so that memory is small
 _BLOCK = 1 << 15
+#: moves that are left as they are, and so not judged
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 #: samples of an arc move at the least
 _ARC_STEPS = 8
@@ -31,10 +33,9 @@ _ARC_STEPS = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
-    """Per nominal move, in mm: `waypoint` at its end, `path` the largest on the way and at its end, `bend`
-    the part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move counts.
-    `flank` (n,): how far the tip may be off because the side of the backlash of an axis is not known
-    yet."""
+    """Deviation per nominal move, in mm: `waypoint` at its end, `path` the largest along it and at its end,
+    `bend` the part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move
+    counts. `side` (n,): how far the tip may be off because the side of the backlash is not known yet."""
 
     waypoint: Single
     path: Single
@@ -57,8 +58,8 @@ def _figures(values: Single) -> dict[str, float]:
 
 
 def cutting_moves(path: Toolpath) -> Mask:
-    """(n,) moves on which the whole path counts and not its end alone: feed moves, not of canned cycles, nor
-    to a touch whose way is the control's own."""
+    """(n,) moves on which the whole path counts and not its end alone: feed moves, but not of canned cycles,
+    nor to a touch whose path the control chooses."""
     own = (path.kind == Kind.PROBE) & ((path.flag & np.uint8(Flag.WHOLE)) != 0)
     cutting = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
     return np.asarray(cutting & ~own, bool)
@@ -73,10 +74,10 @@ def measure(
     bend_mm: float,
     exempt: Mask | None = None,
 ) -> Deviation:
-    """Hold the actual path of `path` against the nominal one.
+    """Compare the actual path of `path` with the nominal one.
 
     `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
-    the last move of `path` that belongs to each nominal move. `exempt` moves pass uncorrected and are not
+    the last move of `path` that belongs to each nominal move. `exempt` moves are left uncorrected and not
     judged.
     """
     count = len(nominal)
@@ -96,8 +97,8 @@ def measure(
 
 
 def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
-    """(n,) mm: what is unknown of the play at the start and the end of each group of moves, whichever is
-    more. It shrinks as an axis moves in both directions, and is gone once that range is the backlash."""
+    """(n,) mm: the unknown play at the start or at the end of each group of moves, whichever is more. It
+    shrinks with the range that an axis has moved, and is 0 once that range is the backlash."""
     width = model.backlash_at(path.end_mm) if len(groups) else None
     if width is None:
         return np.zeros(len(groups))
@@ -116,7 +117,7 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
 
 
 class Tracer:
-    """Goes through the nominal moves in blocks, carrying the play of the axes."""
+    """Goes through the nominal moves in blocks, and keeps the play of the axes from block to block."""
 
     def __init__(
         self, nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, bend: float
@@ -189,7 +190,7 @@ class Tracer:
         if arc.max(initial=-1) >= 0:
             self._arc_steps(arc, known, steps, start, tool)
         reached, inner = self._samples(start, end, arc, steps, known, tool)
-        # ends of parts inside a nominal move are on the way, too
+        # ends of parts inside a nominal move lie along it, too
         last_part = np.zeros(last - first, bool)
         last_part[self.groups[a:b] - first] = True
         cuts = np.flatnonzero(~last_part)
@@ -198,7 +199,7 @@ class Tracer:
         worst[:] = waypoint
         if len(inner.part) or len(cuts):
             self._bend(reached, inner, owner, arc >= 0, bend)
-            self._on_the_way(a, b, first, owner, inner.with_ends(cuts, reached), worst)
+            self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
 
     def _samples(
         self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array
@@ -209,7 +210,7 @@ class Tracer:
         part = long[part]
         inside = share < 1.0
         if self.has_play:
-            # play depends on all that came before, so the samples are gone through in order
+            # play depends on all earlier moves, so the samples are taken in order
             actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
             return actual[~inside], _Inner(part[inside], share[inside], actual[inside])
         part, share, point = part[inside], share[inside], point[inside]
@@ -230,7 +231,7 @@ class Tracer:
         )
 
     def actual(self, point: Array, tool: Array) -> Array:
-        """Where the tip really is; carries the play of the axes from call to call."""
+        """Where the tip really is; keeps the play of the axes from call to call."""
         play = None
         if self.has_play and len(point):
             chain = point if self.last is None else np.concatenate((self.last, point))
@@ -240,7 +241,7 @@ class Tracer:
             self.last, self.play = point[-1:], play[-1]
         return point + self.model.error(point, tool, play)
 
-    def _on_the_way(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
+    def _along(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
         """Distances of samples from their nominal move, the largest per move."""
         nominal = self.nominal
         goal = self.target[a:b]

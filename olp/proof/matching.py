@@ -11,9 +11,11 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.program.program import Program
 
-#: a waypoint counts as reached within this where nothing comes nearer; corrections are far smaller
+#: mm; a waypoint counts as reached within this where nothing comes nearer; corrections are far smaller
 GATE_MM = 0.05
+#: moves that are compared at once
 _BLOCK = 4096
+#: kinds of moves along arcs
 _ARCS = (Kind.ARC_CW, Kind.ARC_CCW)
 
 
@@ -21,15 +23,15 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
     """(n,) index of the last move of `corrected` for each move of `program`, whose waypoints are
     `target_mm`.
 
-    Way-points are looked for in order: the next move that comes within `near_mm`, else the nearest of those
-    within the gate. Raises ProgramError where one is not reached: then the two programs are not the same job.
+    Waypoints are sought in order: the next move that comes within `near_mm`, else the nearest of those within
+    the gate. Raises ProgramError where one is not reached: then the two programs are not the same job.
     """
     nominal, path = program.toolpath, corrected.toolpath
     count, extra = len(nominal), len(path) - len(nominal)
     if extra < 0:
         raise ProgramError(
-            f"the corrected program has {len(path)} moves, fewer than the {count} of the nominal one; "
-            "it is not a correction of it"
+            f"the corrected program has {len(path)} moves, fewer than the {count} of the nominal one, so it "
+            "is not a correction of it; give the two programs of one job"
         )
     if extra == 0:
         return np.arange(count)
@@ -37,7 +39,7 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
     actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
     loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)
-    # what takes up backlash before a whole circle is where that ends, and is no part of an arc
+    # the step that takes up backlash before a whole circle ends where the circle ends, but is no part of it
     curved = np.isin(nominal.kind, _ARCS)
     straight = ~np.isin(path.kind, _ARCS)
     groups = np.zeros(count, np.int64)
@@ -63,8 +65,9 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         )
         if skip < 0 or ahead[skip] > GATE_MM:
             raise ProgramError(
-                f"no move of the corrected program reaches the end of line {int(nominal.line[i])} within "
-                f"{GATE_MM:g} mm; it is not a correction of this program for this machine",
+                f"no move of the corrected program comes within {GATE_MM:g} mm of the end of line "
+                f"{int(nominal.line[i])} of the nominal one; it is not a correction of this program for this "
+                "machine",
                 line=int(path.line[min(j, len(path) - 1)]),
             )
         groups[i] = j + skip

@@ -1,4 +1,4 @@
-"""Proof by reading back: the written bytes are parsed again, run through the forward model and held against
+"""Proof by reading back: the written bytes are parsed again, run through the forward model and compared with
 the nominal path, at and between the waypoints."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from olp.proof.matching import match
 
 #: the proof samples so finely that the error bends by less than this share of the tolerance between samples
 _BEND_SHARE = 0.1
-#: half the diagonal of the last digit's cube
+#: half the diagonal of the last digit's cube, as a share of the digit
 ROUNDING_SHARE = 0.87
 
 
@@ -63,7 +63,7 @@ class Proof:
 
 
 def uncorrected_starts(path: Toolpath, uncorrected: Mask) -> Mask:
-    """(n,) feed moves that begin where the move before ended uncorrected, or a canned cycle left the tool."""
+    """(n,) feed moves after an uncorrected move or after a canned cycle."""
     loose = uncorrected | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
     before = np.concatenate(([False], loose[:-1]))
     return np.asarray(before & cutting_moves(path), bool)
@@ -79,9 +79,9 @@ def prove(
     uncorrected: Index,
     parts: npt.NDArray[np.int32] | None = None,
 ) -> Proof:
-    """Hold the corrected path against the nominal one. `uncorrected` are nominal moves written as they were;
-    `parts` (n,) says how many corrected moves each nominal one became, and is found from the paths where it
-    is not given."""
+    """Compare the corrected path with the nominal one. `uncorrected` are nominal moves that are left
+    uncorrected. `parts` (n,) says how many corrected moves each nominal one became; without it the paths are
+    matched."""
     path, written = nominal.toolpath, corrected.toolpath
     target = targets(path, zero_shifts(path.frames, model))
     exempt = np.zeros(len(path), bool)
@@ -93,8 +93,8 @@ def prove(
         groups = np.cumsum(_with_pecks(nominal, corrected, parts), dtype=np.int64) - 1
     if len(groups) and int(groups[-1]) != len(written) - 1:
         raise ProgramError(
-            f"the corrected program has {len(written)} moves where {int(groups[-1]) + 1} were expected; it "
-            "was not written"
+            f"the corrected program has {len(written)} moves; expected {int(groups[-1]) + 1}; it was not "
+            "written"
         )
     after = measure(path, target, written, groups, model, tolerance_mm * _BEND_SHARE, exempt)
     before = measure(path, target, path, np.arange(len(path)), model, 1e-3, exempt)
@@ -102,8 +102,7 @@ def prove(
 
 
 def _with_pecks(nominal: Program, corrected: Program, parts: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """A corrected depth may take one peck more or less; the last stroke of a hole answers for the
-    difference."""
+    """A corrected depth may take one peck more or less; the difference goes to the last stroke of a hole."""
     parts = parts.copy()
     for mine, other in zip(nominal.holes, corrected.holes, strict=True):
         more = (other.last - other.first) - (mine.last - mine.first)

@@ -143,7 +143,7 @@ def _table_text(evaluated: Evaluated, *, bidirectional: bool) -> Iterator[str]:
     rows = _rows(evaluated, keys, both=bidirectional)
     if rows:
         yield "ISO 230-2" if bidirectional else "ISO 230-2, approached from one side"
-        yield from table(["", "", *map(_head, keys), ""], rows, left=2)
+        yield from table(["", "", *map(_head, keys), ""], rows, text_columns=2)
 
 
 def _head(key: str) -> str:
@@ -156,7 +156,7 @@ def _cyclic_text(evaluated: Evaluated) -> Iterator[str]:
     if any(s.harmonics for s in evaluated.separations):
         yield _CYCLIC
         header = ["", "", "period mm", "amplitude", "+-", "phase rad"]
-        yield from table(header, rows or [["none"] + [""] * 5], left=2)
+        yield from table(header, rows or [["none"] + [""] * 5], text_columns=2)
 
 
 def _cyclic_rows(evaluated: Evaluated) -> list[list[str]]:
@@ -178,7 +178,7 @@ def _reversal_text(evaluated: Evaluated) -> Iterator[str]:
     rows = _reversal_rows(evaluated)
     if rows:
         yield "Reversal (B of all targets, drift removed)"
-        yield from table(["", "", "B", "+-", "along the axis"], rows, left=2)
+        yield from table(["", "", "B", "+-", "along the axis"], rows, text_columns=2)
 
 
 def _reversal_rows(evaluated: Evaluated) -> list[list[str]]:
@@ -405,7 +405,7 @@ def _evaluated(evaluated: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Sec
     for keys, both in ((_FIGURES, True), (_ONE_SIDE, False)):
         rows = _rows(evaluated, keys, both=both)
         if rows:
-            blocks.append(Grid(["", "", *map(_head, keys), ""], rows, left=2))
+            blocks.append(Grid(["", "", *map(_head, keys), ""], rows, text_columns=2))
     yield Section("Accuracy and repeatability (ISO 230-2)", blocks)
     for axis in AXES:
         drawn: list[Block] = [
@@ -425,10 +425,11 @@ def _evaluated(evaluated: Evaluated, plots: Mapping[str, bytes]) -> Iterator[Sec
     if any(s.harmonics for s in evaluated.separations):
         parts.append(Paragraph(f"{_CYCLIC}."))
     if rows:
-        parts.append(Grid(["cyclic error", "", "period mm", "amplitude", "+-", "phase rad"], rows, left=2))
+        header = ["cyclic error", "", "period mm", "amplitude", "+-", "phase rad"]
+        parts.append(Grid(header, rows, text_columns=2))
         parts += [Plot(plots[n], _caption(n)) for n in plots if n.startswith("cyclic")]
     if rows := _reversal_rows(evaluated):
-        parts.append(Grid(["reversal", "", "B", "+-", "along the axis"], rows, left=2))
+        parts.append(Grid(["reversal", "", "B", "+-", "along the axis"], rows, text_columns=2))
         parts += [Plot(plots[n], _caption(n)) for n in plots if n == "reversal"]
     if parts:
         yield Section("Cyclic errors and reversal", parts)
@@ -457,13 +458,13 @@ def _component_tables(report: Mapping[str, Any]) -> Iterator[Block]:
         yield Grid(
             [f"in {unit}", "", "range", "sigma", "residual", "half reversal"],
             [[r["name"], str(r["shape"]), *(number(r[c]) for c in columns)] for r in report[key]],
-            left=2,
+            text_columns=2,
         )
     rows = []
     for row in report["squareness"]:
         angle = angle_words(row["name"], row["value_urad"] * RAD_PER_URAD)
         rows.append([row["name"], angle, number(row["value_urad"]), number(2.0 * row["sigma_urad"])])
-    yield Grid(["squareness", "", "urad", "+-"], rows, left=2)
+    yield Grid(["squareness", "", "urad", "+-"], rows, text_columns=2)
     for name, title in (("sets_of_points", "points"), ("diagonals_and_circles", "diagonals and circles")):
         sets = report.get(name) or ()
         if not sets:

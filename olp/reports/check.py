@@ -56,7 +56,7 @@ def _clearance(report: Report) -> Iterator[str]:
         ]
         for b in sorted(blocks, key=lambda b: b["clearance_mm"])[:_NEAREST]
     ]  # fmt: skip
-    yield from table(["line", "part", "mesh", "clearance", "point"], rows, left=3)
+    yield from table(["line", "part", "mesh", "clearance", "point"], rows, text_columns=3)
 
 
 def _verdict(report: Report, fail_on: str) -> Iterator[str]:

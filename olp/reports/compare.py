@@ -152,7 +152,7 @@ def _runs(report: Report) -> Iterator[str]:
     if rows:
         yield "Runs, in um; normal is level and to the left of travel, binormal points up from it"
         header = ["", "", "points", "max", "rms", "normal", "binormal", "n rms", "b rms"]
-        yield from table(header, rows, left=2)
+        yield from table(header, rows, text_columns=2)
 
 
 def _poses(report: Report) -> Iterator[str]:
@@ -180,5 +180,5 @@ def _worst(report: Report) -> Iterator[str]:
         [str(row["line"]), number(row["max_um"]), shortened(texts.get(row["line"], ""), 60)]
         for row in worst[:5]
     ]
-    for line in table(["line", "max", ""], [[a, b, ""] for a, b, _ in rows], left=0):
+    for line in table(["line", "max", ""], [[a, b, ""] for a, b, _ in rows], text_columns=0):
         yield f"{line}  {rows.pop(0)[2]}".rstrip() if line.split()[0] != "line" else line

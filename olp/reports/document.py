@@ -28,11 +28,11 @@ class Pairs:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A table; the first `left` columns are text."""
+    """A table; the first `text_columns` columns are text."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
-    left: int = 1
+    text_columns: int = 1
     code: int | None = None  # a column that holds text of a program
     aside: int | None = None  # a column that begins a second table beside the first
 
@@ -205,7 +205,7 @@ def _html(block: Block, after: Block | None) -> str:
     def row(cells: Sequence[str], tag: str) -> str:
         html_cells = []
         for column, cell in enumerate(cells):
-            kind = "l" if column < block.left or column in (block.code, block.aside) else "r"
+            kind = "l" if column < block.text_columns or column in (block.code, block.aside) else "r"
             kind += " aside" if column == block.aside else ""
             kind += " code" if column == block.code else ""
             html_cells.append(f'<{tag} class="{kind}">{_text(cell)}</{tag}>')
@@ -231,8 +231,8 @@ def _markdown(block: Block) -> Iterator[str]:
         sentence = f"{_mark(block.message)} {_mark(block.remedy)}"
         yield f"- **{block.code} {_mark(block.title)}** ({block.severity}): {sentence}"
     elif isinstance(block, Grid):
-        left_columns = {*range(block.left), block.code, block.aside}
-        rule = ("---" if column in left_columns else "---:" for column in range(len(block.header)))
+        words = {*range(block.text_columns), block.code, block.aside}
+        rule = ("---" if column in words else "---:" for column in range(len(block.header)))
         yield "| " + " | ".join(map(_mark, block.header)) + " |"
         yield "| " + " | ".join(rule) + " |"
         yield from ("| " + " | ".join(map(_mark, row)) + " |" for row in block.rows)

@@ -27,11 +27,13 @@ _WEIGHT = {"reference": 0.3, "contributing": 0.6, "changes": 0.2, "index": 0.2, 
            "contributing/house": 0.2}  # fmt: skip
 #: Words of a question that say nothing about its subject.
 _EMPTY = frozenset(
-    re.findall(
-        r"\w+",
-        "a an and are as at be by can do does for from has have how i in is it its me mean means my not of "
-        "on or our out should so that the this to was we what when where which who why will with you your",
+    word
+    for line in (
+        "a an and are as at be by can do does for from has have how i in is it its me",
+        "mean means my not of on or our out should so that the this to was we what when",
+        "where which who why will with you your",
     )
+    for word in line.split()
 )
 _CURRENT = " aria-current=page"
 _GROUPS = {

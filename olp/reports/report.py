@@ -55,13 +55,13 @@ def to_text(report: Report) -> str:
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> Iterator[str]:
-    """Lines of a table; the first `left` columns are aligned to the left, the others to the right."""
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int = 1) -> Iterator[str]:
+    """Lines of a table; the first `text_columns` columns are aligned to the left, the others to the right."""
     body = [list(header), *(list(row) for row in rows)]
     widths = [max(len(row[column]) for row in body) for column in range(len(header))]
     for row in body:
         cells = (
-            cell.ljust(width) if column < left else cell.rjust(width)
+            cell.ljust(width) if column < text_columns else cell.rjust(width)
             for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         )
         yield ("  " + "  ".join(cells)).rstrip()
@@ -276,7 +276,7 @@ def _worst(report: Report) -> Iterator[str]:
         [str(block.get("line", "")), number(block.get("before_um")), number(block.get("after_um"))]
         for block in blocks[:MAX_WORST]
     )
-    lines = list(table(["line", UNCORRECTED, CORRECTED], rows, left=0))
+    lines = list(table(["line", UNCORRECTED, CORRECTED], rows, text_columns=0))
     room = WIDTH - max(map(len, lines)) - 2
     yield lines[0] + "  text"
     for line, block in zip(lines[1:], blocks, strict=False):
@@ -299,6 +299,7 @@ def uncertainty_text(report: Report) -> Iterator[str]:
     if not part:
         return
     band, within, expected = part["band_um"], part["within"], part["expected"]
+    before, after = within["before"], within["after"]
     yield f"Uncertainty of the tip at {part['waypoints']} waypoints, from the calibration"
     yield from pairs(
         [
@@ -315,10 +316,9 @@ def uncertainty_text(report: Report) -> Iterator[str]:
             ),
             (
                 f"  Within {within['tolerance_um']:g} um",
-                f"all of the program with probability {percent(within['before']['program'])} uncorrected, "
-                f"{percent(within['after']['program'])} corrected; the worst waypoint "
-                f"{percent(within['before']['least'])} uncorrected, "
-                f"{percent(within['after']['least'])} corrected",
+                f"all of the program with probability {percent(before['program'])} uncorrected, "
+                f"{percent(after['program'])} corrected; the worst waypoint "
+                f"{percent(before['least'])} uncorrected, {percent(after['least'])} corrected",
             ),
             ("  From", str(part["source"])),
             ("  Zero", str(part["zero_setting"])),

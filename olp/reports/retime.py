@@ -153,7 +153,8 @@ def _slow(report: Report) -> Iterator[str]:
         return
     sections = _count(slow["places"], "section", "sections")
     yield (
-        f"{sections} below half of the feed, {slow['seconds']:.2f} s in all, {slow['lost_s']:.2f} s lost there"
+        f"{sections} below half of the feed, {slow['seconds']:.2f} s in all, "
+        f"{slow['lost_s']:.2f} s lost there"
     )
     rows = [
         (

@@ -48,11 +48,11 @@ class Stylus:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forward:
-    """(n, 3) `axis_mm` at the touches with their tool vectors `tool_vector_mm`; `added_mm`, what to add to the
-    reported points in their own frame; `play` of the axes (n, 3), None where no axis has backlash.
+    """(n, 3) `axis_mm` at the touches with their tool vectors `tool_vector_mm`; `added_mm`, what to add to
+    the reported points in their own frame; `play` of the axes (n, 3), None where no axis has backlash.
 
-    `doubt_mm` (n,) is how far the sum may differ because the side of the touch is not stated. `play_mm` (n,) is
-    how far because the direction of the approach is not stated.
+    `doubt_mm` (n,) is how far the sum may differ because the side of the touch is not stated. `play_mm` (n,)
+    is how far because the direction of the approach is not stated.
     """
 
     axis_mm: Array

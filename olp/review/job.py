@@ -269,7 +269,8 @@ def _scene(
         tolerance_um=options.tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
         uncertainty=_uncertainty(
-            loaded, nominal, samples, options.part_tolerance_um or options.tolerance_um, options.date
+            loaded, nominal, samples,
+            loaded.part_tolerance_um(options.part_tolerance_um) or options.tolerance_um, options.date,
         ),
     )
 

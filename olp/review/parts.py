@@ -190,8 +190,8 @@ def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array,
 
 
 def held_mm(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:
-    """(m, 3) the shift of the part from its offsets, at shares of moves: along a line that begins in one
-    frame and ends in another it changes from the one to the other; an arc has that of its own frame."""
+    """(m, 3) the shift of the part from its offsets, at shares of moves. It changes along a line that begins
+    in one frame and ends in another; an arc has the shift of its own frame."""
     own = path.frame[move]
     before = np.where(
         (move > 0) & np.isin(path.kind[move], _STRAIGHT), path.frame[np.maximum(move - 1, 0)], own

@@ -41,11 +41,14 @@ _MOST_STEPS = 1 << 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Of n samples in program order: (n,) nominal `move` and `share` of it; (n,) `part`, the move of the
-    corrected program, and the share of it as `within`; (n, 3) `axis_mm` and `command_mm`, nominal and
-    corrected axis positions; (n, 3) deviations of the tip from its nominal point in mm, `uncorrected` and
-    `result`; (n,) `joined`, whether the path leads here from the sample before; (n,) `arc_mm` along the path.
-    `play` (n, 3) is that of the nominal commands, None where no axis has backlash."""
+    """The n samples of a path in program order.
+
+    (n,) nominal `move` and `share` of it. (n,) `part`, the move of the corrected program, and `within`, the
+    share of it. (n, 3) `axis_mm` and `command_mm`, nominal and corrected axis positions. (n, 3) `uncorrected`
+    and `result`, deviations of the tip from its nominal point in mm. (n,) `joined`, whether the path leads
+    here from the sample before. (n,) `arc_mm` along the path. `play` (n, 3) is that of the nominal commands,
+    None where no axis has backlash.
+    """
 
     move: Index
     share: Array

@@ -1,8 +1,9 @@
-"""Which components of a calibration are known well enough that correcting them surely helps.
+"""Which components of a calibration are known well enough that correcting them most probably helps.
 
-A component is corrected by its calibrated values v, and its true ones are v + d with d unknown. The mean
-square of what it leaves falls by mean(v^2 + 2 v d): a normal variable, so the probability that it falls is
-known. By expectation it always falls; who leaves a component out gives up a small gain to be sure of it.
+A component is corrected by its calibrated values v, and its true ones are v + d with d unknown. Correction
+reduces the mean square of its error by mean(v^2 + 2 v d): a normal variable, so the probability of a gain is
+known. The expected gain is always positive; leaving a component out gives up a small expected gain and
+avoids a possible loss.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import value_rows
 from olp.errormodel.uncertainty import Uncertainty
 from olp.uncertainty.probability import normal
-from olp.uncertainty.spread import SURE
+from olp.uncertainty.spread import PROBABLE_GAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +33,13 @@ class Component:
     helps: float
 
     @property
-    def sure(self) -> bool:
-        return self.helps >= SURE
+    def probable(self) -> bool:
+        return self.helps >= PROBABLE_GAIN
 
 
 def components(calibration: Calibration, uncertainty: Uncertainty) -> list[Component]:
     """All components that the calibration corrects and whose uncertainty is known, the most certain last."""
-    found: list[Component] = []
+    result: list[Component] = []
     for curve in calibration.curves:
         weight = np.gradient(curve.position_mm)
         for name in curve.names:
@@ -46,16 +47,16 @@ def components(calibration: Calibration, uncertainty: Uncertainty) -> list[Compo
             half = curve.half_difference(name)
             if half is not None:
                 parts.append((uncertainty.find("half", name), half))
-            found += _component(name, [(e, curve.position_mm, v, weight) for e, v in parts], calibration)
+            result += _component(name, [(e, curve.position_mm, v, weight) for e, v in parts], calibration)
     for name, value in calibration.squareness.items():
         entry = uncertainty.find("squareness", name)
-        found += _component(name, [(entry, np.zeros(1), np.array([value]), np.ones(1))], calibration)
-    return sorted(found, key=lambda component: component.helps)
+        result += _component(name, [(entry, np.zeros(1), np.array([value]), np.ones(1))], calibration)
+    return sorted(result, key=lambda component: component.helps)
 
 
-def unsure(calibration: Calibration, uncertainty: Uncertainty) -> frozenset[str]:
-    """Components that are better left out by who wants to be sure."""
-    return frozenset(c.name for c in components(calibration, uncertainty) if not c.sure)
+def improbable(calibration: Calibration, uncertainty: Uncertainty) -> frozenset[str]:
+    """Components whose correction helps with less than PROBABLE_GAIN."""
+    return frozenset(c.name for c in components(calibration, uncertainty) if not c.probable)
 
 
 def _component(
@@ -78,7 +79,7 @@ def _component(
         along = (share * value) @ rows
         common = along[:rank] + (common if len(common) else 0.0)
         own += float(along[rank:] @ along[rank:])
-    # a cyclic term is as good as the component: it goes with it
+    # a cyclic term is corrected with its component
     mean += sum(0.5 * term.amplitude**2 for term in terms)
     spread = 2.0 * float(np.sqrt(common @ common + own))
     if known and mean > 0.0:

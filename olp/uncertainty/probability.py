@@ -8,11 +8,15 @@ import numpy as np
 
 from olp.core.arrays import Array
 
-#: Directions of half a sphere over which `within` integrates, and how many numbers that may take: with the
-#: most it is right to a part in a thousand, with the fewest to some.
-FEWEST, MOST, WORK = 128, 1024, 1e7
-#: Farther out than so many standard deviations nothing is.
+#: Directions of half a sphere over which `within` integrates, at least: right to some parts in a thousand.
+FEWEST = 128
+#: The same, at most: right to one part in a thousand.
+MOST = 1024
+#: Directions times positions, at most, where this leaves more than FEWEST.
+WORK = 1e7
+#: Beyond so many standard deviations the probability counts as zero.
 _SIGMAS = 6.0
+#: Positions that are computed at once, to limit memory.
 _BLOCK = 1024
 
 
@@ -22,11 +26,11 @@ def within(covariance: Array, offset: Array, radius: float) -> Array:
 
     Along every direction w of the unit sphere x = rho A w (A A.T the covariance), which is in the ball for
     rho in an interval; of rho the distribution is known (chi with 3 degrees of freedom), so one integral
-    over directions is left.
+    over directions remains.
     """
     size = np.sqrt((offset**2).sum(axis=1))
     reach = _SIGMAS * np.sqrt(np.trace(covariance, axis1=1, axis2=2))
-    out = np.where(size + reach <= radius, 1.0, 0.0)
+    probability = np.where(size + reach <= radius, 1.0, 0.0)
     near = np.flatnonzero(np.abs(size - radius) < reach)
     count = int(np.clip(WORK / max(len(near), 1), FEWEST, MOST))
     z = (np.arange(count) + 0.5) / count
@@ -50,8 +54,8 @@ def within(covariance: Array, offset: Array, radius: float) -> Array:
         share = 0.5 * (_signed_chi(high) - _signed_chi(low))
         fixed = square <= 1e-24 * radius**2
         share = np.where(fixed, (rest >= 0.0) * 1.0, np.where(under > 0.0, share, 0.0))
-        out[part] = share.mean(axis=1)
-    return np.clip(out, 0.0, 1.0)
+        probability[part] = share.mean(axis=1)
+    return np.clip(probability, 0.0, 1.0)
 
 
 def normal(x: Array | float) -> Array:

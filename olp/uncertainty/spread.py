@@ -1,9 +1,8 @@
-"""The way-points of a program with the uncertainty of where the tip really is.
+"""The waypoints of a program with the uncertainty of the position of the tip.
 
-Way-points are ends of moves whose path counts, and bottoms of holes: not rapids, nor moves of the control's
-own. What a touch-off
-on the raw machine holds has the same unknown errors in it, so each way-point has the uncertainty of the
-difference from there; "true" work offsets cancel nothing.
+Waypoints are ends of moves whose path counts, and bottoms of holes: not of rapids, nor of moves that the
+control makes itself. A touch-off on the uncompensated machine contains the same unknown errors, so each
+waypoint has the uncertainty of the difference from there; "true" work offsets cancel nothing.
 """
 
 from __future__ import annotations
@@ -30,22 +29,30 @@ if TYPE_CHECKING:
 
 #: Coverage factor of bands: with normal errors about 95 % of a coordinate.
 COVERAGE = 2.0
-#: Draws of the whole calibration for what holds at many way-points at once, and numbers to draw at the most.
-DRAWS, FEWEST_DRAWS, WORK = 2000, 250, 4e7
+#: Draws of the whole calibration for probabilities at many waypoints at once, at most.
+DRAWS = 2000
+#: Draws of the whole calibration, at least.
+FEWEST_DRAWS = 250
+#: Draws times waypoints, at most, where this leaves more than FEWEST_DRAWS.
+WORK = 4e7
+#: Seed of the draws.
 SEED = 20260514
-#: What is held to be sure: a gain that exceeds its standard uncertainty. A number whose size is its expanded
-#: uncertainty (2 sigma) is corrected with just this probability of a gain.
-SURE = 0.8413
+#: From this probability on a gain counts as probable: it exceeds its standard uncertainty. A number as large
+#: as its expanded uncertainty (k = 2) has just this probability of a gain.
+PROBABLE_GAIN = 0.8413
+#: Waypoints that are computed at once, to limit memory.
 _BLOCK = 2048
+#: Flags of moves that have no waypoint.
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: Rows and columns of a symmetric 3 by 3 matrix.
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Places of a path: (n,) nominal `move`, (n, 3) nominal `axis_mm`, `before_mm` and `after_mm`, the
-    deviations of the tip that the calibration predicts for the nominal and the corrected program, and `play`
-    (n, 3), None where no axis has lost motion."""
+    """Waypoints of a path: (n,) nominal `move`, (n, 3) nominal `axis_mm`, `before_mm` and `after_mm`, the
+    deviations of the tip that the model predicts for the nominal and the corrected program, and `play`
+    (n, 3), None where no axis has backlash."""
 
     move: Index
     axis_mm: Array
@@ -59,37 +66,37 @@ class Points:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unknowns:
-    """How well a machine is known: `sensitivity` to the unknown parts of its calibration, and the standard
-    deviation of its own scatter at one place by axis."""
+    """The uncertainty of a machine: `sensitivity` to the unknown parts of its calibration, and the standard
+    deviation of its own scatter at one position by axis."""
 
     sensitivity: Sensitivity
     repeatability_mm: Vector
 
     def touches(self, frames: tuple[Frame, ...]) -> tuple[Rows, Array]:
-        """(frames, 3, columns): what the touch-offs of each frame hold of the unknowns; and (frames,) how
-        many there are."""
-        out = np.zeros((len(frames), 3, self.sensitivity.columns), np.float32)
+        """(frames, 3, columns): the part of the unknowns in the touch-offs of each frame; and (frames,) their
+        number."""
+        rows = np.zeros((len(frames), 3, self.sensitivity.columns), np.float32)
         count = np.zeros(len(frames))
         for k, frame in enumerate(frames):
             for touch in (frame.touched, frame.tool_touched):
                 if touch is not None:
-                    at, tool_vector = touch
-                    out[k] += self.sensitivity.rows(np.array([at]), np.array(tool_vector, float))[:, 0]
+                    position, tool_vector = touch
+                    rows[k] += self.sensitivity.rows(np.array([position]), np.array(tool_vector, float))[:, 0]
                     count[k] += 1
-        return out, count
+        return rows, count
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Confidence:
-    """Of n way-points in program order, in mm: see `Points`; (n, 3) standard uncertainties `sigma_mm` along
-    X, Y, Z; (n,) `band_mm`, 2 sigma in the direction where it is longest; (n,) probabilities `within_before`
-    and `within_after` that the tip is no farther than `within_mm` from its place, and `nearer`, that
-    correction brings it nearer.
+    """The uncertainty of n waypoints in program order, in mm; see `Points`. `sigma_mm` (n, 3) are standard
+    uncertainties along X, Y, Z; `band_mm` (n,) is 2 sigma in the direction where it is longest. (n,)
+    `within_before` and `within_after` are probabilities that the tip is within `within_mm` of its nominal
+    position, and `nearer` that correction brings it nearer.
 
-    `lines` (l,) of the program with the probabilities that all their way-points are within, `program_before`
-    and `program_after` that all of the program's are, from so many `draws`; `gain` is the probability that
-    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm`
-    is the largest standard uncertainty by temperatures.
+    `lines` (l,) of the program have the probabilities that all their waypoints are within. `program_before`
+    and `program_after` are those of the whole program, from so many `draws`. `gain` is the probability that
+    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm` is
+    the largest standard uncertainty from temperatures.
     """
 
     points: Points
@@ -114,20 +121,20 @@ class Confidence:
 
 
 def waypoints(
-    nominal: Program, corrected: Program, groups: Index, passed: Index, model: ErrorModel
+    nominal: Program, corrected: Program, groups: Index, uncorrected: Index, model: ErrorModel
 ) -> Points:
-    """The way-points of a program and of its correction, whose moves up to groups (n,) belong to each nominal
-    one. Moves in `passed` stay uncorrected and are left out; of canned cycles the bottoms of holes count."""
+    """The waypoints of a program and of its correction, whose moves up to groups (n,) belong to each nominal
+    one. Moves in `uncorrected` are left out; of canned cycles the bottoms of holes count."""
     path, written = nominal.toolpath, corrected.toolpath
     shift = zero_shifts(path.frames, model) if path.frames else np.zeros((1, 3))
     keep = ((path.flag & _AWAY) == 0) & (path.kind != Kind.RAPID)
-    keep[passed] = False
+    keep[uncorrected] = False
     other = groups.copy()
     cycle = (path.flag & np.uint8(Flag.CYCLE)) != 0
-    bottom, there = _bottoms(nominal), _bottoms(corrected)
-    if len(bottom) == len(there):
-        both = (bottom >= 0) & (there >= 0)
-        other[bottom[both]] = there[both]
+    bottom, corrected_bottom = _bottoms(nominal), _bottoms(corrected)
+    if len(bottom) == len(corrected_bottom):
+        both = (bottom >= 0) & (corrected_bottom >= 0)
+        other[bottom[both]] = corrected_bottom[both]
         cycle[bottom[both]] = False
     keep &= ~cycle
     keep &= np.isfinite(path.end_mm).all(axis=1) & np.isfinite(written.end_mm[other]).all(axis=1)
@@ -164,13 +171,13 @@ def _bottoms(program: Program) -> Index:
 
 
 def covariances(unknowns: Unknowns, path: Toolpath, points: Points) -> Array:
-    """(n, 3, 3) covariance of the tip's place at points of a path, in mm^2."""
+    """(n, 3, 3) covariance of the position of the tip at points of a path, in mm^2."""
     touch, count = unknowns.touches(path.frames)
-    out = np.zeros((len(points), 3, 3))
+    covariance = np.zeros((len(points), 3, 3))
     for part, rows in _blocks(unknowns.sensitivity, path, points, np.arange(len(points)), touch):
-        out[part] = _covariance(rows)
-    out += _scatter(unknowns, count, path, points)
-    return out
+        covariance[part] = _covariance(rows)
+    covariance += _scatter(unknowns, count, path, points)
+    return covariance
 
 
 def bands(covariance: Array) -> Array:
@@ -187,7 +194,7 @@ def confidence(
     tell: Progress,
     seed: int = SEED,
 ) -> Confidence:
-    """Bands and probabilities at each way-point, exact for normal errors to first order; those of lines and
+    """Bands and probabilities at each waypoint, exact for normal errors to first order; those of lines and
     of the whole by Monte-Carlo over the calibration's covariance, in memory of blocks."""
     n = len(points)
     line = path.line[points.move].astype(np.int64)
@@ -242,7 +249,7 @@ def _blocks(
     sensitivity: Sensitivity, path: Toolpath, points: Points, which: Index, touch: Rows,
     joint: _Joint | None = None,
 ) -> Iterator[tuple[Index, Rows]]:  # fmt: skip
-    """Points in blocks, with their rows (3, b, columns) less what their touch-off holds."""
+    """Points in blocks, with their rows (3, b, columns) less those of their touch-off."""
     tool = path.tool_mm()
     for a in range(0, len(which), _BLOCK):
         part = which[a : a + _BLOCK]
@@ -259,21 +266,21 @@ def _blocks(
 
 
 def _covariance(rows: Rows) -> Array:
-    out = np.zeros((rows.shape[1], 3, 3))
+    covariance = np.zeros((rows.shape[1], 3, 3))
     for i, j in _PAIRS:
-        out[:, i, j] = out[:, j, i] = np.einsum("nk,nk->n", rows[i], rows[j])
-    return out
+        covariance[:, i, j] = covariance[:, j, i] = np.einsum("nk,nk->n", rows[i], rows[j])
+    return covariance
 
 
 def _scatter(unknowns: Unknowns, count: Array, path: Toolpath, points: Points) -> Array:
-    """(n, 3, 3) of the machine's own scatter, at the way-point and at each touch."""
+    """(n, 3, 3) of the machine's own scatter, at the waypoint and at each touch."""
     own = np.diag(np.array(unknowns.repeatability_mm) ** 2)
     touches = count[path.frame[points.move]] if len(count) else np.zeros(len(points))
     return np.asarray((1.0 + touches)[:, None, None] * own)
 
 
 def _scatter_of_sum(unknowns: Unknowns, count: Array, path: Toolpath, points: Points, change: Array) -> float:
-    """Variance of the sum over way-points of change times scatter: a touch scatters once for its frame."""
+    """Variance of the sum over waypoints of change times scatter: a touch scatters once for its frame."""
     square = np.array(unknowns.repeatability_mm) ** 2
     total = float((change**2 @ square).sum())
     frame = path.frame[points.move]
@@ -283,7 +290,7 @@ def _scatter_of_sum(unknowns: Unknowns, count: Array, path: Toolpath, points: Po
 
 
 class _Joint:
-    """Draws of all unknowns at once, followed through the way-points in the order of lines."""
+    """Draws of all unknowns at once, followed through the waypoints in the order of lines."""
 
     def __init__(
         self, unknowns: Unknowns, path: Toolpath, points: Points, touch: Rows, count: Array,
@@ -308,7 +315,7 @@ class _Joint:
         self.last: tuple[int, Array] | None = None
 
     def add(self, part: Index, weights: Sequence[csr_array]) -> None:
-        """The next way-points, in the order of lines."""
+        """The next waypoints, in the order of lines."""
         sides = (self.points.before_mm[part], self.points.after_mm[part])
         square = np.zeros((2, len(part), self.draws), np.float32)
         frame = self.path.frame[self.points.move[part]]
@@ -331,7 +338,7 @@ class _Joint:
             worst[:, 0] = np.maximum(worst[:, 0], self.last[1])
         else:
             self.end()
-        # the last one may go on in what comes next
+        # the last line may continue in the next part
         self.last = (numbers[-1], worst[:, -1].copy())
         self.lines += numbers[:-1]
         shares = (worst[:, :-1] <= self.limit).mean(axis=2).tolist()
@@ -339,7 +346,7 @@ class _Joint:
             good.extend(share)
 
     def end(self) -> None:
-        """The line that came last is complete."""
+        """Counts the last line, which is complete."""
         if self.last is not None:
             self.lines.append(self.last[0])
             for side, worst in zip(self.good, self.last[1], strict=True):

@@ -14,13 +14,17 @@ from olp.errormodel.sensitivity import Expansion
 from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding
 from olp.uncertainty.components import Component
-from olp.uncertainty.spread import COVERAGE, SEED, SURE, Confidence
+from olp.uncertainty.spread import COVERAGE, PROBABLE_GAIN, SEED, Confidence
 
 #: Probabilities from here on are good enough: 2 sigma on both sides.
 GOOD = 0.95
-#: Standard uncertainties that have grown so much are old.
+#: Standard uncertainties that have grown by this factor are reported as old.
 AGED = 2.0
-_MOST_LINES, _LISTED = 10, 20
+#: Lines in the report, at most.
+_MOST_LINES = 10
+#: Components in the report, and lines of a finding, at most.
+_LISTED = 20
+#: What the uncertainty does not cover.
 _NOT_INCLUDED = (
     "what the control does between blocks, forces, and the process",
     "maps, load and thermal structures",
@@ -28,7 +32,7 @@ _NOT_INCLUDED = (
 
 
 def summary(
-    found: Confidence,
+    confidence: Confidence,
     path: Toolpath,
     uncertainty: Uncertainty,
     growth: float,
@@ -37,10 +41,10 @@ def summary(
     *,
     asked: bool,
 ) -> dict[str, Any]:
-    """What the report says; `asked`: the user named the tolerance."""
-    points = found.points
-    band = found.band_mm * UM_PER_MM
-    variance = (found.sigma_mm**2).sum(axis=1)
+    """The part of the report; `asked`: the user stated the tolerance."""
+    points = confidence.points
+    band = confidence.band_mm * UM_PER_MM
+    variance = (confidence.sigma_mm**2).sum(axis=1)
     frames = {int(k) for k in np.unique(path.frame[points.move])}
     touched = [k for k in frames if path.frames[k].touched or path.frames[k].tool_touched]
     return {
@@ -52,36 +56,36 @@ def summary(
         "unmodelled_K": expansion.unmodelled_K if expansion is not None else 0.0,
         "zero_setting": _zero(len(touched), len(frames)),
         "not_included": list(_NOT_INCLUDED),
-        "waypoints": len(found),
+        "waypoints": len(confidence),
         "band_um": {
             "max_um": float(band.max(initial=0.0)),
             "median_um": float(np.median(band)) if len(band) else 0.0,
             "rms_um": _rms(band),
             "by_axis_max_um": {
-                axis: float(COVERAGE * UM_PER_MM * found.sigma_mm[:, j].max(initial=0.0))
+                axis: float(COVERAGE * UM_PER_MM * confidence.sigma_mm[:, j].max(initial=0.0))
                 for j, axis in enumerate(AXES)
             },
         },
         "expected": {
             "before_rms_um": _expected(points.before_mm, variance),
             "after_rms_um": _expected(points.after_mm, variance),
-            "probability_better": found.gain,
+            "probability_better": confidence.gain,
         },
         "within": {
-            "tolerance_um": found.within_mm * UM_PER_MM,
+            "tolerance_um": confidence.within_mm * UM_PER_MM,
             "asked": asked,
-            "before": _probabilities(found.within_before, found.program_before),
-            "after": _probabilities(found.within_after, found.program_after),
-            "draws": found.draws,
+            "before": _probabilities(confidence.within_before, confidence.program_before),
+            "after": _probabilities(confidence.within_after, confidence.program_after),
+            "draws": confidence.draws,
             "seed": SEED,
         },
-        "lines": _lines(found),
+        "lines": _lines(confidence),
         "components": [_component(part) for part in parts[:_LISTED]],
     }
 
 
 def findings(
-    found: Confidence,
+    confidence: Confidence,
     growth: float,
     expansion: Expansion | None,
     parts: Sequence[Component],
@@ -89,45 +93,49 @@ def findings(
     *,
     asked: bool,
 ) -> list[Finding]:
-    """Where the gain is not sure, and what else is to be known about it."""
-    out = []
-    weak = (found.nearer < SURE) & (found.within_before < GOOD)
+    """Findings about waypoints and components whose gain is not probable, and about the uncertainty."""
+    results = []
+    weak = (confidence.nearer < PROBABLE_GAIN) & (confidence.within_before < GOOD)
     if weak.any():
-        lines = _numbers(found.line[weak])
-        what = f"{int(weak.sum())} of {len(found)} way-points: what is taken away is within its uncertainty"
-        out.append(_finding("OLP431", what, lines))
-    if len(found) and found.gain < SURE:
+        lines = _numbers(confidence.line[weak])
+        what = f"{int(weak.sum())} of {len(confidence)} waypoints: the correction is within its uncertainty"
+        results.append(_finding("OLP431", what, lines))
+    if len(confidence) and confidence.gain < PROBABLE_GAIN:
         before, after = (
-            _expected(side, (found.sigma_mm**2).sum(axis=1))
-            for side in (found.points.before_mm, found.points.after_mm)
+            _expected(side, (confidence.sigma_mm**2).sum(axis=1))
+            for side in (confidence.points.before_mm, confidence.points.after_mm)
         )
         what = (
-            f"the corrected program is better with a probability of {100 * found.gain:.0f} %: rms deviation "
-            f"expected {before:.2f} um before, {after:.2f} um after"
+            f"the corrected program is better with a probability of {100 * confidence.gain:.0f} %: expected "
+            f"rms deviation {before:.2f} um uncorrected, {after:.2f} um corrected"
         )
-        out.append(_finding("OLP432", what))
-    if asked and found.program_after < GOOD:
-        poor = found.lines[found.line_after < GOOD]
+        results.append(_finding("OLP432", what))
+    if asked and confidence.program_after < GOOD:
+        poor = confidence.lines[confidence.line_after < GOOD]
         what = (
-            f"all way-points are within {found.within_mm * UM_PER_MM:g} um with a probability of "
-            f"{100 * found.program_after:.1f} %"
+            f"all waypoints are within {confidence.within_mm * UM_PER_MM:g} um with a probability of "
+            f"{100 * confidence.program_after:.1f} %"
         )
-        out.append(_finding("OLP433", what, _numbers(poor)))
-    if expansion is not None and expansion.unmodelled_K > 0.0 and found.expansion_mm > 0.5 * found.within_mm:
+        results.append(_finding("OLP433", what, _numbers(poor)))
+    if (
+        expansion is not None
+        and expansion.unmodelled_K > 0.0
+        and confidence.expansion_mm > 0.5 * confidence.within_mm
+    ):
         what = (
             f"temperatures differ by up to {expansion.unmodelled_K:g} K without an expansion in the "
-            f"calibration: about {found.expansion_mm * UM_PER_MM:.1f} um on this program"
+            f"calibration: about {confidence.expansion_mm * UM_PER_MM:.1f} um on this program"
         )
-        out.append(_finding("OLP434", what))
-    doubtful = [part.name for part in parts if not part.sure and part.name not in left_out]
+        results.append(_finding("OLP434", what))
+    doubtful = [part.name for part in parts if not part.probable and part.name not in left_out]
     if doubtful:
-        out.append(_finding("OLP435", f"{', '.join(doubtful)}: smaller than 2 sigma"))
+        results.append(_finding("OLP435", f"{', '.join(doubtful)}: smaller than 2 sigma"))
     if left_out:
-        out.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
+        results.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
     if growth >= AGED:
         what = f"standard uncertainties are {growth:.2g} times those on the day of measuring"
-        out.append(_finding("OLP437", what))
-    return out
+        results.append(_finding("OLP437", what))
+    return results
 
 
 def _finding(code: str, message: str, lines: Sequence[int] = ()) -> Finding:
@@ -152,9 +160,9 @@ def _expected(deviation_mm: Array, variance: Array) -> float:
 
 def _zero(touched: int, frames: int) -> str:
     if not touched:
-        return "work offsets are true: nothing cancels, bands are those of absolute places"
-    words = "bands are of places against the touch-off, where what both have in common cancels"
-    return words if touched == frames else f"{words}; other work offsets are true, there nothing cancels"
+        return "work offsets are true: nothing cancels, bands are those of absolute positions"
+    words = "bands are relative to the touch-off: errors that both have in common cancel"
+    return words if touched == frames else f"{words}; other work offsets are true, and nothing cancels there"
 
 
 def _probabilities(each: Array, program: float) -> dict[str, float]:
@@ -165,23 +173,25 @@ def _probabilities(each: Array, program: float) -> dict[str, float]:
     }
 
 
-def _lines(found: Confidence) -> list[dict[str, Any]]:
+def _lines(confidence: Confidence) -> list[dict[str, Any]]:
     """The lines that are most likely out of tolerance after correction."""
-    worst = np.argsort(found.line_after, kind="stable")[:_MOST_LINES]
-    out = []
+    worst = np.argsort(confidence.line_after, kind="stable")[:_MOST_LINES]
+    rows = []
     for k in worst.tolist():
-        own = found.line == found.lines[k]
-        out.append(
+        own = confidence.line == confidence.lines[k]
+        rows.append(
             {
-                "line": int(found.lines[k]),
-                "band_um": float(found.band_mm[own].max() * UM_PER_MM),
-                "before_um": float(np.sqrt((found.points.before_mm[own] ** 2).sum(axis=1)).max() * UM_PER_MM),
-                "within_before": float(found.line_before[k]),
-                "within_after": float(found.line_after[k]),
-                "nearer": float(found.nearer[own].min()),
+                "line": int(confidence.lines[k]),
+                "band_um": float(confidence.band_mm[own].max() * UM_PER_MM),
+                "before_um": float(
+                    np.sqrt((confidence.points.before_mm[own] ** 2).sum(axis=1)).max() * UM_PER_MM
+                ),
+                "within_before": float(confidence.line_before[k]),
+                "within_after": float(confidence.line_after[k]),
+                "nearer": float(confidence.nearer[own].min()),
             }
         )
-    return out
+    return rows
 
 
 def _component(part: Component) -> dict[str, Any]:
@@ -192,5 +202,5 @@ def _component(part: Component) -> dict[str, Any]:
         f"value_{unit}": part.value * scale,
         f"expanded_uncertainty_{unit}": COVERAGE * part.sigma * scale,
         "probability_helps": part.helps,
-        "sure": part.sure,
+        "sure": part.probable,
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
@@ -156,6 +156,9 @@ def run(
         for names in (measured, options.before)
     ]
     side = _nominal_side(nominal, session, options.contour)
+    if side.loaded is not None:
+        part_um = side.loaded.part_tolerance_um(options.part_tolerance_um)
+        options = replace(options, part_tolerance_um=part_um)
     return _poses(side, sets, options) if options.poses else _paths(side, sets, options, tell)
 
 

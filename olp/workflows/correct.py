@@ -161,7 +161,7 @@ def _refuse_stamped(data: bytes) -> None:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rewritten:
     """A program written with its corrections: `nominal` is the program as read, without its words,
-    `uncorrected` are moves that are left so, (n,) `parts` the number of moves that each nominal one became."""
+    `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each nominal one."""
 
     nominal: Program
     text: bytes

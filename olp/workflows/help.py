@@ -39,6 +39,9 @@ def topic(words: Sequence[str]) -> str:
     known = f"**{term[0]}**: {term[1]}\n\n" if term else ""
     more = "".join(f"- {section.title}: `olp help {section.page}`\n" for section in others)
     also = f"\n## See also\n\n{more}" if more else ""
+    page = pages[first.page]
+    if first == page.sections[0]:
+        return f"{known}{page.text}{also}"
     return f"{known}# {first.title}\n\n{first.text}\n\nFrom the page: `olp help {first.page}`\n{also}"
 
 

@@ -106,13 +106,14 @@ def verify_programs(
 
 
 def confidence_of(
-    loaded: Loaded, nominal: Program, corrected: Program, proof: Proof, uncorrected: Index, options: ProofOptions,
-    tell: Progress,
+    loaded: Loaded, nominal: Program, corrected: Program, proof: Proof, uncorrected: Index,
+    options: ProofOptions, tell: Progress,
 ) -> Assessment | None:  # fmt: skip
     """Bands and probabilities of a proof; None where the calibration states no uncertainty."""
+    part_um = loaded.part_tolerance_um(options.part_tolerance_um)
     return assess(
-        loaded, nominal, corrected, proof.groups, uncorrected, options.part_tolerance_um or options.tolerance_um,
-        options.date, tell, asked=options.part_tolerance_um is not None,
+        loaded, nominal, corrected, proof.groups, uncorrected, part_um or options.tolerance_um, options.date,
+        tell, asked=part_um is not None,
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from olp.findings.catalogue import Finding
 from olp.program.text.delimited import Layout, detected_layout, first_lines
 from olp.program.text.numbers import Placing, number, spliced, written
 from olp.results.forward import Forward, forward
-from olp.results.places import frame_of, stylus_of
+from olp.results.frames import frame_of, stylus_of
 from olp.results.reported import Reported, Stated
 from olp.results.table import read_table
 from olp.workflows.results_report import report_of
@@ -78,10 +78,9 @@ def correct_results(
 ) -> ResultCorrection:
     """Correct the points that a measuring machine reported: true = reported + error at the touch.
 
-    `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset that the
-    points are stated in ("machine": axis positions), `tool` the number of the stylus; where a file names
-    several, each is a mapping from the file's names to those of machine and job. `tip_radius_mm` replaces
-    that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
+    `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset of the points
+    ("machine": axis positions), `tool` the number of the stylus. Where a file names several, each is a
+    mapping from the file's names to those of machine and job. `tip_radius_mm` replaces that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
     Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
     """
     session, source = opened(results, machine, job)
@@ -216,9 +215,9 @@ def _already(reported: Reported, loaded: Loaded) -> list[Finding]:
 def _refuse_twice(statement: Stated, active: bool, thermal: bool) -> None:
     if statement.what == "geometry" and not active:
         raise InputError(
-            f"`{statement.text}` says that an error map of the control has corrected these results already, "
-            "and the calibration was measured without one (active_during_measurement is empty), so they "
-            "would be corrected twice; use a calibration measured with the map active",
+            f"`{statement.text}`: an error map of the control has corrected these results already. The "
+            "calibration was measured without one (active_during_measurement is empty), so they would be "
+            "corrected twice; use a calibration measured with the map active",
             line=statement.line,
         )
     if statement.what == "temperature" and thermal:

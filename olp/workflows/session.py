@@ -20,7 +20,7 @@ from olp.files.config import read_setup
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
 from olp.program.registry import DIALECTS, dialect_of, find
-from olp.uncertainty.components import unsure
+from olp.uncertainty.components import improbable
 
 PathLike = str | Path
 Outside = Literal["refuse", "hold"]
@@ -47,6 +47,10 @@ class Loaded:
         if not self.left_out:
             return self.model
         return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
+
+    def part_tolerance_um(self, given: float | None) -> float | None:
+        """The tolerance of the part: what a call gives, else what the job states."""
+        return self.setup.job.part_tolerance_um if given is None else given
 
     def heads(self) -> dict[str, dict[str, Any]]:
         """The parts of a report on the machine and its calibration."""
@@ -170,7 +174,7 @@ class Session:
                     "[covariance] or sigma columns, or leave --only-sure-components out",
                     file=machine.calibration,
                 )
-            left_out = unsure(calibration, uncertainty) - skip
+            left_out = improbable(calibration, uncertainty) - skip
         model = build(calibration, machine.chain, outside=outside, skip_components=skip | left_out)
         digest = self._digest(machine.calibration, left_out)
         control = self.control()

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from cases.calibration import FRESH, TOOLS, case, cloud, left, rays, two_pods
+from cases.calibration import FRESH, TOOLS, case, cloud, rays, residual_of, two_pods
 from judge.simulated import OFFSETS
 
 from olp.calibration.estimator.adjustment import fit
@@ -74,7 +74,7 @@ def run(method: Method, family: str, seeds: int) -> None:
         fitted = fit(taken, machine.chain)
         spent += time.process_time() - begin
         for k, tool in enumerate(method.tools):
-            rows[k].append(dataclasses.astuple(left(machine, fitted, tool)))
+            rows[k].append(dataclasses.astuple(residual_of(machine, fitted, tool)))
     print(f"{family} machines, {method.name}: {spent / seeds:.2f} s of CPU per fit")
     for k, tool in enumerate(method.tools):
         before, before_framed, after, after_framed, z = np.array(rows[k]).T

@@ -25,7 +25,7 @@ def main(seeds: int) -> None:
     for quick, name in ((False, "lines"), (True, "60 points of 20 um")):
         for family in ("smooth", "rough"):
             runs = [turns(seed, family, quick=quick) for seed in range(seeds)]
-            residual = np.array([[one.left for one in row] for row in runs])
+            residual = np.array([[one.residual for one in row] for row in runs])
             stated = np.array([[one.stated for one in row] for row in runs])
             words = " -> ".join(
                 f"{np.median(residual[:, k]):.2f} (stated {np.median(stated[:, k]):.2f})" for k in range(4)

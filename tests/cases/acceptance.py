@@ -1,4 +1,4 @@
-"""What the acceptance tests share: small machines, a judge that tells near passes apart, a plain reader.
+"""What the acceptance tests share: small machines, a judge that separates near passes, a plain reader.
 
 The judge is `judge` alone; nothing here asks olp how good its own output is.
 """
@@ -22,7 +22,7 @@ CUTTING = ("feed", "arc", "probe")
 TOLERANCE_UM = 1.0
 #: half the diagonal of a cube of one digit
 ROUNDING = 0.87
-#: mm of extra distance per mm of path, so that passes over one place are told apart
+#: mm of extra distance per mm of path, so that passes over one position are separated
 _LIFT = 0.05
 
 _AXIS = "[axes.{}]\ntravel_mm = [-1000.0, 2000.0]\nleast_increment_mm = {}\nvelocity_mm_s = 500.0\n"
@@ -81,20 +81,20 @@ def words(text: bytes, letter: str) -> list[float]:
 
 def points(text: bytes, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     """(n, 3) work coordinates after each block with X, Y or Z, in one frame; knows G90 and G91 only."""
-    at, relative, out = list(start), False, []
+    position, relative, points = list(start), False, []
     plain = re.sub(rb"\([^)\n]*\)|;[^\n]*", b"", text).upper()
     for block in plain.splitlines():
         if b"G91" in block:
             relative = True
         elif b"G90" in block:
             relative = False
-        found = re.findall(rb"([XYZ])\s*([+-]?\d*\.?\d+|[+-]?\d+\.)", block)
-        for letter, number in found:
+        words = re.findall(rb"([XYZ])\s*([+-]?\d*\.?\d+|[+-]?\d+\.)", block)
+        for letter, number in words:
             axis = b"XYZ".index(letter)
-            at[axis] = float(number) + (at[axis] if relative else 0.0)
-        if found:
-            out.append(list(at))
-    return np.array(out).reshape(-1, 3)
+            position[axis] = float(number) + (position[axis] if relative else 0.0)
+        if words:
+            points.append(list(position))
+    return np.array(points).reshape(-1, 3)
 
 
 def judged(
@@ -119,16 +119,16 @@ def judged(
         for m in (linuxcnc.interpret(text, folder, **setup) for text in (nominal, corrected))
     )
     shift = shifts(moves, model, shift_by_frame)
-    passed = np.isin(moves.line, list(skip_lines))
+    uncorrected = np.isin(moves.line, list(skip_lines))
     real = _sure_of_play(actual(own, model, spacing_mm), model)
     groups = match(real.points[real.dense.last] + _lift(own), moves.axis + shift + _lift(moves))
-    after = _measure(real, groups, moves, shift, passed, kinds)
+    after = _measure(real, groups, moves, shift, uncorrected, kinds)
     before = _measure(
         _sure_of_play(actual(moves, model, spacing_mm), model),
         np.arange(len(moves)),
         moves,
         shift,
-        passed,
+        uncorrected,
         kinds,
     )
     return Deviation(after, before, moves.line, groups)
@@ -143,17 +143,17 @@ def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
     before = np.vstack([np.full((1, 3), real.dense.moves.start_known), known[:-1]])
     settled = (known & before)[dense.move] | (known[dense.move] & dense.last[:, None])
     edges = [0, *(np.flatnonzero(np.diff(dense.moves.tool[dense.move])) + 1).tolist(), len(dense.move)]
-    sure = real.sure.copy()
+    determined = real.determined.copy()
     for axis in np.flatnonzero(model.has_play).tolist():
         place = np.where(settled[:, axis], dense.points[:, axis], np.nan)
         lost = model.backlash_at(axis, np.clip(dense.points[:, axis], *model.box[axis]))
         for a, b in itertools.pairwise(edges):
             moved = np.fmax.accumulate(place[a:b]) - np.fmin.accumulate(place[a:b])
-            sure[a:b] &= np.nan_to_num(moved) >= lost[a:b]
-    at_begin = np.concatenate([[True], sure[:-1]])
+            determined[a:b] &= np.nan_to_num(moved) >= lost[a:b]
+    at_begin = np.concatenate([[True], determined[:-1]])
     first = np.concatenate([[True], np.diff(dense.move) != 0])
     begun = at_begin[np.flatnonzero(first)][np.cumsum(first) - 1]
-    return replace(real, sure=sure & (begun | dense.last))
+    return replace(real, determined=determined & (begun | dense.last))
 
 
 def _lift(moves: CanonMoves) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Simulated measurements as the project takes them, and what is left of a machine's errors after a fit."""
+"""Simulated measurements as the project takes them, and the residual errors of a machine after a fit."""
 
 from __future__ import annotations
 
@@ -28,9 +28,7 @@ def line_of(taken: simulated.Taken, sigma: float = 0.0) -> Line:
     )  # fmt: skip
 
 
-def measurements_of(
-    taken: Sequence[simulated.Taken], periods: Sequence[float] | None = None
-) -> Measurements:
+def measurements_of(taken: Sequence[simulated.Taken], periods: Sequence[float] | None = None) -> Measurements:
     """All lines, squares of 5 urad, and a period an axis where the screw has one."""
     names = sorted({t.square for t in taken if t.square})
     x, y, z = ((p,) for p in periods) if periods else ((), (), ())
@@ -56,8 +54,8 @@ def cloud(
 ) -> Points:
     """Points of a tracker in a Latin hypercube, with three offsets of the reflector."""
     tools = simulated.OFFSETS if tools is None else tools
-    at, tool, place = simulated.points(machine, seed, n, sigma_um * 1e-3, tools)
-    return Points(at, tool, place, sigma_um * 1e-3, source="points.csv")
+    axis_mm, tool, place = simulated.points(machine, seed, n, sigma_um * 1e-3, tools)
+    return Points(axis_mm, tool, place, sigma_um * 1e-3, source="points.csv")
 
 
 def rays(
@@ -72,9 +70,7 @@ def rays(
     )
 
 
-def two_pods(
-    machine: simulated.Machine, seed: int, n: int, tools: Sequence[object] | None = None
-) -> Pods:
+def two_pods(machine: simulated.Machine, seed: int, n: int, tools: Sequence[object] | None = None) -> Pods:
     """Angles of 10 urad from two pods, whose distance is known within 10 um."""
     tools = simulated.OFFSETS if tools is None else tools
     places = np.array(simulated.PODS)
@@ -95,15 +91,14 @@ class Residual:
     z: float
 
 
-def left(machine: simulated.Machine, fit: Fit, tool: Sequence[float], n: int = 1500) -> Residual:
-    """What a fit leaves of a machine's errors with a tool."""
+def residual_of(machine: simulated.Machine, fit: Fit, tool: Sequence[float], n: int = 1500) -> Residual:
+    """The residual errors of a machine with a tool after a fit."""
     rng = np.random.default_rng(4711)
-    at = rng.uniform(machine.box[:, 0], machine.box[:, 1], (n, 3))
+    axis_mm = rng.uniform(machine.box[:, 0], machine.box[:, 1], (n, 3))
     vector = np.array(tool, float)
-    before = machine.error(at, vector)
-    after = before - fit.error(at, vector)
-    z = after[:200] / fit.sigma(at[:200], vector)
+    before = machine.error(axis_mm, vector)
+    after = before - fit.error(axis_mm, vector)
+    z = after[:200] / fit.sigma(axis_mm[:200], vector)
     rms, off = simulated.rms_um, simulated.off_frame
-    return Residual(
-        rms(before), rms(off(at, before)), rms(after), rms(off(at, after)), float(np.sqrt(np.mean(z**2)))
-    )
+    framed = rms(off(axis_mm, before)), rms(off(axis_mm, after))
+    return Residual(rms(before), framed[0], rms(after), framed[1], float(np.sqrt(np.mean(z**2))))

@@ -40,8 +40,8 @@ class Case:
     support: frozenset[str] = frozenset({"corrected", "read", "carried", "refused"})
 
     def program(self, points: np.ndarray, digits: int) -> bytes:
-        said = [self.point(p, digits) for p in points.tolist()]
-        return ("\n".join([*self.head, *said, *self.tail]) + "\n").encode()
+        rows = [self.point(p, digits) for p in points.tolist()]
+        return ("\n".join([*self.head, *rows, *self.tail]) + "\n").encode()
 
 
 def _words(values: Sequence[float], digits: int) -> str:

@@ -96,15 +96,15 @@ def trial(seed: int, n: int, sigma: float) -> Trial:
     machine = simulated.machine(seed, ("smooth", "rough")[seed % 2], chain)
     machine.half = {}
     calibration, done = spoilt(true_calibration(machine, seed), chain, rng)
-    at, tool, place = simulated.points(machine, seed, n, sigma)
-    found = diagnose(calibration, chain, Points(at, tool, place, sigma))
-    return judged(found, done)
+    axis_mm, tool, place = simulated.points(machine, seed, n, sigma)
+    diagnosis = diagnose(calibration, chain, Points(axis_mm, tool, place, sigma))
+    return judged(diagnosis, done)
 
 
-def judged(found: Diagnosis, done: Done) -> Trial:
+def judged(diagnosis: Diagnosis, done: Done) -> Trial:
     counts: Counter[str] = Counter()
     wrong: list[str] = []
-    for verdict in found.verdicts:
+    for verdict in diagnosis.verdicts:
         spread = f"factor {verdict.factor:.3f} +- {verdict.sigma:.3f}"
         true = done.factors[verdict.name]
         if verdict.sign == "undecided":
@@ -118,13 +118,13 @@ def judged(found: Diagnosis, done: Done) -> Trial:
             counts["unit right" if good else "unit wrong"] += 1
             if not good:
                 wrong.append(f"{verdict.name}: {verdict.unit}, {spread}, true {true:g}")
-    for change in found.arrangements:
+    for change in diagnosis.arrangements:
         if change.words not in done.arranged:
             wrong.append(f"{change.words}; done {done.arranged}")
-    counts["arrangements found"] += sum(a.words in done.arranged for a in found.arrangements)
+    counts["arrangements found"] += sum(a.words in done.arranged for a in diagnosis.arrangements)
     counts["arrangements made"] += len(done.arranged)
-    for letter, sense in found.senses.items():
-        counts[f"table {sense != 'undecided'}"] += 1
-        if sense == "of the table itself" and letter not in done.tables:
+    for letter, convention in diagnosis.senses.items():
+        counts[f"table {convention != 'undecided'}"] += 1
+        if convention == "of the table itself" and letter not in done.tables:
             wrong.append(f"table sense of {letter}")
-    return Trial(counts, wrong, found)
+    return Trial(counts, wrong, diagnosis)

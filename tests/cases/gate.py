@@ -161,16 +161,16 @@ def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> 
     corner = [[(low, high)[(k >> i) & 1][i] for i in range(3)] for k in range(8)]
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
-    out = ["solid box"]
+    lines = ["solid box"]
     for face in faces:
-        out += ["facet normal 0 0 0", "outer loop"]
-        out += ["vertex {:.17g} {:.17g} {:.17g}".format(*corner[k]) for k in face]
-        out += ["endloop", "endfacet"]
-    return ("\n".join([*out, "endsolid box"]) + "\n").encode()
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += ["vertex {:.17g} {:.17g} {:.17g}".format(*corner[k]) for k in face]
+        lines += ["endloop", "endfacet"]
+    return ("\n".join([*lines, "endsolid box"]) + "\n").encode()
 
 
 def clamp(high: float, role: str = "fixture", frame: str = "G54") -> dict[str, Any]:
-    """A block in the way from X0 to X100, between X40 and X60, whose top is at `high`."""
+    """A block on the path from X0 to X100, between X40 and X60, whose top is at `high`."""
     return {
         "job": f'[[meshes]]\nfile = "clamp.stl"\nrole = "{role}"\nframe = "{frame}"\n',
         "files": {"clamp.stl": block((40.0, -10.0, -50.0), (60.0, 10.0, high))},
@@ -205,7 +205,7 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"G64 P0.0099 Q0\nG1 X100\n", **scaled(10.0)),
     ),
     "OLP203": (Call(b"G64 P0.0001\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
-    # short is below 10 times the lost motion, less what the correction takes up
+    # short is below 10 times the backlash, less what the correction takes up
     "OLP204": (Call(WIGGLE, calibration=BACK), Call(b"G1 X100\n" + SLOWER, calibration=BACK)),
     "OLP205": (Call(b"G1 X100 F30001\n"), Call(b"G1 X100 F30000\n")),
     # 2000 mm/s2 at a radius of 5 mm: 100 mm/s
@@ -303,7 +303,7 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(job=sensor(30.1), options={"outside_box": "hold"}, **structure()),
         Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
     ),
-    # one way-point: the gain of 10 um is sure up to a sigma of 5 um
+    # one waypoint: the gain of 10 um exceeds its uncertainty up to a sigma of 5 um
     "OLP431": (Call(**known(5.1)), Call(**known(4.9))),
     "OLP432": (Call(**known(5.1)), Call(**known(4.9))),
     # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer

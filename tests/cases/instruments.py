@@ -29,8 +29,8 @@ N = 60
 
 def places() -> tuple[np.ndarray, np.ndarray]:
     low, high = np.array(BOX).T
-    at = np.random.default_rng(7).uniform(low, high, (N, 3)).round(1)
-    return at, TOOLS[np.arange(N) % len(TOOLS)]
+    axis_mm = np.random.default_rng(7).uniform(low, high, (N, 3)).round(1)
+    return axis_mm, TOOLS[np.arange(N) % len(TOOLS)]
 
 
 def lines(error: Error) -> Readings:
@@ -38,14 +38,14 @@ def lines(error: Error) -> Readings:
     there = np.linspace(0.0, 1000.0, 11)
     q = np.tile(np.concatenate([there, there[::-1]]), 3)
     run, side = np.repeat([1, 2, 3], 22), np.tile(np.repeat([1, -1], 11), 3)
-    at = np.tile(np.array(DATUM), (len(q), 1))
-    at[:, 0] = q
+    axis_mm = np.tile(np.array(DATUM), (len(q), 1))
+    axis_mm[:, 0] = q
     tool, higher = np.array(LEVER), np.add(LEVER, (0.0, 0.0, 1000.0))
-    plain = error(at, tool)
+    plain = error(axis_mm, tool)
     values = {
         "EXX": plain[:, 0] + 0.02,
         "EYX": plain[:, 1] - 0.03 + 2e-5 * q,
-        "EBX": (error(at, higher) - plain)[:, 0] / 1000.0,
+        "EBX": (error(axis_mm, higher) - plain)[:, 0] / 1000.0,
     }
     return tuple(
         Line(
@@ -57,20 +57,20 @@ def lines(error: Error) -> Readings:
 
 
 def points(error: Error) -> Readings:
-    at, tool = places()
+    axis_mm, tool = places()
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    seen = (at + tool + error(at, tool)) @ turn.T + (1000.0, -2000.0, 300.0)
-    return (Points(at, tool, seen, 0.5e-3, source="points.csv"),)
+    seen = (axis_mm + tool + error(axis_mm, tool)) @ turn.T + (1000.0, -2000.0, 300.0)
+    return (Points(axis_mm, tool, seen, 0.5e-3, source="points.csv"),)
 
 
 def _rays(error: Error, place: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
-    at, tool = places()
-    ray = at + tool + error(at, tool) - np.array(place)
-    return at, tool, ray
+    axis_mm, tool = places()
+    ray = axis_mm + tool + error(axis_mm, tool) - np.array(place)
+    return axis_mm, tool, ray
 
 
 def polar(error: Error) -> Readings:
-    at, tool, ray = _rays(error, (-700.0, -1800.0, 200.0))
+    axis_mm, tool, ray = _rays(error, (-700.0, -1800.0, 200.0))
     azimuth, elevation = (
         np.arctan2(ray[:, 1], ray[:, 0]),
         np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1])),
@@ -78,7 +78,7 @@ def polar(error: Error) -> Readings:
     distance = np.linalg.norm(ray, axis=1)
     return (
         polar_points(
-            at,
+            axis_mm,
             tool,
             distance,
             azimuth,
@@ -91,25 +91,26 @@ def polar(error: Error) -> Readings:
 
 
 def stations(error: Error) -> Readings:
-    found = []
+    measurements = []
     for k, place in enumerate([(-700.0, -900.0, 100.0), (1800.0, -600.0, -400.0)]):
-        at, tool, ray = _rays(error, place)
+        axis_mm, tool, ray = _rays(error, place)
         length = np.linalg.norm(ray, axis=1)
-        found.append(Lengths(at, tool, length - 100.0, 0.1e-3 + 0.1e-6 * length, source=f"station {k + 1}"))
-    return tuple(found)
+        sigma = 0.1e-3 + 0.1e-6 * length
+        measurements.append(Lengths(axis_mm, tool, length - 100.0, sigma, source=f"station {k + 1}"))
+    return tuple(measurements)
 
 
 def pods(error: Error) -> Readings:
     stands = [(-300.0, -1200.0, -300.0), (1300.0, -1200.0, -300.0)]
     azimuth, elevation = [], []
     for place in stands:
-        at, tool, ray = _rays(error, place)
+        axis_mm, tool, ray = _rays(error, place)
         azimuth.append(np.arctan2(ray[:, 1], ray[:, 0]))
         elevation.append(np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1])))
     apart = float(np.linalg.norm(np.subtract(*stands)))
     return (
         Pods(
-            at,
+            axis_mm,
             tool,
             np.stack(azimuth, axis=1),
             np.stack(elevation, axis=1),
@@ -135,20 +136,22 @@ def diagonals(error: Error) -> Readings:
 
 def ballbars(error: Error) -> Readings:
     angle = np.tile(np.radians(np.arange(0.0, 360.0, 4.0)), 2)
-    way = np.repeat([1, -1], 90)
-    found = []
+    direction = np.repeat([1, -1], 90)
+    measurements = []
     for plane, (first, second, _) in PLANES.items():
-        out = np.zeros((len(angle), 3))
-        out[:, first], out[:, second] = np.cos(angle), np.sin(angle)
-        value = np.einsum("ni,ni->n", error(np.array(DATUM) + 150.0 * out, np.array(LEVER)), out)
-        value += 0.02 + 0.003 * out[:, first] - 0.004 * out[:, second] + 0.001 * way * np.sin(2.0 * angle)
+        radial = np.zeros((len(angle), 3))
+        radial[:, first], radial[:, second] = np.cos(angle), np.sin(angle)
+        value = np.einsum("ni,ni->n", error(np.array(DATUM) + 150.0 * radial, np.array(LEVER)), radial)
+        value += 0.02 + 0.003 * radial[:, first] - 0.004 * radial[:, second]
+        value += 0.001 * direction * np.sin(2.0 * angle)
         run = np.ones(len(angle), int)
-        found.append(
+        measurements.append(
             Circles(
-                plane, 150.0, DATUM, angle, value, run, way, LEVER, sigma=1e-4, source=f"circle-{plane}.csv"
+                plane, 150.0, DATUM, angle, value, run, direction, LEVER, sigma=1e-4,
+                source=f"circle-{plane}.csv",
             )
-        )
-    return tuple(found)
+        )  # fmt: skip
+    return tuple(measurements)
 
 
 def squareness(error: Error) -> Readings:
@@ -156,9 +159,9 @@ def squareness(error: Error) -> Readings:
     slopes = []
     for moving, along in ((0, 1), (1, 0)):
         q = np.linspace(*BOX[moving], 101)
-        at = np.tile(np.array(DATUM), (len(q), 1))
-        at[:, moving] = q
-        slopes.append(np.polyfit(q - q.mean(), error(at, np.array(LEVER))[:, along], 1)[0])
+        axis_mm = np.tile(np.array(DATUM), (len(q), 1))
+        axis_mm[:, moving] = q
+        slopes.append(np.polyfit(q - q.mean(), error(axis_mm, np.array(LEVER))[:, along], 1)[0])
     value = -float(sum(slopes))
     return (SquarenessReading("C0Y", value, DATUM, (BOX[0], BOX[1]), LEVER, 1e-7, "plan.toml"),)
 

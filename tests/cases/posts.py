@@ -82,26 +82,26 @@ def gcode(steps: Sequence[Step], digits: int = 4) -> bytes:
 def apt(steps: Sequence[Step], flavour: str, digits: int = 4) -> bytes:
     """In the habits of one CAM system."""
     slash, comma = (" / ", ", ") if flavour == "creo" else ("/", ",")
-    out = [HEAD[flavour]]
+    statements = [HEAD[flavour]]
     here = steps[0].end
 
     def say(major: str, *values: object, feed: bool = True) -> str:
-        said = [f"{v:.{digits}f}" if isinstance(v, float) else str(v) for v in values]
-        return major + slash + comma.join(said) + "\n"
+        words = [f"{v:.{digits}f}" if isinstance(v, float) else str(v) for v in values]
+        return major + slash + comma.join(words) + "\n"
 
     feeds = {"creo": "FEDRAT / 600.000000,  MMPM\n", "nx": "FEDRAT/MMPM,600.0000\n"}
     for step in steps:
         place = [float(v) for v in step.end]
         if step.kind == "rapid":
-            out += ["RAPID \n" if flavour == "creo" else "RAPID/\n" if flavour == "solidworks" else "RAPID\n"]
+            statements.append({"creo": "RAPID \n", "solidworks": "RAPID/\n"}.get(flavour, "RAPID\n"))
         elif step is steps[1]:
-            out.append(feeds.get(flavour, "FEDRAT/600.,MMPM\n"))
+            statements.append(feeds.get(flavour, "FEDRAT/600.,MMPM\n"))
         if step.kind == "arc":
-            out.append(_arc(step, here, flavour, say))
+            statements.append(_arc(step, here, flavour, say))
         if step.kind != "arc" or flavour != "catia":
-            out.append(say("GOTO", *place))
+            statements.append(say("GOTO", *place))
         here = step.end
-    return "".join([*out, TAIL.get(flavour, "FINI\n")]).encode()
+    return "".join([*statements, TAIL.get(flavour, "FINI\n")]).encode()
 
 
 def _arc(step: Step, here: np.ndarray, flavour: str, say: object) -> str:
@@ -113,8 +113,8 @@ def _arc(step: Step, here: np.ndarray, flavour: str, say: object) -> str:
     radius = float(np.hypot(here[0] - x, here[1] - y))
     if flavour == "creo":
         text = say("CIRCLE", x, y, z, 0.0, 0.0, sign, radius)
-        at = text.rindex(",", 0, text.rindex(",", 0, text.rindex(",", 0, text.rindex(",")))) + 1
-        return f"{text[:at]}  $\n{text[at:].lstrip()}"
+        position = text.rindex(",", 0, text.rindex(",", 0, text.rindex(",", 0, text.rindex(",")))) + 1
+        return f"{text[:position]}  $\n{text[position:].lstrip()}"
     if flavour == "nx":
         return str(say("CIRCLE", x, y, z, 0.0, 0.0, sign, radius, 0.06, 0.5, 10.0, 0.0))
     if flavour == "solidworks":
@@ -122,11 +122,11 @@ def _arc(step: Step, here: np.ndarray, flavour: str, say: object) -> str:
     if flavour == "autodesk":
         degrees = float(np.degrees(abs(step.sweep)))
         return str(say("MOVARC", x, y, z, 0, 0, int(sign), radius, "ANGLE", degrees))
-    way = sign * np.array([-(here[1] - y), here[0] - x]) / radius
+    tangent = sign * np.array([-(here[1] - y), here[0] - x]) / radius
     second = "2,INTOF," if abs(step.sweep) > np.pi else ""
     ex, ey, ez = (float(v) for v in step.end)
     return (
-        f"INDIRV/{way[0]:.5f},{way[1]:.5f},0.00000\n"
+        f"INDIRV/{tangent[0]:.5f},{tangent[1]:.5f},0.00000\n"
         f"TLON,GOFWD/(CIRCLE/{x:.4f},{y:.4f},{z:.4f},$\n{radius:.4f}),ON,{second}(LINE/{x:.4f},{y:.4f},{z:.4f},$\n"
         f"{ex:.4f},{ey:.4f},{ez:.4f})\n"
     )

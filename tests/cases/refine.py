@@ -28,23 +28,23 @@ def start(seed: int, family: str, quick: bool) -> tuple[simulated.Machine, Calib
     if quick:
         measurements = Measurements("simulated", (run(machine, 7 * seed, 60, 0.020),))
     measurements = dataclasses.replace(measurements, measured=datetime.date(2026, 5, 14))
-    found = fit(measurements, machine.chain)
-    calibration = calibration_of(found, None)
-    return machine, calibration, covariance_of(found, calibration)
+    adjustment = fit(measurements, machine.chain)
+    calibration = calibration_of(adjustment, None)
+    return machine, calibration, covariance_of(adjustment, calibration)
 
 
 def run(machine: simulated.Machine, seed: int, n: int, sigma: float, tools=simulated.OFFSETS) -> Points:
     """A run of points with a tracker, somewhere else each time."""
-    at, tool, place = simulated.points(machine, seed, n, sigma, tools)
-    return Points(at, tool, place, sigma)
+    axis_mm, tool, place = simulated.points(machine, seed, n, sigma, tools)
+    return Points(axis_mm, tool, place, sigma)
 
 
 @dataclass(frozen=True)
 class Judged:
-    """rms lengths in um at fresh places in the frame that fits best: what is left, and what is stated of
-    it."""
+    """rms lengths in um at fresh positions in the frame that fits best: the residual, and its stated
+    uncertainty."""
 
-    left: float
+    residual: float
     stated: float
 
 
@@ -53,33 +53,33 @@ def judge(
 ) -> Judged:
     rng = np.random.default_rng([seed, 99])
     box = np.asarray(calibration.box_mm)
-    at = rng.uniform(box[:, 0], box[:, 1], (400, 3))
-    left, stated = [], []
+    axis_mm = rng.uniform(box[:, 0], box[:, 1], (400, 3))
+    residuals, stated = [], []
     model = build(calibration, machine.chain, outside="hold")
     sensitivity = Sensitivity.of(calibration, machine.chain, uncertainty)
     for tool in TOOLS:
         vector = np.array(tool)
-        rest = machine.error(at, vector) - model.error(at, vector)
-        left.append(simulated.rms_um(simulated.off_frame(at + vector, rest)))
-        rows = np.moveaxis(sensitivity.rows(at, vector), 0, 1).astype(float)
+        rest = machine.error(axis_mm, vector) - model.error(axis_mm, vector)
+        residuals.append(simulated.rms_um(simulated.off_frame(axis_mm + vector, rest)))
+        rows = np.moveaxis(sensitivity.rows(axis_mm, vector), 0, 1).astype(float)
         framed = np.stack(
-            [simulated.off_frame(at + vector, rows[:, :, k]) for k in range(rows.shape[2])], axis=2
+            [simulated.off_frame(axis_mm + vector, rows[:, :, k]) for k in range(rows.shape[2])], axis=2
         )
         stated.append(1e3 * np.sqrt((framed**2).sum(axis=(1, 2)).mean()))
-    return Judged(float(np.mean(left)), float(np.mean(stated)))
+    return Judged(float(np.mean(residuals)), float(np.mean(stated)))
 
 
 def turns(
     seed: int, family: str, *, quick: bool, n: int = 60, sigma: float = 0.008, count: int = 3
 ) -> list[Judged]:
-    """What is left before and after each turn."""
+    """The residual before the first and after each turn."""
     machine, calibration, uncertainty = start(seed, family, quick)
-    found = [judge(machine, calibration, uncertainty, seed)]
+    judged = [judge(machine, calibration, uncertainty, seed)]
     machine.half = {}
     for k in range(count):
         done: Refinement = refine(
             calibration, machine.chain, uncertainty, run(machine, 1000 * seed + k, n, sigma)
         )
         calibration, uncertainty = done.calibration, done.uncertainty
-        found.append(judge(machine, calibration, uncertainty, seed))
-    return found
+        judged.append(judge(machine, calibration, uncertainty, seed))
+    return judged

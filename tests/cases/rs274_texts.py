@@ -1,4 +1,4 @@
-"""Short RS-274 programs, each with something that one control reads in another way than the next."""
+"""Short RS-274 programs, each with something that controls read differently."""
 
 START = "G21 G90 G17 G54 G94 F600\n"
 

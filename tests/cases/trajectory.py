@@ -14,7 +14,8 @@ from olp.trajectory.same import groups_of_same
 from olp.trajectory.smooth import SmoothPath
 
 #: samples in one block, and segments that a search looks ahead
-_BLOCK, _AHEAD = 1 << 14, 64
+_BLOCK = 1 << 14
+_AHEAD = 64
 #: (mm) distances below are none
 _EVEN_MM = 1e-8
 _TINY = float(np.finfo(np.float64).tiny)
@@ -170,7 +171,7 @@ def excess(motion: Motion, limits: AxisLimits, feed: Array) -> float:
 
 def path_deviation(motion: Motion, route: Route, places: int = 5) -> Array:
     """(k,) largest distance mm of each piece, at `places` times, from the polyline: samples are matched to
-    segments that never go back, nearest in the sense of least squares. A wrong match can make the distance
+    segments that never go back, nearest by least squares. A wrong match can make the distance
     too large, never too small."""
     polyline = _polyline(route)
     largest = np.zeros(len(motion))
@@ -206,9 +207,9 @@ def _in_order(point: Array, polyline: Array, first: int) -> tuple[Array, int]:
     """(n,) distances of points in order from segments that never go back, the first not before `first`;
     and the segment reached. Dynamic programming over a window that slides along."""
     away = np.zeros(len(point))
-    at = 0
-    while at < len(point):
-        take = point[at : at + _AHEAD]
+    done = 0
+    while done < len(point):
+        take = point[done : done + _AHEAD]
         last = min(first + 2 * _AHEAD, len(polyline) - 1)
         begin, end = polyline[first:last], polyline[first + 1 : last + 1]
         table = _to_segments(take, begin, end)
@@ -224,15 +225,15 @@ def _in_order(point: Array, polyline: Array, first: int) -> tuple[Array, int]:
             picks.append(column)
         picks.reverse()
         # the later half of a block is decided with what comes after it
-        keep = len(take) if at + len(take) >= len(point) else max(len(take) // 2, 1)
-        away[at : at + keep] = table[np.arange(keep), picks[:keep]]
+        keep = len(take) if done + len(take) >= len(point) else max(len(take) // 2, 1)
+        away[done : done + keep] = table[np.arange(keep), picks[:keep]]
         first += picks[keep - 1]
-        at += keep
+        done += keep
     return away, first
 
 
 def _polyline(route: Route) -> Array:
-    """(m, 3) way-points, those that are the same as the one before left out."""
+    """(m, 3) waypoints, those that are the same as the one before left out."""
     group = groups_of_same(route.point_mm)
     polyline = route.point_mm[np.flatnonzero(np.diff(group, prepend=-1))]
     return np.repeat(polyline, 2, axis=0) if len(polyline) == 1 else polyline

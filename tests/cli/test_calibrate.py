@@ -75,18 +75,18 @@ def test_pages_of_all_lines(tmp_path: Path) -> None:
 
 
 def test_evaluate_as_json_and_markdown(tmp_path: Path) -> None:
-    found = json.loads(good("evaluate", LINES, "--json", "--report", tmp_path / "r.md"))
-    assert found["schema"] == "olp-evaluation-1"
-    [exx] = [row for row in found["lines"] if row["component"] == "EXX"]
+    report = json.loads(good("evaluate", LINES, "--json", "--report", tmp_path / "r.md"))
+    assert report["schema"] == "olp-evaluation-1"
+    [exx] = [row for row in report["lines"] if row["component"] == "EXX"]
     assert exx["E_um"] > exx["M_um"] > exx["B_um"] > 0
     assert exx["runs"] == 5 and len(exx["targets"]["target_mm"]) == 17
-    lost = {row["component"]: row["lost_motion_um"] for row in found["reversals"] if "lost_motion_um" in row}
+    lost = {row["component"]: row["lost_motion_um"] for row in report["reversals"] if "lost_motion_um" in row}
     for name, value in LOST_UM.items():
         assert lost[name] == pytest.approx(value, abs=0.5)
-    angles = {row["component"]: row["value_urad"] for row in found["squareness"]}
+    angles = {row["component"]: row["value_urad"] for row in report["squareness"]}
     assert set(angles) == {"C0Y", "B0Z", "A0Z"}
     assert "EXX" in (tmp_path / "r.md").read_text("utf-8")
-    assert json.loads(json.dumps(found)) == found
+    assert json.loads(json.dumps(report)) == report
 
 
 def test_fail_on_and_plots_of_no_kind(tmp_path: Path) -> None:
@@ -119,10 +119,10 @@ def test_a_period_that_the_targets_miss_is_flagged_never_fitted(tmp_path: Path) 
         for k in range(21)
     ]
     (tmp_path / "x.csv").write_text(head + "\n".join(rows) + "\n", "utf-8")
-    found = json.loads(good("evaluate", tmp_path, "--json"))
-    assert found["cyclic"][0]["cyclic"] == []
-    assert [row["period_mm"] for row in found["cyclic"][0]["not_seen"]] == [10.0, 5.0]
-    assert "OLP853" in {f["code"] for f in found["findings"]}
+    report = json.loads(good("evaluate", tmp_path, "--json"))
+    assert report["cyclic"][0]["cyclic"] == []
+    assert [row["period_mm"] for row in report["cyclic"][0]["not_seen"]] == [10.0, 5.0]
+    assert "OLP853" in {f["code"] for f in report["findings"]}
 
 
 def test_a_fine_sweep_beside_an_aliased_line_is_used(tmp_path: Path) -> None:
@@ -143,37 +143,37 @@ def test_a_fine_sweep_beside_an_aliased_line_is_used(tmp_path: Path) -> None:
 
     (tmp_path / "x.csv").write_text(head + rows([50.0 * k for k in range(21)], 5), "utf-8")
     (tmp_path / "sweep.csv").write_text(head + rows([300.0 + k for k in range(21)], 2), "utf-8")
-    found = json.loads(good("evaluate", tmp_path, "--json"))
-    assert [Path(row["file"]).name for row in found["sweeps"]] == ["sweep.csv"]
-    [part] = found["cyclic"]
+    report = json.loads(good("evaluate", tmp_path, "--json"))
+    assert [Path(row["file"]).name for row in report["sweeps"]] == ["sweep.csv"]
+    [part] = report["cyclic"]
     assert part["not_seen"] == []
     assert part["cyclic"][0]["amplitude_um"] == pytest.approx(4.0, abs=0.05)
     assert part["cyclic"][0]["phase_rad"] == pytest.approx(0.5, abs=0.02)
 
 
 def test_ballbar(tmp_path: Path) -> None:
-    out = tmp_path / "s.toml"
-    text = good("ballbar", CHECKS / "ballbar-xy.csv", "-o", out, "--plot", tmp_path / "c.svg")
+    target = tmp_path / "s.toml"
+    text = good("ballbar", CHECKS / "ballbar-xy.csv", "-o", target, "--plot", tmp_path / "c.svg")
     assert re.search(r"lost motion X\s+um\s+5\.9|lost motion X.*6\.0", text)
-    [table] = tomllib.loads(out.read_text("utf-8"))["squareness"]
+    [table] = tomllib.loads(target.read_text("utf-8"))["squareness"]
     assert table["value_urad"] == pytest.approx(lean_of_plane(0, 1), abs=6.0)
     assert (tmp_path / "c-XY.svg").is_file()
     rows = (CHECKS / "ballbar-xy.csv").read_text("utf-8").splitlines()
     one = [row for row in rows if not re.fullmatch(r"\d+,\d,-1,.*", row)]
     (tmp_path / "one.csv").write_text("\n".join(one) + "\n", "utf-8")
-    found = json.loads(good("ballbar", tmp_path / "one.csv", "--json"))
-    assert "C0Y" not in {row["name"] for row in found["circles"][0]["found"]}
-    assert "OLP856" in {f["code"] for f in found["findings"]}
+    report = json.loads(good("ballbar", tmp_path / "one.csv", "--json"))
+    assert "C0Y" not in {row["name"] for row in report["circles"][0]["found"]}
+    assert "OLP856" in {f["code"] for f in report["findings"]}
 
 
 def lean_of_plane(i: int, j: int) -> float:
     """C0Y of the mean lines through the centre over the circle's diameter, from the error model."""
     slopes = []
     for moving, seen in ((i, j), (j, i)):
-        at = [800.0, 500.0, -220.0]
+        position_mm = [800.0, 500.0, -220.0]
         ends = []
         for step in (-106.0, 106.0):
-            place = list(at)
+            place = list(position_mm)
             place[moving] += step
             error = olp.error_at(PROGRAMS / "gantry-plate" / "machine.toml", tuple(place), (0.0, 0.0, -85.0))
             ends.append(error["error_um"][seen])
@@ -183,9 +183,9 @@ def lean_of_plane(i: int, j: int) -> float:
 
 def test_diagonals(tmp_path: Path) -> None:
     files = sorted(CHECKS.glob("diagonal-*.csv"))
-    found = json.loads(good("diagonals", *files, "--json", "-o", tmp_path / "d.toml"))
-    assert found["not_determined"] == ["SX", "SY", "SZ"]
-    assert [row["name"] for row in found["found"]] == ["C0Y", "B0Z", "A0Z"]
+    report = json.loads(good("diagonals", *files, "--json", "-o", tmp_path / "d.toml"))
+    assert report["not_determined"] == ["SX", "SY", "SZ"]
+    assert [row["name"] for row in report["found"]] == ["C0Y", "B0Z", "A0Z"]
     assert len(tomllib.loads((tmp_path / "d.toml").read_text("utf-8"))["squareness"]) == 3
     known = json.loads(good("diagonals", *files, "--known", "SX=37,1", "--known", "SY=-31,1", "--json"))
     assert known["not_determined"] == []
@@ -202,8 +202,8 @@ def test_squareness_of_a_check_goes_into_a_fit(tmp_path: Path) -> None:
     good("ballbar", CHECKS / "ballbar-xy.csv", "-o", tmp_path / "s.toml")
     plan = folder / "measurements.toml"
     plan.write_text(plan.read_text("utf-8") + "\n" + (tmp_path / "s.toml").read_text("utf-8"), "utf-8")
-    found = load_measurements([folder])
-    assert [reading.component for reading in found.of(SquarenessReading)] == ["C0Y"]
+    measurements = load_measurements([folder])
+    assert [reading.component for reading in measurements.of(SquarenessReading)] == ["C0Y"]
     both = olp.fit_calibration(folder, folder / "machine.toml")
     alone = olp.fit_calibration(LINES, LINES / "machine.toml")
     sigma = [
@@ -214,9 +214,9 @@ def test_squareness_of_a_check_goes_into_a_fit(tmp_path: Path) -> None:
 
 
 def test_go_return(tmp_path: Path) -> None:
-    out = tmp_path / "b.toml"
-    good("go-return", *sorted(CHECKS.glob("go-return-*.csv")), "-o", out, "--plot", tmp_path / "b.svg")
-    backlash = tomllib.loads(out.read_text("utf-8"))["backlash"]
+    target = tmp_path / "b.toml"
+    good("go-return", *sorted(CHECKS.glob("go-return-*.csv")), "-o", target, "--plot", tmp_path / "b.svg")
+    backlash = tomllib.loads(target.read_text("utf-8"))["backlash"]
     assert backlash["X_um"] == pytest.approx(6.0, abs=0.4)
     assert backlash["Y_um"] == pytest.approx(0.0, abs=0.4)
     assert (tmp_path / "b-reversal.svg").is_file()
@@ -232,10 +232,10 @@ def test_postures(tmp_path: Path) -> None:
     known = json.loads(good("postures", CHECKS / "postures.csv", "-m", machine, "--json"))
     truth = {"2": (14.0, -6.0, 9.0), "3": (-3.0, 11.0, 5.0)}
 
-    def miss(found: dict) -> float:  # type: ignore[type-arg]
+    def miss(report: dict) -> float:  # type: ignore[type-arg]
         return max(
             abs(e - t)
-            for row in found["tools"]
+            for row in report["tools"]
             for e, t in zip(row["error_um"], truth[row["name"]], strict=True)
         )
 
@@ -247,8 +247,8 @@ def test_postures(tmp_path: Path) -> None:
 
 
 def test_squareness_in_all_conventions() -> None:
-    found = json.loads(good("squareness", "C0Y=12", "B0Z=5", "--from", "acute", "--json"))
-    rows = {row["name"]: row for row in found["conventions"]}
+    report = json.loads(good("squareness", "C0Y=12", "B0Z=5", "--from", "acute", "--json"))
+    rows = {row["name"]: row for row in report["conventions"]}
     assert rows["iso"]["C0Y_urad"] == -12 and rows["iso"]["B0Z_urad"] == 5
     assert rows["obtuse"]["B0Z_urad"] == -5
     framed = json.loads(good("squareness", "--frame", "C0Y=140.4,142.8,99.8", "--json"))
@@ -266,13 +266,13 @@ def test_report_of_a_fit(tmp_path: Path) -> None:
 
 
 def test_the_same_readings_give_the_same_plots() -> None:
-    found = evaluate_all(load_measurements([LINES]))
-    [one] = found.of("EXX")
+    evaluated = evaluate_all(load_measurements([LINES]))
+    [one] = evaluated.of("EXX")
     assert plots_calibration.positioning(one) == plots_calibration.positioning(one)
     assert plots_calibration.positioning(one, "png").startswith(b"\x89PNG")
-    [pair, _, _] = found.pairs
+    [pair, _, _] = evaluated.pairs
     assert b"urad" in plots_calibration.squareness(pair)
-    [eyx] = found.of("EYX")
+    [eyx] = evaluated.of("EYX")
     assert b"horizontal" in plots_calibration.straightness([eyx])
 
 

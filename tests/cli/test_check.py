@@ -80,13 +80,13 @@ def sarif(text: str) -> dict[str, Any]:
 def test_sarif_holds_rules_places_and_levels(tmp_path: Path) -> None:
     log = sarif(checked(tmp_path, SEVERAL, "--format", "sarif").stdout)
     assert log["version"] == "2.1.0"
-    (found,) = log["runs"]
-    rules = found["tool"]["driver"]["rules"]
+    (sarif_run,) = log["runs"]
+    rules = sarif_run["tool"]["driver"]["rules"]
     assert [r["id"] for r in rules] == list(GATE_CODES)
     assert all(
         r["help"]["text"] and r["shortDescription"]["text"] and r["fullDescription"]["text"] for r in rules
     )
-    results = {r["ruleId"]: r for r in found["results"]}
+    results = {r["ruleId"]: r for r in sarif_run["results"]}
     for code, result in results.items():
         assert rules[result["ruleIndex"]]["id"] == code
         assert result["level"] == {0: "note", 1: "warning", 2: "error"}[RULES[code].severity]
@@ -96,7 +96,7 @@ def test_sarif_holds_rules_places_and_levels(tmp_path: Path) -> None:
     others = [p["physicalLocation"]["region"]["startLine"] for p in results["OLP405"]["relatedLocations"]]
     assert others == [7]
     assert "region" not in results["OLP411"]["locations"][0]["physicalLocation"]
-    assert found["invocations"] == [{"executionSuccessful": True, "exitCode": 1}]
+    assert sarif_run["invocations"] == [{"executionSuccessful": True, "exitCode": 1}]
 
 
 def test_a_relative_program_is_a_relative_uri(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,7 +140,7 @@ def test_every_finding_goes_into_every_form(code: str, tmp_path: Path) -> None:
 
 def test_output_files_are_written_whole_and_never_over_others(tmp_path: Path) -> None:
     program, machine, job = written(tmp_path, Call(**clamp(5.0), tables=tool(50.0)))
-    out, table = tmp_path / "check.sarif", tmp_path / "clear.csv"
+    target, table = tmp_path / "check.sarif", tmp_path / "clear.csv"
     words = [
         "check",
         program,
@@ -151,12 +151,12 @@ def test_output_files_are_written_whole_and_never_over_others(tmp_path: Path) ->
         "--format",
         "sarif",
         "-o",
-        out,
+        target,
         "--clearances",
         table,
     ]
     assert run(*words).exit_code == 1
-    sarif(out.read_text())
+    sarif(target.read_text())
     rows = list(csv.DictReader(io.StringIO(table.read_text())))
     assert [float(rows[-1][k]) for k in ("line", "clearance_mm")] == [4, 0]
     assert run(*words).exit_code == 2

@@ -170,25 +170,26 @@ def test_a_program_before_and_after(tmp_path: Path) -> None:
     points = np.loadtxt(tmp_path / "raw.csv", delimiter=",", skiprows=2)[:, :3]
     away = Rigid(rotation_of(np.array((0.3, -1.1, 2.0))), np.array((3000.0, -1500.0, 700.0)))
     (tmp_path / "tracker.csv").write_text(table(away(points)))
-    found = json.loads(run("compare", PROGRAM, tmp_path / "tracker.csv", "-m", MACHINE, "--json").stdout)
-    assert codes(found) >= {"OLP611"}
-    assert "OLP601" not in codes(found)
-    frame = found["frame"]
+    tracked = json.loads(run("compare", PROGRAM, tmp_path / "tracker.csv", "-m", MACHINE, "--json").stdout)
+    assert codes(tracked) >= {"OLP611"}
+    assert "OLP601" not in codes(tracked)
+    frame = tracked["frame"]
     assert frame["left_by_fit_rms_um"] < frame["error_rms_um"]
     # the fit is of all moves, rapids too, and the figures are of cutting ones
-    assert found["after"]["across_um"]["rms"] == pytest.approx(frame["left_by_fit_rms_um"], rel=0.5, abs=0.3)
+    rms_um = tracked["after"]["across_um"]["rms"]
+    assert rms_um == pytest.approx(frame["left_by_fit_rms_um"], rel=0.5, abs=0.3)
 
 
-@pytest.mark.parametrize(("words", "said"), [
+@pytest.mark.parametrize(("words", "message"), [
     (["compare", PROGRAM, "x.csv"], "no such file"),
     (["compare", "n", "m", "--report", "r.pdf"], ".html, .json, .md"),
     (["compare", "n", "m", "--part-frame", "f.toml"], "--poses"),
     (["compare", "n", "m", "--poses", "-o", "d.csv"], "--poses has none; use --report"),
 ])  # fmt: skip
-def test_calls_that_cannot_be_right(words: list[object], said: str) -> None:
+def test_calls_that_cannot_be_right(words: list[object], message: str) -> None:
     result = run(*words)
     assert result.exit_code in (2, 3)
-    assert said in result.stderr
+    assert message in result.stderr
 
 
 def test_a_program_needs_its_machine(tmp_path: Path) -> None:
@@ -391,8 +392,8 @@ def test_nothing_that_counts_is_no_pass(tmp_path: Path) -> None:
         report = json.loads(run(*words, "--part-tolerance-um", "5", "--json").stdout)
         assert report["holds"] is False
         assert "OLP609" in codes(report)
-        for said in (result.stdout, json.dumps(report)):
-            assert not re.search(r"\bnan\b", said, re.IGNORECASE)
+        for text in (result.stdout, json.dumps(report)):
+            assert not re.search(r"\bnan\b", text, re.IGNORECASE)
         assert "holds" not in json.loads(run(*words, "--json").stdout)
 
 
@@ -442,12 +443,12 @@ def test_errors_are_added_to_a_program_only(nominal: Path) -> None:
 
 
 def test_names_of_runs_are_cells(nominal: Path, tmp_path: Path) -> None:
-    out = tmp_path / "d.csv"
+    target = tmp_path / "d.csv"
     for name in ('a,b "c".csv', "plain.csv"):
         measured = tmp_path / name
         measured.write_text(table(bent(10)))
-        assert run("compare", nominal, measured, "-o", out, "--force", "-q").exit_code == 0
-        with out.open(newline="") as stream:
+        assert run("compare", nominal, measured, "-o", target, "--force", "-q").exit_code == 0
+        with target.open(newline="") as stream:
             rows = list(csv.reader(stream))
         assert {len(row) for row in rows} == {10}
         assert {row[0] for row in rows[1:]} == {name}

@@ -290,9 +290,9 @@ def test_inspect_of_a_program_and_of_a_point() -> None:
     text = run("inspect", PROGRAMS / "haas-mill" / "bracket.nc", "-j", job)
     assert text.exit_code == 0
     assert "haas" in text.stdout
-    at = run("inspect", "-j", job, "--at", "-300", "-100", "-200", "--tool", "1", "--json")
-    assert at.exit_code == 0, at.output
-    assert len(json.loads(at.stdout)["error_um"]) == 3
+    point = run("inspect", "-j", job, "--at", "-300", "-100", "-200", "--tool", "1", "--json")
+    assert point.exit_code == 0, point.output
+    assert len(json.loads(point.stdout)["error_um"]) == 3
     assert run("inspect", "-j", job, "--at", "-300", "-100", "-200").exit_code == 0
 
 

@@ -32,8 +32,8 @@ OWN = {"compare.py": {"--tolerance-um"}}
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
 def test_a_shared_option_is_defined_once(path: Path) -> None:
-    found = set() if path == SHARED else options_in(path.read_text("utf-8")) & SHARED_OPTIONS
-    assert found <= OWN.get(path.name, set())
+    defined = set() if path == SHARED else options_in(path.read_text("utf-8")) & SHARED_OPTIONS
+    assert defined <= OWN.get(path.name, set())
 
 
 def test_a_second_definition_is_seen() -> None:

@@ -37,23 +37,22 @@ def test_the_page_stands_beside_the_program(job: Path) -> None:
 
 
 def test_the_page_goes_where_it_is_sent(job: Path) -> None:
-    out = job / "out.html"
-    assert (
-        run("view", job / "modal.ngc", "-m", job / "machine.toml", "-o", out, "--no-time", "-q").stderr == ""
-    )
+    target = job / "out.html"
+    quiet = run("view", job / "modal.ngc", "-m", job / "machine.toml", "-o", target, "--no-time", "-q")
+    assert quiet.stderr == ""
     stdin = (job / "modal.ngc").read_bytes()
     result = run("view", "-", "-m", job / "machine.toml", "--no-time", stdin=stdin)
-    page, other = Page(result.stdout_bytes), Page(out.read_bytes())
+    page, other = Page(result.stdout_bytes), Page(target.read_bytes())
     assert page.manifest["program"] == "program"
     assert page.array("text_nominal") == other.array("text_nominal")
 
 
 def test_nothing_is_overwritten(job: Path) -> None:
-    out = job / "out.html"
-    out.write_text("mine")
-    words = ("view", "-j", job / "job.toml", "-o", out, "--no-time")
+    target = job / "out.html"
+    target.write_text("mine")
+    words = ("view", "-j", job / "job.toml", "-o", target, "--no-time")
     result = run(*words)
-    assert (result.exit_code, out.read_text()) == (2, "mine")
+    assert (result.exit_code, target.read_text()) == (2, "mine")
     assert "--force" in result.stderr
     assert run(*words, "--force").exit_code == 0
     for name in ("modal.ngc", "machine.toml", "calibration.toml", "x.csv"):
@@ -67,7 +66,7 @@ def test_a_corrected_program_and_measurements_are_shown(job: Path) -> None:
     corrected, measured = job / "good.ngc", job / "raw.csv"
     assert run("correct", "-j", job / "job.toml", "-o", corrected, "-q").exit_code == 0
     assert run("simulate", "-j", job / "job.toml", "-o", measured).exit_code == 0
-    out = job / "out.html"
+    target = job / "out.html"
     words = (
         "view",
         "-j",
@@ -77,11 +76,11 @@ def test_a_corrected_program_and_measurements_are_shown(job: Path) -> None:
         "--measured",
         measured,
         "-o",
-        out,
+        target,
         "--no-time",
     )
     assert run(*words).exit_code == 0
-    page = Page(out.read_bytes())
+    page = Page(target.read_bytes())
     assert page.manifest["corrected"] == "good.ngc"
     assert page.layer("measured")["label"] == "measured"
     for name in (corrected, measured):
@@ -91,7 +90,7 @@ def test_a_corrected_program_and_measurements_are_shown(job: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--live", "-o", "x.html"), "--live serves files: leave out -o"),
         (("--port", "8000"), "--port is for --live"),
@@ -101,10 +100,10 @@ def test_a_corrected_program_and_measurements_are_shown(job: Path) -> None:
         (("--step-mm", "0"), "--step-mm"),
     ],
 )
-def test_calls_that_are_wrong(words: tuple[str, ...], said: str, job: Path) -> None:
+def test_calls_that_are_wrong(words: tuple[str, ...], message: str, job: Path) -> None:
     result = run("view", "-j", job / "job.toml", *words)
     assert result.exit_code == 2
-    assert said in result.stderr
+    assert message in result.stderr
 
 
 def test_refusals_name_file_and_line(job: Path) -> None:
@@ -126,16 +125,16 @@ def test_refusals_name_file_and_line(job: Path) -> None:
 
 
 def test_correct_writes_the_page_of_what_it_wrote(job: Path) -> None:
-    out, page = job / "good.ngc", job / "review.html"
-    done = run("correct", "-j", job / "job.toml", "-o", out, "--review", page, "-q")
+    target, page = job / "good.ngc", job / "review.html"
+    done = run("correct", "-j", job / "job.toml", "-o", target, "--review", page, "-q")
     assert done.exit_code == 0, done.stderr
-    found = Page(page.read_bytes())
-    assert found.manifest["corrected"] == "good.ngc"
-    assert found.manifest["time_source"] == "retimed"
-    assert found.array("text_corrected") == out.read_text().rstrip("\n").split("\n")
+    shown = Page(page.read_bytes())
+    assert shown.manifest["corrected"] == "good.ngc"
+    assert shown.manifest["time_source"] == "retimed"
+    assert shown.array("text_corrected") == target.read_text().rstrip("\n").split("\n")
     setup = olp.load_setup(None, job / "job.toml")
     result = olp.correct(job / "modal.ngc", setup)
-    expected = olp.view(job / "modal.ngc", setup, correction=result, corrected_name=str(out))
+    expected = olp.view(job / "modal.ngc", setup, correction=result, corrected_name=str(target))
     assert page.read_bytes() == expected.html()
 
 
@@ -163,19 +162,19 @@ def test_correct_with_loops_shows_the_unrolled_text(job: Path) -> None:
 
 
 def test_correct_writes_all_files_or_none(job: Path) -> None:
-    out, page = job / "good.ngc", job / "review.html"
+    target, page = job / "good.ngc", job / "review.html"
     page.write_text("mine")
-    assert run("correct", "-j", job / "job.toml", "-o", out, "--review", page, "-q").exit_code == 2
-    assert (out.exists(), page.read_text()) == (False, "mine")
-    result = run("correct", "-j", job / "job.toml", "-o", out, "--review", out, "-q")
-    assert (result.exit_code, out.exists()) == (2, False)
+    assert run("correct", "-j", job / "job.toml", "-o", target, "--review", page, "-q").exit_code == 2
+    assert (target.exists(), page.read_text()) == (False, "mine")
+    result = run("correct", "-j", job / "job.toml", "-o", target, "--review", target, "-q")
+    assert (result.exit_code, target.exists()) == (2, False)
     assert "named as output twice" in result.stderr
-    assert run("correct", "-j", job / "job.toml", "-o", out, "--review", "-", "-q").exit_code == 2
+    assert run("correct", "-j", job / "job.toml", "-o", target, "--review", "-", "-q").exit_code == 2
 
 
 @pytest.mark.skipif(os.name == "nt", reason="paths of the other kind")
 def test_imports_stay_light(job: Path) -> None:
     assert imported_by("view", "--help") & HEAVY == set()
-    out = str(job / "out.html")
-    loaded = imported_by("view", "-j", str(job / "job.toml"), "-o", out, "--no-time")
+    target = str(job / "out.html")
+    loaded = imported_by("view", "-j", str(job / "job.toml"), "-o", target, "--no-time")
     assert loaded & {"meshcat", "trimesh", "matplotlib", "rich"} == set()

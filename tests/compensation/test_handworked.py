@@ -1,4 +1,4 @@
-"""Cases worked out by hand, as programs: zero setting, lost motion, levers, start state."""
+"""Cases worked out by hand, as programs: zero setting, backlash, lever arms, start state."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_touched_off_point_keeps_its_place(
 
 
 def test_a_touch_elsewhere_counts_where_it_was_made(tmp_path: Path) -> None:
-    """Touched at axis 200 (25 um): program zero at axis 100 (10 um) has to give way by 15 um."""
+    """Touched at axis 200 (25 um): program zero at axis 100 (10 um) has to shift by 15 um."""
     frame = "[work_offsets.G54]\nX_mm = 100.0\ntouched_at_mm = { X = 200.0 }\n"
     path = machine(tmp_path, CURVE_X, {"x.csv": STEP}, tables=frame)
     assert words(corrected(path, b"G0 X0. Y0. Z0.\nX100.\n"), "X") == pytest.approx((0.015, 100.0), abs=1e-9)
@@ -110,7 +110,7 @@ def test_temperatures_of_scale_and_workpiece(tmp_path: Path) -> None:
     assert words(corrected(path, b"G0 X1000. Y0. Z0.\n"), "X") == [pytest.approx(999.9955, abs=1e-9)]
 
 
-# -- lost motion --------------------------------------------------------------------------------------
+# -- backlash -----------------------------------------------------------------------------------------
 
 PLAY = "[backlash]\nX_um = 6.0\n"
 
@@ -121,7 +121,7 @@ def test_each_side_of_the_play_gets_half(tmp_path: Path) -> None:
 
 
 def test_within_the_play_the_tip_arrives_all_the_same(tmp_path: Path) -> None:
-    """The way-points of the hand case, behind a run-up: the tip ends on each of them within the dead band."""
+    """The waypoints of the hand case, behind a run-up: the tip ends on each of them within the dead band."""
     path = machine(tmp_path, PLAY, tables=TRUE_ZERO, increment_mm=FINE_MM)
     nominal = np.array([0.0, 10.0, 10.002, 9.999, 9.9, 9.9005, 12.0])
     body = "G0 X-5. Y0. Z0.\nG1 F100 " + "\n".join(f"X{x}" for x in nominal) + "\n"

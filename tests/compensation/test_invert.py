@@ -21,12 +21,12 @@ def rough_machine(seed: int, slope: float, cyclic_mm: float) -> ErrorModel:
     rng = np.random.default_rng(seed)
     curves = []
     for axis, (low, high) in zip("XYZ", BOX, strict=True):
-        at = np.linspace(low, high, 41)
-        rise = rng.uniform(-slope, slope, (len(at), 6)) * (at[1] - at[0])
+        knots = np.linspace(low, high, 41)
+        rise = rng.uniform(-slope, slope, (len(knots), 6)) * (knots[1] - knots[0])
         values = np.cumsum(rise * ([1.0] * 3 + [2e-3] * 3), axis=0)
         names = [f"E{d}{axis}" for d in "XYZABC"]
         columns = dict(zip(names, values.T, strict=True))
-        curves.append(Curve(axis, at, columns, line_mm=(0.0, 0.0, 0.0)))
+        curves.append(Curve(axis, knots, columns, line_mm=(0.0, 0.0, 0.0)))
     terms = (Cyclic("EXX", 2.0, cyclic_mm, 0.3),) if cyclic_mm else ()
     return build(Calibration("rough", BOX, curves=tuple(curves), cyclic=terms), "YFXZ")
 
@@ -43,9 +43,9 @@ def test_the_tip_comes_to_its_place(seed: int, slope: float, cyclic_mm: float, c
     target = np.random.default_rng(seed).uniform(BOX[:, 0], BOX[:, 1], (count, 3))
     tool = np.array([10.0, -20.0, -150.0])
     command = invert(model, target, tool)
-    left = np.abs(command + model.error(command, tool) - target).max()
+    residual = np.abs(command + model.error(command, tool) - target).max()
     # sums of numbers of 1e3 mm carry 1e-13 mm
-    assert left <= TOLERANCE_MM + 1e-12
+    assert residual <= TOLERANCE_MM + 1e-12
 
 
 def test_an_error_that_grows_faster_than_the_position_is_refused() -> None:

@@ -53,13 +53,14 @@ def test_slope_and_curvature_bound_the_curve(kind: str, n: int, seed: int) -> No
 
 
 @pytest.mark.parametrize(
-    "at", [np.linspace(-300.0, 1700.0, 41), np.sort(np.random.default_rng(4).uniform(0, 2000, 41))]
+    "knots", [np.linspace(-300.0, 1700.0, 41), np.sort(np.random.default_rng(4).uniform(0, 2000, 41))]
 )
-def test_the_dense_table_meets_its_tolerance(at: np.ndarray) -> None:
+def test_the_dense_table_meets_its_tolerance(knots: np.ndarray) -> None:
     rng = np.random.default_rng(5)
-    curve = Interpolant.through(at, np.cumsum(rng.normal(size=(41, 3)), axis=0) * [5e-3, 5e-3, 1e-5], "pchip")
-    table = dense_table(at, curve, curve.max_curvature().tolist(), [1e-7, 1e-7, 1e-10])
-    q = rng.uniform(at[0], at[-1], 100_000)
+    values = np.cumsum(rng.normal(size=(41, 3)), axis=0) * [5e-3, 5e-3, 1e-5]
+    curve = Interpolant.through(knots, values, "pchip")
+    table = dense_table(knots, curve, curve.max_curvature().tolist(), [1e-7, 1e-7, 1e-10])
+    q = rng.uniform(knots[0], knots[-1], 100_000)
     difference = np.abs(np.stack(table.lookup(q), axis=1) - curve(q)).max(axis=0)
     worst = table.step**2 / 8.0 * curve.max_curvature()
     assert np.all(difference <= worst * (1 + 1e-6))
@@ -68,20 +69,20 @@ def test_the_dense_table_meets_its_tolerance(at: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(
-    "at", [np.arange(-2, 9) * 25.0, np.array([0.0, 12.5, 20.0, 55.0, 60.0]), np.array([0, 1.23, 9.7])]
+    "knots", [np.arange(-2, 9) * 25.0, np.array([0.0, 12.5, 20.0, 55.0, 60.0]), np.array([0, 1.23, 9.7])]
 )
-def test_linear_data_stay_exact(at: np.ndarray) -> None:
+def test_linear_data_stay_exact(knots: np.ndarray) -> None:
     rng = np.random.default_rng(6)
-    curve = Interpolant.through(at, rng.normal(size=(len(at), 2)), "linear")
-    table = dense_table(at, curve, [0.0, 0.0], [1e-7, 1e-7])
-    q = rng.uniform(at[0] - 5.0, at[-1] + 5.0, 10_000)
+    curve = Interpolant.through(knots, rng.normal(size=(len(knots), 2)), "linear")
+    table = dense_table(knots, curve, [0.0, 0.0], [1e-7, 1e-7])
+    q = rng.uniform(knots[0] - 5.0, knots[-1] + 5.0, 10_000)
     np.testing.assert_allclose(np.stack(table.lookup(q), axis=1), curve(q), atol=1e-12)
 
 
 def test_a_constant_column_is_a_number() -> None:
-    at = np.array([0.0, 10.0, 20.0])
-    curve = Interpolant.through(at, np.array([[1.0, 2.0], [1.0, 3.0], [1.0, 2.0]]), "pchip")
-    constant, varying = dense_table(at, curve, curve.max_curvature().tolist(), [1e-7, 1e-7]).lookup(
+    knots = np.array([0.0, 10.0, 20.0])
+    curve = Interpolant.through(knots, np.array([[1.0, 2.0], [1.0, 3.0], [1.0, 2.0]]), "pchip")
+    constant, varying = dense_table(knots, curve, curve.max_curvature().tolist(), [1e-7, 1e-7]).lookup(
         np.array([5.0, 99.0])
     )
     assert constant == 1.0

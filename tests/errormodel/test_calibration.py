@@ -16,7 +16,7 @@ X = [0.0, 50.0, 100.0]
 
 
 @pytest.mark.parametrize(
-    ("options", "found"),
+    ("options", "expected"),
     [
         ({"axis": "W"}, "axis 'W'"),
         ({"position_mm": [0.0]}, "1 positions"),
@@ -33,13 +33,13 @@ X = [0.0, 50.0, 100.0]
         ({"line_mm": (0.0, math.inf, 0.0)}, "line_mm"),
     ],
 )
-def test_a_bad_curve_is_refused(options: dict[str, object], found: str) -> None:
-    with pytest.raises(ConfigError, match=found):
+def test_a_bad_curve_is_refused(options: dict[str, object], expected: str) -> None:
+    with pytest.raises(ConfigError, match=expected):
         Curve(**({"axis": "X", "position_mm": X, "columns": {"EXX": [0, 0, 0]}} | options))
 
 
 @pytest.mark.parametrize(
-    ("options", "found"),
+    ("options", "expected"),
     [
         ({"box_mm": np.zeros((2, 2))}, "box_mm"),
         ({"box_mm": BOX[:, ::-1]}, "box_mm"),
@@ -51,15 +51,15 @@ def test_a_bad_curve_is_refused(options: dict[str, object], found: str) -> None:
         ({"backlash_mm": (1e-3, 0.0, 0.0)}, "direction column"),
     ],
 )
-def test_a_contradiction_is_refused(options: dict[str, object], found: str) -> None:
+def test_a_contradiction_is_refused(options: dict[str, object], expected: str) -> None:
     curve = Curve("X", X, forward={"EXX": [0, 0, 1e-3]}, backward={"EXX": [0, 0, 2e-3]})
-    with pytest.raises(ConfigError, match=found):
+    with pytest.raises(ConfigError, match=expected):
         Calibration(**({"machine": "m", "box_mm": BOX, "curves": (curve,)} | options))
 
 
 def test_a_component_stands_once() -> None:
     curve = Curve("X", X, {"EXX": [0, 0, 1e-3]})
-    with pytest.raises(ConfigError, match="EXX stands in two curves"):
+    with pytest.raises(ConfigError, match="EXX is in two curves"):
         Calibration("m", BOX, curves=(curve, curve))
 
 

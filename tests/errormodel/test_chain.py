@@ -40,11 +40,11 @@ def random_calibration(
         line = tuple(float(rng.uniform(*b)) for b in BOX)
         reference = str(rng.choice(["table", "functional-point"]))
         tool = tuple(rng.normal(size=3) * 50.0)
-        at = np.linspace(low, high, 9)
+        knots = np.linspace(low, high, 9)
         curves.append(
             Curve(
                 axis,
-                at,
+                knots,
                 columns,
                 line_mm=line,
                 tool_mm=tool,
@@ -77,7 +77,7 @@ def shift(vector: Array) -> Array:
 def by_matrices(chain: str, e: dict[str, float], p: Array, tool: Array, datum: Array) -> Array:
     """Tool in the workpiece's frame by the product of all matrices, minus the nominal one.
 
-    Frame to tool: each axis moves, then turns. Frame to workpiece: its axes move and turn the other way.
+    Frame to tool: each axis moves, then turns. Frame to workpiece: its axes move and turn oppositely.
     Errors are those of a reflector on the table (table side) or at the origin an axis carries (tool side).
     """
     direction = {
@@ -86,11 +86,11 @@ def by_matrices(chain: str, e: dict[str, float], p: Array, tool: Array, datum: A
         "Z": np.array([e.get("B0Z", 0.0), -e.get("A0Z", 0.0), 1.0]),
     }
 
-    def body(axis: str, sense: float) -> Array:
+    def body(axis: str, sign: float) -> Array:
         q = (p - datum)["XYZ".index(axis)]
         moved = q * direction[axis] + np.array([e.get(f"E{d}{axis}", 0.0) for d in "XYZ"])
-        a, b, c = (sense * e.get(f"E{d}{axis}", 0.0) for d in "ABC")
-        return shift(sense * moved) @ turn(2, c) @ turn(1, b) @ turn(0, a)
+        a, b, c = (sign * e.get(f"E{d}{axis}", 0.0) for d in "ABC")
+        return shift(sign * moved) @ turn(2, c) @ turn(1, b) @ turn(0, a)
 
     frame = chain.index("F")
     workpiece, to_tool = np.eye(4), np.eye(4)
@@ -136,7 +136,7 @@ def test_all_errors_together_are_the_exact_product(chain: str, size: float) -> N
 
 
 #: Displacement in um of 10 urad or 10 um at P = (400, 300, 200), t = (0, 130, -243.4852), by the program of a
-#: metrology institute, for F-X-Y-Z, F-Y-X-Z, table Y, table X; moving tables in table-motion sense.
+#: metrology institute, for F-X-Y-Z, F-Y-X-Z, table Y, table X; of moving tables signed by the table's motion.
 UNIT_CHAINS = ("FXYZ", "FYXZ", "YFXZ", "XFYZ")
 UNIT_ANGLES = {
     "EAX": ((0, 0.4349, 4.3), (0, 0.4349, 1.3), (0, 0.4349, 1.3), (0, -0.4349, -4.3)),
@@ -434,7 +434,8 @@ POLYNOMIAL = {
     ],
 )
 def test_polynomial_machine_of_an_independent_program(chain: str, expected_um: Vector) -> None:
-    """A linear curve in table-motion sense at the negative coordinate is the same in coordinate sense."""
+    """A linear curve signed by the table's motion, at the negative coordinate, is the same signed by the
+    coordinate."""
     curves = tuple(
         Curve(
             axis,

@@ -19,12 +19,12 @@ def calibration(seed: int, interpolation: str, angle: float, length: float, cycl
     rng = np.random.default_rng(seed)
     curves = []
     for axis, (low, high) in zip("XYZ", BOX, strict=True):
-        at = np.concatenate([[low], np.sort(rng.uniform(low, high, 7)), [high]])
+        knots = np.concatenate([[low], np.sort(rng.uniform(low, high, 7)), [high]])
         columns = {f"E{d}{axis}": rng.normal(size=9) * (length if d in "XYZ" else angle) for d in "XYZABC"}
         curves.append(
             Curve(
                 axis,
-                at,
+                knots,
                 columns,
                 line_mm=tuple(BOX.mean(axis=1)),
                 interpolation=interpolation,
@@ -87,10 +87,10 @@ def test_no_chord_departs_by_more(
 @pytest.mark.parametrize("interpolation", ["linear", "pchip"])
 def test_a_move_over_the_worst_place_comes_near_the_bound(interpolation: str) -> None:
     """For one curve and single-axis moves the worst of many moves reaches half the bound at every length."""
-    at = np.linspace(0.0, 800.0, 9)
+    knots = np.linspace(0.0, 800.0, 9)
     wave = np.array([0, 1, 0, -1, 0, 1, 0, -1, 0]) * 0.01
     model = build(
-        Calibration("m", BOX, curves=(Curve("X", at, {"EXX": wave}, interpolation=interpolation),)), "FXYZ"
+        Calibration("m", BOX, curves=(Curve("X", knots, {"EXX": wave}, interpolation=interpolation),)), "FXYZ"
     )
     for length in (5.0, 20.0, 100.0):
         start = np.zeros((3000, 3))
@@ -121,17 +121,17 @@ def test_the_farthest_of_many_tools_counts() -> None:
     assert np.all(model.chord_bound(delta, tools) >= np.maximum(model.chord_bound(delta, TOOL), 0.0))
 
 
-@pytest.mark.parametrize("sense", [-1.0, 0.5, 1.0])
-def test_the_bound_holds_in_either_direction(sense: float) -> None:
+@pytest.mark.parametrize("direction", [-1.0, 0.5, 1.0])
+def test_the_bound_holds_in_either_direction(direction: float) -> None:
     rng = np.random.default_rng(8)
-    at = np.linspace(0.0, 800.0, 17)
+    knots = np.linspace(0.0, 800.0, 17)
     forward, backward = ({n: rng.normal(size=17) * 0.01 for n in ("EXX", "EYX")} for _ in range(2))
-    curve = Curve("X", at, forward=forward, backward=backward, interpolation="linear")
+    curve = Curve("X", knots, forward=forward, backward=backward, interpolation="linear")
     model = build(Calibration("m", BOX, curves=(curve,)), "FXYZ")
     start, delta = random_moves(9, 500, "X")
     share = np.linspace(0.0, 1.0, 65)
     points = (start[:, None, :] + share[None, :, None] * delta[:, None, :]).reshape(-1, 3)
-    error = model.error(points, TOOL, np.full(points.shape, sense)).reshape(500, 65, 3)
+    error = model.error(points, TOOL, np.full(points.shape, direction)).reshape(500, 65, 3)
     chord = error[:, :1] + share[None, :, None] * (error[:, -1:] - error[:, :1])
     departure = np.linalg.norm(error - chord, axis=2).max(axis=1)
     assert np.all(departure <= model.chord_bound(delta, TOOL) * (1 + 1e-9) + 1e-12)

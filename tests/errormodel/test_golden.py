@@ -95,7 +95,7 @@ def test_yaw_of_a_moving_table_by_where_the_reflector_stood(reference: str, dx: 
     np.testing.assert_allclose(error * 1e3, [[dx, 4.0, 0.0]], atol=1e-4)
 
 
-def test_lost_motion_follows_the_play() -> None:
+def test_backlash_follows_the_play() -> None:
     """b = 6 um, commands 0, 10, 10.002, 9.999, 9.9, 9.9005, 12 from unknown."""
     commands = np.zeros((7, 3))
     commands[:, 0] = [0.0, 10.0, 10.002, 9.999, 9.9, 9.9005, 12.0]

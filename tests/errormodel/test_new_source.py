@@ -39,7 +39,7 @@ def test_a_new_source_is_one_file_and_one_line(tmp_path: Path) -> None:
     registry.write_text(text.replace(ONE, f"{ONE}    Sags(),\n").replace("\nSOURCES", where, 1))
     done = run(tmp_path, "sag")
     assert done.stdout.count(".") > 20 and done.returncode == 0, done.stdout
-    # the laws bite: a number that acts the other way
+    # the laws bite: a number that acts with the wrong sign
     wrong = (sources / "sag.py").read_text()
     (sources / "sag.py").write_text(wrong.replace("yield 2, -1.0", "yield 2, 1.0"))
     done = run(tmp_path, "sag and uncertainty")

@@ -43,14 +43,14 @@ def loaded(folder: Path, job: str = "", calibration: str = "", tables: str = TRU
 
 def z_words(text: bytes) -> dict[int, float]:
     """Z by X at the end of each block, of a program that names X in each."""
-    out, z = {}, 0.0
+    words, z = {}, 0.0
     for line in text.decode().splitlines():
         plain = re.sub(r"\([^)]*\)|;.*", "", line)
-        found = dict(re.findall(r"([XZ])([-+]?[\d.]+)", plain))
-        z = float(found.get("Z", z))
-        if "X" in found:
-            out[round(float(found["X"]))] = z
-    return out
+        letters = dict(re.findall(r"([XZ])([-+]?[\d.]+)", plain))
+        z = float(letters.get("Z", z))
+        if "X" in letters:
+            words[round(float(letters["X"]))] = z
+    return words
 
 
 def test_a_payload_that_changes_in_the_program_worked_by_hand(tmp_path: Path) -> None:
@@ -68,15 +68,16 @@ def test_a_payload_that_changes_in_the_program_worked_by_hand(tmp_path: Path) ->
     # the virtual machine: sags by 60 um at X200 as it is, and by nothing once corrected
     for text, sag in ((program, -0.06), (result.data, 0.0)):
         shown = olp.simulate(text, path, step_mm=1000.0)
-        at = np.flatnonzero(np.abs(shown.points_mm[:, 0] - 200.0) < 0.01)
-        np.testing.assert_allclose(shown.points_mm[at[-1], 2], sag, atol=6e-4)
+        samples = np.flatnonzero(np.abs(shown.points_mm[:, 0] - 200.0) < 0.01)
+        np.testing.assert_allclose(shown.points_mm[samples[-1], 2], sag, atol=6e-4)
     assert [f.code for f in result.findings] == []
 
 
 def test_the_same_by_lines_of_the_job_file_and_as_one_text_for_every_later_verb(tmp_path: Path) -> None:
     body = HEAD + "G1 X100 F600\nG0 X200 ; fetch\nG1 X300\nG0 X400 (put down)\nM2\n"
-    comments = body.replace("G0 X200 ;", "G0 X200 (OLP PAYLOAD 30) ;").replace("G0 X400",
-    "(OLP payload 0)G0 X400")
+    comments = body.replace("G0 X200 ;", "G0 X200 (OLP PAYLOAD 30) ;").replace(
+        "G0 X400", "(OLP payload 0)G0 X400"
+    )
     by_comment = olp.correct(comments.encode(), loaded(tmp_path / "a"))
     path = loaded(
         tmp_path / "b", "[[payloads]]\nline = 4\npayload_kg = 30\n[[payloads]]\nline = 6\npayload_kg = 0.0"
@@ -154,15 +155,15 @@ def test_what_the_table_of_the_job_file_may_not_say(tmp_path: Path) -> None:
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_a_comment_is_put_at_the_end_of_its_line_and_nothing_else_changes(end: str) -> None:
     source = end.join(["%", "G1 X1", "", "N3 (a;b) G1 X2 ; c", "M2"]).encode()
-    out = with_payloads(source, {2: 0.5, 3: 1e-7, 4: 30.0}, (b"(", b")"))
+    commented = with_payloads(source, {2: 0.5, 3: 1e-7, 4: 30.0}, (b"(", b")"))
     expected = end.join(
         [
             "%", "G1 X1 (OLP PAYLOAD 0.5 kg, line 2)", "(OLP PAYLOAD 0.0000001 kg, line 3)",
             "N3 (a;b) G1 X2  (OLP PAYLOAD 30 kg, line 4); c", "M2",
         ]
     )  # fmt: skip
-    assert out == expected.encode()
-    assert with_payloads(out, {2: 0.5, 3: 1e-7, 4: 30.0}, (b"(", b")")) == out
+    assert commented == expected.encode()
+    assert with_payloads(commented, {2: 0.5, 3: 1e-7, 4: 30.0}, (b"(", b")")) == commented
     assert with_payloads(source, {}, (b"(", b")")) is source
 
 
@@ -178,11 +179,11 @@ def test_a_payload_as_while_measuring_changes_nothing(tmp_path: Path) -> None:
 def test_a_touch_off_under_load_holds_the_part_where_it_was_touched(tmp_path: Path) -> None:
     """Touched at X 100 with 30 kg: the tip was 30 um lower than the axis said, and so is the part."""
     body = HEAD + "G1 X100 F600\nG1 X300\nM2\n"
-    at = "[work_offsets.G54]\ntouched_at_mm = { X = 100.0, Y = 0.0, Z = 0.0 }\n"
-    with_load = loaded(tmp_path / "a", "payload_kg = 30", tables=at)
+    touched = "[work_offsets.G54]\ntouched_at_mm = { X = 100.0, Y = 0.0, Z = 0.0 }\n"
+    with_load = loaded(tmp_path / "a", "payload_kg = 30", tables=touched)
     text = olp.correct(body.encode(), with_load, with_load.with_name("job.toml")).data
     assert (z_words(text)[100], z_words(text)[300]) == (0.0, 0.06)
-    without = loaded(tmp_path / "b", "payload_kg = 30", tables=at + "touched_payload_kg = 0.0\n")
+    without = loaded(tmp_path / "b", "payload_kg = 30", tables=touched + "touched_payload_kg = 0.0\n")
     text = olp.correct(body.encode(), without, without.with_name("job.toml")).data
     assert (z_words(text)[100], z_words(text)[300]) == (0.03, 0.09)
 
@@ -190,9 +191,9 @@ def test_a_touch_off_under_load_holds_the_part_where_it_was_touched(tmp_path: Pa
 def test_a_feed_move_that_starts_with_a_jump_is_found(tmp_path: Path) -> None:
     path = loaded(tmp_path)
     cut = (HEAD + "G1 X200 F600\n(olp payload 30)\nG1 X300\nM2\n").encode()
-    found = {f.code: f for f in olp.correct(cut, path).findings}
-    assert found["OLP421"].line == 5
-    assert "60 um" in found["OLP421"].message
+    findings = {f.code: f for f in olp.correct(cut, path).findings}
+    assert findings["OLP421"].line == 5
+    assert "60 um" in findings["OLP421"].message
 
 
 def test_error_at_a_place_takes_the_payload_of_the_job(tmp_path: Path) -> None:
@@ -212,7 +213,7 @@ BOX = np.array([[0.0, 800.0], [-300.0, 300.0], [-400.0, 0.0]])
 
 def tables(seed: int, interpolation: str, angle: float = 2e-6) -> tuple[ComponentTable, ...]:
     rng = np.random.default_rng(seed)
-    out = []
+    tables = []
     for axis, arguments in (("X", ("X",)), ("Y", ("Y", "Z")), ("Z", ("X", "Y", "Z"))):
         knots = [np.linspace(*BOX["XYZ".index(a)], int(rng.integers(2, 6))) for a in arguments]
         shape = tuple(map(len, knots))
@@ -220,13 +221,13 @@ def tables(seed: int, interpolation: str, angle: float = 2e-6) -> tuple[Componen
             f"E{d}{axis}": rng.normal(size=shape) * (1e-3 if d in "XYZ" else angle)
             for d in rng.choice(list("XYZABC"), 4, replace=False)
         }
-        out.append(
+        tables.append(
             ComponentTable(
                 axis, arguments, tuple(knots), columns, tuple(BOX.mean(axis=1)), (5.0, 0.0, -100.0),
                 str(rng.choice(["table", "functional-point"])), interpolation,
             )
         )  # fmt: skip
-    return tuple(out)
+    return tuple(tables)
 
 
 @pytest.mark.parametrize("chain", sorted(CHAINS))
@@ -243,8 +244,8 @@ def test_a_constant_sensitivity_is_a_curve_times_the_load(chain: str) -> None:
     curve_model = build(Calibration("m", BOX, curves=(curve,)), chain)
     points = rng.uniform(BOX[:, 0], BOX[:, 1], (300, 3))
     vector = np.array([20.0, -30.0, -200.0])
-    found = load_model.error(points, np.append(vector, 25.0))
-    np.testing.assert_allclose(found, curve_model.error(points, vector), atol=1e-7)
+    error = load_model.error(points, np.append(vector, 25.0))
+    np.testing.assert_allclose(error, curve_model.error(points, vector), atol=1e-7)
     np.testing.assert_allclose(
         load_model.rotation(points, None, 25.0), curve_model.rotation(points), atol=1e-18
     )
@@ -258,18 +259,18 @@ def test_files_of_one_axis_measured_on_different_lines_share_their_levers() -> N
     angle, straight = {"EBX": [0.0, 1e-6, 3e-6]}, {"EZX": [0.0, 1e-3, 0.0]}
     lines = ((0.0, 10.0, -300.0), (0.0, 100.0, -50.0))
     tools = ((0.0, 0.0, -120.0), (60.0, 0.0, -40.0))
-    at = list(zip((angle, straight), lines, tools, strict=True))
+    measured = list(zip((angle, straight), lines, tools, strict=True))
     load_model = build(
         Calibration(
             "m",
             BOX,
             compliance=tuple(
-                ComponentTable("X", ("X",), (x,), c, li, t, interpolation="linear") for c, li, t in at
+                ComponentTable("X", ("X",), (x,), c, li, t, interpolation="linear") for c, li, t in measured
             ),
         ),
         "FXYZ",
     )
-    curves = tuple(Curve("X", x, c, line_mm=li, tool_mm=t, interpolation="linear") for c, li, t in at)
+    curves = tuple(Curve("X", x, c, line_mm=li, tool_mm=t, interpolation="linear") for c, li, t in measured)
     points = np.random.default_rng(1).uniform(BOX[:, 0], BOX[:, 1], (50, 3))
     vector = np.array([20.0, 5.0, -90.0])
     expected = build(Calibration("m", BOX, curves=curves), "FXYZ").error(points, vector)
@@ -278,14 +279,14 @@ def test_files_of_one_axis_measured_on_different_lines_share_their_levers() -> N
 
 def test_a_load_is_not_counted_twice() -> None:
     table = ComponentTable("X", ("X",), (BOX[0],), {"EZX": [0.0, 1e-3]})
-    with pytest.raises(ConfigError, match="EZX stands in compliance and in compliance"):
+    with pytest.raises(ConfigError, match="EZX is in compliance and in compliance"):
         Calibration("m", BOX, compliance=(table, table))
     with pytest.raises(ConfigError, match="what was measured holds the beam"):
         Calibration("m", BOX, compliance=(table,), beams=(Beam("X", "simple", (0.0, 800.0), 210.0, 1e8),))
     two = (Beam("X", "simple", (0.0, 800.0), 210.0, 1e8), Beam("X", "fixed", (0.0, 800.0), 210.0, 1e8))
-    at, tool = np.array([[300.0, 0.0, 0.0]]), np.array([30.0, 0.0, -100.0, 20.0])
-    one = [build(Calibration("m", BOX, beams=(b,)), "FXYZ").error(at, tool) for b in two]
-    np.testing.assert_allclose(build(Calibration("m", BOX, beams=two), "FXYZ").error(at, tool), sum(one))
+    points, tool = np.array([[300.0, 0.0, 0.0]]), np.array([30.0, 0.0, -100.0, 20.0])
+    one = [build(Calibration("m", BOX, beams=(b,)), "FXYZ").error(points, tool) for b in two]
+    np.testing.assert_allclose(build(Calibration("m", BOX, beams=two), "FXYZ").error(points, tool), sum(one))
 
 
 def test_the_error_is_linear_in_the_payload_and_its_sources_add() -> None:
@@ -306,9 +307,7 @@ def test_the_error_is_linear_in_the_payload_and_its_sources_add() -> None:
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10**6), st.sampled_from(["linear", "cubic"]), st.sampled_from(sorted(CHAINS)))
 def test_the_chord_bound_holds_with_load(seed: int, interpolation: str, chain: str) -> None:
-    model = build(
-        Calibration("m", BOX, compliance=tables(seed, interpolation, 1e-5), payload_kg=7.0), chain
-    )
+    model = build(Calibration("m", BOX, compliance=tables(seed, interpolation, 1e-5), payload_kg=7.0), chain)
     rng = np.random.default_rng(seed + 1)
     start, end = rng.uniform(BOX[:, 0], BOX[:, 1], (2, 40, 3))
     delta = (end - start) * 10.0 ** rng.uniform(-3.0, 0.0, (40, 1))
@@ -317,17 +316,17 @@ def test_the_chord_bound_holds_with_load(seed: int, interpolation: str, chain: s
     points = start[:, None, :] + share[None, :, None] * delta[:, None, :]
     error = model.error(points.reshape(-1, 3), tool).reshape(points.shape)
     chord = error[:, :1] + share[None, :, None] * (error[:, -1:] - error[:, :1])
-    found = np.linalg.norm(error - chord, axis=2).max(axis=1)
+    departure = np.linalg.norm(error - chord, axis=2).max(axis=1)
     bound = model.chord_bound(delta, tool)
-    assert np.all(found <= bound * (1.0 + 1e-9) + 1e-15)
+    assert np.all(departure <= bound * (1.0 + 1e-9) + 1e-15)
     assert np.all(model.chord_bound(0.7 * delta, tool) <= bound * (1.0 + 1e-12))
 
 
 def test_an_unknown_axis_hides_only_what_depends_on_it() -> None:
     table = ComponentTable("Y", ("Y",), (BOX[1],), {"EZY": [0.0, 1e-3]})
     model = build(Calibration("m", BOX, compliance=(table,)), "FXYZ")
-    found = model.error(np.array([[np.nan, 0.0, np.nan]]), np.array([0.0, 0.0, 0.0, 2.0]))
-    np.testing.assert_allclose(found, [[0.0, 0.0, 1e-3]])
+    error = model.error(np.array([[np.nan, 0.0, np.nan]]), np.array([0.0, 0.0, 0.0, 2.0]))
+    np.testing.assert_allclose(error, [[0.0, 0.0, 1e-3]])
     hidden = model.error(np.array([[0.0, np.nan, 0.0]]), np.array([0.0, 0.0, 0.0, 2.0]))
     np.testing.assert_array_equal(hidden, [[0.0, 0.0, np.nan]])
 
@@ -336,13 +335,13 @@ def test_an_unknown_axis_hides_only_what_depends_on_it() -> None:
 
 
 @pytest.mark.parametrize("support", ["simple", "fixed", "cantilever"])
-@pytest.mark.parametrize("at", [400.0, 1000.0, 1700.0])
-def test_beams_agree_with_finite_differences(support: str, at: float) -> None:
+@pytest.mark.parametrize("load_mm", [400.0, 1000.0, 1700.0])
+def test_beams_agree_with_finite_differences(support: str, load_mm: float) -> None:
     section = tube_mm4(200.0, 300.0, 10.0)
     beam = Beam("X", support, (0.0, 2000.0), 210.0, section)
-    deflection, slope = beam.bends(np.array([at]))
-    length = at if support == "cantilever" else 2000.0  # a ram that is out by so much
-    expected = under_the_load(support, length, at, 1.0, 210e3 * section)
+    deflection, slope = beam.bends(np.array([load_mm]))
+    length = load_mm if support == "cantilever" else 2000.0  # a ram that is out by so much
+    expected = under_the_load(support, length, load_mm, 1.0, 210e3 * section)
     assert deflection[0] == pytest.approx(expected[0], rel=2e-3)
     assert slope[0] == pytest.approx(expected[1], rel=5e-3, abs=1e-11)
 
@@ -363,8 +362,9 @@ def test_a_tube_and_the_published_figures_of_a_beam() -> None:
     ("axis", "direction", "angle", "sign"),
     [("X", "-Z", "EBX", 1), ("Y", "-Z", "EAY", -1), ("X", "+Y", "ECX", 1), ("Z", "-X", "EBZ", -1)],
 )
-def test_a_beam_turns_the_tool_as_a_rigid_body_on_it(axis: str, direction: str, angle: str, sign:
-int) -> None:
+def test_a_beam_turns_the_tool_as_a_rigid_body_on_it(
+    axis: str, direction: str, angle: str, sign: int
+) -> None:
     """The sag grows along the axis, so a point that is ahead on the carriage lies lower by slope times
     lever."""
     beam = Beam(axis, "cantilever", (-1000.0, 2000.0), 210.0, 1e8, direction)
@@ -374,24 +374,24 @@ int) -> None:
     assert np.all(np.sign(table.columns[angle]) == sign)
     ahead = np.zeros(4)
     ahead[j], ahead[3] = 50.0, 30.0
-    at = np.array([[200.0, 200.0, 200.0]])
+    points = np.array([[200.0, 200.0, 200.0]])
     slope = beam.bends(np.array([200.0]))[1]
-    way = 1.0 if direction[0] == "+" else -1.0
-    change = model.error(at, ahead) - model.error(at, ahead * [0, 0, 0, 1])
-    assert change[0, i] == pytest.approx(way * 30.0 * slope[0] * 50.0, rel=1e-4)
+    toward = 1.0 if direction[0] == "+" else -1.0
+    change = model.error(points, ahead) - model.error(points, ahead * [0, 0, 0, 1])
+    assert change[0, i] == pytest.approx(toward * 30.0 * slope[0] * 50.0, rel=1e-4)
 
 
 def test_a_beam_in_the_files_of_a_machine(tmp_path: Path) -> None:
     table = (
         '[[compliance_beam]]\naxis = "X"\nsupport = "simple"\nspan_mm = [-1000, 2000]\nyoungs_modulus_GPa '
-        '= 210\n'
+        "= 210\n"
         "section_mm = [200, 300, 10]\n"
     )
     path = machine(tmp_path, table, tables=TRUE_ZERO, job="payload_kg = 30")
-    found = Session.start(path, path.with_name("job.toml")).loaded("refuse").model
+    model = Session.start(path, path.with_name("job.toml")).loaded("refuse").model
     expected = 30 * 9.80665 * 3000.0**3 / (48 * 210e3 * tube_mm4(200, 300, 10))
     np.testing.assert_allclose(
-        found.error(np.array([[500.0, 0, 0]]), np.array([0, 0, 0, 30.0])), [[0, 0, -expected]], rtol=1e-6
+        model.error(np.array([[500.0, 0, 0]]), np.array([0, 0, 0, 30.0])), [[0, 0, -expected]], rtol=1e-6
     )
 
 
@@ -462,9 +462,9 @@ def test_the_review_page_and_a_comparison_take_the_payload(tmp_path: Path) -> No
     assert page is not None
     shown = olp.simulate(source, path, job, step_mm=5.0)
     (tmp_path / "measured.csv").write_bytes(shown.to_csv())
-    found = olp.compare(source, [tmp_path / "measured.csv"], path, job)
+    comparison = olp.compare(source, [tmp_path / "measured.csv"], path, job)
     # 3 um/kg at X300
-    assert found.report["after"]["across_um"]["max"] == pytest.approx(90.0, abs=0.1)
+    assert comparison.report["after"]["across_um"]["max"] == pytest.approx(90.0, abs=0.1)
 
 
 def test_payloads_between_the_holes_of_a_cycle_and_in_distances(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Lost motion: the play along a program, against one step at a time; and curves with a direction."""
+"""Backlash: the play along a program, against one step at a time; and curves with a direction."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_unknown_until_taken_up() -> None:
     np.testing.assert_allclose(play_states(command, np.array([6.0, 3.0, 0.0])), 0.5 * (low + high))
 
 
-def test_over_compensated_lost_motion_follows_the_sign_of_motion() -> None:
+def test_over_compensated_backlash_follows_the_sign_of_motion() -> None:
     command = np.array([[0.0] * 3, [0.001] * 3, [0.0005] * 3, [0.0005] * 3])
     width = np.full(3, -4e-3)
     model = build(Calibration("m", BOX, backlash_mm=tuple(width)), "FXYZ")
@@ -119,13 +119,13 @@ def test_direction_columns_give_both_directions_and_the_mean(chain: str) -> None
     curve = calibration.curves[0]
     points = np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
     model = build(calibration, chain)
-    for sense, columns in ((1.0, curve.forward), (-1.0, curve.backward)):
-        error = model.error(points, TOOL, np.full((3, 3), sense))
+    for direction, columns in ((1.0, curve.forward), (-1.0, curve.backward)):
+        error = model.error(points, TOOL, np.full((3, 3), direction))
         np.testing.assert_allclose(
             error[:, :2], np.stack([columns["EXX"], columns["EYX"]], axis=1), atol=1e-15
         )
         np.testing.assert_allclose(
-            model.rotation(points, np.full((3, 3), sense))[:, 1], columns["EBX"], atol=1e-18
+            model.rotation(points, np.full((3, 3), direction))[:, 1], columns["EBX"], atol=1e-18
         )
     mean = 0.5 * (curve.forward["EXX"] + curve.backward["EXX"])
     np.testing.assert_allclose(model.error(points, TOOL)[:, 0], mean, atol=1e-15)
@@ -133,12 +133,12 @@ def test_direction_columns_give_both_directions_and_the_mean(chain: str) -> None
         model.backlash_at(points), [[4e-3, 0, 0], [3e-3, 0, 0], [6e-3, 0, 0]], atol=1e-15
     )
     parts = dict(model.contributions(points, np.array([0.0, 0.0, -100.0]), np.ones((3, 3))))
-    # The lever of the difference in pitch belongs to the lost motion too.
+    # The lever arm of the difference in pitch belongs to the backlash too.
     expected = [-2e-3, -1.5e-3 + 1e-5 * 100.0, -3e-3]
     np.testing.assert_allclose(parts["lost motion X"][:, 0], expected, atol=1e-15)
 
 
-def test_lost_motion_is_unknown_where_the_position_is() -> None:
+def test_backlash_is_unknown_where_the_position_is() -> None:
     model = build(bidirectional(), "FXYZ")
     lost = model.backlash_at(np.array([[np.nan, 1.0, 1.0], [1.0, np.nan, np.nan]]))
     np.testing.assert_array_equal(np.isnan(lost), [[True, False, False], [False] * 3])

@@ -78,12 +78,12 @@ def folder_of(path: Path, key: str | None, by: float = 1.0) -> Path:
 
 
 def loaded(path: Path, key: str) -> Calibration:
-    found = load_calibration(path / "calibration.toml", None, DEGC)
+    calibration = load_calibration(path / "calibration.toml", None, DEGC)
     sensors = NAMES[key].example(1.0).sensors_degC
     if sensors:
-        assert found.structure is not None
-        found = dataclasses.replace(found, structure=found.structure.at(sensors))
-    return found
+        assert calibration.structure is not None
+        calibration = dataclasses.replace(calibration, structure=calibration.structure.at(sensors))
+    return calibration
 
 
 def calibration_of(path: Path, key: str, by: float = 1.0) -> Calibration:
@@ -194,8 +194,8 @@ def test_a_move_departs_from_its_chord_by_no_more_than_the_budget(
     bound = model.chord_bound(ends - POINTS, TOOL)
     first, last = model.error(POINTS, TOOL), model.error(ends, TOOL)
     for share in np.linspace(0.0, 1.0, 33)[1:-1]:
-        at = model.error(POINTS + share * (ends - POINTS), TOOL)
-        departure = np.linalg.norm(at - (first + share * (last - first)), axis=1)
+        inner = model.error(POINTS + share * (ends - POINTS), TOOL)
+        departure = np.linalg.norm(inner - (first + share * (last - first)), axis=1)
         assert (departure <= bound * (1.0 + 1e-9) + 1e-13).all()
 
 
@@ -264,9 +264,9 @@ def test_what_is_written_reads_back(key: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("chain", sorted(CHAINS))
 def test_all_of_them_at_once(chain: str, tmp_path: Path) -> None:
     """The examples fit together: what one leaves, another does not hold."""
-    found = calibration_of(tmp_path, SOURCES[0].key)
+    calibration = calibration_of(tmp_path, SOURCES[0].key)
     for key in NAMES:
-        found = with_values(found, key, values_of(calibration_of(tmp_path / key, key), key))
-    model = build(found, chain)
+        calibration = with_values(calibration, key, values_of(calibration_of(tmp_path / key, key), key))
+    model = build(calibration, chain)
     command = invert(model, POINTS, TOOL, PLAY)
     np.testing.assert_allclose(command + model.error(command, TOOL, PLAY), POINTS, rtol=0.0, atol=1e-9)

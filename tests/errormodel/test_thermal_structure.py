@@ -56,22 +56,22 @@ def test_a_lag_is_exact_for_steps_and_ramps(lag: float, steps: list[float], rate
 def test_a_distortion_worked_by_hand() -> None:
     """24 and 26 degC: EXX = 4 (1 um + 10 um/m q'), EZX = 4 * 5 um in the middle, EBX = 5 * 2 urad."""
     model = build(Calibration("m", BOX, structure=STRUCTURE.at({"beam": 24.0, "column": 26.0})), "FXYZ")
-    at = np.array([[0.0, 0, 0], [1000.0, 0, 0], [1500.0, 0, 0]])
+    points = np.array([[0.0, 0, 0], [1000.0, 0, 0], [1500.0, 0, 0]])
     tool = np.array([0.0, 0.0, -100.0])
     expected = np.array([[4 - 40, 0, 0], [4, 0, 20], [4 + 20, 0, 20 * 0.75]]) * 1e-3
     expected[:, 0] += 10e-6 * -100.0
-    np.testing.assert_allclose(model.error(at, tool), expected, atol=1e-15)
-    np.testing.assert_allclose(model.rotation(at), [[0, 1e-5, 0]] * 3)
-    assert {name for name, _ in model.contributions(at, tool)} == {
+    np.testing.assert_allclose(model.error(points, tool), expected, atol=1e-15)
+    np.testing.assert_allclose(model.rotation(points), [[0, 1e-5, 0]] * 3)
+    assert {name for name, _ in model.contributions(points, tool)} == {
         "thermal EXX", "thermal EZX", "thermal EBX",
     }  # fmt: skip
     np.testing.assert_array_equal(
-        model.error(at, np.append(tool, 30.0)), model.error(at, tool)
+        model.error(points, np.append(tool, 30.0)), model.error(points, tool)
     )  # no matter what it carries
     half = build(Calibration("m", BOX, structure=STRUCTURE.at({"beam": 22.0, "column": 23.5})), "FXYZ")
-    np.testing.assert_allclose(2.0 * half.error(at, tool), expected, atol=1e-15)
+    np.testing.assert_allclose(2.0 * half.error(points, tool), expected, atol=1e-15)
     nothing = build(Calibration("m", BOX, structure=STRUCTURE), "FXYZ")
-    np.testing.assert_array_equal(nothing.error(at, tool), 0.0)
+    np.testing.assert_array_equal(nothing.error(points, tool), 0.0)
 
 
 def test_the_chord_bound_holds() -> None:
@@ -89,14 +89,14 @@ def test_temperatures_that_were_not_identified_are_refused_or_held() -> None:
     warm = Calibration("m", BOX, structure=STRUCTURE.at({"beam": 31.0, "column": 20.0}))
     with pytest.raises(ConfigError, match=r"beam: the structure is at 31.00 degC.* from 15.00 to 30.00 degC"):
         build(warm, "FXYZ")
-    at, tool = np.array([[500.0, 0, 0]]), np.zeros(3)
+    points, tool = np.array([[500.0, 0, 0]]), np.zeros(3)
     edge = build(Calibration("m", BOX, structure=STRUCTURE.at({"beam": 30.0, "column": 20.0})), "FXYZ")
     np.testing.assert_array_equal(
-        build(warm, "FXYZ", outside="hold").error(at, tool), edge.error(at, tool)
+        build(warm, "FXYZ", outside="hold").error(points, tool), edge.error(points, tool)
     )
     with pytest.raises(ConfigError, match="no temperature of sensor column"):
         STRUCTURE.at({"beam": 20.0})
-    with pytest.raises(ConfigError, match="spindle is no sensor"):
+    with pytest.raises(ConfigError, match="spindle is not a sensor"):
         STRUCTURE.at({"beam": 20.0, "column": 20.0, "spindle": 20.0})
 
 
@@ -121,13 +121,16 @@ def test_a_log_leads_to_the_temperatures_at_its_end_or_at_a_time() -> None:
 # -- identification ---------------------------------------------------------------------------------------
 
 
-def exact_log(structure: Structure, seed: int, places=(0.0, 500.0, 1500.0, 2000.0), noise: float =
-0.0) -> DriftLog:
+def exact_log(
+    structure: Structure, seed: int, places=(0.0, 500.0, 1500.0, 2000.0), noise: float = 0.0
+) -> DriftLog:
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 6 * 3600.0, 120.0)
     sensors = {
-        s.name: 20.0 + 3.0 * np.sin(time / rng.uniform(2000, 6000)) + 2.0 * np.sin(time / rng.uniform(700,
-        1500)) for s in structure.sensors
+        s.name: 20.0
+        + 3.0 * np.sin(time / rng.uniform(2000, 6000))
+        + 2.0 * np.sin(time / rng.uniform(700, 1500))
+        for s in structure.sensors
     }
     readings = {}
     for component, place in itertools.product(("EXX", "EZX", "EBX"), places):
@@ -149,25 +152,25 @@ def test_a_model_of_the_same_form_is_found_again() -> None:
     assert abs(lags["column"]) < 30.0
     assert fit.removed > 0.99
     assert fit.held_out == "log 2"
-    found = {(d.component, d.sensor): d for d in fit.structure.distortions}
-    assert found["EXX", "beam"].growth == pytest.approx(1e-5, rel=0.02)
-    assert found["EZX", "beam"].bow == pytest.approx(5e-3, rel=0.02)
-    assert found["EBX", "column"].offset == pytest.approx(2e-6, rel=0.02)
-    assert abs(found["EXX", "column"].growth) < 3e-7
+    distortions = {(d.component, d.sensor): d for d in fit.structure.distortions}
+    assert distortions["EXX", "beam"].growth == pytest.approx(1e-5, rel=0.02)
+    assert distortions["EZX", "beam"].bow == pytest.approx(5e-3, rel=0.02)
+    assert distortions["EBX", "column"].offset == pytest.approx(2e-6, rel=0.02)
+    assert abs(distortions["EXX", "column"].growth) < 3e-7
     assert findings(fit) == ()
 
 
 def test_the_stated_uncertainty_is_that_of_repeated_fits() -> None:
     offset = Distortion("EXX", "beam", (0.0, 2000.0), 1e-3)
     steady = Structure((Sensor("beam", 20.0, (0.0, 40.0)),), (offset,))
-    found, sigma = [], []
+    errors, sigma = [], []
     for seed in range(16):
         log = exact_log(steady, seed, noise=1e-3)
         own = {key: value for key, value in log.readings.items() if key[0] == "EXX"}
         fit = identify([DriftLog(log.time_s, log.sensors_degC, own)], BOX, 20.0)
-        found.append(fit.structure.distortions[0].offset - 1e-3)
+        errors.append(fit.structure.distortions[0].offset - 1e-3)
         sigma.append(fit.sigma[0][0])
-    z = np.array(found) / np.array(sigma)
+    z = np.array(errors) / np.array(sigma)
     assert 0.6 < np.sqrt(np.mean(z * z)) < 1.6
 
 
@@ -197,7 +200,7 @@ def test_what_the_logs_do_not_tell_is_refused_or_said() -> None:
     with pytest.raises(CannotCompute, match="column does not change"):
         identify([DriftLog(log.time_s, still, log.readings)], BOX, 20.0)
     assert identify([DriftLog(log.time_s, still, log.readings)], BOX, 20.0, sensors=["beam"]).condition == 1.0
-    with pytest.raises(ConfigError, match="spindle is no sensor"):
+    with pytest.raises(ConfigError, match="spindle is not a sensor"):
         identify([log], BOX, 20.0, sensors=["spindle"])
     few = {k: v for k, v in log.readings.items() if k in {("EXX", 0.0), ("EXX", 500.0), ("EZX", 500.0)}}
     fit = identify([DriftLog(log.time_s, log.sensors_degC, few)], BOX, 20.0)
@@ -276,14 +279,14 @@ PLACES = np.array([0.0, 500.0, 1000.0, 1500.0, 2000.0])
 def written_log(path: Path, seed: int, hours: float, swing: float, power: float, *, readings: bool = True):
     """A day of the judge's machine as its log, drift counted from its first reading, one position a
     minute."""
-    found = drift.day(seed, hours, swing, power)
-    sensors = drift.sensed(found, seed)
-    errors = drift.errors(found.bodies, PLACES)
+    day = drift.day(seed, hours, swing, power)
+    sensors = drift.sensed(day, seed)
+    errors = drift.errors(day.bodies, PLACES)
     rng = np.random.default_rng(seed)
     names = [f"{c}@{x:g}_{'um' if c[1] in 'XYZ' else 'urad'}" for c in errors for x in PLACES]
     header = ["t_s", *(f"{n}_degC" for n in sensors), *(names if readings else [])]
     lines = [",".join(header)]
-    for i, t in enumerate(found.time_s):
+    for i, t in enumerate(day.time_s):
         row = [f"{t:g}", *(f"{v[i]:.3f}" for v in sensors.values())]
         for c, v in errors.items() if readings else ():
             scale, noise = (1e3, 0.5) if c[1] in "XYZ" else (1e6, 1.0)
@@ -292,7 +295,7 @@ def written_log(path: Path, seed: int, hours: float, swing: float, power: float,
                 row.append(f"{value:.3f}" if i % len(PLACES) == k else "")
         lines.append(",".join(row))
     path.write_text("\n".join(lines) + "\n")
-    return found
+    return day
 
 
 def reference() -> list[str]:
@@ -322,25 +325,26 @@ def test_the_drift_of_days_that_were_not_seen_is_removed(tmp_path: Path) -> None
     nominal = points(source.encode())
     before, after = [], []
     for seed in range(11, 17):
-        found = written_log(tmp_path / "today.csv", seed, 7, 2.0, 5.0, readings=False)
-        at = np.random.default_rng(seed).uniform(3600.0, found.time_s[-1])
+        today = written_log(tmp_path / "today.csv", seed, 7, 2.0, 5.0, readings=False)
+        time_s = np.random.default_rng(seed).uniform(3600.0, today.time_s[-1])
         job = path.with_name("job.toml")
         job.write_text(
-            f'schema = "olp-job-1"\n[temperatures_degC]\nsensor_log = "today.csv"\nsensor_log_at_s = '
-            f'{at:.0f}\n'
+            'schema = "olp-job-1"\n[temperatures_degC]\n'
+            f'sensor_log = "today.csv"\nsensor_log_at_s = {time_s:.0f}\n'
         )
         result = olp.correct(source.encode(), path, job, outside_box="hold")
-        bodies = np.array([[np.interp(at, found.time_s, b) for b in found.bodies.T]])
-        for commands, out in ((nominal, before), (points(result.data), after)):
+        bodies = np.array([[np.interp(time_s, today.time_s, b) for b in today.bodies.T]])
+        for commands, deviations in ((nominal, before), (points(result.data), after)):
             error = {c: v[0] for c, v in drift.errors(bodies, commands[:, 0]).items()}
             tip = np.zeros_like(commands)
             tip[:, 0] = error["EXX"] + error["EBX"] * (commands[:, 2] + tool[2])
             tip[:, 2] = error["EZX"] - error["EBX"] * tool[0]
-            out.append(commands + tip - nominal)
-    drifted, left = (np.sqrt((np.concatenate(v) ** 2).sum(axis=1).mean()) for v in (before, after))
-    print(f"drift {1e3 * drifted:.1f} um rms, left {1e3 * left:.2f} um, removed {1 - left / drifted:.1%}")
+            deviations.append(commands + tip - nominal)
+    drifted, residual = (np.sqrt((np.concatenate(v) ** 2).sum(axis=1).mean()) for v in (before, after))
+    removed = 1 - residual / drifted
+    print(f"drift {1e3 * drifted:.1f} um rms, residual {1e3 * residual:.2f} um, removed {removed:.1%}")
     assert drifted > 0.01
-    assert left <= 0.15 * drifted
+    assert residual <= 0.15 * drifted
 
 
 def test_a_job_without_temperatures_is_told_so_and_one_out_of_range_is_refused(tmp_path: Path) -> None:

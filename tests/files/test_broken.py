@@ -464,7 +464,7 @@ def test_what_the_calibration_itself_refuses_names_its_file(tmp_path: Path) -> N
         load_all(tmp_path)
     assert len(caught.value.problems) == 2
     for line, name in zip(str(caught.value).split("\n"), ("EBX", "EXX"), strict=True):
-        assert line.startswith(f"{tmp_path / 'calibration.toml'}: {name} stands in two curves")
+        assert line.startswith(f"{tmp_path / 'calibration.toml'}: {name} is in two curves")
 
 
 def test_a_report_of_very_many_problems_ends(tmp_path: Path) -> None:

@@ -35,12 +35,12 @@ def main() -> int:
         base = retime_fuzz.setup(Path(name))
         for seed in range(options.first, options.first + options.count):
             try:
-                found = retime_fuzz.outcome(seed, base)
-                wrong = found.wrong
-                waypoints += len(found.verdicts) and found.waypoints
-                motion_s += found.duration_s
+                outcome = retime_fuzz.outcome(seed, base)
+                wrong = outcome.wrong
+                waypoints += len(outcome.verdicts) and outcome.waypoints
+                motion_s += outcome.duration_s
                 for key in RATIOS:
-                    most[key] = max(most[key], *(getattr(v, key) for v in found.verdicts), 0.0)
+                    most[key] = max(most[key], *(getattr(v, key) for v in outcome.verdicts), 0.0)
             except Exception:
                 wrong = (traceback.format_exc(limit=-3),)
             if wrong:
@@ -50,7 +50,7 @@ def main() -> int:
                     options.write.mkdir(parents=True, exist_ok=True)
                     (options.write / f"{seed}.ngc").write_bytes(retime_programs.program(seed))
     spent = time.process_time() - begun
-    print(f"{options.count} programs, {waypoints} way-points, {motion_s:.0f} s of motion, {bad} wrong")
+    print(f"{options.count} programs, {waypoints} waypoints, {motion_s:.0f} s of motion, {bad} wrong")
     print(", ".join(f"{key} {value:.9f}" for key, value in most.items()), f"in {spent:.0f} s of CPU")
     return int(bad > 0)
 

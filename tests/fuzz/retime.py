@@ -23,7 +23,7 @@ _RECIPE = Recipe(
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What was planned of one program: way-points, seconds of motion, and the verdict of each stretch."""
+    """What was planned of one program: waypoints, seconds of motion, and the verdict of each stretch."""
 
     waypoints: int
     duration_s: float
@@ -64,10 +64,10 @@ def outcome(seed: int, base: olp.Setup) -> Outcome:
 
 
 def judged(program: bytes | Path, machine: olp.Setup) -> Outcome:
-    found = olp.retime(program, machine)
-    stretches = zip(found.trajectories, found.routes, strict=True)
+    retimed = olp.retime(program, machine)
+    stretches = zip(retimed.trajectories, retimed.routes, strict=True)
     return Outcome(
-        sum(len(route) for route in found.routes),
-        found.duration_s,
+        sum(len(route) for route in retimed.routes),
+        retimed.duration_s,
         tuple(judge(planned.motion, route, planned.limits) for planned, route in stretches),
     )

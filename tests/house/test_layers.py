@@ -52,13 +52,13 @@ def imported(tree: ast.Module) -> Iterator[tuple[int, str]]:
 
 
 def violations(own: str, tree: ast.Module) -> list[str]:
-    found = []
+    forbidden = []
     for line, name in imported(tree):
         other = [*name.split("."), "__init__"][1]
         if other == own or (other in ROW and ROW[other] < ROW[own]):
             continue
-        found.append(f"line {line}: {own} (row {ROW[own]}) imports {name}")
-    return found
+        forbidden.append(f"line {line}: {own} (row {ROW[own]}) imports {name}")
+    return forbidden
 
 
 def test_every_room_is_in_the_list_and_nothing_lies_loose() -> None:

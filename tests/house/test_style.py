@@ -32,7 +32,7 @@ def broken_strings(source: str) -> Iterator[int]:
     """Lines of a piece of a sentence that a formatter left with a word or two."""
     held: tokenize.TokenInfo | None = None
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type == tokenize.STRING:
+        if token.type == tokenize.STRING and "r" not in token.string.split(token.string[-1])[0].lower():
             if held is not None and held.start[0] != token.start[0]:
                 text = held.string.strip("rbfRBF\"'")
                 if len(text.split()) < LEAST_WORDS and not text.endswith(("\\n", "}")) and " " in text:

@@ -18,8 +18,9 @@ def elastic_line(
 ) -> tuple[np.ndarray, float]:
     """(nodes + 1,) deflection in mm along the load, and the step in mm; a cantilever is loaded at its end."""
     h, size = length_mm / nodes, nodes + 5
-    matrix = lil_array(diags_array([1.0, -4.0, 6.0, -4.0, 1.0], offsets=[-2, -1, 0, 1, 2], shape=(size,
-    size)))
+    matrix = lil_array(
+        diags_array([1.0, -4.0, 6.0, -4.0, 1.0], offsets=[-2, -1, 0, 1, 2], shape=(size, size))
+    )
     right = np.zeros(size)
     simple, flat = (1.0, -2.0, 1.0), (-1.0, 0.0, 1.0)
 

@@ -54,13 +54,13 @@ def driver() -> Iterator[Any]:
 @contextmanager
 def launched(play: Any, *arguments: str) -> Iterator[Any]:
     """A browser without a window; `arguments` are added to its command line."""
-    found = play.chromium.launch(
+    browser = play.chromium.launch(
         executable_path=executable(), args=["--no-sandbox", "--disable-dev-shm-usage", *arguments]
     )
     try:
-        yield found
+        yield browser
     finally:
-        found.close()
+        browser.close()
 
 
 @contextmanager

@@ -13,7 +13,12 @@ from pathlib import Path
 
 COLUMNS = 20
 MM = 25.4
-RAPID, FEED, ARC, PROBE, DWELL = range(5)
+#: Kinds of rows, as in `linuxcnc`.
+RAPID = 0
+FEED = 1
+ARC = 2
+PROBE = 3
+DWELL = 4
 
 
 def prepare_tools(table):
@@ -46,7 +51,7 @@ class Canon:
         self.line, self.tool, self.plane, self.feed, self.index = 0, -1, 1, 0.0, 1
         self.g5x, self.g92, self.length = [0.0] * 3, [0.0] * 3, [0.0] * 3
         self.cos, self.sin = 1.0, 0.0
-        self.at = [0.0] * 3
+        self.position = [0.0] * 3
         self.messages = []
 
     def __getattr__(self, name):
@@ -107,7 +112,7 @@ class Canon:
         return [MM * (x + self.g5x[0]), MM * (y + self.g5x[1]), MM * (z + self.g5x[2])]
 
     def row(self, kind, tip, centre=(0.0, 0.0, 0.0), turns=0, extra=0.0):
-        self.at = tip
+        self.position = tip
         length = [MM * value for value in self.length]
         self.data.extend([float(self.line), float(kind), *tip, *length, float(self.tool), float(self.index)])
         self.data.extend([MM * self.feed, *centre, float(turns), float(self.plane), extra])
@@ -123,12 +128,12 @@ class Canon:
         self.row(PROBE, self.absolute(x, y, z))
 
     def rigid_tap(self, x, y, z, *_):
-        back = self.at
+        back = self.position
         self.row(FEED, self.absolute(x, y, z))
         self.row(FEED, back)
 
     def dwell(self, seconds):
-        self.row(DWELL, self.at, extra=seconds)
+        self.row(DWELL, self.position, extra=seconds)
 
     def arc_feed(self, first, second, centre_1, centre_2, turns, third, *_):
         order = {1: (0, 1, 2), 2: (2, 0, 1), 3: (1, 2, 0)}[self.plane]
@@ -138,14 +143,14 @@ class Canon:
 
 
 def main():
-    program, table, variables, out, initcode, unitcode = sys.argv[1:7]
+    program, table, variables, output, initcode, unitcode = sys.argv[1:7]
     keep = prepare_tools(table)  # the library reads this block for as long as the interpreter runs
     import gcode
 
     canon = Canon(read_tools(table))
     canon.parameter_file = variables
     result, line = gcode.parse(program, canon, unitcode, initcode)
-    Path(out).write_bytes(canon.data.tobytes())
+    Path(output).write_bytes(canon.data.tobytes())
     failed = result > gcode.MIN_ERROR
     report = {
         "error": gcode.strerror(result) if failed else None,

@@ -36,7 +36,7 @@ def numbers(text: str) -> list[float]:
 
 def joined(data: bytes) -> list[tuple[int, str]]:
     """(line, statement) with comments cut off and lines joined."""
-    out: list[tuple[int, str]] = []
+    statements: list[tuple[int, str]] = []
     pending, first, comment = "", 0, False
     for number, raw in enumerate(data.decode("latin-1").replace("\r", "").split("\n"), 1):
         text = raw
@@ -44,16 +44,16 @@ def joined(data: bytes) -> list[tuple[int, str]]:
             comment = (comment or "$$->" in text[:8]) and text.rstrip().endswith("$")
             continue
         if not pending and text.strip().upper().startswith(TEXT):
-            out.append((number, text.strip().upper()))
+            statements.append((number, text.strip().upper()))
             continue
         text = re.sub(r"\$\$.*", "", text)
         first = first if pending else number
         if text.rstrip().endswith("$"):
             pending += text.rstrip()[:-1]
             continue
-        out.append((first, (pending + text).strip().upper()))
+        statements.append((first, (pending + text).strip().upper()))
         pending = ""
-    return [(line, text) for line, text in out if text]
+    return [(line, text) for line, text in statements if text]
 
 
 @dataclass
@@ -103,12 +103,12 @@ def read_apt(
 ) -> Moves:
     """`tools`: lengths by number, which count once loaded; `tool`: in the spindle at the start, its length
     not active. The second coordinate system of the program is the frame CSYS2, and so on."""
-    out = Moves()
+    moves = Moves()
     unit, rapid, system, systems = 1.0, False, "", [""]
     here, length, aim = np.full(3, np.nan), np.zeros(3), np.array([0.0, 0.0, 1.0])
     tall = tools.get(tool, 0.0)
     arc: tuple[np.ndarray, np.ndarray, int] | None = None
-    way, size = None, 0.0
+    direction, size = None, 0.0
     for line, text in joined(data):
         major = text.partition("/")[0].strip()
         value = numbers(text.partition("/")[2]) if not text.startswith(TEXT) else []
@@ -131,7 +131,7 @@ def read_apt(
                 centre, normal, turns = arc
                 k = int(np.abs(normal).argmax())
                 sign = 1 if normal[k] > 0 else -1
-                out.add(
+                moves.add(
                     line,
                     ARC,
                     here,
@@ -143,24 +143,24 @@ def read_apt(
                     AXIS_OF_PLANE[k],
                 )
             else:
-                out.add(line, RAPID if rapid else FEED, here, length, tool, tool_vector)
+                moves.add(line, RAPID if rapid else FEED, here, length, tool, tool_vector)
             rapid, arc = False, None
         elif major in ("CIRCLE", "MOVARC"):
             times = re.search(r"TIMES\s*,\s*(\d+)", text)
             arc = (at(frame, value[:3], unit, np.zeros(3)), rotation @ np.array(value[3:6]),
                    int(times[1]) if times else 1)  # fmt: skip
         elif major == "INDIRV":
-            way = rotation @ np.array(value)
+            direction = rotation @ np.array(value)
         elif major == "TLON,GOFWD":
             circle = numbers(re.search(r"\((?:CIRCLE|CYLNDR)/([^)]*)\)", text)[1])  # type: ignore[index]
             straight = numbers(re.search(r"\(LINE/([^)]*)\)", text)[1])  # type: ignore[index]
             normal = rotation @ np.array(circle[3:6] if len(circle) == 7 else (0.0, 0.0, 1.0))
             k = int(np.abs(normal).argmax())
             centre = at(frame, circle[:3], unit, length)
-            sense = np.cross(here - centre, way)[k]
+            turn = np.cross(here - centre, direction)[k]
             here = at(frame, straight[3:], unit, length)
-            turns = 1 if sense > 0 else -1
-            out.add(line, ARC, here, length, tool, -tall * aim, centre, turns, AXIS_OF_PLANE[k])
+            turns = 1 if turn > 0 else -1
+            moves.add(line, ARC, here, length, tool, -tall * aim, centre, turns, AXIS_OF_PLANE[k])
         elif major in ("LOADTL", "LOAD"):
             tool, size = int(value[0]), 1.0
             tall = tools[tool]
@@ -169,7 +169,7 @@ def read_apt(
         elif major in ("CSYS", "MSYS"):
             same = ([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0], [0, 0, 0, 1, 0, 0, 0, 1, 0])
             key = "" if value in same else repr(value)
-            if not out.line and key:
+            if not moves.line and key:
                 systems[0] = key
             system = key
             if key not in systems:
@@ -178,4 +178,4 @@ def read_apt(
             break
         elif not QUIET.match(text):
             raise KeyError(f"line {line}: {text}")
-    return out
+    return moves

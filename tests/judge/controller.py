@@ -17,9 +17,12 @@ import numpy as np
 from judge.linuxcnc import SYSTEM_PYTHON, _parameters, _setup
 
 PERIOD_NS = 1_000_000
-SPEED_MM_S, ACCELERATION_MM_S2 = 500.0, 2000.0
+SPEED_MM_S = 500.0
+ACCELERATION_MM_S2 = 2000.0
 #: kinds of motion as the planner names them
-TRAVERSE, FEED, ARC = 1, 2, 3
+TRAVERSE = 1
+FEED = 2
+ARC = 3
 #: starts that are tried: on a busy machine modules fail to load or come late, before the program is looked at
 _STARTS = 3
 _LATE = re.compile("not within .* s: (machine on|homed|started)")
@@ -41,7 +44,7 @@ _NETS = {
 @dataclass(frozen=True, slots=True)
 class Run:
     """Commanded axis positions (n, 3) in mm, one row a servo cycle, and the kind of motion (n,); `motor`
-    (n, 3) is what the drives are told, tables of the control included."""
+    (n, 3) are the commands to the drives, tables of the control included."""
 
     axis: np.ndarray
     kind: np.ndarray
@@ -49,7 +52,7 @@ class Run:
 
     @property
     def cutting(self) -> np.ndarray:
-        """Cycles on a feed move, its first and last one left out: the kind may be told a cycle late."""
+        """Cycles on a feed move without its first and last one: the kind may be reported a cycle late."""
         now = (self.kind == FEED) | (self.kind == ARC)
         return now & np.roll(now, 1) & np.roll(now, -1)
 
@@ -82,7 +85,7 @@ def run(
     if os.getuid() == 0:  # the realtime part refuses to be root
         env |= {"RTAPI_UID": "65534", "RTAPI_FIFO_PATH": str(folder / ".rtapi_fifo")}
     lock = Path(tempfile.gettempdir()) / "judge-controller.lock"
-    said = folder / "driver.log"
+    driver_log = folder / "driver.log"
     with lock.open("wb") as one, (folder / "log").open("wb") as log:
         # its realtime part is one a machine: other processes of the tests wait
         fcntl.flock(one, fcntl.LOCK_EX)
@@ -97,11 +100,11 @@ def run(
                 )  # fmt: skip
             finally:
                 _end_realtime(folder)
-            if said.exists() and not _LATE.search(said.read_text()):
+            if driver_log.exists() and not _LATE.search(driver_log.read_text()):
                 break
-    if not said.exists() or said.read_text() != "ended\n":
+    if not driver_log.exists() or driver_log.read_text() != "ended\n":
         debug = folder / "linuxcnc_debug.txt"
-        texts = [p.read_text(errors="replace")[-2000:] for p in (said, debug) if p.exists()]
+        texts = [p.read_text(errors="replace")[-2000:] for p in (driver_log, debug) if p.exists()]
         detail = texts[0] if texts else "it did not start"
         raise RuntimeError(f"the control did not run the program to its end: {detail}")
     rows = np.loadtxt(folder / "samples", comments=None, usecols=range(1, 8))

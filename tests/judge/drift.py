@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 ALPHA = 11.5e-6  # 1/K, steel
-LENGTH, HEIGHT = 2000.0, 300.0
+LENGTH = 2000.0  # mm
+HEIGHT = 300.0  # mm
 BODIES = ("base", "top", "bottom", "column")
 STEP_S = 5.0
 REFERENCE = 20.0
@@ -41,15 +42,15 @@ def day(seed: int, hours: float, swing: float, power: float) -> Day:
     lag = np.array([9000.0, 2400.0, 4200.0, 5400.0])  # s, to the room
     heat = np.array([0.0, 1.0, 0.35, 0.15]) / 2400.0  # K/s per unit of power
     state = np.full(4, REFERENCE)
-    out = np.empty((count + 1, 4))
+    temperatures = np.empty((count + 1, 4))
     for i in range(count + 1):
-        out[i] = state
+        temperatures[i] = state
         flow = (room[i] - state) / lag + heat * runs[i]
         flow[1] += (state[2] - state[1]) / 6000.0
         flow[2] += (state[1] - state[2]) / 6000.0
         state = state + STEP_S * flow
     every = int(60 / STEP_S)
-    return Day(t[::every], out[::every], room[::every])
+    return Day(t[::every], temperatures[::every], room[::every])
 
 
 def errors(bodies: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
@@ -70,18 +71,18 @@ def errors(bodies: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def sensed(found: Day, seed: int) -> dict[str, np.ndarray]:
+def sensed(day: Day, seed: int) -> dict[str, np.ndarray]:
     """What the sensors say: each a lag behind its body of minutes, an offset of tenths, noise of 0.05 K."""
     rng = np.random.default_rng(seed + 1000)
     lags = np.array([600.0, 240.0, 300.0, 420.0])
-    offset = np.random.default_rng(99).normal(0.0, 0.1, 4)  # the sensors stay the same
-    out = {}
-    step = float(found.time_s[1] - found.time_s[0])
+    offset = np.random.default_rng(99).normal(0.0, 0.1, 4)  # the sensors are the same
+    sensors = {}
+    step = float(day.time_s[1] - day.time_s[0])
     for i, name in enumerate(BODIES):
-        value = found.bodies[0, i]
+        value = day.bodies[0, i]
         seen = []
-        for body in found.bodies[:, i]:
+        for body in day.bodies[:, i]:
             value += (body - value) * (1.0 - np.exp(-step / lags[i]))
             seen.append(value)
-        out[name] = np.array(seen) + offset[i] + rng.normal(0.0, 0.05, len(seen))
-    return out
+        sensors[name] = np.array(seen) + offset[i] + rng.normal(0.0, 0.05, len(seen))
+    return sensors

@@ -1,7 +1,7 @@
-"""Whether a motion follows a polyline: passes every way-point in order, near enough, and never turns back.
+"""Whether a motion follows a polyline: passes every waypoint in order, near enough, and never turns back.
 
-The way-points are found by brute force over all chords of the sampled motion: a way-point can be passed on a
-chord if one on which the way-point before can be passed comes no later, and all places between are near the
+The waypoints are found by brute force over all chords of the sampled motion: a waypoint can be passed on a
+chord if one on which the waypoint before can be passed comes no later, and all places between are near the
 segment that joins the two. That is the free space in which the distance of two curves after Frechet is
 decided (H. Alt, M. Godau, 1995), so a spike that is left out, a loop, or a step back are seen.
 """
@@ -14,22 +14,28 @@ import numpy as np
 
 from judge.polynomials import Pieces
 
-#: mm, below which places are one; shares of a tolerance that count as rounding, and that chords may take
-NEAR_MM, ROUNDING, CHORD = 2e-9, 1e-6, 5e-3
+#: mm, below which positions are one
+NEAR_MM = 2e-9
+#: share of a tolerance that counts as rounding
+ROUNDING = 1e-6
+#: share of a tolerance that chords may take
+CHORD = 5e-3
 #: mm, of segments that a planner may take as one with the next
 SHORT_MM = 1e-3
-#: mm, so near a segment that a place is on it
-ON_MM, BESIDE_MM = 1e-9, 1e-7
+#: mm, so near a segment that a position is on it
+ON_MM = 1e-9
+#: mm, farther from a segment a position is beside it
+BESIDE_MM = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
-    """Samples of a motion in order: `piece`, `u` after its start (m,), `at` (m, 3); `bulge` (m - 1,) how far
-    the motion leaves the chord between two."""
+    """Samples of a motion in order: `piece`, `u` after its start (m,), `position_mm` (m, 3); `bulge` (m - 1,)
+    how far the motion leaves the chord between two."""
 
     piece: np.ndarray
     u: np.ndarray
-    at: np.ndarray
+    position_mm: np.ndarray
     bulge: np.ndarray
 
 
@@ -61,11 +67,11 @@ def places(pieces: Pieces, tolerance_mm: float) -> Places:
     step = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
     u = step / count[piece] * pieces.lasts_s[piece]
     piece, u = np.append(piece, len(pieces) - 1), np.append(u, pieces.lasts_s[-1])
-    at = pieces.at(piece, u)
+    position_mm = pieces.at(piece, u)
     middle = pieces.at(piece[:-1], u[:-1] + pieces.lasts_s[piece[:-1]] / count[piece[:-1]] / 2)
-    off = middle - (at[1:] + at[:-1]) / 2
+    off = middle - (position_mm[1:] + position_mm[:-1]) / 2
     bulge = np.where(pieces.bent[piece[:-1]], 4 / 3 * np.sqrt((off * off).sum(axis=1)), 0.0)
-    return Places(piece, u, at, bulge)
+    return Places(piece, u, position_mm, bulge)
 
 
 def _apart(point: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -84,31 +90,33 @@ def allowed(tolerance_mm: np.ndarray) -> np.ndarray:
 
 
 def passages(point: np.ndarray, tolerance_mm: np.ndarray, path: Places) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) the first and the last chord on which each way-point can be passed. AssertionError where there is
+    """(n,) the first and the last chord on which each waypoint can be passed. AssertionError where there is
     none."""
     chords = len(path.bulge)
     wide = allowed(tolerance_mm) * (1 + ROUNDING) + NEAR_MM
     near = tolerance_mm * (1 + ROUNDING) + NEAR_MM
     first, last = np.zeros(len(point), np.int64), np.zeros(len(point), np.int64)
     before = np.zeros(1, np.int64)
-    assert np.sqrt(((path.at[0] - point[0]) ** 2).sum()) <= near[0], "the motion does not begin at its route"
+    begin = np.sqrt(((path.position_mm[0] - point[0]) ** 2).sum())
+    assert begin <= near[0], "the motion does not begin at its route"
     for k in range(1, len(point)):
         lo, size = int(before[0]), max(2 * int(before[-1] - before[0]) + 2, 32)
         while True:
             hi = min(lo + size, chords)
-            inside = _apart(path.at[lo + 1 : hi], point[k - 1], point[k]) <= wide[k - 1]
+            inside = _apart(path.position_mm[lo + 1 : hi], point[k - 1], point[k]) <= wide[k - 1]
             if hi == chords or (hi > before[-1] + 1 and not inside[int(before[-1]) - lo :].all()):
                 break
             size *= 4
         chord = np.arange(lo, hi)
-        # the last sample outside the segment's reach, and the last chord of the way-point before
+        # the last sample outside the segment's reach, and the last chord of the waypoint before
         barred = np.concatenate(([lo], np.where(inside, lo, chord[1:])))
         came = np.full(hi - lo, -1)
         came[before - lo] = before
         reached = np.maximum.accumulate(came) >= np.maximum.accumulate(barred)
-        passed = _apart(point[k], path.at[lo:hi], path.at[lo + 1 : hi + 1]) <= near[k] + path.bulge[lo:hi]
+        ends = path.position_mm[lo:hi], path.position_mm[lo + 1 : hi + 1]
+        passed = _apart(point[k], *ends) <= near[k] + path.bulge[lo:hi]
         before = chord[reached & passed]
-        assert len(before), f"way-point {k} at {point[k].tolist()} is not passed"
+        assert len(before), f"waypoint {k} at {point[k].tolist()} is not passed"
         first[k], last[k] = before[0], before[-1]
     assert last[-1] == chords - 1, "the motion does not end at its route"
     return first, np.minimum.accumulate(last[::-1])[::-1]
@@ -118,7 +126,7 @@ def follow(route, pieces: Pieces, path: Places) -> Followed:
     """Match samples to the segments of a route. AssertionError where the motion does not follow it."""
     point, tolerance = np.asarray(route.point_mm), _tolerances(route)
     begin, end = passages(point, tolerance, path)
-    count = len(path.at)
+    count = len(path.position_mm)
     chord = np.minimum(np.arange(count), count - 2)
     # a sample is the end of one chord and the start of the next
     low = np.clip(np.searchsorted(end[1:], np.maximum(chord - 1, 0), side="left"), 0, len(point) - 2)
@@ -131,16 +139,16 @@ def follow(route, pieces: Pieces, path: Places) -> Followed:
     unit = way / np.maximum(length, 1e-300)[:, None]
     used, away = np.full(count, np.inf), np.full(count, np.inf)
     for rows, k in _pairs(low, high):
-        d = _apart(path.at[rows], point[k], point[k + 1])
+        d = _apart(path.position_mm[rows], point[k], point[k + 1])
         away[rows] = np.minimum(away[rows], d)
         used[rows] = np.minimum(used[rows], (d - NEAR_MM) / np.maximum(bound[k], 1e-12))
     feed, forward = np.zeros(count), np.full(count, -np.inf)
-    # rounding spreads a corner over its neighbours; a straight way knows its direction
+    # rounding spreads a corner over its neighbours; a straight segment has one direction
     beside = np.where(pieces.bent[path.piece], 2, 0)
     for rows, k in _pairs(np.maximum(low - beside, 0), np.minimum(high + beside, len(way) - 1)):
         forward[rows] = np.maximum(forward[rows], (velocity[rows] * unit[k]).sum(axis=1))
     for rows, k in _pairs(low, high):
-        d = _apart(path.at[rows], point[k], point[k + 1])
+        d = _apart(path.position_mm[rows], point[k], point[k + 1])
         free = d <= bound[k] * (1 + ROUNDING) + NEAR_MM
         # on the polyline itself there is no doubt about the segment
         on = away[rows] <= ON_MM

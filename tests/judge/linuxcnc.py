@@ -18,7 +18,12 @@ import numpy as np
 SYSTEM_PYTHON = "/usr/bin/python3"
 DRIVER = Path(__file__).with_name("canon_driver.py")
 FRAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-RAPID, FEED, ARC, PROBE, DWELL = range(5)
+#: Kinds of rows of `canon_driver`.
+RAPID = 0
+FEED = 1
+ARC = 2
+PROBE = 3
+DWELL = 4
 KINDS = ("rapid", "feed", "arc", "probe", "dwell")
 NO_END = "File ended with no percent sign or program end"
 COLUMNS = 20
@@ -119,7 +124,7 @@ def interpret(
 ) -> CanonMoves:
     """Canonical moves of a program with the offsets and tools of a machine folder; arguments override it.
 
-    With `find_known` the start counts as unknown, and a second run from elsewhere tells which axis positions
+    With `find_known` the start counts as unknown, and a second run from elsewhere shows which axis positions
     depend on it; without, the machine really stands at `start_mm` and all is known.
 
     Raises InterpreterError where LinuxCNC refuses; a missing program end alone is let pass (`ended`).

@@ -148,8 +148,8 @@ def random_machine(folder: Path, seed: int, recipe: Recipe | None = None) -> Pat
         for error in "XYZABC" if recipe.angular else "XYZ":
             waves, phase = rng.uniform(0.1, recipe.waves, 3), rng.uniform(0, 2 * np.pi, 3)
             weight = rng.normal(size=3) * (15.0 if error in "XYZ" else 25.0)
-            at = (np.append(q, datum[axis]) - low[axis]) / (high[axis] - low[axis])
-            values = np.sin(2 * np.pi * waves * at[:, None] + phase) @ weight
+            share = (np.append(q, datum[axis]) - low[axis]) / (high[axis] - low[axis])
+            values = np.sin(2 * np.pi * waves * share[:, None] + phase) @ weight
             columns[f"E{error}{letter}_{'um' if error in 'XYZ' else 'urad'}"] = values[:-1] - values[-1]
         direction = None
         if letter in recipe.directed:

@@ -42,11 +42,11 @@ def _rotation(angles: np.ndarray) -> np.ndarray:
 
 
 def _homogeneous(rotation: np.ndarray | None, shift: np.ndarray) -> np.ndarray:
-    out = np.tile(np.eye(4), (len(shift), 1, 1))
+    matrices = np.tile(np.eye(4), (len(shift), 1, 1))
     if rotation is not None:
-        out[:, :3, :3] = rotation
-    out[:, :3, 3] = shift
-    return out
+        matrices[:, :3, :3] = rotation
+    matrices[:, :3, 3] = shift
+    return matrices
 
 
 @dataclass(frozen=True)
@@ -243,24 +243,24 @@ class JudgeModel:
     def error_mm(self, axis_mm: np.ndarray, tool_mm: Any, play: np.ndarray | None = None) -> np.ndarray:
         """(n, 3) error at axis positions (n, 3), tool vectors (3,) or (n, 3), play (n, 3) in [-1, 1].
 
-        `play` is +1 where the axis last moved in + and has taken up its lost motion; without it the mean
+        `play` is +1 where the axis last moved in + and has taken up its backlash; without it the mean
         of both directions holds. Outside the box the model is evaluated at the box face.
         """
         points = np.atleast_2d(np.asarray(axis_mm, float))
         tools = np.broadcast_to(np.asarray(tool_mm, float), points.shape)
         states = np.zeros(points.shape) if play is None else np.broadcast_to(play, points.shape)
-        out = np.zeros(points.shape)
+        error = np.zeros(points.shape)
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
             held = np.clip(points[part], self.box[:, 0], self.box[:, 1])
-            out[part] = (
+            error[part] = (
                 self._first_order(held, states[part])
                 if self.first_order
                 else self._exact(held, tools[part], states[part])
             )
             for described in self.maps:
-                out[part] += described(held)
-        return out
+                error[part] += described(held)
+        return error
 
     def inside(self, axis_mm: np.ndarray) -> np.ndarray:
         """(n,) True in the calibrated box."""
@@ -370,7 +370,7 @@ class JudgeModel:
             total += shift + tool_vector + np.cross(angle, reach) + self._tilt(axis, own)
         return total
 
-    # -- lost motion -------------------------------------------------------------------------------
+    # -- backlash ----------------------------------------------------------------------------------
 
     @property
     def has_play(self) -> np.ndarray:
@@ -390,7 +390,7 @@ class JudgeModel:
         return states, known
 
     def backlash_at(self, axis: int, q: np.ndarray) -> np.ndarray:
-        """(n,) lost motion b of one axis: error moving in - less error moving in +."""
+        """(n,) backlash b of one axis: error moving in - less error moving in +."""
         total = np.full(len(q), self.backlash_mm[axis])
         for curve in self.curves:
             name = f"E{AXES[axis]}{AXES[axis]}"
@@ -434,19 +434,19 @@ class JudgeModel:
         return np.array([entry.get(f"{a}_mm", 0.0) for a in AXES], float)
 
     def zero_shift(self, work_offset: str) -> np.ndarray:
-        """(3,) target - nominal for a work offset: where its zero was touched off on the raw machine."""
+        """(3,) target - nominal for a work offset: its zero was touched off on the uncompensated machine."""
         entry = self.machine.get("work_offsets", {}).get(work_offset, {})
         if not entry or entry.get("set_by", "touch") == "true":
             return np.zeros(3)
         tool = entry.get("touch_tool")
         default = np.array([entry.get(f"{a}_mm", 0.0) for a in AXES]) + self.length_mm(tool)
-        at = _position(entry.get("touched_at_mm", {}), default)
-        return np.asarray(self.error_mm(at[None], self.tool_vector_mm(tool))[0])
+        position = _position(entry.get("touched_at_mm", {}), default)
+        return np.asarray(self.error_mm(position[None], self.tool_vector_mm(tool))[0])
 
     def tool_shift(self, tool: int | None) -> np.ndarray:
-        """(3,) the same for an active tool length that was set on the raw machine."""
+        """(3,) the same for an active tool length that was set on the uncompensated machine."""
         entry = self.machine.get("tools", {}).get(str(tool), {})
         if entry.get("set_by", "true") == "true":
             return np.zeros(3)
-        at = _position(entry["touched_at_mm"], np.zeros(3))
-        return np.asarray(self.error_mm(at[None], self.tool_vector_mm(tool))[0])
+        position = _position(entry["touched_at_mm"], np.zeros(3))
+        return np.asarray(self.error_mm(position[None], self.tool_vector_mm(tool))[0])

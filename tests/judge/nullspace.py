@@ -15,7 +15,8 @@ import numpy as np
 from judge.simulated import AXES, BOX, NAMES, Machine
 
 SQUARE = ("C0Y", "B0Z", "A0Z")
-_DEGREES, _OPEN = 4, 1e-6
+_DEGREES = 4
+_OPEN = 1e-6
 Reading = Callable[[Machine], np.ndarray]
 
 
@@ -37,20 +38,20 @@ def _polynomial(name: str, degree: int) -> Callable[[np.ndarray], np.ndarray]:
 def columns(chain: str, reading: Reading) -> tuple[np.ndarray, list[str]]:
     """(n, p) what one micrometre or microradian of each unknown does to the readings, and their names."""
     start = reading(blank(chain))
-    found, names = [], []
+    changes, names = [], []
     for name in NAMES:
         straight = name[1] in AXES and name[1] != name[2]
         for degree in range(2 if straight else 1, _DEGREES + 1 + straight):
             machine = blank(chain)
             machine.curves[name] = _polynomial(name, degree)
-            found.append(reading(machine) - start)
+            changes.append(reading(machine) - start)
             names.append(name)
     for name in SQUARE:
         machine = blank(chain)
         machine.square[name] = 1e-6
-        found.append(reading(machine) - start)
+        changes.append(reading(machine) - start)
         names.append(name)
-    return np.stack(found, axis=1), names
+    return np.stack(changes, axis=1), names
 
 
 def open_changes(table: np.ndarray, nuisances: np.ndarray) -> np.ndarray:
@@ -66,17 +67,17 @@ def open_changes(table: np.ndarray, nuisances: np.ndarray) -> np.ndarray:
 
 
 def open_names(changes: np.ndarray, names: list[str]) -> set[str]:
-    """Unknowns of which every part may change unseen."""
+    """Unknowns of which no part is observable."""
     if not len(changes):
         return set()
-    found = set()
+    opened = set()
     for name in dict.fromkeys(names):
         own = np.array([n == name for n in names])
         rest = changes[:, own] / np.abs(changes).max()
         size = np.linalg.svd(rest, compute_uv=False)
         if (size > 1e-4).sum() == own.sum():
-            found.add(name)
-    return found
+            opened.add(name)
+    return opened
 
 
 def frame(places: np.ndarray) -> np.ndarray:

@@ -57,34 +57,34 @@ class _Curves:
         return cls(begin, end, arc, axes, centre, radius, start, sweep)
 
     def lengths(self) -> np.ndarray:
-        out = np.linalg.norm(self.end - self.begin, axis=1)
+        lengths = np.linalg.norm(self.end - self.begin, axis=1)
         rows = np.flatnonzero(self.arc >= 0)
         rise = (self.end - self.begin)[rows, self.axes[:, 2]]
-        out[rows] = np.hypot(np.abs(self.sweep) * self.radius.mean(axis=1), rise)
-        return np.asarray(out)
+        lengths[rows] = np.hypot(np.abs(self.sweep) * self.radius.mean(axis=1), rise)
+        return np.asarray(lengths)
 
     def at(self, move: np.ndarray, fraction: np.ndarray) -> np.ndarray:
         """(m, 3) points of moves at fractions; unequal radii make a spiral, as the control runs it."""
         t = fraction[:, None]
-        out = (1.0 - t) * self.begin[move] + t * self.end[move]
+        points = (1.0 - t) * self.begin[move] + t * self.end[move]
         on_arc = np.flatnonzero(self.arc[move] >= 0)
         a, s = self.arc[move[on_arc]], fraction[on_arc]
         radius = self.radius[a, 0] + s * (self.radius[a, 1] - self.radius[a, 0])
         angle = self.angle[a] + s * self.sweep[a]
-        out[on_arc, self.axes[a, 0]] = self.centre[a, 0] + radius * np.cos(angle)
-        out[on_arc, self.axes[a, 1]] = self.centre[a, 1] + radius * np.sin(angle)
-        return np.asarray(out)
+        points[on_arc, self.axes[a, 0]] = self.centre[a, 0] + radius * np.cos(angle)
+        points[on_arc, self.axes[a, 1]] = self.centre[a, 1] + radius * np.sin(angle)
+        return np.asarray(points)
 
     def nearest(self, move: np.ndarray, points: np.ndarray) -> np.ndarray:
         """(m,) fraction of the own move nearest to each point."""
         along = self.end[move] - self.begin[move]
         square = np.einsum("ij,ij->i", along, along)
         dot = np.einsum("ij,ij->i", points - self.begin[move], along)
-        out = np.clip(np.divide(dot, square, out=np.ones(len(move)), where=square > 0), 0.0, 1.0)
+        share = np.clip(np.divide(dot, square, out=np.ones(len(move)), where=square > 0), 0.0, 1.0)
         rows = np.flatnonzero(self.arc[move] >= 0)
         if len(rows):
-            out[rows] = self._nearest_on_arc(move[rows], points[rows])
-        return np.asarray(out)
+            share[rows] = self._nearest_on_arc(move[rows], points[rows])
+        return np.asarray(share)
 
     def _nearest_on_arc(self, move: np.ndarray, points: np.ndarray) -> np.ndarray:
         a = self.arc[move]
@@ -140,12 +140,12 @@ class ActualPath:
 
     dense: DensePath
     points: np.ndarray
-    sure: np.ndarray  # (m,) position and lost motion are determined
+    determined: np.ndarray  # (m,) position and backlash are determined
     inside: np.ndarray  # (m,) command in the calibrated box
 
 
 def actual(moves: CanonMoves, model: JudgeModel, spacing_mm: float = 1.0, *, least: int = 4) -> ActualPath:
-    """The path the machine really takes: error with the lever of the tool in the spindle and with play."""
+    """The path the machine really takes: error with the tool vector of the tool in the spindle and play."""
     dense = densify(moves, spacing_mm, least)
     known = dense.moves.known
     before = np.vstack([np.full((1, 3), moves.start_known), known[:-1]])
@@ -157,33 +157,33 @@ def actual(moves: CanonMoves, model: JudgeModel, spacing_mm: float = 1.0, *, lea
         column[:, axis] = dense.points[rows, axis]
         taken_up[:, axis] = False
         if len(rows):
-            states, sure = model.play(column)
-            play[rows, axis], taken_up[rows, axis] = states[:, axis], sure[:, axis]
+            states, determined = model.play(column)
+            play[rows, axis], taken_up[rows, axis] = states[:, axis], determined[:, axis]
     points = dense.points + model.error_mm(dense.points, tool_vectors(dense.moves, model)[dense.move], play)
-    sure = settled.all(axis=1) & taken_up.all(axis=1)
-    return ActualPath(dense, points, sure, model.inside(dense.points))
+    determined = settled.all(axis=1) & taken_up.all(axis=1)
+    return ActualPath(dense, points, determined, model.inside(dense.points))
 
 
 def tool_vectors(moves: CanonMoves, model: JudgeModel) -> np.ndarray:
     """(n, 3) tool vector of each move."""
-    out = np.zeros((len(moves), 3))
+    vectors = np.zeros((len(moves), 3))
     for tool in np.unique(moves.tool):
-        out[moves.tool == tool] = model.tool_vector_mm(int(tool)) if tool > 0 else 0.0
-    return out
+        vectors[moves.tool == tool] = model.tool_vector_mm(int(tool)) if tool > 0 else 0.0
+    return vectors
 
 
 def shifts(moves: CanonMoves, model: JudgeModel, by_frame: Mapping[str, Any] | None = None) -> np.ndarray:
     """(n, 3) target - nominal of each move from zero setting; `by_frame` overrides the machine file's."""
-    out = np.zeros((len(moves), 3))
+    shifts = np.zeros((len(moves), 3))
     for frame in np.unique(moves.frame):
         name = FRAMES[frame]
         shift = by_frame[name] if by_frame is not None and name in by_frame else model.zero_shift(name)
-        out[moves.frame == frame] = shift
+        shifts[moves.frame == frame] = shift
     for tool in np.unique(moves.tool):
         active = (moves.tool == tool) & (moves.length != 0).any(axis=1)
         if active.any() and tool > 0:
-            out[active] += model.tool_shift(int(tool))
-    return out
+            shifts[active] += model.tool_shift(int(tool))
+    return shifts
 
 
 def match(ends: np.ndarray, vertices: np.ndarray) -> np.ndarray:
@@ -211,16 +211,16 @@ def match(ends: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         new = np.ones(width, bool)
         new[1:] = total[1:] < earlier[:-1]
         fresh[i] = np.packbits(new, bitorder="little")
-    out = np.zeros(n, int)
+    matches = np.zeros(n, int)
     column = m - n + before
     for i in range(n - 1, -1, -1):
-        out[i] = i - before + column
+        matches[i] = i - before + column
         if i and shared[i, column >> 3] >> (column & 7) & 1:
             column += 1
         elif i:
             bits = np.unpackbits(fresh[i - 1], bitorder="little", count=width)
             column = int(np.flatnonzero(bits[: column + 1])[-1])
-    return out
+    return matches
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +237,7 @@ class PathError:
     worst_point_mm: tuple[float, float, float]
     by_move_um: np.ndarray = field(repr=False)  # (n,) largest per nominal move, nan where not judged
     judged: int
-    left_out: int  # points with an unknown position, unknown lost motion, or on a skipped line
+    left_out: int  # points with an unknown position, unknown play, or on a skipped line
     outside: int  # judged points with a command outside the calibrated box, where the box face counts
 
 
@@ -280,9 +280,9 @@ def deviation(
 ) -> Deviation:
     """Distance of the actual path to nominal path + zero shift, after and before correction.
 
-    `skip_lines` are nominal lines that the corrector passes on purpose (G53, G28, unknown axes); points with
-    unknown axes or lost motion are left out and counted. `forget_at_tool_change`: an axis is unknown after a
-    tool change until it moves again.
+    `skip_lines` are nominal lines that are left uncorrected on purpose (G53, G28, unknown axes). Points with
+    unknown axes or play are left out and counted. `forget_at_tool_change`: an axis is unknown after a tool
+    change until it moves again.
     """
     moves = nominal.pick(nominal.kind != DWELL)
     own = corrected.pick(corrected.kind != DWELL)
@@ -291,14 +291,14 @@ def deviation(
     if forget_at_tool_change:
         moves, own = _forget(moves), _forget(own)
     shift = shifts(moves, model, shift_by_frame)
-    passed = np.isin(moves.line, list(skip_lines))
+    uncorrected = np.isin(moves.line, list(skip_lines))
     real = actual(own, model, spacing_mm)
     groups = match(real.points[real.dense.last], moves.axis + shift)
-    after = _measure(real, groups, moves, shift, passed, kinds)
+    after = _measure(real, groups, moves, shift, uncorrected, kinds)
     if not after.judged:
         raise ValueError("no point could be judged: nowhere are all axes known on a line that counts")
     raw = actual(moves, model, spacing_mm)
-    before = _measure(raw, np.arange(len(moves)), moves, shift, passed, kinds)
+    before = _measure(raw, np.arange(len(moves)), moves, shift, uncorrected, kinds)
     return Deviation(after, before, moves.line, groups)
 
 
@@ -316,11 +316,11 @@ def _measure(
     groups: np.ndarray,
     moves: CanonMoves,
     shift: np.ndarray,
-    passed: np.ndarray,
+    uncorrected: np.ndarray,
     kinds: Collection[str],
 ) -> PathError:
     dense = real.dense
-    skip = passed | ~np.isin(moves.kind, [KINDS.index(kind) for kind in kinds])
+    skip = uncorrected | ~np.isin(moves.kind, [KINDS.index(kind) for kind in kinds])
     owner_of_move = np.searchsorted(groups, np.arange(len(dense.moves)))
     owner = np.minimum(owner_of_move, len(moves) - 1)[dense.move]
     curves = _Curves.of(moves)
@@ -329,15 +329,15 @@ def _measure(
     distance = 1e3 * np.linalg.norm(points - curves.at(owner, fraction), axis=1)
     end_known = np.asarray(moves.known.all(axis=1), bool)
     whole = end_known & np.concatenate([[moves.start_known], end_known[:-1]])
-    # the way from another zero, another tool or an uncorrected place has no nominal of its own
-    whole[1:] &= (np.diff(shift, axis=0) == 0).all(axis=1) & (np.diff(moves.tool) == 0) & ~passed[:-1]
+    # a path from another zero, another tool or an uncorrected position has no nominal path
+    whole[1:] &= (np.diff(shift, axis=0) == 0).all(axis=1) & (np.diff(moves.tool) == 0) & ~uncorrected[:-1]
     at_end = dense.last & (dense.move == groups[owner])
-    use = real.sure & ~skip[owner] & (whole[owner] | (end_known[owner] & at_end))
+    use = real.determined & ~skip[owner] & (whole[owner] | (end_known[owner] & at_end))
     by_move = np.full(len(moves), np.nan)
     np.fmax.at(by_move, owner[use], distance[use])
     ends = real.points[dense.last][groups]
-    sure_end = real.sure[dense.last][groups] & end_known & ~skip
-    vertex = 1e3 * np.linalg.norm(ends - moves.axis - shift, axis=1)[sure_end]
+    determined_end = real.determined[dense.last][groups] & end_known & ~skip
+    vertex = 1e3 * np.linalg.norm(ends - moves.axis - shift, axis=1)[determined_end]
     along = (fraction * curves.lengths()[owner])[use]
     block = 1e6 * owner[use]
     back = np.maximum.accumulate(along + block) - along - block if use.any() else np.zeros(1)

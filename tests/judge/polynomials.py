@@ -66,7 +66,7 @@ class Pieces:
     def at(self, piece: np.ndarray, u: np.ndarray, order: int = 0) -> np.ndarray:
         """(m, 3) positions or derivatives of pieces (m,) at times (m,) after their starts."""
         rows = self.derivative(order)
-        out = np.empty((len(piece), 3))
+        values = np.empty((len(piece), 3))
         bent = self.bent[piece]
         for chosen, degree in ((bent, rows.shape[1] - 1), (~bent, self.plain - order)):
             some = np.flatnonzero(chosen)
@@ -74,8 +74,8 @@ class Pieces:
             value = rows[mine, degree]
             for i in range(degree - 1, -1, -1):
                 value = value * time + rows[mine, i]
-            out[some] = value
-        return out
+            values[some] = value
+        return values
 
     def position(self, time_s: np.ndarray) -> np.ndarray:
         """(m, 3) at any times."""
@@ -122,20 +122,20 @@ def _bounded(control: np.ndarray) -> np.ndarray:
     above 1, else any bound of it that is not."""
     known = np.abs(control[:, [0, -1]]).max(axis=1)
     hull = np.abs(control).max(axis=1)
-    out = np.maximum(known, np.where(hull <= 1.0, hull, 0.0))
+    bound = np.maximum(known, np.where(hull <= 1.0, hull, 0.0))
     owner = np.flatnonzero(hull > 1.0)
     control = control[owner]
     first, second = _halves(control.shape[1] - 1)
     for depth in range(_DEPTH + 1):
         hull = np.abs(control).max(axis=1)
-        np.maximum.at(out, owner, np.abs(control[:, [0, -1]]).max(axis=1, initial=0.0))
-        decided = hull <= np.maximum(1.0, out[owner] * (1.0 + 1e-7))
+        np.maximum.at(bound, owner, np.abs(control[:, [0, -1]]).max(axis=1, initial=0.0))
+        decided = hull <= np.maximum(1.0, bound[owner] * (1.0 + 1e-7))
         if depth == _DEPTH:
             decided[:] = True
-        np.maximum.at(out, owner[decided], hull[decided])
+        np.maximum.at(bound, owner[decided], hull[decided])
         owner, control = owner[~decided], control[~decided]
         if not len(owner):
             break
         control = np.concatenate((control @ first.T, control @ second.T))
         owner = np.concatenate((owner, owner))
-    return out
+    return bound

@@ -27,8 +27,8 @@ class _Writer:
     style: bool
     numbers: bool
     modal: bool
-    out: list[str] = field(default_factory=list)
-    at: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])  # program units, rounded as written
+    blocks: list[str] = field(default_factory=list)
+    position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])  # program units, as written
     offset: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])  # G92 or G52 in force
     motion: str = ""
     relative: bool = False
@@ -63,13 +63,13 @@ class _Writer:
             gap = ["", " ", "  ", "\t"][self.rng.choice(4, p=[0.25, 0.6, 0.1, 0.05])]
         else:
             gap = " "
-        self.out.append(gap.join(parts) + comment)
+        self.blocks.append(gap.join(parts) + comment)
 
     def go(self, code: str, target: list[float], *extra: str) -> None:
         """One motion block to a target in program units (absolute, without the running offset)."""
         words = []
         for i, letter in enumerate("XYZ"):
-            step = round(target[i] - self.at[i], self.digits)
+            step = round(target[i] - self.position[i], self.digits)
             if step == 0.0 and (self.modal and self.rng.random() < 0.9):
                 continue
             number = step if self.relative else round(target[i] - self.offset[i], self.digits)
@@ -83,7 +83,7 @@ class _Writer:
             shown = shown.replace("G", "G0")
         self.line(shown, *words, *extra)
         self.motion = code
-        self.at = list(target)
+        self.position = list(target)
 
 
 def random_program(
@@ -111,9 +111,9 @@ def random_program(
     low, high = np.array(range_mm).T
     percent = bool(rng.random() < 0.5)
     if percent:
-        w.out.append("%")
+        w.blocks.append("%")
     if "comments" in on:
-        w.out.append("(random program: X1 Y2 in a comment is no motion)")
+        w.blocks.append("(random program: X1 Y2 in a comment is no motion)")
     if "g10" in on:
         g55 = [w.value(w.round(v)) for v in g55_mm]
         w.line("G20" if inch else "G21", "G90")
@@ -126,7 +126,7 @@ def random_program(
     w.line("S1000", "M3", comment=" ; spindle" if "comments" in on else "")
     speed = w.value(w.round(1200.0))
     start = [w.round(float(v)) for v in rng.uniform(low, high)]
-    w.at = [math.nan] * 3
+    w.position = [math.nan] * 3
     modal, w.modal = w.modal, False
     w.go("G0", start)
     w.modal = modal
@@ -134,21 +134,21 @@ def random_program(
     kinds = [kind for kind in FEATURES if kind in on and kind in _SECTIONS]
     for _ in range(blocks if kinds else 0):
         if "comments" in on and rng.random() < 0.2:
-            w.out.append(str(rng.choice(["(G1 X9 Y9)", "; a remark, X1", "", "(MSG, part)"])))
+            w.blocks.append(str(rng.choice(["(G1 X9 Y9)", "; a remark, X1", "", "(MSG, part)"])))
         _SECTIONS[str(rng.choice(kinds))](w, low, high)
     w.line("G80", "M5", "M9")
     w.line("M30" if rng.random() < 0.5 else "M2")
     if percent:
-        w.out.append("%")
+        w.blocks.append("%")
     end = "\r\n" if "style" in on and rng.random() < 0.3 else "\n"
-    return (end.join(w.out) + end).encode("ascii")
+    return (end.join(w.blocks) + end).encode("ascii")
 
 
 def _point(w: _Writer, low: np.ndarray, high: np.ndarray) -> list[float]:
     target = [w.round(float(v)) for v in w.rng.uniform(low, high)]
     for i in range(3):
         if w.rng.random() < 0.35:
-            target[i] = w.at[i]
+            target[i] = w.position[i]
     return target
 
 
@@ -164,7 +164,7 @@ def _rapid(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
 def _short(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
     for _ in range(15):
         step = w.rng.normal(size=3) * [0.8, 0.8, 0.2]
-        target = np.clip(np.array(w.at) * w.scale + step, low, high)
+        target = np.clip(np.array(w.position) * w.scale + step, low, high)
         w.go("G1", [w.round(float(v)) for v in target])
 
 
@@ -178,14 +178,14 @@ def _incremental(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
 
 def _fit(w: _Writer, low: np.ndarray, high: np.ndarray, axes: tuple[int, int]) -> tuple[list[float], float]:
     """A centre (mm, in the plane) and radius of a circle through the present point that stays in range."""
-    here = [w.at[i] * w.scale for i in axes]
+    here = [w.position[i] * w.scale for i in axes]
     for _ in range(50):
         radius, angle = float(w.rng.uniform(1.5, 15.0)), float(w.rng.uniform(0, 2 * np.pi))
         centre = [here[0] + radius * math.cos(angle), here[1] + radius * math.sin(angle)]
         if all(low[i] + radius <= c <= high[i] - radius for i, c in zip(axes, centre, strict=True)):
             return centre, radius
     middle = [0.5 * (low[i] + high[i]) for i in axes]
-    target = list(w.at)
+    target = list(w.position)
     for i, c in zip(axes, middle, strict=True):
         target[i] = w.round(c)
     w.go("G1", target)
@@ -195,7 +195,7 @@ def _fit(w: _Writer, low: np.ndarray, high: np.ndarray, axes: tuple[int, int]) -
 def _arc_words(w: _Writer, axes: tuple[int, int], centre: list[float]) -> list[str]:
     """I, J, K words of the exact centre, rounded; zero ones may be left out."""
     words = []
-    offsets = [w.round(c - w.at[i] * w.scale) for i, c in zip(axes, centre, strict=True)]
+    offsets = [w.round(c - w.position[i] * w.scale) for i, c in zip(axes, centre, strict=True)]
     for i, value in zip(axes, offsets, strict=True):
         if value == 0.0 and any(offsets) and w.modal:
             continue
@@ -208,11 +208,11 @@ def _one_arc(w: _Writer, low: np.ndarray, high: np.ndarray, plane: int, how: str
     normal = 3 - sum(axes)
     centre, radius = _fit(w, low, high, axes)
     words = _arc_words(w, axes, centre)
-    start = [w.at[i] * w.scale for i in axes]
+    start = [w.position[i] * w.scale for i in axes]
     middle = [s + w.round(c - s) * w.scale for s, c in zip(start, centre, strict=True)]
     radius = math.dist(start, middle)
     code = str(w.rng.choice(["G2", "G3"]))
-    target = list(w.at)
+    target = list(w.position)
     if how == "circle" and w.rng.random() < 0.5:  # the end point left out; elsewhere it may be written
         w.line(code, *words)
         w.motion = code
@@ -264,7 +264,7 @@ def _reposition(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
     """All three axes by name, as after a change of frame."""
     target = [w.round(float(v)) for v in w.rng.uniform(low, high)]
     modal, w.modal = w.modal, False
-    w.at = [math.nan] * 3
+    w.position = [math.nan] * 3
     w.go("G0", target)
     w.modal = modal
 
@@ -288,7 +288,7 @@ def _tools(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
 def _cycles(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
     top, bottom = w.round(high[2] - 5.0), w.round(low[2] + 1.0)
     clear = w.round(high[2])
-    w.go("G0", [w.at[0], w.at[1], clear])
+    w.go("G0", [w.position[0], w.position[1], clear])
     back = str(w.rng.choice(["G98", "G99"]))
     peck = w.rng.random() < 0.4
     holes = [[w.round(float(v)) for v in w.rng.uniform(low[:2], high[:2])] for _ in range(3)]
@@ -303,13 +303,13 @@ def _cycles(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
         first = False
     w.line("G80")
     w.motion = ""
-    w.at = [*holes[-1], clear if back == "G98" else top]
+    w.position = [*holes[-1], clear if back == "G98" else top]
 
 
 def _g92(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
     new = [w.round(float(v)) for v in w.rng.uniform(-5, 5, 3)]
     w.line("G92", *(letter + w.value(v) for letter, v in zip("XYZ", new, strict=True)))
-    w.offset = [round(a - n, w.digits) for a, n in zip(w.at, new, strict=True)]
+    w.offset = [round(a - n, w.digits) for a, n in zip(w.position, new, strict=True)]
     _lines(w, low, high)
     w.line("G92.1")
     w.offset = [0.0] * 3

@@ -23,18 +23,18 @@ _PLANES = {17: "XYZ", 18: "ZXY", 19: "YZX"}
 def limits(seed: int) -> np.ndarray:
     """(3, 3) velocity, acceleration and jerk of X, Y and Z, mm and s, over decades; at times one is slow."""
     rng = np.random.default_rng([seed, 1])
-    out = np.array(
+    limits = np.array(
         [10.0 ** rng.uniform(1.3, 3.0), 10.0 ** rng.uniform(2.0, 4.3), 10.0 ** rng.uniform(3.0, 6.0)]
     )
-    out = out[:, None] * 10.0 ** rng.uniform(-0.4, 0.4, (3, 3))
+    limits = limits[:, None] * 10.0 ** rng.uniform(-0.4, 0.4, (3, 3))
     draw = rng.random()
     if draw < 0.1:
-        out[:, rng.integers(3)] /= 100.0
+        limits[:, rng.integers(3)] /= 100.0
     elif draw < 0.15:
-        out[2] = 10.0 ** rng.uniform(1.0, 2.0)
+        limits[2] = 10.0 ** rng.uniform(1.0, 2.0)
     elif draw < 0.2:
-        out[2] = 1e9
-    return np.asarray(out)
+        limits[2] = 1e9
+    return np.asarray(limits)
 
 
 def program(seed: int) -> bytes:
@@ -61,12 +61,12 @@ class _Writer:
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
-        self.at = np.zeros(3)
+        self.position = np.zeros(3)
         self.scale = 10.0 ** rng.uniform(-2, 2.5)
         self.digits = int(rng.choice([3, 4, 6]))
         self.plane = 17
         self.inverse = False
-        self.out = ["G21 G90 G17 G40 G49 G80 G94", _mode(rng), self.feed()]
+        self.blocks = ["G21 G90 G17 G40 G49 G80 G94", _mode(rng), self.feed()]
 
     def feed(self) -> str:
         if self.rng.random() < 0.05:
@@ -82,7 +82,7 @@ class _Writer:
         for kind in self.rng.choice(kinds, size=blocks, p=weights / weights.sum()):
             getattr(self, f"_{kind}")()
         self._leave()
-        return "\n".join([*self.out, "M2"]) + "\n"
+        return "\n".join([*self.blocks, "M2"]) + "\n"
 
     def word(self) -> str:
         """The F word that each feed block needs under inverse time, else perhaps one."""
@@ -94,46 +94,46 @@ class _Writer:
         target = np.round(np.clip(target, -900.0, 900.0), self.digits)
         words = "".join(
             f" {name}{value:.{self.digits}f}"
-            for name, value, old in zip("XYZ", target, self.at, strict=True)
+            for name, value, old in zip("XYZ", target, self.position, strict=True)
             if value != old or self.rng.random() < 0.1
         )
         if words:
-            self.out.append(code + words + (self.word() if code == "G1" else ""))
-            self.at = target
+            self.blocks.append(code + words + (self.word() if code == "G1" else ""))
+            self.position = target
 
     def step(self, size: float) -> np.ndarray:
-        way = self.rng.normal(size=3)
+        direction = self.rng.normal(size=3)
         if self.rng.random() < 0.5:
-            way *= self.rng.random(3) < 0.5
-        return np.asarray(way * size * 10.0 ** self.rng.uniform(-0.7, 0.3))
+            direction *= self.rng.random(3) < 0.5
+        return np.asarray(direction * size * 10.0 ** self.rng.uniform(-0.7, 0.3))
 
     def _line(self) -> None:
-        self.to(self.at + self.step(self.scale))
+        self.to(self.position + self.step(self.scale))
 
     def _rapid(self) -> None:
-        self.to(self.at + self.step(self.scale * 3), "G0")
+        self.to(self.position + self.step(self.scale * 3), "G0")
 
     def _straight(self) -> None:
         """Parts of one line, with feeds of their own."""
         way = self.step(self.scale)
         for _ in range(int(self.rng.integers(2, 5))):
-            self.to(self.at + way * self.rng.uniform(0.05, 1.0))
+            self.to(self.position + way * self.rng.uniform(0.05, 1.0))
 
     def _back(self) -> None:
-        here = self.at
+        here = self.position
         self._line()
         self.to(here)
 
     def _tiny(self) -> None:
         for _ in range(int(self.rng.integers(1, 6))):
-            self.to(self.at + self.rng.normal(size=3) * 10.0 ** self.rng.uniform(-6, -2))
+            self.to(self.position + self.rng.normal(size=3) * 10.0 ** self.rng.uniform(-6, -2))
 
     def _burst(self) -> None:
         """Dense points of a curve, in rounded digits."""
         a, b = self.step(self.scale * 0.3), self.step(self.scale * 0.3)
         count = int(self.rng.integers(8, 40))
         for t in np.linspace(0.0, 1.0, count)[1:]:
-            self.to(self.at + (a * math.cos(4 * t) + b * math.sin(3 * t)) / count * 4)
+            self.to(self.position + (a * math.cos(4 * t) + b * math.sin(3 * t)) / count * 4)
 
     def _circle(self) -> None:
         self._arc(whole=True)
@@ -145,14 +145,14 @@ class _Writer:
         if radius < 0.05:
             return
         first, second, third = ("XYZ".index(name) for name in _PLANES[self.plane])
-        angle, left = self.rng.uniform(0, 2 * math.pi), self.rng.random() < 0.5
+        angle, counter_clockwise = self.rng.uniform(0, 2 * math.pi), self.rng.random() < 0.5
         sweep = 2 * math.pi if whole else self.rng.uniform(0.02, 3.0 if self.rng.random() < 0.8 else 6.2)
         centre = np.zeros(3)
         centre[[first, second]] = -radius * np.array([math.cos(angle), math.sin(angle)])
         # the radius at the end is the radius at the start, but for the last digit
         offset = np.round(centre, 6)
-        turned = angle + sweep * (1 if left else -1)
-        end = self.at.copy()
+        turned = angle + sweep * (1 if counter_clockwise else -1)
+        end = self.position.copy()
         if not whole:
             reach = math.hypot(offset[first], offset[second])
             end[[first, second]] += offset[[first, second]] + reach * np.array(
@@ -166,40 +166,40 @@ class _Writer:
         words = "".join(f" {'XYZ'[i]}{end[i]:.6f}" for i in range(3) if not (whole and i != third))
         words += "".join(f" {'IJK'[i]}{offset[i]:.6f}" for i in (first, second))
         turns = f" P{self.rng.integers(2, 4)}" if self.rng.random() < 0.1 else ""
-        self.out.append(("G3" if left else "G2") + words + turns + self.word())
-        self.at = end
+        self.blocks.append(("G3" if counter_clockwise else "G2") + words + turns + self.word())
+        self.position = end
 
     def _mode(self) -> None:
-        self.out.append(_mode(self.rng))
+        self.blocks.append(_mode(self.rng))
 
     def _feed(self) -> None:
         if not self.inverse:
-            self.out.append(self.feed())
+            self.blocks.append(self.feed())
 
     def _dwell(self) -> None:
-        self.out.append(f"G4 P{self.rng.uniform(0, 2) * (self.rng.random() < 0.9):.3f}")
+        self.blocks.append(f"G4 P{self.rng.uniform(0, 2) * (self.rng.random() < 0.9):.3f}")
 
     def _stop(self) -> None:
-        self.out.append(str(self.rng.choice(["M0", "M3 S1000", "M8", "M9", "S500", "M62 P0"])))
+        self.blocks.append(str(self.rng.choice(["M0", "M3 S1000", "M8", "M9", "S500", "M62 P0"])))
 
     def _plane(self) -> None:
         self.plane = int(self.rng.choice(list(_PLANES)))
-        self.out.append(f"G{self.plane}")
+        self.blocks.append(f"G{self.plane}")
 
     def _leave(self) -> None:
         if self.inverse:
             self.inverse = False
-            self.out += ["G94", self.feed()]
+            self.blocks += ["G94", self.feed()]
 
     def _inverse(self) -> None:
         if self.inverse:
             self._leave()
         else:
             self.inverse = True
-            self.out.append("G93")
+            self.blocks.append("G93")
 
     def _turns(self) -> None:
         self._leave()
-        self.out += [f"S{self.rng.integers(10, 9000)}", f"G95 F{10.0 ** self.rng.uniform(-3, 0):.4f}"]
+        self.blocks += [f"S{self.rng.integers(10, 9000)}", f"G95 F{10.0 ** self.rng.uniform(-3, 0):.4f}"]
         self._line()
-        self.out += ["G94", self.feed()]
+        self.blocks += ["G94", self.feed()]

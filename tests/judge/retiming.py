@@ -9,14 +9,18 @@ import numpy as np
 from judge.follow import NEAR_MM, Followed, Places, follow, places
 from judge.polynomials import Pieces
 
-#: by how much a limit may be passed
+#: share by which a limit may be exceeded
 EXCESS = 1e-6
-#: s, between samples of a control, and how many of them stand between differences
-CYCLE_S, WINDOWS = 1e-3, (1, 7, 50)
+#: s, between samples of a control
+CYCLE_S = 1e-3
+#: cycles between differences
+WINDOWS = (1, 7, 50)
 #: samples taken at 1 kHz of a whole motion
 _MOST = 20_000
-#: where pieces join: mm, and shares of the limits of velocity and acceleration
-JOIN_MM, JOIN_SHARE = 1e-9, 1e-8
+#: mm, where pieces join
+JOIN_MM = 1e-9
+#: shares of the limits of velocity and acceleration, where pieces join
+JOIN_SHARE = 1e-8
 #: at rest, as shares of the limits
 REST_SHARE = 1e-7
 _ULP = 2.0**-52
@@ -56,22 +60,22 @@ def judge(motion, route, limits) -> Verdict:
     inner = np.asarray(route.tolerance_mm)[1:-1]
     path = places(pieces, float(inner[inner > 0].min(initial=1.0)))
     try:
-        found = follow(route, pieces, path)
+        followed = follow(route, pieces, path)
     except AssertionError as error:
         return Verdict(*ratios, np.nan, differences, np.nan, (*wrong, str(error)))
-    feed = _feed(pieces, path, found)
+    feed = _feed(pieces, path, followed)
     if feed > 1 + EXCESS:
         wrong.append(f"feed is {feed:.9f} of its limit")
-    used = float(found.used.max())
+    used = float(followed.used.max())
     if used > 1 + EXCESS:
         wrong.append(f"the path leaves the polyline by {used:.9f} of the tolerance")
     speed = np.sqrt((pieces.at(path.piece, path.u, 1) ** 2).sum(axis=1))
-    back = float((-found.forward).max(initial=0.0)) / max(float(speed.max()), 1e-300)
+    back = float((-followed.forward).max(initial=0.0)) / max(float(speed.max()), 1e-300)
     if back > 1e-8:
         wrong.append(f"it runs back at {back:.3g} of its speed")
-    if not found.lines_ok.all():
-        wrong.append(f"a line of the program is told elsewhere than near it, piece "
-                     f"{int(path.piece[np.flatnonzero(~found.lines_ok)[0]])}")  # fmt: skip
+    if not followed.lines_ok.all():
+        wrong.append(f"a line of the program is reported elsewhere than near it, piece "
+                     f"{int(path.piece[np.flatnonzero(~followed.lines_ok)[0]])}")  # fmt: skip
     wrong += _rests(pieces, route, bounds)
     return Verdict(*ratios, feed, differences, used, tuple(wrong))
 
@@ -84,7 +88,7 @@ def _joins(pieces: Pieces, bounds: tuple[np.ndarray, ...]) -> list[str]:
     end = [pieces.at(all_, pieces.lasts_s, order) for order in range(4)]
     time = np.append(pieces.start_s, pieces.start_s[-1] + pieces.lasts_s[-1])
     allowances = (np.full(3, JOIN_MM), JOIN_SHARE * bounds[0], JOIN_SHARE * bounds[1])
-    out = []
+    wrong = []
     for order, (name, allowance) in enumerate(
         zip(("position", "velocity", "acceleration"), allowances, strict=True)
     ):
@@ -97,7 +101,7 @@ def _joins(pieces: Pieces, bounds: tuple[np.ndarray, ...]) -> list[str]:
         )
         if len(off) and off.max() > 0:
             k = int(off.max(axis=1).argmax())
-            out.append(f"{name} jumps by {jump[k].max():.3g} at {time[k + 1]:.9g} s, joint {k}")
+            wrong.append(f"{name} jumps by {jump[k].max():.3g} at {time[k + 1]:.9g} s, joint {k}")
         if order:
             for state, rate, when in ((begin, begin[order + 1][0], 0.0), (end, end[order + 1][-1], time[-1])):
                 slip = 2 * _ULP * when * np.abs(rate)
@@ -105,8 +109,8 @@ def _joins(pieces: Pieces, bounds: tuple[np.ndarray, ...]) -> list[str]:
                     ((np.abs(state[order][0 if when == 0.0 else -1]) - slip) / bounds[order - 1]).max()
                 )
                 if still > REST_SHARE:
-                    out.append(f"{name} at an end is {still:.3g} of its limit")
-    return out
+                    wrong.append(f"{name} at an end is {still:.3g} of its limit")
+    return wrong
 
 
 def _differences(pieces: Pieces, bounds: tuple[np.ndarray, ...]) -> float:
@@ -139,14 +143,14 @@ def _stretches(pieces: Pieces, ticks: int) -> list[tuple[int, int]]:
     return [(0, 2000), (ticks - 2000, ticks), *((int(k) - 150, int(k) + 150) for k in joints)]
 
 
-def _feed(pieces: Pieces, path: Places, found: Followed) -> float:
+def _feed(pieces: Pieces, path: Places, followed: Followed) -> float:
     """Largest ratio of speed to feed: at every sample, and between them by the piece's own bound."""
     speed = np.sqrt((pieces.at(path.piece, path.u, 1) ** 2).sum(axis=1))
-    most = float((speed / found.feed).max())
+    most = float((speed / followed.feed).max())
     # a sample on a joint stands for the piece that it ends as well
     feed = np.zeros(len(pieces))
-    np.maximum.at(feed, path.piece, found.feed)
-    np.maximum.at(feed, np.maximum(path.piece[1:] - 1, 0), found.feed[1:])
+    np.maximum.at(feed, path.piece, followed.feed)
+    np.maximum.at(feed, np.maximum(path.piece[1:] - 1, 0), followed.feed[1:])
     rows = np.isfinite(feed)
     return max(most, float(pieces.fastest(np.where(rows, feed, 1e300)).max()))
 
@@ -160,18 +164,19 @@ def _rests(pieces: Pieces, route, bounds: tuple[np.ndarray, ...]) -> list[str]:
     stop = np.bincount(group, (np.asarray(route.tolerance_mm) == 0) | (dwell > 0)) > 0
     stop[[0, -1]] = True
     where = point[np.concatenate(([True], apart))]
-    out = []
+    wrong = []
     piece = np.arange(len(pieces))
     begin = pieces.at(piece, np.zeros(len(pieces)))
     still = np.ones(len(pieces), bool)
     for order, bound in enumerate(bounds[:2], start=1):
         still &= (np.abs(pieces.at(piece, np.zeros(len(pieces)), order)) <= REST_SHARE * bound).all(axis=1)
-    at = np.vstack((begin[still], pieces.at(piece[-1:], pieces.lasts_s[-1:])))
+    rest_mm = np.vstack((begin[still], pieces.at(piece[-1:], pieces.lasts_s[-1:])))
     k = 0
     for number in np.flatnonzero(stop).tolist():
-        off = np.abs(at[k:] - where[number]).max(axis=1) <= NEAR_MM + 4 * _ULP * np.abs(where[number]).max()
+        near = NEAR_MM + 4 * _ULP * np.abs(where[number]).max()
+        off = np.abs(rest_mm[k:] - where[number]).max(axis=1) <= near
         if not off.any():
-            out.append(f"no rest at {where[number].tolist()}")
+            wrong.append(f"no rest at {where[number].tolist()}")
             break
         k += int(off.argmax())
     resting = ~pieces.axis[:, 1:].any(axis=(1, 2)) & (pieces.lasts_s > 0)
@@ -188,5 +193,5 @@ def _rests(pieces: Pieces, route, bounds: tuple[np.ndarray, ...]) -> list[str]:
         for (a, s), (b, t) in zip(runs, wanted, strict=True)
     )
     if not same:
-        out.append(f"it waits {[s for _, s in runs]} s, the route {[t for _, t in wanted]} s")
-    return out
+        wrong.append(f"it waits {[s for _, s in runs]} s, the route {[t for _, t in wanted]} s")
+    return wrong

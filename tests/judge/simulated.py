@@ -38,23 +38,23 @@ class Machine:
     def angles(self, axis: int, q: np.ndarray) -> np.ndarray:
         return np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in "ABC"], axis=-1)
 
-    def error(self, at: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
+    def error(self, axis_mm: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
         """(n, 3) at axis positions (n, 3) with tool vectors (3,) or (n, 3), directions `play` (n, 3)."""
-        out = np.zeros(at.shape)
+        error = np.zeros(axis_mm.shape)
         for axis in range(3):
-            q = at[:, axis]
-            tool_vector = np.array(np.broadcast_to(np.asarray(tool, float), at.shape))
+            q = axis_mm[:, axis]
+            tool_vector = np.array(np.broadcast_to(np.asarray(tool, float), axis_mm.shape))
             for k in self.after(axis):
-                tool_vector[:, k] += at[:, k] - self.datum[k]
-            out += np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in AXES], axis=-1)
-            out += np.cross(self.angles(axis, q), tool_vector)
+                tool_vector[:, k] += axis_mm[:, k] - self.datum[k]
+            error += np.stack([self.curves[f"E{d}{AXES[axis]}"](q) for d in AXES], axis=-1)
+            error += np.cross(self.angles(axis, q), tool_vector)
             if play is not None:
                 for d, letter in enumerate(AXES):
-                    out[:, d] += play[:, axis] * self.half.get(f"E{letter}{AXES[axis]}", 0.0)
-        y, z = at[:, 1] - self.datum[1], at[:, 2] - self.datum[2]
-        out[:, 0] += -self.square["C0Y"] * y + self.square["B0Z"] * z
-        out[:, 1] += -self.square["A0Z"] * z
-        return out
+                    error[:, d] += play[:, axis] * self.half.get(f"E{letter}{AXES[axis]}", 0.0)
+        y, z = axis_mm[:, 1] - self.datum[1], axis_mm[:, 2] - self.datum[2]
+        error[:, 0] += -self.square["C0Y"] * y + self.square["B0Z"] * z
+        error[:, 1] += -self.square["A0Z"] * z
+        return error
 
 
 def _waves(rng: np.random.Generator, low: float, span: float, size: float, slope: bool) -> Curve:
@@ -128,12 +128,12 @@ def _rough(
 
     def curve(q: np.ndarray) -> np.ndarray:
         q = np.asarray(q, float)
-        out = smooth(q)
-        for at, bend in zip(knots, bends, strict=True):
-            out = out + bend * np.maximum(q - at, 0.0)
-        for at, jump in zip(joints, jumps, strict=True):
-            out = out + jump * (q > at)
-        return out
+        value = smooth(q)
+        for knot, bend in zip(knots, bends, strict=True):
+            value = value + bend * np.maximum(q - knot, 0.0)
+        for knot, jump in zip(joints, jumps, strict=True):
+            value = value + jump * (q > knot)
+        return value
 
     return curve
 
@@ -161,19 +161,19 @@ SQUARE_SIGMA = 5e-6
 
 
 def take(
-    m: Machine, rng: np.random.Generator, component: str, *, targets: np.ndarray, at: Any = LINE,
+    m: Machine, rng: np.random.Generator, component: str, *, targets: np.ndarray, line_mm: Any = LINE,
     tool: Any = TOOL, runs: int = 5, slope: float | None = None, square: str | None = None,
     reference: str = "functional-point", drift: float = 1.0,
 ) -> Taken:  # fmt: skip
-    """Read a component there and back along a line through `at`: laser 0.5 um + 0.5 um/m (noise that grows
-    with the distance for straightness, a scale of the line for positioning), angles 1 urad, drift over some
-    um or urad."""
+    """Read a component in both directions along a line through `line_mm`: laser 0.5 um + 0.5 um/m (noise that
+    grows with the distance for straightness, a scale of the line for positioning), angles 1 urad, drift over
+    some um or urad."""
     d, axis = "XYZABC".index(component[1]), AXES.index(component[2])
     one = np.concatenate([targets, targets[::-1]])
     side = np.concatenate([np.ones(len(targets)), -np.ones(len(targets))])
     q, direction = np.tile(one, runs), np.tile(side, runs)
     run = np.repeat(np.arange(1, runs + 1), len(one))
-    position = np.tile(np.array(at, float), (len(q), 1))
+    position = np.tile(np.array(line_mm, float), (len(q), 1))
     position[:, axis] = q
     far = np.abs(q - targets[0]) / 1000.0
     scale = 0.0
@@ -200,13 +200,13 @@ def take(
     level = rng.normal() * time + 0.5 * rng.normal() * np.sin(2 * np.pi * time * rng.uniform(0.3, 1.0))
     value = value + drift * 2.0 * unit * level + rng.normal(0.0, 30.0) * unit + rng.normal(0.0, noise)
     return Taken(
-        component, q, value, run, direction, tuple(map(float, at)), tuple(map(float, tool)), square,
+        component, q, value, run, direction, tuple(map(float, line_mm)), tuple(map(float, tool)), square,
         reference, scale,
     )  # fmt: skip
 
 
 def all_lines(
-    m: Machine, seed: int, *, at: Any = LINE, tool: Any = TOOL, tables: str = "", jitter: float = 5.0,
+    m: Machine, seed: int, *, line_mm: Any = LINE, tool: Any = TOOL, tables: str = "", jitter: float = 5.0,
     runs: int = 5, drift: float = 1.0,
 ) -> list[Taken]:  # fmt: skip
     """The lines of a full set: positioning, eight angles (not roll of the vertical axis), straightness pairs
@@ -217,14 +217,14 @@ def all_lines(
         q = np.linspace(*m.box[axis], COUNT[axis])
         q[1:-1] += rng.uniform(-jitter, jitter, len(q) - 2)
         targets.append(np.round(q, 3))
-    out: list[Taken] = []
+    lines: list[Taken] = []
 
     def add(name: str, **more: Any) -> None:
         axis = AXES.index(name[2])
         reference = "table" if name[2] in tables else "functional-point"
         more.setdefault("tool", tool)
-        same: dict[str, Any] = {"at": at, "runs": runs, "drift": drift, "reference": reference}
-        out.append(take(m, rng, name, targets=targets[axis], **same, **more))
+        same: dict[str, Any] = {"line_mm": line_mm, "runs": runs, "drift": drift, "reference": reference}
+        lines.append(take(m, rng, name, targets=targets[axis], **same, **more))
 
     for a in AXES:
         add(f"E{a}{a}")
@@ -237,9 +237,9 @@ def all_lines(
         add(f"E{b}{a}", slope=first, square=f"S{a}{b}")
         add(f"E{a}{b}", slope=second, square=f"S{a}{b}")
     for side in (150.0, -150.0):
-        # the square stays where it is, only the reflector moves
+        # the square is not moved, only the reflector
         add("EYZ", tool=np.array(tool) + np.array([side, 0.0, 0.0]), slope=second, square="SYZ")
-    return out
+    return lines
 
 
 def off_frame(position: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -253,8 +253,8 @@ def off_frame(position: np.ndarray, error: np.ndarray) -> np.ndarray:
         axis[k] = 1.0
         table[:, :, 3 + k] = np.cross(axis, centred)
     flat = table.reshape(-1, 6)
-    found = np.linalg.lstsq(flat, error.ravel(), rcond=None)[0]
-    return error - (flat @ found).reshape(-1, 3)
+    motion = np.linalg.lstsq(flat, error.ravel(), rcond=None)[0]
+    return error - (flat @ motion).reshape(-1, 3)
 
 
 def rms_um(error: np.ndarray) -> float:
@@ -272,15 +272,15 @@ def points(
     """Axis positions, tool vectors and places (n, 3) in a tracker's frame: a Latin hypercube, with noise."""
     rng = np.random.default_rng([seed, n, 11])
     share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
-    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    axis_mm = m.box[:, 0] + share * np.ptp(m.box, axis=1)
     tool = np.array(tools)[np.arange(n) % len(tools)]
-    place = at + tool + rng.normal(0.0, sigma, (n, 3))
+    place = axis_mm + tool + rng.normal(0.0, sigma, (n, 3))
     for vector in np.array(tools):
         own = (tool == vector).all(axis=1)
-        place[own] += m.error(at[own], vector)
+        place[own] += m.error(axis_mm[own], vector)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    return at, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
+    return axis_mm, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
 
 
 def polar(
@@ -290,11 +290,11 @@ def polar(
     sees the tips; it stands upright and looks along +Y where its azimuth is 25 degrees."""
     rng = np.random.default_rng([seed, n, 19])
     share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
-    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    axis_mm = m.box[:, 0] + share * np.ptp(m.box, axis=1)
     tool = np.array(tools)[np.arange(n) % len(tools)]
-    x, y, z = (at + tool + m.error(at, tool) - np.array(station, float)).T
+    x, y, z = (axis_mm + tool + m.error(axis_mm, tool) - np.array(station, float)).T
     azimuth = np.arctan2(-x, y) + np.radians(25.0)
-    return at, tool, np.sqrt(x * x + y * y + z * z), azimuth, np.arctan2(z, np.hypot(x, y))
+    return axis_mm, tool, np.sqrt(x * x + y * y + z * z), azimuth, np.arctan2(z, np.hypot(x, y))
 
 
 def stations(m: Machine, seed: int, count: int) -> np.ndarray:
@@ -314,30 +314,30 @@ def lengths(
     station."""
     rng = np.random.default_rng([seed, number, n, 13])
     share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
-    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    axis_mm = m.box[:, 0] + share * np.ptp(m.box, axis=1)
     tool = np.array(tools)[np.arange(n) % len(tools)]
-    place = at + tool
+    place = axis_mm + tool
     for vector in np.array(tools):
         own = (tool == vector).all(axis=1)
-        place[own] += m.error(at[own], vector)
+        place[own] += m.error(axis_mm[own], vector)
     true = np.linalg.norm(place - station, axis=1)
     noise = sigma[0] + sigma[1] * true
-    return at, tool, true - 321.0 - 40.0 * number + rng.normal(0.0, noise), noise
+    return axis_mm, tool, true - 321.0 - 40.0 * number + rng.normal(0.0, noise), noise
 
 
 def directions(
     m: Machine, seed: int, n: int, places: np.ndarray, sigma: float, tools: Any = OFFSETS
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Axis positions, tool vectors, azimuths and elevations (n, k) of pods at places (k, 3), each turned in
-    its own way."""
+    """Axis positions, tool vectors, azimuths and elevations (n, k) of pods at places (k, 3), each turned
+    differently."""
     rng = np.random.default_rng([seed, n, 17])
     share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
-    at = m.box[:, 0] + share * np.ptp(m.box, axis=1)
+    axis_mm = m.box[:, 0] + share * np.ptp(m.box, axis=1)
     tool = np.array(tools)[np.arange(n) % len(tools)]
-    place = at + tool
+    place = axis_mm + tool
     for vector in np.array(tools):
         own = (tool == vector).all(axis=1)
-        place[own] += m.error(at[own], vector)
+        place[own] += m.error(axis_mm[own], vector)
     angles = []
     for pod in places:
         # upright, turned about the vertical, a little out of level
@@ -350,7 +350,7 @@ def directions(
         angles.append((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))))
     azimuth, elevation = (np.stack([a[k] for a in angles], axis=1) for k in range(2))
     return (
-        at,
+        axis_mm,
         tool,
         azimuth + rng.normal(0.0, sigma, azimuth.shape),
         elevation + rng.normal(0.0, sigma, elevation.shape),
@@ -367,12 +367,12 @@ def bent(m: Machine, sag_mm: float = 0.030, twist_mm: float = 0.015) -> Machine:
 
     @dataclass
     class Bent(Machine):
-        def error(self, at: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
-            out = Machine.error(self, at, tool, play)
-            u = (at - self.box[:, 0]) / np.ptp(self.box, axis=1)
-            out[:, 2] -= sag_mm * np.sin(np.pi * u[:, 0]) * np.sin(np.pi * u[:, 1]) * (0.5 + u[:, 2])
-            out[:, 0] += twist_mm * np.prod(2.0 * u - 1.0, axis=1)
-            return out
+        def error(self, axis_mm: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
+            error = Machine.error(self, axis_mm, tool, play)
+            u = (axis_mm - self.box[:, 0]) / np.ptp(self.box, axis=1)
+            error[:, 2] -= sag_mm * np.sin(np.pi * u[:, 0]) * np.sin(np.pi * u[:, 1]) * (0.5 + u[:, 2])
+            error[:, 0] += twist_mm * np.prod(2.0 * u - 1.0, axis=1)
+            return error
 
     return Bent(m.chain, m.box, m.datum, m.curves, m.square, m.half)
 
@@ -380,8 +380,8 @@ def bent(m: Machine, sag_mm: float = 0.030, twist_mm: float = 0.015) -> Machine:
 def diagonal(
     m: Machine, seed: int, start: Any, end: Any, tool: Any, *, count: int = 21, runs: int = 3
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Distances from the start, deviations along the diagonal, runs and directions there and back: 0.5 um, a
-    zero of its own, 8 um of lost motion as a whole."""
+    """Distances from the start, deviations along the diagonal, runs and both directions: 0.5 um, an
+    unknown zero, 8 um of backlash as a whole."""
     rng = np.random.default_rng([seed, 23, *np.abs(np.array(end, int))])
     a, b = np.array(start, float), np.array(end, float)
     length = float(np.linalg.norm(b - a))
@@ -398,18 +398,18 @@ def circles(
     m: Machine, seed: int, plane: str, centre: Any, radius: float, tool: Any, *, both: bool = True
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Angles, radius deviations, runs and directions of circles: 0.2 um, a bar and a centre that are off, a
-    servo mismatch of 9 um and lost motions of 6 and 3 um."""
+    servo mismatch of 9 um and backlash of 6 and 3 um."""
     rng = np.random.default_rng([seed, 29, AXES.index(plane[0])])
     one = np.linspace(0.0, 2 * np.pi, 180, endpoint=False) + 0.01
     angle = np.concatenate([one, one[::-1]]) if both else one
     direction = np.repeat([1, -1], 180)[: len(angle)]
     i, j = AXES.index(plane[0]), AXES.index(plane[1])
-    out = np.zeros((len(angle), 3))
-    out[:, i], out[:, j] = np.cos(angle), np.sin(angle)
-    error = m.error(np.array(centre, float) + radius * out, np.array(tool, float))
-    # an axis that moves toward + lags behind by half its lost motion
+    radial = np.zeros((len(angle), 3))
+    radial[:, i], radial[:, j] = np.cos(angle), np.sin(angle)
+    error = m.error(np.array(centre, float) + radius * radial, np.array(tool, float))
+    # an axis that moves toward + lags behind by half its backlash
     for axis, lost, speed in ((i, 6e-3, -np.sin(angle)), (j, 3e-3, np.cos(angle))):
         error[:, axis] -= 0.5 * lost * direction * np.sign(speed)
-    value = (error * out).sum(axis=1) + 9e-3 * direction * np.sin(2 * angle)
+    value = (error * radial).sum(axis=1) + 9e-3 * direction * np.sin(2 * angle)
     value = value + 0.03 + 0.02 * np.cos(angle) - 0.01 * np.sin(angle) + rng.normal(0.0, 0.2e-3, len(angle))
     return angle, value, np.repeat([1, 2], 180)[: len(angle)], direction

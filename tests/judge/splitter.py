@@ -30,26 +30,26 @@ def longest_chords(
     def command(fraction: float) -> np.ndarray:
         return np.asarray(model.command_for((begin + fraction * (end - begin))[None], tool_mm)[0])
 
-    def stays(first: np.ndarray, start: float, stop: float) -> bool:
+    def fits(first: np.ndarray, start: float, stop: float) -> bool:
         count = max(32, int(np.ceil((stop - start) * length / spacing_mm)))
         part = (np.arange(1, count) / count)[:, None]
         path = (1.0 - part) * first + part * command(stop)
         offset = path + model.error_mm(path, tool_mm) - begin
         return bool(np.linalg.norm(offset - np.outer(offset @ along, along), axis=1).max() <= tolerance_mm)
 
-    ends, at = [], 0.0
-    while at < 1.0:
-        first, good, bad = command(at), at, 1.0
-        if stays(first, at, 1.0):
+    ends, reached = [], 0.0
+    while reached < 1.0:
+        first, good, bad = command(reached), reached, 1.0
+        if fits(first, reached, 1.0):
             good = 1.0
         else:
-            while (bad - good) * length > max(1e-3 * (good - at) * length, 1e-3):
+            while (bad - good) * length > max(1e-3 * (good - reached) * length, 1e-3):
                 middle = 0.5 * (good + bad)
-                good, bad = (middle, bad) if stays(first, at, middle) else (good, middle)
-            if good == at:
-                raise ValueError("no chord stays within the tolerance")
+                good, bad = (middle, bad) if fits(first, reached, middle) else (good, middle)
+            if good == reached:
+                raise ValueError("no chord is within the tolerance")
         ends.append(good)
-        at = good
+        reached = good
     return np.array(ends)
 
 

@@ -76,39 +76,39 @@ def decoded(specs: dict[str, Any], raw: bytes, name: str) -> Any:
         lines = raw[spec["off"] : spec["off"] + spec["bytes"]].decode().split("\n")
         assert len(lines) == spec["n"]
         return lines
-    n, c, at = spec["n"], spec["c"], spec["off"]
-    assert at % 8 == 0
+    n, c, offset = spec["n"], spec["c"], spec["off"]
+    assert offset % 8 == 0
     if spec["enc"] == "raw":
         size = np.dtype(_TYPES[spec["dtype"]]).itemsize
-        out = np.frombuffer(raw[at : at + n * c * size], _TYPES[spec["dtype"]]).reshape(n, c)
+        column = np.frombuffer(raw[offset : offset + n * c * size], _TYPES[spec["dtype"]]).reshape(n, c)
     else:
         whole = np.array(_integers(specs, raw, spec), dtype=object).reshape(c, n).T
-        out = np.array(whole / round(1 / spec["q"]), float).reshape(n, c)
-    return out[:, 0] if c == 1 else out
+        column = np.array(whole / round(1 / spec["q"]), float).reshape(n, c)
+    return column[:, 0] if c == 1 else column
 
 
 def _integers(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[int]:
     """Columns one after the other, summed in Python's own integers."""
-    n, c, at = spec["n"], spec["c"], spec["off"]
-    planes = [raw[at + k * n * c : at + (k + 1) * n * c] for k in range(4)]
+    n, c, offset = spec["n"], spec["c"], spec["off"]
+    planes = [raw[offset + k * n * c : offset + (k + 1) * n * c] for k in range(4)]
     steps = [int.from_bytes(four, "little", signed=True) for four in zip(*planes, strict=True)]
-    out: list[int] = []
+    values: list[int] = []
     for column in range(c):
-        out += accumulate(steps[column * n : (column + 1) * n])
+        values += accumulate(steps[column * n : (column + 1) * n])
     for other in spec.get("plus", ()):
         more = specs[other]
         assert (more["q"], more["n"], more["c"]) == (spec["q"], n, c)
         assert "plus" not in more
-        out = [a + b for a, b in zip(out, _integers(specs, raw, more), strict=True)]
-    return out
+        values = [a + b for a, b in zip(values, _integers(specs, raw, more), strict=True)]
+    return values
 
 
 def _patched(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[str]:
     of = decoded(specs, raw, spec["of"])
     columns = [decoded(specs, raw, spec[key]) for key in ("from", "prefix", "suffix", "middle")]
-    out = []
+    rows = []
     for line, prefix, suffix, middle in zip(*columns, strict=True):
         old = of[int(line)] if line >= 0 else ""
-        out.append(old[: int(prefix)] + middle + old[len(old) - int(suffix) :])
-    assert len(out) == spec["n"]
-    return out
+        rows.append(old[: int(prefix)] + middle + old[len(old) - int(suffix) :])
+    assert len(rows) == spec["n"]
+    return rows

@@ -50,8 +50,8 @@ def test_golden_cases(golden: Path, case: str) -> None:
     expected = json.loads((golden / case / "expected.json").read_text())
     names = ("axis_mm", "tool_mm", "error_um")
     points, tools, errors = (np.array([row[name] for row in expected["points"]], float) for name in names)
-    found = JudgeModel(golden / case).error_mm(points, tools) / UM
-    assert np.abs(found - errors).max() <= expected["tolerance_um"]
+    error = JudgeModel(golden / case).error_mm(points, tools) / UM
+    assert np.abs(error - errors).max() <= expected["tolerance_um"]
 
 
 @pytest.mark.parametrize(
@@ -75,8 +75,8 @@ def test_unit_errors_of_a_fixed_table(tmp_path: Path, component: str, expected: 
     unit, axis = ("um" if component[1] in "XYZ" else "urad"), component[2]
     curve = f"{axis}_mm,{component}_{unit}\n-1000,10\n2000,10\n"
     model = machine(tmp_path, '[[curves]]\nfile = "a.csv"\n', {"a.csv": curve})
-    found = model.error_mm(np.array([[400.0, 300.0, 200.0]]), (0.0, 130.0, -243.4852)) / UM
-    assert found[0] == pytest.approx(expected, abs=1e-3)
+    error = model.error_mm(np.array([[400.0, 300.0, 200.0]]), (0.0, 130.0, -243.4852)) / UM
+    assert error[0] == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -85,8 +85,8 @@ def test_unit_errors_of_a_fixed_table(tmp_path: Path, component: str, expected: 
 def test_moving_table_by_hand(tmp_path: Path, reference: str, expected: tuple[float, ...]) -> None:
     curve = "Y_mm,ECY_urad\n-1000,10\n2000,10\n"
     model = machine(tmp_path, f'[[curves]]\nfile = "a.csv"\n{reference}', {"a.csv": curve}, "YFXZ")
-    found = model.error_mm(np.array([[400.0, 300.0, 200.0]]), (0.0, 130.0, -243.5)) / UM
-    assert found[0] == pytest.approx(expected, abs=1e-4)
+    error = model.error_mm(np.array([[400.0, 300.0, 200.0]]), (0.0, 130.0, -243.5)) / UM
+    assert error[0] == pytest.approx(expected, abs=1e-4)
 
 
 def test_squareness_tilts_the_line_and_never_the_tool(tmp_path: Path) -> None:
@@ -94,21 +94,21 @@ def test_squareness_tilts_the_line_and_never_the_tool(tmp_path: Path) -> None:
     model = machine(tmp_path, text, {})
     points = np.array([[0.0, 1000.0, 0.0], [0.0, 0.0, 0.0]])
     for tool in ((0.0, 0.0, 0.0), (0.0, 0.0, -300.0), (0.0, 300.0, 0.0)):
-        found = model.error_mm(points, tool) / UM
-        assert found == pytest.approx(np.array([[0, 0, 0], [20, 0, 0]]), abs=1e-9)
+        error = model.error_mm(points, tool) / UM
+        assert error == pytest.approx(np.array([[0, 0, 0], [20, 0, 0]]), abs=1e-9)
 
 
-def test_lost_motion_by_hand(tmp_path: Path) -> None:
+def test_backlash_by_hand(tmp_path: Path) -> None:
     model = machine(tmp_path, "[backlash]\nX_um = 6.0\n", {})
     points = np.zeros((7, 3))
     points[:, 0] = [0.0, 10.0, 10.002, 9.999, 9.9, 9.9005, 12.0]
     states, known = model.play(points)
-    found = model.error_mm(points, 0.0, states)[:, 0] / UM
+    error = model.error_mm(points, 0.0, states)[:, 0] / UM
     assert not known[0, 0] and known[1:].all()
-    assert found == pytest.approx([0, -3, -3, 0, 3, 2.5, -3], abs=1e-9)
+    assert error == pytest.approx([0, -3, -3, 0, 3, 2.5, -3], abs=1e-9)
 
 
-def test_over_compensated_lost_motion_follows_the_sign_of_motion(tmp_path: Path) -> None:
+def test_over_compensated_backlash_follows_the_sign_of_motion(tmp_path: Path) -> None:
     model = machine(tmp_path, "[backlash]\nY_um = -4.0\n", {})
     points = np.zeros((5, 3))
     points[:, 1] = [0.0, 1.0, 1.0, 0.9999, 1.0]
@@ -118,7 +118,7 @@ def test_over_compensated_lost_motion_follows_the_sign_of_motion(tmp_path: Path)
 
 
 def test_direction_column_and_backlash_say_the_same(tmp_path: Path) -> None:
-    """Constant curves 3 um apart are a lost motion of 3 um: -1.5 um moving in +."""
+    """Constant curves 3 um apart are a backlash of 3 um: -1.5 um moving in +."""
     rows = "".join(f"{q},{d},{5 - 1.5 * d}\n" for d in (1, -1) for q in (-1000, 2000))
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
@@ -150,8 +150,8 @@ def test_touch_off_by_hand(tmp_path: Path, set_by: str, expected: tuple[float, f
 def test_constant_and_zero_machines(tmp_path: Path) -> None:
     points = np.random.default_rng(0).uniform((0, 0, -400), (800, 600, 0), (50, 3))
     shifted = JudgeModel(machines.shift_machine(tmp_path / "s", (100.0, -50.0, 25.0)))
-    found = shifted.error_mm(points, (0, 0, -120)) / UM
-    assert found == pytest.approx(np.tile([100.0, -50.0, 25.0], (50, 1)))
+    error = shifted.error_mm(points, (0, 0, -120)) / UM
+    assert error == pytest.approx(np.tile([100.0, -50.0, 25.0], (50, 1)))
     zero = JudgeModel(machines.zero_machine(tmp_path / "z"))
     assert not zero.error_mm(points, (5, 0, -120)).any()
 
@@ -331,7 +331,7 @@ def test_unknown_axes_and_skipped_lines_are_left_out(model: JudgeModel) -> None:
     assert deviation(CanonMoves.polyline(command, tool=1), moves, model).max_um > 1.0
 
 
-def test_lost_motion_acts_along_the_path(tmp_path: Path) -> None:
+def test_backlash_acts_along_the_path(tmp_path: Path) -> None:
     recipe = replace(BARE, backlash_um={"X": 8.0}, peak_um=(1e-9, 1e-9))
     model = JudgeModel(machines.random_machine(tmp_path, 0, recipe))
     points = np.array([[0, 0, -5], [50, 0, -5], [50, 40, -5], [10, 40, -5], [10, 60, -5.0]])
@@ -401,10 +401,10 @@ def test_nearest_point_of_an_arc(
     own = rng.uniform(0, 1, 20)
     zeros = np.zeros(20, int)
     points = curves.at(zeros, own) + rng.normal(size=(20, 3)) * 0.01
-    found = np.linalg.norm(points - curves.at(zeros, curves.nearest(zeros, points)), axis=1)
+    distance = np.linalg.norm(points - curves.at(zeros, curves.nearest(zeros, points)), axis=1)
     dense = curves.at(np.zeros(40_001, int), np.linspace(0, 1, 40_001))
     best = np.array([np.linalg.norm(dense - point, axis=1).min() for point in points])
-    assert (found < best + 1e-6).all() and (found > best - 2e-3).all()
+    assert (distance < best + 1e-6).all() and (distance > best - 2e-3).all()
 
 
 def test_full_circle_and_densify_spacing() -> None:

@@ -51,13 +51,13 @@ def changed(name: str, k: int, value: float) -> np.ndarray:
 
 
 def doubled_back() -> Motion:
-    """A step back of 1 mm on the third way, and forth again."""
+    """A step back of 1 mm on the third segment, and forth again."""
     points = np.insert(WALK.point_mm, 3, [[50, 20, 10 / 3], [49, 20, 19 / 6]], axis=0)
     back = route(points, 100.0, 0.02)
     back.tolerance_mm[[3, 4, 5]] = 0.0
     back.dwell_s[6] = 0.5
-    found = plan(back, LIMITS).motion
-    return replace(found, line=np.array([0, 1, 2, 2, 2, 3, 4, 5])[found.line])
+    motion = plan(back, LIMITS).motion
+    return replace(motion, line=np.array([0, 1, 2, 2, 2, 3, 4, 5])[motion.line])
 
 
 def with_path(k: int, power: int, by: float) -> Motion:
@@ -70,22 +70,22 @@ DAMAGE: dict[str, tuple[Callable[[], Motion], str]] = {
     "too fast": (lambda: MOTION.slowed(1 / 1.000002), "jerk is 1.00000"),
     "a place off by 2 nm": (lambda: with_path(20, 0, 2e-9), "position jumps"),
     "a direction off": (lambda: with_path(20, 1, 1e-6), "position jumps"),
-    "a corner missed": (lambda: of_other(point_mm=moved(2, (0.0, 0.1, 0.0))), "way-point 3"),
-    "a corner cut too far": (lambda: of_other(tolerance_mm=WALK.tolerance_mm * 1.7), "way-point"),
-    "a way-point left out": (
+    "a corner missed": (lambda: of_other(point_mm=moved(2, (0.0, 0.1, 0.0))), "waypoint 3"),
+    "a corner cut too far": (lambda: of_other(tolerance_mm=WALK.tolerance_mm * 1.7), "waypoint"),
+    "a waypoint left out": (
         lambda: (
             plan(Route(*(np.delete(getattr(WALK, n), 2, axis=0) for n in Route.__slots__)), LIMITS).motion
         ),
-        "way-point 2",
+        "waypoint 2",
     ),
-    "another end": (lambda: of_other(point_mm=moved(6, (0.0, 1.0, 0.0))), "way-point 6"),
+    "another end": (lambda: of_other(point_mm=moved(6, (0.0, 1.0, 0.0))), "waypoint 6"),
     "another start": (lambda: of_other(point_mm=moved(0, (1.0, 0.0, 0.0))), "begin"),
     "an end of its own": (
         lambda: plan(route(np.vstack((WALK.point_mm, [0, 5, 0])), 100.0, 0.0), LIMITS).motion,
         "end at its route",
     ),
     "a step back": (doubled_back, "runs back"),
-    "a stop not made": (lambda: of_other(tolerance_mm=changed("tolerance_mm", 3, 0.02)), "way-point 3"),
+    "a stop not made": (lambda: of_other(tolerance_mm=changed("tolerance_mm", 3, 0.02)), "waypoint 3"),
     "no dwell": (lambda: of_other(dwell_s=np.zeros(7)), "waits"),
     "a dwell too short": (lambda: of_other(dwell_s=changed("dwell_s", 4, 0.499999)), "waits"),
     "a dwell elsewhere": (lambda: of_other(dwell_s=np.array([0, 0, 0, 0.5, 0, 0, 0])), "waits"),
@@ -96,11 +96,11 @@ DAMAGE: dict[str, tuple[Callable[[], Motion], str]] = {
 
 
 def test_a_sound_motion_passes() -> None:
-    found = judge(MOTION, WALK, LIMITS)
-    assert found.wrong == ()
-    assert found.jerk == pytest.approx(1.0, rel=1e-6)
-    assert found.feed == pytest.approx(1.0, rel=1e-6)
-    assert 0.5 < found.tolerance <= 1.0
+    judged = judge(MOTION, WALK, LIMITS)
+    assert judged.wrong == ()
+    assert judged.jerk == pytest.approx(1.0, rel=1e-6)
+    assert judged.feed == pytest.approx(1.0, rel=1e-6)
+    assert 0.5 < judged.tolerance <= 1.0
 
 
 @pytest.mark.parametrize("name", DAMAGE)

@@ -61,7 +61,7 @@ class Pair:
 
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Pair]]:
-    folder, found = tmp_path_factory.mktemp("bent"), {}
+    folder, setups = tmp_path_factory.mktemp("bent"), {}
     with pytest.MonkeyPatch.context() as patch:
         for name in NAMES:
             recipe = Recipe(controller=name, tools=TOOLS, work_offsets=OFFSETS, off_datum=True)
@@ -71,13 +71,13 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Pair]]
             copy = replace(dialect, name=f"{OTHER}-{name}")
             patch.setitem(registry._BY_NAME, copy.name, copy)
             other = replace(setup.machine, controller=copy.name)
-            found[name] = Pair(
+            setups[name] = Pair(
                 replace(setup, job=replace(setup.job, dialect=name, described=described(name))),
                 dialect,
                 replace(setup, machine=other, job=replace(setup.job, dialect=copy.name)),
                 copy,
             )
-        yield found
+        yield setups
 
 
 def test_the_copies_are_registered_and_only_here(pairs: Mapping[str, Pair]) -> None:
@@ -101,10 +101,10 @@ def plain(value: Any) -> Any:
 def outcome(run: Callable[[], Any], dialect: Dialect, name: str) -> Any:
     """What a run returns or how it refuses, with `name` for the name of its dialect."""
     try:
-        found = json.dumps(plain(run()), default=repr)
+        result = json.dumps(plain(run()), default=repr)
     except OlpError as error:
-        found = f"{type(error).__name__} {error} {getattr(error, 'line', None)}"
-    return found.replace(dialect.name, name)
+        result = f"{type(error).__name__} {error} {getattr(error, 'line', None)}"
+    return result.replace(dialect.name, name)
 
 
 def alike(run: Callable[[Setup, Dialect], Any], pair: Pair) -> str:
@@ -116,15 +116,15 @@ def alike(run: Callable[[Setup, Dialect], Any], pair: Pair) -> str:
 def texts_of(name: str) -> list[bytes]:
     case = CASES[name]
     steps = np.random.default_rng(7).uniform(-40, 40, (8, 3))
-    out = [case.program(steps, 3), *case.examples]
-    out += [case.program(steps, 3).replace(b"\n", b"\n" + text + b"\n", 3) for text in case.examples]
+    texts = [case.program(steps, 3), *case.examples]
+    texts += [case.program(steps, 3).replace(b"\n", b"\n" + text + b"\n", 3) for text in case.examples]
     if isinstance(registry.find(name), Profile):
-        out += [(START + text).encode() for text in (*BLOCKS, *PARAMETRIC)]
-        out += [text.encode() for text in BLOCKS]
+        texts += [(START + text).encode() for text in (*BLOCKS, *PARAMETRIC)]
+        texts += [text.encode() for text in BLOCKS]
     folders = ("apt-flavours", "dmis-housing", "nasty", "haas-mill", "table-router")
     files = [p for folder in folders for p in sorted((ROOT / "programs" / folder).iterdir())]
     endings = {".ngc", ".nc", ".ncl", ".cls", ".apt", ".aptsource", ".dmi"}
-    return out + [p.read_bytes()[:20_000] for p in files if p.suffix in endings]
+    return texts + [p.read_bytes()[:20_000] for p in files if p.suffix in endings]
 
 
 def reading(text: bytes, setup: Setup, dialect: Dialect, options: Options) -> list[Any]:
@@ -138,8 +138,8 @@ def reading(text: bytes, setup: Setup, dialect: Dialect, options: Options) -> li
 @pytest.mark.parametrize("options", [Options(), Options(block_delete=True, contour=True)], ids=str)
 @pytest.mark.parametrize("name", NAMES)
 def test_programs_are_read_and_timed_alike(pairs: Mapping[str, Pair], name: str, options: Options) -> None:
-    found = [alike(lambda s, d: reading(text, s, d, options), pairs[name]) for text in texts_of(name)]  # noqa: B023
-    assert sum(said.startswith("[") for said in found) > 3
+    outcomes = [alike(lambda s, d: reading(text, s, d, options), pairs[name]) for text in texts_of(name)]  # noqa: B023
+    assert sum(text.startswith("[") for text in outcomes) > 3
 
 
 def _unrolled(text: bytes, setup: Setup, dialect: Dialect, expand: bool, clearance: float | None) -> bytes:
@@ -159,8 +159,8 @@ def test_programs_are_unrolled_alike(pairs: Mapping[str, Pair], name: str) -> No
 @pytest.mark.parametrize("name", NAMES)
 def test_programs_are_corrected_and_judged_alike(pairs: Mapping[str, Pair], name: str) -> None:
     def corrected(text: bytes, setup: Setup) -> tuple[bytes, object, object]:
-        found = olp.correct(text, setup, contour=True)
-        return found.data, found.report, [finding.as_dict() for finding in found.findings]
+        result = olp.correct(text, setup, contour=True)
+        return result.data, result.report, [finding.as_dict() for finding in result.findings]
 
     pair, good = pairs[name], 0
     texts = texts_of(name)[:4]
@@ -191,4 +191,4 @@ def test_axis_positions_of_results_count_alike(pairs: Mapping[str, Pair]) -> Non
         name: alike(lambda s, d: olp.correct_results(table, s, frame="machine").report, by_control(pair))
         for name, pair in pairs.items()
     }
-    assert [name for name, found in counted.items() if "end of the ram" in found] == ["dmis"]
+    assert [name for name, remark in counted.items() if "end of the ram" in remark] == ["dmis"]

@@ -90,15 +90,15 @@ def test_l1_any_bytes_come_back_or_are_refused(
     text = data.draw(
         st.one_of(st.binary(max_size=200), st.text(CASES[name].alphabet, max_size=120).map(str.encode))
     )
-    out = attempt(text, zero[name])
-    assert out is None or out == text
+    written = attempt(text, zero[name])
+    assert written is None or written == text
     attempt(text, shifted[name])
 
 
 @pytest.mark.parametrize(("name", "text"), [(n, t) for n, c in CASES.items() for t in c.examples])
 def test_l1_chosen_texts(zero: dict[str, Setup], shifted: dict[str, Setup], name: str, text: bytes) -> None:
-    out = attempt(text, zero[name])
-    assert out is None or out == text
+    written = attempt(text, zero[name])
+    assert written is None or written == text
     attempt(text, shifted[name])
 
 
@@ -108,8 +108,8 @@ def test_l1_chosen_texts(zero: dict[str, Setup], shifted: dict[str, Setup], name
 @settings(max_examples=15)
 def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Setup], name: str, noise: bytes) -> None:
     case = CASES[name]
-    said = re.sub(rb"[\r\n()]|olp", b"", noise).rstrip(b" $\t\v\f").decode("latin-1")
-    text = "\n".join([*case.head, case.comment(said), case.point((1.0, 2.0, 3.0), 3), *case.tail])
+    content = re.sub(rb"[\r\n()]|olp", b"", noise).rstrip(b" $\t\v\f").decode("latin-1")
+    text = "\n".join([*case.head, case.comment(content), case.point((1.0, 2.0, 3.0), 3), *case.tail])
     data = text.encode("latin-1")
     assert olp.correct(data, zero[name]).data == data
 
@@ -127,11 +127,11 @@ def test_l1_a_damaged_program_never_crashes(
     rng = np.random.default_rng(seed)
     text = bytearray(CASES[name].program(rng.uniform(-50, 50, (6, 3)), 3))
     for place, piece in cuts:
-        at = place % len(text)
-        text[at : at + 2] = piece
+        position = place % len(text)
+        text[position : position + 2] = piece
     data = bytes(text)
-    out = attempt(data, zero[name])
-    assert out is None or out == data
+    written = attempt(data, zero[name])
+    assert written is None or written == data
     attempt(data, shifted[name])
 
 
@@ -145,7 +145,7 @@ def test_l3_no_error_no_edit(zero: dict[str, Setup], name: str, seed: int) -> No
 
 @pytest.mark.corpus
 @pytest.mark.parametrize("name", [n for n, c in CASES.items() if c.specimens])
-def test_l1_l3_every_specimen_is_carried(corpus: Path, tmp_path: Path, name: str) -> None:
+def test_l1_l3_every_specimen_stays_unchanged(corpus: Path, tmp_path: Path, name: str) -> None:
     case = CASES[name]
     tools = {n: {"Z_mm": 100.0 + n} for n in range(1, 31)}
     frames = {**FRAMES, **{f"COOR_{n:04d}": FRAMES["A"] for n in range(1, 30)}}
@@ -158,17 +158,17 @@ def test_l1_l3_every_specimen_is_carried(corpus: Path, tmp_path: Path, name: str
         + '[styli."A0.0B0.0"]\noffset_mm = [0, 0, -150]\n[styli."A90.0B0.0"]\noffset_mm = [0, 120, -50]\n'
     )
     paths = [p for pattern in case.specimens for p in sorted(corpus.glob(pattern))]
-    carried = 0
+    unchanged = 0
     for path in (p for p in paths if p.stat().st_size < 400_000):
         try:
-            out = olp.correct(path, pinned(described, case), contour=True).data
-            assert out == path.read_bytes(), path.name
-            carried += 1
+            written = olp.correct(path, pinned(described, case), contour=True).data
+            assert written == path.read_bytes(), path.name
+            unchanged += 1
         except OlpError as refusal:
             assert isinstance(refusal, ProgramError), path.name
             assert refusal.line is not None, path.name
             assert case.name not in ("apt", "dmis"), refusal
-    assert carried
+    assert unchanged
 
 
 # -- L2: bytes outside edits; a shift edits every slot -------------------------------------------------
@@ -176,17 +176,17 @@ def test_l1_l3_every_specimen_is_carried(corpus: Path, tmp_path: Path, name: str
 
 def numbers(text: bytes, pattern: re.Pattern[bytes]) -> tuple[bytes, list[Decimal]]:
     """The text with a mark in place of each coordinate, and the coordinates."""
-    found: list[Decimal] = []
+    values: list[Decimal] = []
 
     def mark(hit: re.Match[bytes]) -> bytes:
-        found.extend(Decimal(g.decode()) for g in hit.groups())
-        out = hit[0]
+        values.extend(Decimal(g.decode()) for g in hit.groups())
+        digits = hit[0]
         for group in range(3, 0, -1):
             a, b = hit.span(group)
-            out = out[: a - hit.start()] + b"@" + out[b - hit.start() :]
-        return out
+            digits = digits[: a - hit.start()] + b"@" + digits[b - hit.start() :]
+        return digits
 
-    return pattern.sub(mark, text), found
+    return pattern.sub(mark, text), values
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -211,7 +211,7 @@ def test_l2_a_shift_edits_every_slot_and_nothing_else(
 def commanded(
     nominal: np.ndarray, text: bytes, path: Path, case: Case, own: np.ndarray | None = None
 ) -> float:
-    """Largest difference of the written end of a nominal move from the command that the judge asks for."""
+    """Largest difference of the written end of a nominal move from the command of the judge."""
     model = JudgeModel(path)
     # the ram of a measuring machine ends a stylus above the tip, and there its axes count
     up = np.array([0.0, 0.0, 120.0]) if case.name == "dmis" else np.zeros(3)
@@ -240,14 +240,15 @@ def test_l6_distances_do_not_drift(bent: dict[str, Path], name: str) -> None:
     rng = np.random.default_rng(3)
     steps = np.round(rng.normal(scale=0.4, size=(1500, 3)) * (1, 1, 0.2), 3)
     steps -= np.round(steps.mean(axis=0), 3)
-    said = [case.distance(s, 3) for s in steps.tolist()]
-    text = "\n".join([*case.head, case.point((0.0, 0.0, 0.0), 3), *said, *case.tail]) + "\n"
-    out = olp.correct(text.encode(), pinned(bent[name], case)).data
+    statements = [case.distance(s, 3) for s in steps.tolist()]
+    text = "\n".join([*case.head, case.point((0.0, 0.0, 0.0), 3), *statements, *case.tail]) + "\n"
+    written = olp.correct(text.encode(), pinned(bent[name], case)).data
     three = rb"X?([^,\s]+)[,\s]Y?([^,\s]+)[,\s]Z?([^,\s)]+)"
-    found = re.findall(rb"(?m)^(?:G91 )?(?:G1 |GODLTA/|GOTO/|DRAW |LMOVE TRANS\(|MOVES TRANS\()" + three, out)
-    own = np.cumsum([[float(n) for n in row] for row in found], axis=0)
+    begins = rb"(?m)^(?:G91 )?(?:G1 |GODLTA/|GOTO/|DRAW |LMOVE TRANS\(|MOVES TRANS\()"
+    rows = re.findall(begins + three, written)
+    own = np.cumsum([[float(n) for n in row] for row in rows], axis=0)
     nominal = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-    assert commanded(nominal, out, bent[name], case, own) <= HALF_DIGIT
+    assert commanded(nominal, written, bent[name], case, own) <= HALF_DIGIT
 
 
 # -- L8: every move is accounted for ------------------------------------------------------------------

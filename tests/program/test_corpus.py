@@ -37,7 +37,7 @@ def plain(path: Path) -> bool:
 @pytest.fixture(scope="module")
 def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Path]]:
     """A big smooth machine for each control, with tools 1 to 30, and a job that says where the axes start."""
-    out = {}
+    by_dialect = {}
     for folder, controller in PROFILE_OF.items():
         recipe = Recipe(
             controller=controller,
@@ -50,14 +50,14 @@ def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Pa
         )
         machine = machines.random_machine(tmp_path_factory.mktemp(folder), 5, recipe)
         if folder == "gcode_fanuc":
-            # these were written for calculator input: `X0Y50` stands beside `X50.Y0`
+            # these were written for calculator input: `X0Y50` is beside `X50.Y0`
             text = machine.read_text()
             machine.write_text(text.replace("controller =", 'decimal_point = "calculator"\ncontroller =', 1))
         job = machine.with_name("job.toml")
         start = "start_mm = { X = 0.0, Y = 0.0, Z = 100.0 }\n"
         job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}')
-        out[folder] = (machine, job)
-    return out
+        by_dialect[folder] = (machine, job)
+    return by_dialect
 
 
 @pytest.mark.slow
@@ -105,7 +105,7 @@ def everything(corpus: Path) -> Iterator[Path]:
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["linuxcnc", "grbl", "fanuc", "haas"])
 def test_no_text_of_any_dialect_crashes(corpus: Path, tmp_path: Path, controller: str) -> None:
-    """Robot languages and part descriptions under a G-code profile are refused, or carried."""
+    """Robot languages and part descriptions under a G-code profile are refused, or stay unchanged."""
     machine = machines.shift_machine(tmp_path, recipe=Recipe(controller=controller))
     for path in everything(corpus):
         try:
@@ -132,13 +132,15 @@ def test_the_judge_agrees_where_it_reads(corpus: Path, setups: dict[str, tuple[P
             interpreter = {"start_mm": (0.0, 0.0, 100.0), "find_known": False}
             if not linuxcnc.accepts(nominal, machine.parent, start_mm=(0.0, 0.0, 100.0)):
                 continue
-            passed = tuple(
+            uncorrected = tuple(
                 line for f in result.findings if f.code in ("OLP102", "OLP306") for line in f.lines
             )
-            found = judged(nominal, result.data, machine.parent, skip_lines=passed, interpreter=interpreter)
+            errors = judged(
+                nominal, result.data, machine.parent, skip_lines=uncorrected, interpreter=interpreter
+            )
             compared += 1
             bar = allowed_um(nominal) + 0.02
-            if found.max_um > bar or found.vertex_max_um > bar:
-                wrong.append((path.name, found.max_um, found.vertex_max_um, found.worst_line))
+            if errors.max_um > bar or errors.vertex_max_um > bar:
+                wrong.append((path.name, errors.max_um, errors.vertex_max_um, errors.worst_line))
     assert not wrong
     assert compared >= 4

@@ -85,8 +85,8 @@ def attempt(data: bytes, path: Path) -> bytes | None:
 @example(data=b"G0x9.1Y5Z-10.75G18\ng2x18.70Z-3I-3.3K13.9")
 @settings(max_examples=40)
 def test_l1_any_bytes_come_back_or_are_refused(zero: dict[str, Path], dialect: str, data: bytes) -> None:
-    out = attempt(data, zero[dialect])
-    assert out is None or out == data
+    written = attempt(data, zero[dialect])
+    assert written is None or written == data
 
 
 @pytest.mark.parametrize("dialect", RS274)
@@ -108,11 +108,11 @@ def test_l1_a_damaged_program_never_crashes(
 ) -> None:
     text = bytearray(programs.random_program(seed, blocks=4))
     for place, piece in cuts:
-        at = place % len(text)
-        text[at : at + 2] = piece
+        position = place % len(text)
+        text[position : position + 2] = piece
     data = bytes(text)
-    out = attempt(data, zero["linuxcnc"])
-    assert out is None or out == data
+    written = attempt(data, zero["linuxcnc"])
+    assert written is None or written == data
     attempt(data, shifted["linuxcnc"])
     attempt(data, shifted["haas"])
 
@@ -128,15 +128,15 @@ def test_l3_no_error_no_edit(zero: dict[str, Path], seed: int) -> None:
 
 def numbers(text: bytes) -> tuple[bytes, list[Decimal]]:
     """The text with a mark in place of each coordinate outside comments, and the coordinates."""
-    found: list[Decimal] = []
+    values: list[Decimal] = []
 
     def mark(hit: re.Match[bytes]) -> bytes:
-        found.append(Decimal(hit[3].decode()))
+        values.append(Decimal(hit[3].decode()))
         return hit[1] + hit[2] + b"@"
 
     pieces = re.split(rb"(\([^)\n]*\)|;[^\n]*)", text)
     pieces[::2] = [WORD.sub(mark, piece) for piece in pieces[::2]]
-    return b"".join(pieces), found
+    return b"".join(pieces), values
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -166,7 +166,7 @@ def test_l2_the_stamp_is_one_line_behind_tape_mark_and_number(shifted: dict[str,
 
 
 def commanded(nominal_mm: np.ndarray, text: bytes, path: Path) -> np.ndarray:
-    """(n, 3) difference of the written end of each nominal move from the command the judge asks for."""
+    """(n, 3) difference of the written end of each nominal move from the command of the judge."""
     model = JudgeModel(path)
     offset = np.array([250.0, 200.0, -300.0])
     want = model.command_for(nominal_mm + offset, TOOL) - offset
@@ -210,19 +210,19 @@ def test_l7_arcs_keep_their_radius(
     code = "G2" if clockwise else "G3"
     text = f"G21 G90 G17 G54\nG0 X{x0} Y{y0} Z5.\nG1 Z0. F500\n{code} X{x1} Y{y1} I{-x0:.3f} J{-y0:.3f}\nM2\n"
     corrected = olp.correct(text.encode(), bent).data
-    at, arcs = np.zeros(2), 0
+    position, arcs = np.zeros(2), 0
     for block in corrected.splitlines():
-        found = {
+        values = {
             key: float(number) for key, number in re.findall(rb"([XYIJ])([+-]?(?:\d+\.?\d*|\.\d+))", block)
         }
         if b"olp-corrected" in block:
             continue
-        end = np.array([found.get(b"X", at[0]), found.get(b"Y", at[1])])
-        if b"I" in found or b"J" in found:
-            centre = at + np.array([found.get(b"I", 0.0), found.get(b"J", 0.0)])
+        end = np.array([values.get(b"X", position[0]), values.get(b"Y", position[1])])
+        if b"I" in values or b"J" in values:
+            centre = position + np.array([values.get(b"I", 0.0), values.get(b"J", 0.0)])
             arcs += 1
-            assert abs(np.linalg.norm(end - centre) - np.linalg.norm(at - centre)) <= RADIUS_MM
-        at = end
+            assert abs(np.linalg.norm(end - centre) - np.linalg.norm(position - centre)) <= RADIUS_MM
+        position = end
     assert arcs >= 1
 
 

@@ -35,9 +35,9 @@ def test_a_section_may_be_long(shifted: Path) -> None:
     """Over many of the chunks in which a text is read."""
     inner = "".join(f"X{i % 97}.5\n" for i in range(120_000))
     source = f"G21 G90 G54 G64 P0.01\nG0 X1 Y1 Z1\n(olp off)\nG1 F100\n{inner}(olp on)\nX3 Y3 Z2\nM2\n"
-    out = olp.correct(source.encode(), shifted).data
-    assert f"(olp off)\nG1 F100\n{inner}(olp on)\n".encode() in out
-    assert b"\nX3 Y3 Z2\n" not in out
+    written = olp.correct(source.encode(), shifted).data
+    assert f"(olp off)\nG1 F100\n{inner}(olp on)\n".encode() in written
+    assert b"\nX3 Y3 Z2\n" not in written
 
 
 @pytest.mark.parametrize("comment", ["(now olp off)", "(olp offset 3)", "(MSG, olp off)"])

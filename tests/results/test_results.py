@@ -133,7 +133,7 @@ def test_each_row_may_have_its_stylus(machine: Path) -> None:
         assert np.abs(values(data) - true).max() < BAR_MM
 
 
-def test_lost_motion_is_known_where_the_approach_is(tmp_path: Path) -> None:
+def test_the_play_is_known_where_the_approach_is(tmp_path: Path) -> None:
     recipe = Recipe(work_offsets=FRAMES, tools=STYLI, backlash_um={"X": 6.0, "Y": 4.0, "Z": 5.0})
     machine = random_machine(tmp_path / "m", 8, recipe)
     model = JudgeModel(machine)
@@ -196,13 +196,13 @@ def test_dmis_output_is_corrected_point_by_point(machine: Path) -> None:
     assert stamp.startswith(b"$$ olp-corrected ")
     blank = re.compile(rb"-?\d+\.\d{6}(?=[,$\r])")
     assert blank.sub(b"#", rest) == blank.sub(b"#", source)
-    carried = [f for f in result.findings if f.code == "OLP622"]
-    assert {f.line for f in carried} == {11, 12}
+    unchanged = [f for f in result.findings if f.code == "OLP622"]
+    assert {f.line for f in unchanged} == {11, 12}
 
 
 @pytest.mark.parametrize(("change", "line", "words"), [
     (("UNITS/MM,ANGDEC\r\n", ""), 6, "before any UNITS"),
-    (("UNITS/MM,", "UNITS/FURLONG,"), 2, "FURLONG is no unit"),
+    (("UNITS/MM,", "UNITS/FURLONG,"), 2, "FURLONG is not a unit"),
     (("POINT,CART, ", "POINT,POL, "), 7, "stated in POL"),
     (("ENDFIL", "GOTO/1,2,3"), 13, "part program"),
     (("D(PART)=DATSET/DAT(A),ZDIR,ZORIG\r\n", ""), None, "frame MCS is not defined"),
@@ -216,8 +216,8 @@ def test_what_cannot_be_right_is_refused(
     true, normal = truth(2)
     source = dmo(true, normal).replace(change[0].encode(), change[1].encode())
     if not words:
-        found = olp.correct_results(source, machine).findings
-        assert "OLP625" in {f.code for f in found}
+        findings = olp.correct_results(source, machine).findings
+        assert "OLP625" in {f.code for f in findings}
         return
     with pytest.raises(OlpError, match=words) as caught:
         olp.correct_results(source, machine)
@@ -238,8 +238,8 @@ def test_a_stylus_of_a_file_is_looked_up_by_its_label(machine: Path, tmp_path: P
     result = olp.correct_results(source, here, tip_radius_mm=1.0)
     axis = true + 1.0 * normal + OFFSET - [0, 0, 120] - tool_vector
     assert np.abs(read_dmis(result.data).value_mm - true - model.error_mm(axis, tool_vector)).max() < 2e-6
-    found = np.array([p["axis_mm"] for p in result.report["points"]])
-    assert found == pytest.approx(axis, abs=2e-6)
+    axis_mm = np.array([p["axis_mm"] for p in result.report["points"]])
+    assert axis_mm == pytest.approx(axis, abs=2e-6)
 
 
 def test_results_are_never_corrected_twice(machine: Path, tmp_path: Path) -> None:
@@ -285,9 +285,10 @@ def test_names_of_the_file_lead_to_those_of_the_job(machine: Path) -> None:
 
 
 def test_doubt_about_the_touch_is_stated(machine: Path) -> None:
-    found = {f.code: f.message for f in olp.correct_results(csv(truth()[0]), machine, frame="G54").findings}
-    said = found.get("OLP623") or found["OLP621"]
-    assert "which side of the tip" in said or "OLP623" in found
+    findings = olp.correct_results(csv(truth()[0]), machine, frame="G54").findings
+    messages = {f.code: f.message for f in findings}
+    message = messages.get("OLP623") or messages["OLP621"]
+    assert "which side of the tip" in message or "OLP623" in messages
 
 
 def test_columns_keep_their_edges(machine: Path) -> None:

@@ -58,14 +58,14 @@ def needs_a_browser() -> None:
 @pytest.fixture(scope="module")
 def play() -> Iterator[Any]:
     browser.require()
-    with browser.driver() as found:
-        yield found
+    with browser.driver() as driver:
+        yield driver
 
 
 @pytest.fixture(scope="module")
 def chromium(play: Any) -> Iterator[Any]:
-    with browser.launched(play, *browser.SOFTWARE_GL) as found:
-        yield found
+    with browser.launched(play, *browser.SOFTWARE_GL) as launched:
+        yield launched
 
 
 @pytest.fixture(scope="module")
@@ -123,10 +123,10 @@ def test_positions_deviations_and_times_unpack_to_what_was_packed(page: Any, rev
         ("t", scene.time_s[:, None], 1e-6),
         ("s", scene.samples.arc_mm[:, None], 1e-3),
     ):
-        found = array(page, name, truth.shape[1]).reshape(truth.shape)
+        unpacked = array(page, name, truth.shape[1]).reshape(truth.shape)
         # "result" is a sum of three roundings
         share = 1.5 if name == "d_result" else 0.5
-        assert np.abs(found - truth).max() <= share * step * (1 + 1e-6), name
+        assert np.abs(unpacked - truth).max() <= share * step * (1 + 1e-6), name
 
 
 def test_ten_metres_of_axis_lose_nothing(chromium: Any, tmp_path: Path) -> None:
@@ -257,17 +257,17 @@ def test_metrics_are_the_parts_of_the_deviation(page: Any, review: Review) -> No
     for layer, delta in (("uncorrected", scene.samples.uncorrected), ("result", scene.samples.result)):
         for name, truth in parts_of(review, delta).items():
             page.evaluate("name => olp.set_metric(name)", name)
-            found = np.array(
+            shown = np.array(
                 page.evaluate(
                     "layer => Array.from("
                     "olp.app.metrics.values(olp.app.metrics.find(olp.state.metric), layer),"
                     " v => Number.isNaN(v) ? null : v)", layer,
                 ), float,
             )  # fmt: skip
-            assert np.array_equal(np.isnan(found), rapid)
+            assert np.array_equal(np.isnan(shown), rapid)
             known = ~rapid & ~np.isnan(truth)
             # the direction of the shortest steps is known to their rounding only
-            assert np.abs(found - 1e3 * truth)[known].max() < 0.01
+            assert np.abs(shown - 1e3 * truth)[known].max() < 0.01
 
 
 def test_the_path_is_coloured_by_band_and_by_probability(chromium: Any, tmp_path: Path) -> None:
@@ -285,14 +285,14 @@ def test_the_path_is_coloured_by_band_and_by_probability(chromium: Any, tmp_path
         rapid = array(page, "rapid") != 0
         for name, truth in (("band", 1e3 * sure.band_mm), ("beyond", 100.0 * sure.beyond["result"])):
             page.select_option("#metric", name)
-            found = np.array(
+            shown = np.array(
                 page.evaluate(
                     "Array.from(olp.app.metrics.values(olp.app.metrics.find(olp.state.metric), 'result'),"
                     " v => Number.isNaN(v) ? null : v)"
                 ), float,
             )  # fmt: skip
-            assert np.array_equal(np.isnan(found), rapid)
-            assert np.abs(found - truth)[~rapid].max() <= max(truth.max() / 200, 0.051)
+            assert np.array_equal(np.isnan(shown), rapid)
+            assert np.abs(shown - truth)[~rapid].max() <= max(truth.max() / 200, 0.051)
             still(page)
             assert page.evaluate("document.getElementById('legend-title').textContent") == (
                 "uncertainty (k = 2), µm" if name == "band" else "probability beyond 8 µm, %"
@@ -357,12 +357,12 @@ def test_statistics_are_those_of_the_feed_moves(page: Any, review: Review) -> No
     samples = review.scene.samples
     for layer, delta in (("uncorrected", samples.uncorrected), ("result", samples.result)):
         size = 1e3 * np.linalg.norm(delta, axis=1)[feed]
-        found = page.evaluate("n => olp.app.metrics.summary(olp.app.plot_metric(), n, 20)", layer)
+        summary = page.evaluate("n => olp.app.metrics.summary(olp.app.plot_metric(), n, 20)", layer)
         truth = {
             "largest": size.max(), "mean": size.mean(), "rms": np.sqrt((size**2).mean()), "sigma": size.std(),
             "inside": (size <= 20).mean(),
         }  # fmt: skip
-        assert {k: found[k] for k in truth} == pytest.approx(truth, rel=1e-4, abs=2e-3)
+        assert {k: summary[k] for k in truth} == pytest.approx(truth, rel=1e-4, abs=2e-3)
     shown = page.locator("#statistics table").first.inner_text()
     assert f"{1e3 * np.linalg.norm(review.scene.samples.uncorrected[feed], axis=1).max():.3g}" in shown
 
@@ -373,7 +373,7 @@ def test_statistics_are_those_of_the_feed_moves(page: Any, review: Review) -> No
 def test_a_click_on_the_path_finds_its_line(page: Any, review: Review) -> None:
     page.click("#view-iso")
     rows = array(page, "line")
-    found = 0
+    hits = 0
     for sample in middle_of_moves(review)[1:]:
         x, y = page.evaluate("s => olp.project(s, 'nominal')", sample)
         hit = page.evaluate("p => olp.pick(...p)", [x, y])
@@ -381,14 +381,14 @@ def test_a_click_on_the_path_finds_its_line(page: Any, review: Review) -> None:
         page.mouse.click(x, y)
         assert page.evaluate("olp.state.row") == rows[int(np.ceil(hit["sample"] - 1e-9))]
         if abs(hit["sample"] - sample) < 5:
-            found += 1
+            hits += 1
             assert page.evaluate("olp.state.row") == rows[sample]
         selected = page.locator(".row.selected:visible")
         assert selected.count() == 1
         assert int(selected.get_attribute("data-row")) == page.evaluate("olp.state.row")
         marks = page.evaluate("olp.app.plots.charts.map(c => c.marks.now)")
         assert marks == pytest.approx([page.evaluate("olp.state.time")] * len(marks))
-    assert found >= 4
+    assert hits >= 4
 
 
 def test_a_click_on_a_line_finds_its_moves(page: Any, review: Review) -> None:
@@ -445,7 +445,7 @@ def test_plots_zoom_together_about_the_pointer_and_come_back(page: Any) -> None:
 
 
 def test_no_peak_is_lost_in_a_plot_of_a_million_points(page: Any) -> None:
-    found = page.evaluate(
+    peaks = page.evaluate(
         """() => {
           const n = 1e6, x = Float64Array.from({length: n}, (_, i) => i), y = new Float32Array(n);
           y[123457] = 9; y[777777] = -4; y[500000] = NaN;
@@ -456,8 +456,8 @@ def test_no_peak_is_lost_in_a_plot_of_a_million_points(page: Any) -> None:
           return [columns.length, Math.max(...ends[1]), Math.min(...ends[0]), chart.wide];
         }"""
     )
-    assert found[0] <= found[3] + 2
-    assert found[1:3] == [9, -4]
+    assert peaks[0] <= peaks[3] + 2
+    assert peaks[1:3] == [9, -4]
 
 
 def test_motion_plots_show_limits_and_ways(page: Any) -> None:
@@ -496,9 +496,9 @@ def test_scrubbing_moves_tool_and_machine(page: Any, review: Review) -> None:
             moment,
         )
         assert page.evaluate("olp.state.time") == pytest.approx(moment, abs=1e-9)
-        at = page.evaluate(PLACE, ["tool"])
+        position = page.evaluate(PLACE, ["tool"])
         truth = [np.interp(moment, scene.time_s, scene.position_mm[:, j]) for j in range(3)]
-        assert np.array(at) + page.evaluate("olp.manifest.origin_mm") == pytest.approx(truth, abs=1e-2)
+        assert np.array(position) + page.evaluate("olp.manifest.origin_mm") == pytest.approx(truth, abs=1e-2)
         for node in nodes:
             axis = node["axis"]
             there = np.interp(moment, scene.time_s, axes[:, axis])
@@ -613,9 +613,9 @@ def test_standard_views_show_the_whole_path(page: Any, review: Review) -> None:
         assert page.get_attribute("#ortho", "aria-pressed") == str(ortho).lower()
         for name in ("iso", "top", "front", "side"):
             page.click(f"#view-{name}")
-            at = np.array([page.evaluate("s => olp.project(s, 'nominal')", s) for s in corners])
-            assert (at >= [box["x"], box["y"]]).all()
-            assert (at <= [box["x"] + box["width"], box["y"] + box["height"]]).all()
+            pixels = np.array([page.evaluate("s => olp.project(s, 'nominal')", s) for s in corners])
+            assert (pixels >= [box["x"], box["y"]]).all()
+            assert (pixels <= [box["x"] + box["width"], box["y"] + box["height"]]).all()
             assert page.evaluate("olp.state.view") == name
         page.click("#ortho")
 
@@ -893,10 +893,10 @@ def test_measured_paths_and_workpieces_stand_beside_the_rest(chromium: Any, tmp_
         '[[meshes]]\nfile = "part.stl"\nrole = "workpiece"\nframe = "G54"\n'
     )
     (tmp_path / "tip.csv").write_bytes(olp.simulate(PROGRAM, GANTRY, step_mm=2.0).to_csv())
-    found = view(
+    review = view(
         tmp_path / "part.ngc", GANTRY, tmp_path / "job.toml", measured=[tmp_path / "tip.csv"], time=False
     )
-    found.write(tmp_path / "measured.html")
+    review.write(tmp_path / "measured.html")
     with browser.opened(chromium, tmp_path / "measured.html") as page:
         assert page.evaluate("olp.drawn.measured") > 100
         uncorrected, measured = page.evaluate(
@@ -954,8 +954,8 @@ def test_shipped_jobs_open(
     chromium: Any, tmp_path: Path, program: str, job: str, size: tuple[int, int], theme: str
 ) -> None:
     folder = (PROGRAMS / program).parent
-    found = view(PROGRAMS / program, folder / "machine.toml", PROGRAMS / job, time=False)
-    found.write(tmp_path / "job.html")
+    review = view(PROGRAMS / program, folder / "machine.toml", PROGRAMS / job, time=False)
+    review.write(tmp_path / "job.html")
     with browser.opened(chromium, tmp_path / "job.html", size=size, theme=theme) as page:
         still(page)
         assert colourful(browser.picture(page)) > 1000
@@ -963,4 +963,4 @@ def test_shipped_jobs_open(
         shown = json.loads(json.dumps(page.evaluate("olp.worst()")))
         assert shown and shown["value"] > 0
         origin = np.array(page.evaluate("olp.manifest.origin_mm"))
-        assert np.abs(array(page, "P", 3) + origin - found.scene.position_mm).max() <= 0.5e-4 * (1 + 1e-6)
+        assert np.abs(array(page, "P", 3) + origin - review.scene.position_mm).max() <= 0.5e-4 * (1 + 1e-6)

@@ -88,9 +88,9 @@ def test_an_inserted_block_stands_before_the_block_that_it_was_split_from(tmp_pa
     machine = random_machine(tmp_path / "m", 3)
     page = Page(olp.view(TEXT.encode(), machine, tolerance_um=0.2, time=False).html())
     rows = page.array("row_nominal").astype(int).tolist()
-    at = rows.index(9)
-    assert rows[at - 1] == 0
-    assert "X500" not in page.array("text_corrected")[int(page.array("row_corrected")[at - 1]) - 1]
+    index = rows.index(9)
+    assert rows[index - 1] == 0
+    assert "X500" not in page.array("text_corrected")[int(page.array("row_corrected")[index - 1]) - 1]
     assert rows[1] == 0 or rows[0] == 0  # the stamp
 
 

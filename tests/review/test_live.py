@@ -26,15 +26,16 @@ TEXT = "G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100 F600\nM2\n"
 
 
 class Served:
-    """A job in a folder, its server, and what it said."""
+    """A job in a folder, its server, and its messages."""
 
     def __init__(self, folder: Path) -> None:
         self.machine = zero_machine(folder / "m")
         self.program = folder / "part.ngc"
         self.program.write_text(TEXT)
-        self.said: list[str] = []
+        self.messages: list[str] = []
+        inputs = [str(self.program)]
         self.server = Server(
-            lambda: olp.view(self.program, self.machine, time=False), [str(self.program)], self.said.append
+            lambda: olp.view(self.program, self.machine, time=False), inputs, self.messages.append
         )
         self.thread = threading.Thread(target=self.server.run)
         self.thread.start()
@@ -55,11 +56,11 @@ class Served:
 @pytest.fixture
 def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     monkeypatch.setattr(live, "WATCH_S", 0.02)
-    found = Served(tmp_path)
-    yield found
-    found.server.stop()
-    found.thread.join(10)
-    assert not found.thread.is_alive()
+    server = Served(tmp_path)
+    yield server
+    server.server.stop()
+    server.thread.join(10)
+    assert not server.thread.is_alive()
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -94,18 +95,18 @@ def test_a_change_of_the_inputs_changes_the_page(served: Served) -> None:
     served.change(TEXT.replace("100", "90"))
     until(lambda: served.get("/version")[1] != before)
     assert Page(served.get()[1]).array("text_nominal")[3] == "G1 X90 F600"
-    assert served.said == ["the page is up to date again"]
+    assert served.messages == ["the page is up to date again"]
 
 
 def test_an_input_that_is_wrong_leaves_the_page_as_it_was(served: Served) -> None:
     before = served.get("/version")[1]
     served.change("G1 X#\n")
-    until(lambda: bool(served.said))
-    assert "the page is unchanged" in served.said[0] and "part.ngc:1:" in served.said[0]
+    until(lambda: bool(served.messages))
+    assert "the page is unchanged" in served.messages[0] and "part.ngc:1:" in served.messages[0]
     assert served.get("/version")[1] == before
     served.program.unlink()
-    until(lambda: len(served.said) == 2)
-    assert "no such file" in served.said[1]
+    until(lambda: len(served.messages) == 2)
+    assert "no such file" in served.messages[1]
     served.program.write_text(TEXT + "(more)\n")
     until(lambda: served.get("/version")[1] != before)
 

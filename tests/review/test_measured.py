@@ -46,8 +46,8 @@ def test_what_simulate_writes_is_the_uncorrected_machine(name: str, tmp_path: Pa
     delta = page.array(layer["delta"])
     # each is no farther from the path than from the sample that the model puts it to
     size = np.linalg.norm(delta, axis=1)
-    at = np.linalg.norm(scene.samples.uncorrected, axis=1)
-    assert size.max() <= at.max() + 1e-5
+    size_mm = np.linalg.norm(scene.samples.uncorrected, axis=1)
+    assert size.max() <= size_mm.max() + 1e-5
     assert np.median(size) > 0.002
     base = page.array(layer["base"]) + np.array(page.manifest["origin_mm"])
     points = np.loadtxt(path, delimiter=",", skiprows=2)[:, :3]
@@ -59,8 +59,8 @@ def test_the_second_time_round_is_not_the_first(tmp_path: Path) -> None:
     path = written(tmp_path, olp.simulate(TEXT.encode(), machine, step_mm=3.0).to_csv())
     scene = olp.view(TEXT.encode(), machine, measured=[path], time=False).scene
     lines = np.loadtxt(path, delimiter=",", skiprows=2)[:, 3]
-    found = scene.nominal.toolpath.line[scene.samples.move[scene.measured[0].index]]
-    assert (found == lines).all()
+    own_lines = scene.nominal.toolpath.line[scene.samples.move[scene.measured[0].index]]
+    assert (own_lines == lines).all()
     assert np.abs(scene.measured[0].delta_mm).max() < 1e-6 + CHORD_MM
 
 
@@ -93,10 +93,10 @@ def test_points_against_the_order_are_shown_in_its_order(tmp_path: Path) -> None
     path = written(tmp_path, csv(points + np.array((0.0, 0.0, 0.01))))
     program = b"G21 G90 G54\nG43 H1\nG0 X100 Y0 Z20\nG1 Y80 F600\nX60 Y40\nM2\n"
     scene = olp.view(program, machine, measured=[path], time=False).scene
-    found = scene.measured[0]
-    np.testing.assert_allclose(found.base_mm, points[::-1], atol=1e-6)
-    assert (np.diff(found.index) > 0).all()
-    assert "OLP606" in [f.code for f in found.findings]
+    matched = scene.measured[0]
+    np.testing.assert_allclose(matched.base_mm, points[::-1], atol=1e-6)
+    assert (np.diff(matched.index) > 0).all()
+    assert "OLP606" in [f.code for f in matched.findings]
 
 
 @pytest.mark.slow
@@ -112,12 +112,13 @@ def test_the_page_pairs_as_compare_does_and_says_what_that_found(tmp_path: Path)
         path = written(tmp_path, csv(points))
         review = olp.view(program, machine, measured=[path], time=False)
         run = olp.compare(program, [path], machine).runs[0]
-        found = review.scene.measured[0]
-        np.testing.assert_allclose(found.delta_mm, (run.points_mm - run.pairing.foot_mm)[run.good], atol=1e-9)
-        assert len(found.index) == len(points) - 1
+        matched = review.scene.measured[0]
+        delta_mm = (run.points_mm - run.pairing.foot_mm)[run.good]
+        np.testing.assert_allclose(matched.delta_mm, delta_mm, atol=1e-9)
+        assert len(matched.index) == len(points) - 1
         shown = {f["code"] for f in Page(review.html()).manifest["findings"]}
         assert codes <= shown
-        assert {f.code for f in found.findings} <= codes | {"OLP603"}
+        assert {f.code for f in matched.findings} <= codes | {"OLP603"}
 
 
 def test_frames_are_told_apart(tmp_path: Path) -> None:
@@ -141,8 +142,8 @@ def test_frames_lie_where_they_were_touched_off(tmp_path: Path) -> None:
     setup = olp.load_setup(machine)
     for name in ("G54", "G55"):
         offset = np.array(setup.work_offset(name).offset_mm)  # type: ignore[union-attr]
-        at = offset + np.array((0.0, 0.0, setup.tool(1).length_mm[2]))  # type: ignore[union-attr]
-        zero[name] = offset + np.array(olp.error_at(machine, tuple(at), 1)["error_um"]) * 1e-3
+        origin_mm = offset + np.array((0.0, 0.0, setup.tool(1).length_mm[2]))  # type: ignore[union-attr]
+        zero[name] = offset + np.array(olp.error_at(machine, tuple(origin_mm), 1)["error_um"]) * 1e-3
     assert np.abs(np.subtract(zero["G54"], zero["G55"]) - (-120.0, -30.0, 0.0)).max() > 1e-4
     first, *others = (
         olp.view(program, machine, measured=[written(tmp_path, csv(points, frame))], time=False).scene
@@ -173,7 +174,7 @@ def test_several_measurements_are_layers_each(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("# frame=G54\n", ": does not show which columns"),
         ("# frame=G54\nX_mm,Y_mm,Z_mm\n", ": holds no points"),
@@ -184,20 +185,20 @@ def test_several_measurements_are_layers_each(tmp_path: Path) -> None:
         ("# frame=G54\n# frame=G55\nX_mm,Y_mm,Z_mm\n1,2,3\n", ":2: the frame is G55 here and G54 before"),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line(text: str, said: str, tmp_path: Path) -> None:
+def test_a_wrong_file_is_refused_with_its_line(text: str, message: str, tmp_path: Path) -> None:
     machine, path = zero_machine(tmp_path / "m"), written(tmp_path, text)
     with pytest.raises(InputError) as caught:
         olp.view(TEXT.encode(), machine, measured=[path], time=False)
-    assert str(caught.value).startswith(f"{path}{said}")
+    assert str(caught.value).startswith(f"{path}{message}")
 
 
 def test_columns_may_come_in_any_order() -> None:
-    found = parse_points(
+    points = parse_points(
         b"\xef\xbb\xbf# a tracker\r\n#frame = G54\r\nt_s,Z_mm,Y_mm,X_mm\r\n0,3,2,1\r\n1,6,5,4\r\n", "m.csv"
     )
-    assert found.frame == "G54"
-    assert found.points_mm.tolist() == [[1, 2, 3], [4, 5, 6]]
-    assert found.time_s is not None and found.time_s.tolist() == [0, 1]
+    assert points.frame == "G54"
+    assert points.points_mm.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert points.time_s is not None and points.time_s.tolist() == [0, 1]
 
 
 def test_noise_finds_the_same_places(tmp_path: Path) -> None:
@@ -207,13 +208,13 @@ def test_noise_finds_the_same_places(tmp_path: Path) -> None:
     spiral = np.stack((3 / np.pi * turn * np.cos(turn), 3 / np.pi * turn * np.sin(turn), 0 * turn), axis=1)
     lines = [f"G1 X{x:.6f} Y{y:.6f} F600" for x, y, _ in spiral.tolist()]
     program = "\n".join(["G21 G90 G54", "G43 H1", "G0 X0 Y0 Z0", *lines, "M2", ""]).encode()
-    at = np.sort(rng.choice(len(spiral), 4000, replace=False))
-    noise = rng.normal(0.0, 0.01, (len(at), 3))
-    path = written(tmp_path, csv(spiral[at] + noise))
+    chosen = np.sort(rng.choice(len(spiral), 4000, replace=False))
+    noise = rng.normal(0.0, 0.01, (len(chosen), 3))
+    path = written(tmp_path, csv(spiral[chosen] + noise))
     scene = olp.view(program, zero_machine(tmp_path / "m"), measured=[path], time=False, step_mm=50.0).scene
-    found = scene.measured[0]
-    line = scene.nominal.toolpath.line[scene.samples.move[found.index]]
-    assert np.abs(line - (at + 4)).max() <= 2
+    matched = scene.measured[0]
+    line = scene.nominal.toolpath.line[scene.samples.move[matched.index]]
+    assert np.abs(line - (chosen + 4)).max() <= 2
     # the nearest place is no farther than where the point was taken
-    assert (np.linalg.norm(found.delta_mm, axis=1) <= np.linalg.norm(noise, axis=1) + 1e-5).mean() > 0.98
-    assert np.linalg.norm(found.delta_mm, axis=1).max() <= 2 * np.linalg.norm(noise, axis=1).max()
+    assert (np.linalg.norm(matched.delta_mm, axis=1) <= np.linalg.norm(noise, axis=1) + 1e-5).mean() > 0.98
+    assert np.linalg.norm(matched.delta_mm, axis=1).max() <= 2 * np.linalg.norm(noise, axis=1).max()

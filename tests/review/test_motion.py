@@ -25,8 +25,8 @@ BLEND_MM = 0.01
 @cache
 def viewed(name: str) -> tuple[Review, olp.Retiming]:
     result = olp.correct(NASTY / f"{name}.ngc", NASTY / "machine.toml")
-    found = olp.retime(result.data, NASTY / "machine.toml")
-    return olp.view(NASTY / f"{name}.ngc", NASTY / "machine.toml", correction=result), found
+    timing = olp.retime(result.data, NASTY / "machine.toml")
+    return olp.view(NASTY / f"{name}.ngc", NASTY / "machine.toml", correction=result), timing
 
 
 @pytest.mark.slow
@@ -34,16 +34,16 @@ def viewed(name: str) -> tuple[Review, olp.Retiming]:
 def test_at_its_time_the_motion_is_at_the_sample(name: str) -> None:
     """The re-timed motion, asked for its position at the time of a sample, is where the corrected program has
     the sample: but for rounded corners, and for what a stretch takes between two looks at it."""
-    review, found = viewed(name)
+    review, timing = viewed(name)
     scene = review.scene
-    assert scene.duration_s == found.duration_s
+    assert scene.duration_s == timing.duration_s
     assert (np.diff(scene.time_s) >= 0.0).all()
-    assert scene.time_s[0] >= 0.0 and scene.time_s[-1] <= found.duration_s + 1e-9
+    assert scene.time_s[0] >= 0.0 and scene.time_s[-1] <= timing.duration_s + 1e-9
     # a hole may take another number of pecks than before
     path = scene.nominal.toolpath
     reached = (path.flag[scene.samples.move] & np.uint8(Flag.CYCLE)) != 0
     begin = 0.0
-    for trajectory in found.trajectories:
+    for trajectory in timing.trajectories:
         mine = (scene.time_s >= begin) & (scene.time_s <= begin + trajectory.duration_s) & ~reached
         position, velocity = trajectory.at(scene.time_s[mine] - begin)[:2]
         away = np.linalg.norm(position - scene.samples.command_mm[mine], axis=1)
@@ -94,26 +94,26 @@ def test_a_program_without_feed_has_times_all_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_thinned_table_keeps_the_peaks(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    _, found = viewed(name)
+    _, timing = viewed(name)
     monkeypatch.setattr(motions, "MOST_ROWS", 10**9)
-    whole = table(found.trajectories, found.routes)
+    whole = table(timing.trajectories, timing.routes)
     monkeypatch.setattr(motions, "MOST_ROWS", 400)
-    few = table(found.trajectories, found.routes)
-    assert len(few.time_s) <= 1000 * max(len(found.trajectories), 1)
+    few = table(timing.trajectories, timing.routes)
+    assert len(few.time_s) <= 1000 * max(len(timing.trajectories), 1)
     assert len(few.time_s) < len(whole.time_s) or len(whole.time_s) <= 1000
     for column in ("velocity", "acceleration", "jerk", "speed_mm_s"):
         some, all_of = getattr(few, column), getattr(whole, column)
         np.testing.assert_array_equal(some.max(axis=0), all_of.max(axis=0))
         np.testing.assert_array_equal(some.min(axis=0), all_of.min(axis=0))
     assert (np.diff(few.time_s) >= 0.0).all()
-    assert few.time_s[-1] == pytest.approx(found.duration_s)
+    assert few.time_s[-1] == pytest.approx(timing.duration_s)
 
 
 def test_the_table_shows_no_more_than_the_audit_found() -> None:
-    review, found = viewed("modal")
+    review, timing = viewed("modal")
     shown = review.scene.motion
     assert shown is not None
-    audit, limits = found.trajectory.audit, found.trajectory.limits
+    audit, limits = timing.trajectory.audit, timing.trajectory.limits
     for name, values, limit in (
         ("velocity", shown.velocity, limits.velocity),
         ("acceleration", shown.acceleration, limits.acceleration),

@@ -21,21 +21,21 @@ TEXTS = st.lists(st.text(st.characters(exclude_characters="\n", exclude_categori
 )
 
 
-def out(arrays: Arrays, name: str) -> Any:
+def unpacked(arrays: Arrays, name: str) -> Any:
     return decoded(arrays.specs, zlib.decompress(arrays.deflated()), name)
 
 
 def rows(most: float, columns: int = 3) -> st.SearchStrategy[np.ndarray]:
     """Points along an axis, jumps from end to end among them."""
     row = st.lists(st.floats(-most, most), min_size=columns, max_size=columns)
-    return st.lists(row, max_size=40).map(lambda found: np.array(found, float).reshape(-1, columns))
+    return st.lists(row, max_size=40).map(lambda values: np.array(values, float).reshape(-1, columns))
 
 
 @given(rows(TEN_METRES))
 def test_positions_on_a_long_axis_come_out_to_half_a_step(values: np.ndarray) -> None:
     arrays = Arrays()
     arrays.quantised("P", values, POSITION_MM)
-    assert np.abs(out(arrays, "P") - values).max(initial=0.0) <= POSITION_MM / 2 + 1e-11
+    assert np.abs(unpacked(arrays, "P") - values).max(initial=0.0) <= POSITION_MM / 2 + 1e-11
 
 
 @given(rows(TEN_METRES), st.integers(0, 2**32))
@@ -47,14 +47,14 @@ def test_deviations_do_not_suffer_from_where_they_are(values: np.ndarray, seed: 
     arrays.quantised("b", deltas[1], DEVIATION_MM, keep=True)
     arrays.quantised("c", deltas[2], DEVIATION_MM, plus=["a", "b"])
     for name, delta in zip("abc", deltas, strict=True):
-        assert np.abs(out(arrays, name) - delta).max(initial=0.0) <= DEVIATION_MM / 2 + 1e-15
+        assert np.abs(unpacked(arrays, name) - delta).max(initial=0.0) <= DEVIATION_MM / 2 + 1e-15
 
 
 def test_times_may_pass_what_four_bytes_hold() -> None:
     seconds = np.linspace(0.0, 90_000.0, 4000)
     arrays = Arrays()
     arrays.quantised("t", seconds, TIME_S)
-    assert np.abs(out(arrays, "t") - seconds).max() <= TIME_S / 2 + 1e-10
+    assert np.abs(unpacked(arrays, "t") - seconds).max() <= TIME_S / 2 + 1e-10
 
 
 def test_neighbours_too_far_apart_are_refused() -> None:
@@ -66,7 +66,7 @@ def test_neighbours_too_far_apart_are_refused() -> None:
 def test_texts_come_out_to_the_letter(text: str) -> None:
     arrays = Arrays()
     arrays.text("nominal", text)
-    assert "\n".join(out(arrays, "nominal")) == text
+    assert "\n".join(unpacked(arrays, "nominal")) == text
 
 
 @given(TEXTS, TEXTS, st.data())
@@ -79,7 +79,7 @@ def test_changed_texts_come_out_to_the_letter(text: str, original: str, data: st
     arrays = Arrays()
     arrays.text("nominal", original)
     arrays.patch("corrected", text, "nominal", original, np.array(lines))
-    assert "\n".join(out(arrays, "corrected")) == text
+    assert "\n".join(unpacked(arrays, "corrected")) == text
 
 
 def test_a_line_that_is_the_same_costs_no_letters() -> None:
@@ -87,7 +87,7 @@ def test_a_line_that_is_the_same_costs_no_letters() -> None:
     arrays = Arrays()
     arrays.text("nominal", text)
     arrays.patch("corrected", text, "nominal", text, np.arange(50))
-    assert set(out(arrays, "corrected_middle")) == {""}
+    assert set(unpacked(arrays, "corrected_middle")) == {""}
 
 
 @pytest.mark.parametrize(
@@ -98,8 +98,8 @@ def test_raw_values_come_out_as_they_are(dtype: str, kind: type) -> None:
     arrays = Arrays()
     arrays.raw("odd", [1, 2, 3], "u1")
     arrays.raw("v", values, dtype)
-    assert (out(arrays, "v") == values).all()
-    assert out(arrays, "v").dtype == kind
+    assert (unpacked(arrays, "v") == values).all()
+    assert unpacked(arrays, "v").dtype == kind
 
 
 def test_a_stream_of_many_parts_is_one_stream(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,7 +108,7 @@ def test_a_stream_of_many_parts_is_one_stream(monkeypatch: pytest.MonkeyPatch) -
     values = np.random.default_rng(0).integers(0, 255, 54_321)
     arrays = Arrays()
     arrays.raw("v", values, "u1")
-    assert (out(arrays, "v") == values).all()
+    assert (unpacked(arrays, "v") == values).all()
 
 
 def test_nothing_is_a_stream_too() -> None:

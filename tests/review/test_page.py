@@ -49,13 +49,13 @@ def html(machine: Path) -> bytes:
 
 
 def policy(page: Page) -> dict[str, str]:
-    found = [
+    policies = [
         a["content"]
         for tag, a in page.tags
         if tag == "meta" and a.get("http-equiv") == "Content-Security-Policy"
     ]
-    assert len(found) == 1
-    return dict(part.split(None, 1) for part in str(found[0]).split(";") if part.strip())
+    assert len(policies) == 1
+    return dict(part.split(None, 1) for part in str(policies[0]).split(";") if part.strip())
 
 
 # -- one file, no network -------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Uncertainty on the path: laws, an independent Monte-Carlo, files, and what a correction says of it."""
+"""Uncertainty on the path: laws, an independent Monte-Carlo, files, and its report in a correction."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from olp.files.calibration.covariance import covariance_bytes, load_uncertainty,
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.reports.report import to_text
-from olp.uncertainty.components import components, unsure
+from olp.uncertainty.components import components, improbable
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Confidence, Points, Unknowns, bands, confidence, covariances
 
@@ -47,8 +47,8 @@ AT = rng.uniform(*np.array(simulated.BOX).T, (7, 3))
 
 def taken(machine: simulated.Machine, seed: int) -> Measurements:
     """The readings of a full set of lines."""
-    found = measurements_of(simulated.all_lines(machine, seed), simulated.PITCH)
-    return replace(found, measured=datetime.date(2026, 5, 14))
+    readings = measurements_of(simulated.all_lines(machine, seed), simulated.PITCH)
+    return replace(readings, measured=datetime.date(2026, 5, 14))
 
 
 def flat(**more: Any) -> Calibration:
@@ -74,20 +74,26 @@ def random_uncertainty(rank: int = 5, seed: int = 1) -> Uncertainty:
     return Uncertainty(tuple(entries), fingerprint(flat()), "test")
 
 
-def path_of(at: np.ndarray, *, touch: bool = False, line: np.ndarray | None = None) -> Toolpath:
-    n = len(at)
+def path_of(position: np.ndarray, *, touch: bool = False, line: np.ndarray | None = None) -> Toolpath:
+    n = len(position)
     frame = Frame(tool_mm=tuple(TOOL), touched=TOUCH if touch else None)
     number = np.arange(1, n + 1) if line is None else line
     return Toolpath(
-        np.ones(n, np.uint8), np.zeros(n, np.uint8), number.astype(np.int32), np.zeros(n, np.int32), at,
+        np.ones(n, np.uint8), np.zeros(n, np.uint8), number.astype(np.int32), np.zeros(n, np.int32), position,
         (frame,),
     )  # fmt: skip
 
 
-def points_of(at: np.ndarray, before: np.ndarray | None = None, after: np.ndarray | None = None) -> Points:
-    zero = np.zeros(at.shape)
+def points_of(
+    position: np.ndarray, before: np.ndarray | None = None, after: np.ndarray | None = None
+) -> Points:
+    zero = np.zeros(position.shape)
     return Points(
-        np.arange(len(at)), at, zero if before is None else before, zero if after is None else after, None
+        np.arange(len(position)),
+        position,
+        zero if before is None else before,
+        zero if after is None else after,
+        None,
     )
 
 
@@ -107,9 +113,9 @@ def test_an_independent_monte_carlo_agrees(chain: str, touch: bool) -> None:
     at_touch = (np.array(TOUCH[0]), np.array(TOUCH[1])) if touch else None
     judged = sampled(chain, draw, KNOTS, AT, TOOL, at_touch, 2000)
     # tables: the judge counts levers of workpiece axes as the contract does, own coordinate left out
-    found = covariances(unknowns(known, chain), path_of(AT, touch=touch), points_of(AT))
+    covariance = covariances(unknowns(known, chain), path_of(AT, touch=touch), points_of(AT))
     scale = np.sqrt(np.einsum("nii,njj->nij", judged, judged))
-    assert np.abs((found - judged) / scale).max() < 0.13
+    assert np.abs((covariance - judged) / scale).max() < 0.13
 
 
 def test_four_times_the_covariance_doubles_the_bands_and_none_gives_none() -> None:
@@ -121,14 +127,14 @@ def test_four_times_the_covariance_doubles_the_bands_and_none_gives_none() -> No
     assert (none == 0.0).all() and (one > 1e-3).all()
 
 
-def test_a_place_where_it_was_touched_off_is_known() -> None:
-    at = np.array([TOUCH[0], (900.0, 300.0, -200.0)])
-    path = path_of(at, touch=True)
+def test_a_position_where_it_was_touched_off_is_known() -> None:
+    position = np.array([TOUCH[0], (900.0, 300.0, -200.0)])
+    path = path_of(position, touch=True)
     frame = replace(path.frames[0], tool_mm=TOUCH[1])
     path = replace(path, frames=(frame,))
     for known in (random_uncertainty(), of_sigmas(flat(), {"curves": {"EXX": np.full(6, 3e-3)}})):
         assert known is not None
-        band = bands(covariances(unknowns(known), path, points_of(at)))
+        band = bands(covariances(unknowns(known), path, points_of(position)))
         assert band[0] < 1e-9 < 1e-3 < band[1]
 
 
@@ -138,8 +144,8 @@ def test_sigma_columns_hold_anywhere_between_their_positions(q: float, name: str
     sigma = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 4.0]) * (1e-3 if name == "EXX" else 1e-6)
     known = of_sigmas(flat(), {"curves": {name: sigma}})
     assert known is not None
-    at = np.array([[q, 0.0, -400.0]])
-    rows = Sensitivity.of(flat(), "FXYZ", known).rows(at, np.zeros(3))[0, 0]
+    position = np.array([[q, 0.0, -400.0]])
+    rows = Sensitivity.of(flat(), "FXYZ", known).rows(position, np.zeros(3))[0, 0]
     tool_vector = 1.0 if name == "EXX" else 400.0
     assert np.sqrt(rows @ rows) == pytest.approx(tool_vector * np.interp(q, KNOTS["X"], sigma), rel=1e-5)
 
@@ -147,10 +153,10 @@ def test_sigma_columns_hold_anywhere_between_their_positions(q: float, name: str
 def test_variances_of_independent_numbers_add() -> None:
     first = of_sigmas(flat(), {"curves": {"EXX": np.full(6, 3e-3)}, "squareness": {"C0Y": 4e-6}})
     assert first is not None
-    at = np.array([[100.0, 1000.0, 0.0]])
-    sigma = np.sqrt(np.diagonal(covariances(unknowns(first), path_of(at), points_of(at))[0]))
+    position = np.array([[100.0, 1000.0, 0.0]])
+    sigma = np.sqrt(np.diagonal(covariances(unknowns(first), path_of(position), points_of(position))[0]))
     assert sigma == pytest.approx([5e-3, 0.0, 0.0])
-    scatter = covariances(unknowns(first, repeat=1e-3), path_of(at), points_of(at))[0]
+    scatter = covariances(unknowns(first, repeat=1e-3), path_of(position), points_of(position))[0]
     assert np.sqrt(np.diagonal(scatter)) == pytest.approx([np.sqrt(26.0) * 1e-3, 1e-3, 1e-3])
 
 
@@ -165,8 +171,8 @@ def test_probability_in_a_ball_against_known_distributions() -> None:
         assert along == pytest.approx(norm.cdf(0.7 / sigma) - norm.cdf(-1.3 / sigma), abs=1e-3)
         aside = within(line, np.array([[0.0, 0.6, 0.0]]), 1.0)[0]
         assert aside == pytest.approx(2.0 * norm.cdf(0.8 / sigma) - 1.0, abs=1e-3)
-    sure = within(np.zeros((2, 3, 3)), np.array([[0.0, 0.0, 0.9], [0.0, 0.0, 1.1]]), 1.0)
-    assert sure.tolist() == [1.0, 0.0]
+    exact = within(np.zeros((2, 3, 3)), np.array([[0.0, 0.0, 0.9], [0.0, 0.0, 1.1]]), 1.0)
+    assert exact.tolist() == [1.0, 0.0]
 
 
 @given(st.integers(0, 2**31), st.floats(0.1, 3.0))
@@ -185,28 +191,28 @@ def test_probability_in_a_ball_turns_with_the_frame_and_grows_with_the_ball(seed
 
 def assessed(lines: np.ndarray, radius: float, repeat: float = 0.0) -> Confidence:
     n = len(lines)
-    at = np.random.default_rng(9).uniform(*np.array(simulated.BOX).T, (n, 3))
+    position = np.random.default_rng(9).uniform(*np.array(simulated.BOX).T, (n, 3))
     before = np.random.default_rng(8).normal(size=(n, 3)) * 5e-3
     return confidence(
-        unknowns(random_uncertainty().scaled(0.2), repeat=repeat), path_of(at, line=lines),
-        points_of(at, before), radius, tell=silent,
+        unknowns(random_uncertainty().scaled(0.2), repeat=repeat), path_of(position, line=lines),
+        points_of(position, before), radius, tell=silent,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("repeat", [0.0, 2e-3])
-def test_lines_and_programs_are_no_surer_than_their_way_points(repeat: float) -> None:
+def test_lines_and_programs_are_no_more_probable_than_their_waypoints(repeat: float) -> None:
     lines = np.array([3, 3, 1, 2, 2, 3, 1, 7])
-    found = assessed(lines, 0.012, repeat)
-    assert found.lines.tolist() == [1, 2, 3, 7]
-    slack = 4.0 * np.sqrt(0.25 / found.draws)
-    for k, line in enumerate(found.lines.tolist()):
+    result = assessed(lines, 0.012, repeat)
+    assert result.lines.tolist() == [1, 2, 3, 7]
+    slack = 4.0 * np.sqrt(0.25 / result.draws)
+    for k, line in enumerate(result.lines.tolist()):
         own = lines == line
-        assert found.line_after[k] <= found.within_after[own].min() + slack
-        assert found.line_after[k] >= 1.0 - (1.0 - found.within_after[own]).sum() - slack
-        assert found.line_before[k] <= found.within_before[own].min() + slack
-    assert found.program_after <= found.line_after.min()
-    assert found.line_after[3] == pytest.approx(found.within_after[7], abs=slack)
-    assert 0.02 < found.program_after < found.within_after.max()
+        assert result.line_after[k] <= result.within_after[own].min() + slack
+        assert result.line_after[k] >= 1.0 - (1.0 - result.within_after[own]).sum() - slack
+        assert result.line_before[k] <= result.within_before[own].min() + slack
+    assert result.program_after <= result.line_after.min()
+    assert result.line_after[3] == pytest.approx(result.within_after[7], abs=slack)
+    assert 0.02 < result.program_after < result.within_after.max()
 
 
 def test_lines_do_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,15 +226,15 @@ def test_lines_do_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     assert parts.gain == pytest.approx(whole.gain)
 
 
-def test_the_gain_of_one_number_is_sure_beyond_two_sigma() -> None:
+def test_the_gain_of_one_number_is_probable_beyond_two_sigma() -> None:
     known = of_sigmas(flat(), {"curves": {"EXX": np.full(6, 2e-3)}})
     assert known is not None
-    at = np.full((2, 3), [1500.0, 0.0, 0.0])
+    position = np.full((2, 3), [1500.0, 0.0, 0.0])
     before = np.array([[4.0e-3, 0.0, 0.0], [1.0e-3, 0.0, 0.0]])
-    found = confidence(unknowns(known), path_of(at), points_of(at, before), 0.005, tell=silent)
+    result = confidence(unknowns(known), path_of(position), points_of(position, before), 0.005, tell=silent)
     # the tip gets nearer unless the true error is below half of what is corrected: Phi(v / 2 sigma)
-    assert found.nearer == pytest.approx([0.8413, 0.5987], abs=1e-4)
-    assert found.band_mm == pytest.approx([4e-3, 4e-3])
+    assert result.nearer == pytest.approx([0.8413, 0.5987], abs=1e-4)
+    assert result.band_mm == pytest.approx([4e-3, 4e-3])
 
 
 def test_components_within_their_uncertainty_are_named() -> None:
@@ -246,11 +252,11 @@ def test_components_within_their_uncertainty_are_named() -> None:
         },
     )
     assert known is not None
-    assert unsure(calibration, known) == {"EYX", "B0Z"}
+    assert improbable(calibration, known) == {"EYX", "B0Z"}
     assert {c.name for c in components(calibration, known)} == {"EXX", "EYX", "C0Y", "B0Z"}
 
 
-def test_expansion_that_nobody_corrects_is_uncertainty() -> None:
+def test_expansion_without_a_model_is_uncertainty() -> None:
     known = Uncertainty((), "", "", temperature_K=0.5)
     expansion = Expansion.of(flat(), known, {"X_scale": 24.0})
     assert expansion.unmodelled_K == 4.0
@@ -274,17 +280,17 @@ def test_uncertainties_grow_with_age_as_stated() -> None:
 
 @pytest.fixture(scope="module")
 def fitted() -> Iterator[tuple[Fit, Calibration, Uncertainty]]:
-    found = fit(taken(simulated.machine(1, "rough"), 1), "FXYZ")
-    calibration = calibration_of(found)
-    yield found, calibration, covariance_of(found, calibration)
+    result = fit(taken(simulated.machine(1, "rough"), 1), "FXYZ")
+    calibration = calibration_of(result)
+    yield result, calibration, covariance_of(result, calibration)
 
 
 def test_the_covariance_of_a_fit_is_that_of_the_path(fitted: tuple[Fit, Calibration, Uncertainty]) -> None:
-    found, calibration, known = fitted
-    at = np.random.default_rng(4).uniform(*found.box_mm.T, (60, 3))
-    rows = Sensitivity.of(calibration, "FXYZ", known).rows(at, TOOL)
+    result, calibration, known = fitted
+    position = np.random.default_rng(4).uniform(*result.box_mm.T, (60, 3))
+    rows = Sensitivity.of(calibration, "FXYZ", known).rows(position, TOOL)
     sigma = np.sqrt((rows.astype(float) ** 2).sum(axis=2)).T
-    judged = found.sigma(at, TOOL)
+    judged = result.sigma(position, TOOL)
     away = np.abs(sigma / judged - 1.0)
     # where a step is in doubt its uncertainty is a half circle over the doubt, here of eight straight pieces
     assert np.median(away) < 0.005 and np.quantile(away, 0.95) < 0.06
@@ -337,9 +343,9 @@ def test_what_is_no_covariance_is_refused(broken: str) -> None:
             arrays["name"][1] = arrays["name"][0]
         else:
             arrays["factor"][0, 0] = np.nan
-        out = io.BytesIO()
-        np.savez(out, **arrays)
-        data = out.getvalue()
+        buffer = io.BytesIO()
+        np.savez(buffer, **arrays)
+        data = buffer.getvalue()
     with pytest.raises(ConfigError) as caught:
         parse_covariance(data, "c.npz")
     assert caught.value.file == "c.npz"
@@ -416,23 +422,23 @@ def codes(findings: tuple[olp.Finding, ...]) -> set[str]:
     return {f.code for f in findings if f.code.startswith("OLP43")}
 
 
-def test_a_correction_tells_how_sure_it_is(tmp_path: Path) -> None:
+def test_a_correction_reports_its_uncertainty(tmp_path: Path) -> None:
     result = olp.correct(PROGRAM, shop(tmp_path), part_tolerance_um=5.0)
-    found, said = result.confidence, result.report["uncertainty"]
-    assert found is not None
-    assert found.line.tolist() == [3, 4, 5, 6, 7]
-    # against the touch-off at X 100: two independent places of 1 um each; C0Y over 150 mm and at none
-    assert found.sigma_mm[1, 0] == pytest.approx(np.sqrt(2.0) * 1e-3, rel=1e-4)
-    assert found.sigma_mm[2, 0] == pytest.approx(np.hypot(np.sqrt(2.0) * 1e-3, 0.75e-3), rel=1e-4)
-    assert found.points.before_mm[1] == pytest.approx([20e-3, 0.0, 0.0], abs=1e-6)
-    assert np.abs(found.points.after_mm).max() < 0.1e-3
-    assert said["within"]["before"]["program"] == 0.0
-    assert said["within"]["after"]["program"] > 0.95 and said["expected"]["probability_better"] > 0.999
+    confidence_, report = result.confidence, result.report["uncertainty"]
+    assert confidence_ is not None
+    assert confidence_.line.tolist() == [3, 4, 5, 6, 7]
+    # against the touch-off at X 100: two independent positions of 1 um each; C0Y over 150 mm and at none
+    assert confidence_.sigma_mm[1, 0] == pytest.approx(np.sqrt(2.0) * 1e-3, rel=1e-4)
+    assert confidence_.sigma_mm[2, 0] == pytest.approx(np.hypot(np.sqrt(2.0) * 1e-3, 0.75e-3), rel=1e-4)
+    assert confidence_.points.before_mm[1] == pytest.approx([20e-3, 0.0, 0.0], abs=1e-6)
+    assert np.abs(confidence_.points.after_mm).max() < 0.1e-3
+    assert report["within"]["before"]["program"] == 0.0
+    assert report["within"]["after"]["program"] > 0.95 and report["expected"]["probability_better"] > 0.999
     assert codes(result.findings) == {"OLP435"}
     assert "better with probability >99.9 %" in to_text(result.report)
 
 
-def test_without_stated_uncertainties_nothing_is_said(tmp_path: Path) -> None:
+def test_without_stated_uncertainties_nothing_is_reported(tmp_path: Path) -> None:
     machine = shop(tmp_path, sigma=0.0, square=0.0)
     result = olp.correct(PROGRAM, machine)
     assert result.confidence is None and "uncertainty" not in result.report
@@ -440,15 +446,15 @@ def test_without_stated_uncertainties_nothing_is_said(tmp_path: Path) -> None:
         olp.correct(PROGRAM, machine, only_sure_components=True)
 
 
-def test_only_sure_components_leaves_the_unsure_squareness(tmp_path: Path) -> None:
+def test_only_sure_components_leaves_the_improbable_squareness(tmp_path: Path) -> None:
     machine = shop(tmp_path)
     whole, sure = olp.correct(PROGRAM, machine), olp.correct(PROGRAM, machine, only_sure_components=True)
     assert b"X199.9808" in whole.data and b"X199.9808" not in sure.data
     assert codes(sure.findings) >= {"OLP436"}
     assert sure.confidence is not None and whole.confidence is not None
-    # what is left out stays as expected deviation: 5 urad over 150 mm
-    left = sure.confidence.points.after_mm
-    assert left[2] == pytest.approx([-0.75e-3, 0.0, 0.0], abs=0.1e-3)
+    # what is left out remains as expected deviation: 5 urad over 150 mm
+    deviation = sure.confidence.points.after_mm
+    assert deviation[2] == pytest.approx([-0.75e-3, 0.0, 0.0], abs=0.1e-3)
     assert sure.confidence.sigma_mm == pytest.approx(whole.confidence.sigma_mm)
     checked = olp.verify(PROGRAM, sure.data, machine, only_sure_components=True)
     assert checked.report["deviation"]["holds"] and checked.report["uncertainty"]["waypoints"] == 5
@@ -469,7 +475,7 @@ def test_age_and_temperature_count(tmp_path: Path) -> None:
     old = olp.correct(PROGRAM, machine, date=datetime.date(2028, 5, 13))
     assert "OLP437" in codes(old.findings) and "OLP437" not in codes(new.findings)
     assert new.confidence is not None and old.confidence is not None
-    # scatter of the machine, at the place and at the touch, does not grow
+    # scatter of the machine, at the position and at the touch, does not grow
     assert new.confidence.sigma_mm[1, 0] == pytest.approx(1e-3 * np.sqrt(2.0 + 8.0), rel=1e-4)
     assert old.confidence.sigma_mm[1, 0] == pytest.approx(1e-3 * np.sqrt(9.0 * 2.0 + 8.0), rel=2e-3)
     (tmp_path / "job.toml").write_text(
@@ -488,12 +494,12 @@ def test_two_sigma_cover_the_errors_of_fresh_machines() -> None:
     inside, count = 0.0, 0
     for seed in range(10):
         machine = simulated.machine(100 + seed, ("smooth", "rough")[seed % 2])
-        found = fit(taken(machine, seed), "FXYZ")
-        calibration = calibration_of(found)
-        known = Sensitivity.of(calibration, "FXYZ", covariance_of(found, calibration))
-        at = np.random.default_rng(seed).uniform(*calibration.box_mm.T, (40, 3))
-        off = machine.error(at, TOOL) - build(calibration, "FXYZ").error(at, TOOL)
-        sigma = np.sqrt((known.rows(at, TOOL).astype(float) ** 2).sum(axis=2)).T
+        result = fit(taken(machine, seed), "FXYZ")
+        calibration = calibration_of(result)
+        known = Sensitivity.of(calibration, "FXYZ", covariance_of(result, calibration))
+        position = np.random.default_rng(seed).uniform(*calibration.box_mm.T, (40, 3))
+        off = machine.error(position, TOOL) - build(calibration, "FXYZ").error(position, TOOL)
+        sigma = np.sqrt((known.rows(position, TOOL).astype(float) ** 2).sum(axis=2)).T
         inside += (np.abs(off) <= 2.0 * sigma).sum()
         count += off.size
     # ten machines: a squareness or two out of 30 beyond 2 sigma is 5 % of all (the benchmark takes 200)

@@ -36,8 +36,8 @@ NAMES = (*COMPONENTS, *SQUARENESS)
 def case(seed: int, chain: str = "FXYZ", n: int = 60, sigma: float = 0.002):
     machine = simulated.machine(seed, "smooth", chain)
     machine.half = {}
-    at, tool, place = simulated.points(machine, seed, n, sigma)
-    return true_calibration(machine, seed, 0.0), Points(at, tool, place, sigma)
+    axis_mm, tool, place = simulated.points(machine, seed, n, sigma)
+    return true_calibration(machine, seed, 0.0), Points(axis_mm, tool, place, sigma)
 
 
 @pytest.mark.parametrize("seed", (0, 3, 5))
@@ -50,38 +50,38 @@ def test_no_wrong_decision_among_blunders(seed: int) -> None:
 def test_curves_in_the_other_sense_are_put_right_exactly() -> None:
     calibration, points = case(4)
     flipped = {"EXX": -1.0, "EYY": -1.0, "C0Y": -1.0}
-    found = diagnose(scaled(calibration, flipped), "FXYZ", points)
-    assert {v.name: v.applied for v in found.wrong} == flipped
-    assert {v.sign for v in found.wrong} == {"flipped"}
-    put_right = build(found.corrected, "FXYZ").error(points.axis_mm, points.tool_mm)
+    diagnosis = diagnose(scaled(calibration, flipped), "FXYZ", points)
+    assert {v.name: v.applied for v in diagnosis.wrong} == flipped
+    assert {v.sign for v in diagnosis.wrong} == {"flipped"}
+    put_right = build(diagnosis.corrected, "FXYZ").error(points.axis_mm, points.tool_mm)
     assert np.array_equal(put_right, build(calibration, "FXYZ").error(points.axis_mm, points.tool_mm))
 
 
 def test_units_that_a_factor_explains() -> None:
     calibration, points = case(2)
     factors = {"EXX": 1000.0, "EYY": 1e-3, "EAX": np.pi / 0.648, "C0Y": 0.648 / np.pi}
-    found = diagnose(scaled(calibration, factors), "FXYZ", points)
-    assert {v.name: v.unit for v in found.wrong} == {
+    diagnosis = diagnose(scaled(calibration, factors), "FXYZ", points)
+    assert {v.name: v.unit for v in diagnosis.wrong} == {
         "EXX": "um (or urad) stated as mm (rad)",
         "EYY": "mm (or rad) stated as um (urad)",
         "EAX": "urad stated as arcsec",
         "C0Y": "arcsec stated as urad",
     }
-    assert all(v.applied * factors[v.name] == pytest.approx(1.0) for v in found.wrong)
+    assert all(v.applied * factors[v.name] == pytest.approx(1.0) for v in diagnosis.wrong)
 
 
 def test_pitch_and_roll_in_each_other_s_place() -> None:
     calibration, points = case(3, "YFXZ")
     swap = next(a for a in arrangements(calibration, "YFXZ") if a.words.startswith("EAX and EBX"))
-    found = diagnose(swap.apply(calibration), "YFXZ", points)
-    assert [a.words for a in found.arrangements] == [swap.words]
-    assert found.wrong == ()
+    diagnosis = diagnose(swap.apply(calibration), "YFXZ", points)
+    assert [a.words for a in diagnosis.arrangements] == [swap.words]
+    assert diagnosis.wrong == ()
 
 
 def test_a_table_stated_as_the_table_moves() -> None:
     calibration, points = case(4, "YFXZ")
-    found = diagnose(scaled(calibration, {f"E{d}Y": -1.0 for d in "XYZABC"}), "YFXZ", points)
-    assert found.senses == {"Y": "of the table itself"}
+    diagnosis = diagnose(scaled(calibration, {f"E{d}Y": -1.0 for d in "XYZABC"}), "YFXZ", points)
+    assert diagnosis.senses == {"Y": "of the table itself"}
     assert diagnose(calibration, "YFXZ", points).senses == {"Y": "of the tool relative to the workpiece"}
 
 
@@ -90,8 +90,8 @@ def test_a_curve_that_the_control_corrects_already() -> None:
     off = build(calibration, "FXYZ").error(points.axis_mm, points.tool_mm)
     without = build(scaled(calibration, {"EXX": 0.0}), "FXYZ").error(points.axis_mm, points.tool_mm)
     moved = dataclasses.replace(points, measured_mm=points.axis_mm + points.tool_mm + without)
-    found = diagnose(calibration, "FXYZ", moved)
-    assert [(v.name, v.sign) for v in found.wrong] == [("EXX", "absent")]
+    diagnosis = diagnose(calibration, "FXYZ", moved)
+    assert [(v.name, v.sign) for v in diagnosis.wrong] == [("EXX", "absent")]
     skipped = diagnose(calibration, "FXYZ", moved, skip=frozenset({"EXX"}))
     assert skipped.wrong == ()
     assert not np.allclose(off, without)
@@ -102,9 +102,9 @@ def test_one_straight_tool_leaves_what_it_cannot_see(chain: str) -> None:
     """With t = (0, 0, t) no turn about Z of the last axis moves the tip."""
     machine = simulated.machine(6, "smooth", chain)
     machine.half = {}
-    at, tool, place = simulated.points(machine, 6, 60, 0.002, tools=((0.0, 0.0, -120.0),))
-    found = diagnose(true_calibration(machine, 6, 0.0), chain, Points(at, tool, place, 0.002))
-    assert "ECZ" not in {v.name for v in found.verdicts}
+    axis_mm, tool, place = simulated.points(machine, 6, 60, 0.002, tools=((0.0, 0.0, -120.0),))
+    diagnosis = diagnose(true_calibration(machine, 6, 0.0), chain, Points(axis_mm, tool, place, 0.002))
+    assert "ECZ" not in {v.name for v in diagnosis.verdicts}
 
 
 @pytest.mark.slow
@@ -113,9 +113,9 @@ def test_proposed_points_decide() -> None:
     first = diagnose(calibration, "FXYZ", points)
     advice = advise(first, [(0.0, 0.0, -120.0)])
     assert 0 < len(advice.axis_mm) <= 12
-    at = np.vstack([points.axis_mm, advice.axis_mm])
+    axis_mm = np.vstack([points.axis_mm, advice.axis_mm])
     tool = np.vstack([points.tool_mm, advice.tool_mm])
-    both = Points(at, tool, at + tool + build(calibration, "FXYZ").error(at, tool), 0.005)
+    both = Points(axis_mm, tool, axis_mm + tool + build(calibration, "FXYZ").error(axis_mm, tool), 0.005)
     second = diagnose(calibration, "FXYZ", both)
     assert len(second.undecided) < len(first.undecided)
     assert second.wrong == ()
@@ -136,8 +136,8 @@ def test_the_instrument_s_frame_does_not_matter(seed: int, turn: float, shift: t
 
 def test_judging_is_no_formality() -> None:
     calibration, points = case(8)
-    found = diagnose(calibration, "FXYZ", points)
-    assert judged(found, Done(dict.fromkeys(NAMES, -1.0))).wrong
+    diagnosis = diagnose(calibration, "FXYZ", points)
+    assert judged(diagnosis, Done(dict.fromkeys(NAMES, -1.0))).wrong
 
 
 # -- files and the command -------------------------------------------------------------------------------
@@ -217,9 +217,9 @@ def test_what_is_put_right_keeps_its_uncertainty(shop: Path, tmp_path: Path) -> 
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["uncertainty"] == "carried over"
     back = load_calibration(target)
-    left = load_uncertainty(target, back)
-    assert left is not None
-    for a, b in zip(left.entries, known.entries, strict=True):
+    uncertainty = load_uncertainty(target, back)
+    assert uncertainty is not None
+    for a, b in zip(uncertainty.entries, known.entries, strict=True):
         assert np.array_equal(a.factor, b.factor)
 
 

@@ -52,9 +52,10 @@ def line(file: str, component: str, more: str = "") -> str:
 def test_a_plan_says_how_each_line_was_taken(tmp_path: Path) -> None:
     text = line("exx", "EXX", "sigma_scale_um_m = 0.5\nline_mm = { Y = 100.0 }") + line("eax", "EAX")
     plan = planned(tmp_path, text, exx=LENGTHS, eax=ANGLES)
-    found = load_measurements([tmp_path])
-    assert (found.machine, str(found.measured), found.temperature_degC) == ("m", "2026-05-14", 20.0)
-    first, second = found.lines
+    measurements = load_measurements([tmp_path])
+    assert (measurements.machine, str(measurements.measured)) == ("m", "2026-05-14")
+    assert measurements.temperature_degC == 20.0
+    first, second = measurements.lines
     assert first.line_mm == (1500.0, 100.0, -600.0)
     assert first.tool_mm == (0.0, 0.0, -120.0)
     assert first.sigma_scale == 5e-7
@@ -77,8 +78,8 @@ def test_a_plan_says_how_each_line_was_taken(tmp_path: Path) -> None:
 )
 def test_every_sense_becomes_that_of_the_contract(tmp_path: Path, sense: str, factor: int) -> None:
     planned(tmp_path, line("exx", "EXX", f'sense = "{sense}"'), exx=LENGTHS)
-    (found,) = load_measurements([tmp_path], "XFYZ").lines
-    assert found.value == pytest.approx(factor * np.array([0.0, 2.5, 0.5, 3.5]) * 1e-3)
+    (line_read,) = load_measurements([tmp_path], "XFYZ").lines
+    assert line_read.value == pytest.approx(factor * np.array([0.0, 2.5, 0.5, 3.5]) * 1e-3)
 
 
 def test_files_that_describe_themselves(tmp_path: Path) -> None:
@@ -88,11 +89,11 @@ def test_files_that_describe_themselves(tmp_path: Path) -> None:
         "# sense = actual-minus-commanded\n# square = S\n# square_sigma_urad = 5\n# period_mm = [10.0]\n"
     )
     (tmp_path / "a.csv").write_text(head + LENGTHS)
-    found = load_measurements([tmp_path])
-    (one,) = found.lines
+    measurements = load_measurements([tmp_path])
+    (one,) = measurements.lines
     assert (one.component, one.line_mm, one.tool_mm) == ("EYX", (0.0, 1.0, 2.0), (0.0, 0.0, -50.0))
-    assert found.squares[0].sigma_rad == pytest.approx(5e-6)
-    assert found.periods_mm == ((10.0,), (), ())
+    assert measurements.squares[0].sigma_rad == pytest.approx(5e-6)
+    assert measurements.periods_mm == ((10.0,), (), ())
     assert one.row[0] == 13
 
 
@@ -134,11 +135,11 @@ def test_nothing_is_assumed_and_all_problems_come_at_once(tmp_path: Path) -> Non
 
 
 def test_plan_and_file_must_agree(tmp_path: Path) -> None:
-    told = "# tool_mm = [0, 0, -80]\n"
-    planned(tmp_path, line("exx", "EXX", "tool_mm = [0, 0, -90]"), exx=told + LENGTHS)
+    header = "# tool_mm = [0, 0, -80]\n"
+    planned(tmp_path, line("exx", "EXX", "tool_mm = [0, 0, -90]"), exx=header + LENGTHS)
     with pytest.raises(ConfigError, match=r"exx.csv: line 1: tool_mm = .*but the plan says"):
         load_measurements([tmp_path])
-    planned(tmp_path, line("exx", "EXX"), exx=told + LENGTHS)
+    planned(tmp_path, line("exx", "EXX"), exx=header + LENGTHS)
     assert load_measurements([tmp_path]).lines[0].tool_mm == (0.0, 0.0, -80.0)
 
 
@@ -150,11 +151,11 @@ POINTS = "X_mm,Y_mm,Z_mm,measured_X_mm,measured_Y_mm,measured_Z_mm\n" + "".join(
 def test_points_of_a_tracker(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("# a comment\n" + POINTS)
     planned(tmp_path, '[[points]]\nfile = "t.csv"\nsigma_um = 8.0\ntool_mm = [0, 0, -90]\n')
-    (found,) = load_measurements([tmp_path]).of(Points)
-    assert found.axis_mm.shape == found.measured_mm.shape == (8, 3)
-    assert found.tool_mm[3].tolist() == [0.0, 0.0, -90.0]
-    assert found.sigma == 0.008
-    assert found.row.tolist() == list(range(3, 11))
+    (points,) = load_measurements([tmp_path]).of(Points)
+    assert points.axis_mm.shape == points.measured_mm.shape == (8, 3)
+    assert points.tool_mm[3].tolist() == [0.0, 0.0, -90.0]
+    assert points.sigma == 0.008
+    assert points.row.tolist() == list(range(3, 11))
 
 
 def test_lengths_from_a_station(tmp_path: Path) -> None:
@@ -162,10 +163,10 @@ def test_lengths_from_a_station(tmp_path: Path) -> None:
     head = "X_mm,Y_mm,Z_mm,length_mm,tool_X_mm,tool_Y_mm,tool_Z_mm\n"
     (tmp_path / "s.csv").write_text(head + "".join(rows))
     planned(tmp_path, '[[stations]]\nfile = "s.csv"\nsigma_um = 0.2\nsigma_um_m = 0.3\n')
-    (found,) = load_measurements([tmp_path]).of(Lengths)
-    assert found.length_mm[-1] == 1500.0
-    assert found.sigma_mm[-1] == pytest.approx(0.2e-3 + 0.3e-6 * 1500.0)
-    assert found.tool_mm[-1].tolist() == [50.0, 0.0, -90.0]
+    (lengths,) = load_measurements([tmp_path]).of(Lengths)
+    assert lengths.length_mm[-1] == 1500.0
+    assert lengths.sigma_mm[-1] == pytest.approx(0.2e-3 + 0.3e-6 * 1500.0)
+    assert lengths.tool_mm[-1].tolist() == [50.0, 0.0, -90.0]
 
 
 def test_directions_from_pods(tmp_path: Path) -> None:
@@ -176,10 +177,10 @@ def test_directions_from_pods(tmp_path: Path) -> None:
     pods = '[[pods]]\nfile = "p.csv"\nsigma_urad = 10.0\n[[pods.baselines]]\nbetween = [1, {}]\n'
     pods += "length_mm = 4000.0\n"
     planned(tmp_path, pods.format(2) + "sigma_um = 10.0\n")
-    (found,) = load_measurements([tmp_path]).of(Pods)
-    assert np.degrees(found.azimuth_rad[-1]) == pytest.approx([15.0, -17.0])
-    assert np.degrees(found.elevation_rad[-1]) == pytest.approx([1.0, 2.0])
-    assert found.baselines == ((0, 1, 4000.0, 0.01),)
+    (pods_read,) = load_measurements([tmp_path]).of(Pods)
+    assert np.degrees(pods_read.azimuth_rad[-1]) == pytest.approx([15.0, -17.0])
+    assert np.degrees(pods_read.elevation_rad[-1]) == pytest.approx([1.0, 2.0])
+    assert pods_read.baselines == ((0, 1, 4000.0, 0.01),)
     planned(tmp_path, pods.format(3) + "sigma_um = 10.0\n")
     with pytest.raises(ConfigError, match="two of the pods 1 to 2"):
         load_measurements([tmp_path])
@@ -223,20 +224,20 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_table_says_what_was_found(example: Path) -> None:
-    told = (example / "told.txt").read_text()
+    shown = (example / "told.txt").read_text()
     for words in ("EXX", "Squareness", "Lost motion um", "ezx.csv: row 42", "wrote"):
-        assert words in told
+        assert words in shown
 
 
 def test_the_example_finds_the_errors_that_were_simulated(example: Path) -> None:
     """The independent judge reads both calibrations; the frame of the machine cannot be measured."""
-    true, found = JudgeModel(PROGRAMS / "gantry-plate"), JudgeModel(example)
-    at = np.random.default_rng(3).uniform(found.box[:, 0], found.box[:, 1], (800, 3))
+    true, fitted = JudgeModel(PROGRAMS / "gantry-plate"), JudgeModel(example)
+    position_mm = np.random.default_rng(3).uniform(fitted.box[:, 0], fitted.box[:, 1], (800, 3))
     for tool in ((0.0, 0.0, -120.0), (80.0, -40.0, -200.0)):
-        before = true.error_mm(at, tool)
-        rest = before - found.error_mm(at, tool)
-        assert simulated.rms_um(simulated.off_frame(at, before)) > 20.0
-        assert simulated.rms_um(simulated.off_frame(at, rest)) < 3.0
+        before = true.error_mm(position_mm, tool)
+        rest = before - fitted.error_mm(position_mm, tool)
+        assert simulated.rms_um(simulated.off_frame(position_mm, before)) > 20.0
+        assert simulated.rms_um(simulated.off_frame(position_mm, rest)) < 3.0
 
 
 def test_the_calibration_corrects_a_program(example: Path) -> None:
@@ -276,5 +277,5 @@ def test_json_and_fail_on(example: Path) -> None:
     ],
 )
 def test_wrong_calls(example: Path, arguments: tuple[str, ...], code: int, words: str) -> None:
-    found, output = run("calibrate", "fit", *(a.format(example, PROGRAMS) for a in arguments))
-    assert (found, words in output) == (code, True), output
+    exit_code, output = run("calibrate", "fit", *(a.format(example, PROGRAMS) for a in arguments))
+    assert (exit_code, words in output) == (code, True), output

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases.calibration import left
+from cases.calibration import residual_of
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -65,9 +65,9 @@ def test_time_of_a_move(way: float, v: float, a: float, j: float) -> None:
 def test_an_order_visits_all_and_is_no_slower_than_the_rows(n: int, seed: int) -> None:
     places = np.random.default_rng(seed).uniform(0, 1000, (n, 3))
     axes = load_setup(MACHINE).machine.axes
-    found = order(places, axes)
-    assert sorted(found.tolist()) == list(range(n))
-    took = [float(move_s(np.diff(places[k], axis=0), axes).sum()) for k in (found, np.arange(n))]
+    ordered = order(places, axes)
+    assert sorted(ordered.tolist()) == list(range(n))
+    took = [float(move_s(np.diff(places[k], axis=0), axes).sum()) for k in (ordered, np.arange(n))]
     assert took[0] <= took[1] * (1.0 + 1e-9) or n < 6
 
 
@@ -76,13 +76,13 @@ def test_an_order_visits_all_and_is_no_slower_than_the_rows(n: int, seed: int) -
 
 @given(st.integers(8, 200), st.integers(0, 50))
 def test_a_latin_hypercube_has_as_many_levels_as_points(n: int, seed: int) -> None:
-    at = layout.hypercube(BOX, n, seed)
+    position_mm = layout.hypercube(BOX, n, seed)
     for k in range(3):
         # one in each of n slices, to the digits of a program
         edges = np.linspace(*BOX[k], n + 1)
-        assert (np.sort(at[:, k]) >= edges[:-1] - 0.051).all()
-        assert (np.sort(at[:, k]) <= edges[1:] + 0.051).all()
-    assert (at >= BOX[:, 0]).all() and (at <= BOX[:, 1]).all()
+        assert (np.sort(position_mm[:, k]) >= edges[:-1] - 0.051).all()
+        assert (np.sort(position_mm[:, k]) <= edges[1:] + 0.051).all()
+    assert (position_mm >= BOX[:, 0]).all() and (position_mm <= BOX[:, 1]).all()
 
 
 def test_targets_at_which_a_period_hides_are_not_proposed() -> None:
@@ -114,15 +114,15 @@ def test_a_prediction_is_what_comes_out() -> None:
     """Machines that had no part in it: the median over seeds is within a third of the prediction."""
     tools = (simulated.OFFSETS[0],)
     planned = layout.points("m", BOX, simulated.OFFSETS, 120, 0.005, 1)
-    found = predict(planned, "FXYZ", BOX, tools)
+    prediction = predict(planned, "FXYZ", BOX, tools)
     after = []
     for seed in range(3):
         machine = simulated.machine(seed, "smooth")
         machine.half = {}
-        at, tool, place = simulated.points(machine, seed, 120, 0.005)
-        fitted = fit(Measurements("m", (Points(at, tool, place, 0.005),)), "FXYZ")
-        after.append(left(machine, fitted, tools[0], 400).after_framed)
-    assert 0.7 < np.median(after) / (1e3 * found.rms_mm) < 1.4
+        axis_mm, tool, place = simulated.points(machine, seed, 120, 0.005)
+        fitted = fit(Measurements("m", (Points(axis_mm, tool, place, 0.005),)), "FXYZ")
+        after.append(residual_of(machine, fitted, tools[0], 400).after_framed)
+    assert 0.7 < np.median(after) / (1e3 * prediction.rms_mm) < 1.4
 
 
 def test_more_points_and_better_ones_are_never_worse() -> None:

@@ -29,11 +29,11 @@ PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "family"), [(0, "smooth"), (0, "rough")])
 def test_three_turns(seed: int, family: str) -> None:
-    found = turns(seed, family, quick=True)
-    left = [one.left for one in found]
-    assert left == sorted(left, reverse=True)
-    assert left[-1] < 0.7 * left[0]
-    stated = [one.stated for one in found]
+    results = turns(seed, family, quick=True)
+    residuals = [one.residual for one in results]
+    assert residuals == sorted(residuals, reverse=True)
+    assert residuals[-1] < 0.7 * residuals[0]
+    stated = [one.stated for one in results]
     assert stated == sorted(stated, reverse=True)
 
 
@@ -89,8 +89,8 @@ def test_a_run_that_fits_nothing_is_told_and_widens(begun) -> None:
     good = refine(calibration, machine.chain, uncertainty.scaled(0.2), run(machine, 6, 40, 0.001))
     assert good.chi_square / good.freedom > 1.5
     parts = [Sensitivity.of(calibration, machine.chain, u) for u in (good.uncertainty, uncertainty)]
-    at = simulated.points(machine, 9, 20, 0.0)[0]
-    rms = [float(np.sqrt((p.rows(at, np.zeros(3)) ** 2).sum())) for p in parts]
+    axis_mm = simulated.points(machine, 9, 20, 0.0)[0]
+    rms = [float(np.sqrt((p.rows(axis_mm, np.zeros(3)) ** 2).sum())) for p in parts]
     assert rms[0] > 0.05 * rms[1]
 
 
@@ -120,12 +120,12 @@ def test_points_say_nothing_along_their_path(begun) -> None:
 
 
 def _in_machine(machine, points: Points) -> np.ndarray:
-    at, tools = points.axis_mm, points.tool_mm
-    out = at + tools
+    axis_mm, tools = points.axis_mm, points.tool_mm
+    tip_mm = axis_mm + tools
     for tool in np.unique(tools, axis=0):
         own = (tools == tool).all(axis=1)
-        out[own] += machine.error(at[own], tool)
-    return out
+        tip_mm[own] += machine.error(axis_mm[own], tool)
+    return tip_mm
 
 
 # -- files and the command -------------------------------------------------------------------------------
@@ -191,12 +191,12 @@ def test_a_run_of_a_corrected_program(shop: Path, tmp_path: Path) -> None:
     true = PROGRAMS / "gantry-plate" / "machine.toml"
     done = call("simulate", str(corrected), "-m", str(true), "-o", str(measured))
     assert done.exit_code == 0, done.output
-    found = refine_calibration(
+    refined = refine_calibration(
         shop / "off.toml", measured, machine, program=plate, sigma_um=10.0
     )
-    new = found.calibration.squareness["C0Y"] * 1e6
+    new = refined.calibration.squareness["C0Y"] * 1e6
     assert abs(new - value) < 12.0
-    assert found.refinement.after_mm < 0.6 * found.refinement.before_mm
+    assert refined.refinement.after_mm < 0.6 * refined.refinement.before_mm
 
 
 def test_a_calibration_without_uncertainty_is_refused(shop: Path) -> None:

@@ -53,8 +53,8 @@ def test_lines_through_zero_make_the_same_errors(chain: str, tmp_path: Path) -> 
     for reference in ("functional-point", "table"):
         moved = zeroed(calibration, chain, reference)
         assert all(c.line_mm == (0, 0, 0) and c.tool_mm == (0, 0, 0) for c in moved.curves)
-        found = build(moved, chain).error(points, tools)
-        assert np.abs(found - expected).max() < 2e-4
+        error = build(moved, chain).error(points, tools)
+        assert np.abs(error - expected).max() < 2e-4
 
 
 def test_squareness_as_slopes_is_the_same_error() -> None:
@@ -66,8 +66,8 @@ def test_squareness_as_slopes_is_the_same_error() -> None:
     points, tools = random_points(1)
     straight = replace(calibration, curves=(replace(curve, interpolation="linear"),))
     for case, allowed_mm in ((straight, 2e-8), (calibration, 5e-5)):
-        found = build(as_straightness(case), "FXYZ").error(points, tools)
-        assert np.abs(found - build(case, "FXYZ").error(points, tools)).max() <= allowed_mm
+        error = build(as_straightness(case), "FXYZ").error(points, tools)
+        assert np.abs(error - build(case, "FXYZ").error(points, tools)).max() <= allowed_mm
 
 
 @settings(max_examples=40)
@@ -83,9 +83,10 @@ def test_rows_follow_the_curve_as_far_as_they_say(seed: int, most: int | None, e
     if even:
         assert np.ptp(np.diff(rows.position_mm)) < 1e-9
     q = np.linspace(0.0, 800.0, 4001)
-    at = np.column_stack([q, 0 * q, 0 * q])
+    position_mm = np.column_stack([q, 0 * q, 0 * q])
     for side, values in ((1.0, rows.forward), (-1.0, rows.backward)):
-        model = build(calibration, "FXYZ").error(at, np.zeros(3), side * np.ones(at.shape))[:, 0]
+        direction = side * np.ones(position_mm.shape)
+        model = build(calibration, "FXYZ").error(position_mm, np.zeros(3), direction)[:, 0]
         assert np.abs(np.interp(q, rows.position_mm, values) - model).max() <= 1.05 * rows.miss + 1e-6
     if most is None and not even:
         assert rows.miss <= 5e-5
@@ -110,9 +111,9 @@ def test_a_control_that_holds_everything_leaves_nothing() -> None:
     for calibration, control in cases:
         model = build(calibration, "FXYZ", outside="hold")
         command = points + control.offset(points, tools, direction)
-        left = command + model.error(command, tools, direction) - points
+        residual = command + model.error(command, tools, direction) - points
         before = np.abs(model.error(points, tools, direction)).max()
-        assert np.abs(left).max() < 1e-3 * before
+        assert np.abs(residual).max() < 1e-3 * before
 
 
 def test_cyclic_errors_are_followed_where_rows_allow() -> None:
@@ -124,8 +125,8 @@ def test_cyclic_errors_are_followed_where_rows_allow() -> None:
         assert rows is not None and rows.cyclic == followed
         q = np.linspace(0.0, length, 5001)
         true = 0.002 * np.sin(2 * np.pi * q / 10.0 + 0.4)
-        left = np.abs(np.interp(q, rows.position_mm, rows.forward) - true).max()
-        assert left < 5e-5 if followed else left > 1.9e-3
+        residual = np.abs(np.interp(q, rows.position_mm, rows.forward) - true).max()
+        assert residual < 5e-5 if followed else residual > 1.9e-3
 
 
 def test_points_of_the_hypercube_fill_every_cell() -> None:
@@ -161,10 +162,10 @@ def test_a_volumetric_table_leaves_next_to_nothing(
     """On every kind of chain, measured off the datum and on tables: written, read back, taken off."""
     recipe = Recipe(chain=chain, off_datum=True, on_table=chain.split("F")[0][:1], peak_um=(50.0, 60.0))
     machine = machines.random_machine(tmp_path / "m", 11, recipe)
-    found = olp.export_table(machine, key, tmp_path / "t.csv", reference=reference)
-    left = found.report["box"]["left"]
-    assert left["as it is"]["rms_um"] > 10.0
-    assert left[key]["max_um"] < 0.25
+    exported = olp.export_table(machine, key, tmp_path / "t.csv", reference=reference)
+    residuals = exported.report["box"]["left"]
+    assert residuals["as it is"]["rms_um"] > 10.0
+    assert residuals[key]["max_um"] < 0.25
 
 
 @pytest.mark.parametrize("key", FORMATS)
@@ -194,8 +195,8 @@ def test_the_table_marks_what_the_control_corrects(tmp_path: Path) -> None:
     """With the line in the machine file `olp correct` leaves to the control what its table does."""
     recipe = Recipe(angular=False)
     machine = machines.random_machine(tmp_path / "m", 4, recipe)
-    found = olp.export_table(machine, "siemens-cec", tmp_path / "t.mpf", sense="error")
-    names = found.report["compensated_by_controller"]
+    exported = olp.export_table(machine, "siemens-cec", tmp_path / "t.mpf", sense="error")
+    names = exported.report["compensated_by_controller"]
     assert {"EXX", "EYX", "C0Y"} <= set(names)
     text = machine.read_text().replace("compensated_by_controller = []\n", "")
     machine.write_text(f"compensated_by_controller = {json.dumps(names)}\n{text}")
@@ -232,7 +233,7 @@ def test_commands(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "found"),
+    ("options", "message"),
     [
         (["--format", "isg"], "-o"),
         (["--compare", "--format", "isg"], "either --format"),
@@ -244,13 +245,13 @@ def test_commands(tmp_path: Path) -> None:
     ],
 )
 def test_a_call_that_cannot_be_meant_is_refused(
-    options: list[str], found: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    options: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     machine = str(PROGRAMS / "gantry-plate" / "machine.toml")
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(main, ["calibrate", "export", "-m", machine, *options])
     assert done.exit_code == 2, done.output
-    assert found in done.stderr
+    assert message in done.stderr
 
 
 def test_a_program_that_correct_refuses_is_said() -> None:

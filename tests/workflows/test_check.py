@@ -32,10 +32,10 @@ def test_every_code_has_its_cases_and_its_explanation() -> None:
 @pytest.mark.parametrize("code", CASES)
 def test_a_program_that_triggers_it_and_one_that_just_does_not(code: str, tmp_path: Path) -> None:
     hit, miss = CASES[code]
-    found = hit.run(tmp_path / "hit")
-    assert code in codes(found)
+    result = hit.run(tmp_path / "hit")
+    assert code in codes(result)
     assert code not in codes(miss.run(tmp_path / "miss"))
-    assert found.report["findings"] == [f.as_dict() for f in found.findings]
+    assert result.report["findings"] == [f.as_dict() for f in result.findings]
 
 
 def test_a_good_job_has_no_finding(tmp_path: Path) -> None:
@@ -79,8 +79,8 @@ def test_the_nominal_program_must_not_be_corrected_itself(tmp_path: Path) -> Non
     path = call.machine(tmp_path)
     once = olp.correct(call.program(), path).data
     twice = olp.correct(once.replace(b"olp-corrected", b"olp corrected"), path).data
-    found = olp.check(twice, path, nominal=once, select=["OLP311"])
-    assert codes(found) == {"OLP311"}
+    result = olp.check(twice, path, nominal=once, select=["OLP311"])
+    assert codes(result) == {"OLP311"}
     assert codes(olp.check(once, path, nominal=call.program())) <= {"OLP408"}
 
 
@@ -111,7 +111,7 @@ def test_each_text_is_read_and_timed_once(
         return read(data, *more, **words)  # type: ignore[arg-type]
 
     monkeypatch.setattr(gate, "read", counted)
-    monkeypatch.setattr(motion.Feeds, "of", lambda found: timed.append(found) or of(found))
+    monkeypatch.setattr(motion.Feeds, "of", lambda parsed: timed.append(parsed) or of(parsed))
     olp.check(program, path, nominal=nominal if pair else None)
     assert len(reads) == len(set(reads)) == 2
     assert len(timed) == 2

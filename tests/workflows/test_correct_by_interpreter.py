@@ -87,17 +87,17 @@ def check(seed: int, folder: Path) -> None:
     nominal = programs.random_program(seed, features=features, blocks=3 + seed % 17)
     whole = seed % 4 == 3 and "tools" not in features and not recipe.backlash_um and not recipe.directed
     result = olp.correct(nominal, path, expand_cycles=True, split_rapids=whole)
-    found = judged(nominal, result.data, folder, kinds=KINDS if whole else CUTTING)
+    verdict = judged(nominal, result.data, folder, kinds=KINDS if whole else CUTTING)
     bar = allowed_um(nominal) + SLACK_UM
     if recipe.directed:
-        # at a reversal of one axis the straightness of another jumps by its part that depends on direction, and
-        # that axis cannot follow against its own backlash: README, honest limits
+        # at a reversal of one axis the straightness of another jumps by its part that depends on direction,
+        # and that axis cannot follow against its own backlash: README, honest limits
         bar += DIRECTED_JUMP_UM
-    assert found.after.judged > 0
-    assert found.max_um <= bar, f"line {found.worst_line}: {features}"
-    assert found.vertex_max_um <= bar
-    if found.before.max_um > 10.0:
-        assert found.after.rms_um < 0.2 * found.before.rms_um
+    assert verdict.after.judged > 0
+    assert verdict.max_um <= bar, f"line {verdict.worst_line}: {features}"
+    assert verdict.vertex_max_um <= bar
+    if verdict.before.max_um > 10.0:
+        assert verdict.after.rms_um < 0.2 * verdict.before.rms_um
 
 
 @pytest.mark.parametrize("seed", range(1000, 1040))
@@ -144,11 +144,11 @@ def test_few_blocks_more_than_the_longest_chords(tmp_path: Path, seed: int) -> N
     rng = np.random.default_rng(seed)
     path = machines.random_machine(tmp_path, seed, Recipe(chain=str(rng.choice(CHAINS)), off_datum=True))
     low, high = np.array(machines.TRAVEL).T
-    at = rng.uniform(low + 30, high - 30, (7, 3)).round(3)
-    text = programs.polyline_program(at - (250.0, 200.0, -300.0), 3)
+    position_mm = rng.uniform(low + 30, high - 30, (7, 3)).round(3)
+    text = programs.polyline_program(position_mm - (250.0, 200.0, -300.0), 3)
     count = len(points(olp.correct(text, path).data)) - 1
     model, tool_vector = JudgeModel(path), np.array([0.0, 0.0, -120.0])
-    best = sum(chord_count(a, b, model, tool_vector, 1e-3) for a, b in itertools.pairwise(at))
+    best = sum(chord_count(a, b, model, tool_vector, 1e-3) for a, b in itertools.pairwise(position_mm))
     assert best >= 10
     assert count <= 1.15 * best
 
@@ -232,10 +232,10 @@ def test_samples_are_read_as_linuxcnc_reads_them(big: Path, unroll: bool) -> Non
             theirs = linuxcnc.interpret(nominal, big, find_known=False)
         except linuxcnc.InterpreterError:
             continue
-        found = difference(ours, theirs)
+        mismatch = difference(ours, theirs)
         compared, moves = compared + 1, moves + len(theirs)
-        if found:
-            wrong.append((str(sample), found))
+        if mismatch:
+            wrong.append((str(sample), mismatch))
     assert not wrong
     assert compared >= (100 if unroll else 5)
     assert moves >= 1000

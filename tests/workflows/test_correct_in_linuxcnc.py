@@ -25,13 +25,13 @@ SLACK_UM = 0.05
 def distances_mm(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """(n,) distance of points (n, 3) from a finely sampled line (m, 3), which may pass a place many times."""
     _, near = cKDTree(line).query(points, k=16)
-    out = np.full(len(points), np.inf)
+    distance = np.full(len(points), np.inf)
     for first in (*np.maximum(near - 1, 0).T, *np.minimum(near, len(line) - 2).T):
         a, d = line[first], line[first + 1] - line[first]
         square = np.maximum((d * d).sum(axis=1), 1e-30)
         share = np.clip(((points - a) * d).sum(axis=1) / square, 0.0, 1.0)
-        out = np.minimum(out, np.sqrt(((points - a - share[:, None] * d) ** 2).sum(axis=1)))
-    return out
+        distance = np.minimum(distance, np.sqrt(((points - a - share[:, None] * d) ** 2).sum(axis=1)))
+    return distance
 
 
 @pytest.mark.parametrize("seed", [11, 12])

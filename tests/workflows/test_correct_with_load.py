@@ -92,11 +92,11 @@ def test_the_deflection_that_a_payload_adds_is_removed(tmp_path: Path, support: 
     for mass in (30.0, 60.0):
         rows = masses == mass
         added = np.sqrt((before[rows] ** 2).sum(axis=1).mean())
-        left = np.sqrt((after[rows] ** 2).sum(axis=1).mean())
-        share = 1.0 - left / added
-        print(f"{support} {known} {mass:g} kg: {1e3 * added:.1f} -> {1e3 * left:.2f} um, {share:.1%}")
+        residual = np.sqrt((after[rows] ** 2).sum(axis=1).mean())
+        share = 1.0 - residual / added
+        print(f"{support} {known} {mass:g} kg: {1e3 * added:.1f} -> {1e3 * residual:.2f} um, {share:.1%}")
         assert added > 0.015
-        assert left <= 0.05 * added
+        assert residual <= 0.05 * added
         assert np.linalg.norm(after[rows], axis=1).max() <= 0.05 * np.linalg.norm(before[rows], axis=1).max()
     virtual = olp.simulate(result.data, path, step_mm=1e4).points_mm
     assert np.abs(virtual[-1] - nominal[-1]).max() < 1e-4
@@ -136,8 +136,8 @@ def test_map_and_load_judged_by_the_control_and_an_independent_model(tmp_path: P
     features = ["lines", "short", "rapid", "arcs", "helix", "frames", "tools"][: 4 + seed % 4]
     nominal = programs.random_program(seed, features=features, blocks=6)
     result = olp.correct(nominal, path, tmp_path / "job.toml")
-    found = judged(nominal, result.data, tmp_path)
-    assert found.after.judged > 0
-    assert found.max_um <= allowed_um(nominal) + 0.02, f"line {found.worst_line}"
-    assert found.before.max_um > 20.0
-    assert found.after.rms_um < 0.1 * found.before.rms_um
+    verdict = judged(nominal, result.data, tmp_path)
+    assert verdict.after.judged > 0
+    assert verdict.max_um <= allowed_um(nominal) + 0.02, f"line {verdict.worst_line}"
+    assert verdict.before.max_um > 20.0
+    assert verdict.after.rms_um < 0.1 * verdict.before.rms_um

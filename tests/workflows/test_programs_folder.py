@@ -113,8 +113,8 @@ def test_the_judge_agrees(name: str, tmp_path: Path) -> None:
     passed = tuple(line for f in result.findings if f.code in ("OLP102", "OLP306") for line in f.lines)
     # G10 L20 names the place where the tip is in another frame: the part stays where G54 has it
     same = {"G55": JudgeModel(machine).zero_shift("G54")} if b"\nG10 L20" in nominal else None
-    found = judged(nominal, result.data, machine.parent, skip_lines=passed, shift_by_frame=same)
+    verdict = judged(nominal, result.data, machine.parent, skip_lines=passed, shift_by_frame=same)
     digit_um = 0.1 if (FOLDER / name).parent.name == "bridge-cmm" else 1.0
-    assert found.after.judged > 0
-    assert found.max_um <= TOLERANCE_UM + ROUNDING * digit_um + 0.02, found.worst_line
-    assert found.vertex_max_um <= TOLERANCE_UM + ROUNDING * digit_um + 0.02
+    assert verdict.after.judged > 0
+    assert verdict.max_um <= TOLERANCE_UM + ROUNDING * digit_um + 0.02, verdict.worst_line
+    assert verdict.vertex_max_um <= TOLERANCE_UM + ROUNDING * digit_um + 0.02

@@ -35,14 +35,14 @@ TICK_S = controller.PERIOD_NS * 1e-9
 def random_moves(seed: int, count: int, reach: float, code: str = "G1") -> list[str]:
     """Moves in space and along axes, of several feeds; no one goes nowhere."""
     rng = np.random.default_rng(seed)
-    out = []
+    moves = []
     for k in range(count):
         to = rng.uniform(-reach, reach, 3)
         if k % 3:
             to[rng.integers(3)] = 0.0
         feed = f" F{rng.choice([3000, 9000, 20000])}" if code == "G1" else ""
-        out.append(f"{code} X{to[0]:.3f} Y{to[1]:.3f} Z{to[2]:.3f}{feed}")
-    return out
+        moves.append(f"{code} X{to[0]:.3f} Y{to[1]:.3f} Z{to[2]:.3f}{feed}")
+    return moves
 
 
 def square() -> list[str]:
@@ -75,17 +75,17 @@ def times(
     limits = AxisLimits(
         np.full(3, controller.SPEED_MM_S), np.full(3, share * controller.ACCELERATION_MM_S2), np.full(3, JERK)
     )
-    found = plan(route, limits)
-    assert judge(found.motion, route, limits).wrong == ()
+    trajectory = plan(route, limits)
+    assert judge(trajectory.motion, route, limits).wrong == ()
     least = np.inf
     for attempt in range(3):
         run = controller.run(text, described, folder / f"control{attempt}")
         moving = np.flatnonzero((np.diff(run.axis, axis=0) != 0.0).any(axis=1))
         assert np.abs(run.axis[moving[-1] + 1] - route.point_mm[-1]).max() <= 0.05
         least = min(least, float(moving[-1] - moving[0] + 1) * TICK_S)
-        if least <= enough(found.duration_s):
+        if least <= enough(trajectory.duration_s):
             break
-    return least, found.duration_s, found, route
+    return least, trajectory.duration_s, trajectory, route
 
 
 EXACT: dict[str, tuple[str, float, Callable[[], list[str]]]] = {
@@ -130,8 +130,8 @@ def test_continuous_programs_take_no_longer_and_little_less(
 ) -> None:
     controller.require()
     mode, moves, least = CONTINUOUS[name]
-    theirs, ours, found, _ = times(mode, moves(), 1.0, tmp_path, lambda ours: ours / least)
+    theirs, ours, trajectory, _ = times(mode, moves(), 1.0, tmp_path, lambda ours: ours / least)
     record_property("ours over LinuxCNC", ours / theirs)
-    solvers = sorted({leg.solver for leg in found.legs})
+    solvers = sorted({leg.solver for leg in trajectory.legs})
     print(f"{name}: LinuxCNC {theirs:.3f} s, ours {ours:.4f} s, {ours / theirs:.3f} of it by {solvers}")
     assert least * theirs <= ours <= theirs + TICK_S

@@ -21,8 +21,8 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> olp.Setup:
 
 
 def faults(seeds: Iterable[int], base: olp.Setup) -> dict[int, tuple[str, ...]]:
-    found = {seed: retime_fuzz.outcome(seed, base).wrong for seed in seeds}
-    return {seed: wrong for seed, wrong in found.items() if wrong}
+    wrong_by_seed = {seed: retime_fuzz.outcome(seed, base).wrong for seed in seeds}
+    return {seed: wrong for seed, wrong in wrong_by_seed.items() if wrong}
 
 
 @pytest.mark.slow
@@ -64,14 +64,14 @@ def test_samples_of_linuxcnc_keep_every_limit(tmp_path: Path) -> None:
         try:
             flat = olp.flatten(sample, path)
             linuxcnc.interpret(flat, path, find_known=False)
-            found = retime_fuzz.judged(flat, setup)
+            verdict = retime_fuzz.judged(flat, setup)
         except linuxcnc.InterpreterError:
             continue
         except ProgramError as refusal:
             assert refusal.line is not None, sample.name
             continue
-        done += bool(found.verdicts)
-        if found.wrong:
-            wrong[sample.name] = found.wrong
+        done += bool(verdict.verdicts)
+        if verdict.wrong:
+            wrong[sample.name] = verdict.wrong
     assert wrong == {}
     assert done >= 15

@@ -95,15 +95,15 @@ CALLS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("words", CALLS, ids=" ".join)
 def test_each_input_is_opened_once(folder: Path, words: tuple[str, ...]) -> None:
-    found = opened(folder, words[0], *words[1:], "-j", "job.toml")
+    counts = opened(folder, words[0], *words[1:], "-j", "job.toml")
     named = {word for word in words if word in ("corrected.ngc", "report.json", "tip.csv")}
     needed = {"job.toml", "plate.ngc", "machine.toml", *named}
-    assert needed <= found.keys()
+    assert needed <= counts.keys()
     if words[0] in ("correct", "check", "simulate", "view"):
-        assert found.keys() >= CALIBRATION
+        assert counts.keys() >= CALIBRATION
     with_meshes = words[0] in ("check", "view") or "--review" in words
-    assert ("box.stl" in found) == with_meshes
-    assert {name: count for name, count in found.items() if count > 1} == {}
+    assert ("box.stl" in counts) == with_meshes
+    assert {name: count for name, count in counts.items() if count > 1} == {}
 
 
 @pytest.mark.slow
@@ -113,10 +113,10 @@ def test_each_input_is_opened_once(folder: Path, words: tuple[str, ...]) -> None
     ("compare", "plate.ngc", "tip.csv", "--report", "f.html"),
 ])  # fmt: skip
 def test_each_of_several_texts_is_opened_once(folder: Path, words: tuple[str, ...]) -> None:
-    found = opened(folder, *words, "-j", "job.toml")
+    counts = opened(folder, *words, "-j", "job.toml")
     named = {word for word in words if word.endswith((".ngc", ".csv"))}
-    assert found.keys() >= CALIBRATION | named
-    assert {name: count for name, count in found.items() if count > 1} == {}
+    assert counts.keys() >= CALIBRATION | named
+    assert {name: count for name, count in counts.items() if count > 1} == {}
 
 
 def test_the_count_sees_a_second_opening(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

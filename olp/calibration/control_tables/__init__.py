@@ -1,1 +1,1 @@
-"""What a control does with compensation tables, and what they leave."""
+"""What a control does with compensation tables, and the errors that remain."""

@@ -1,7 +1,8 @@
 """What a control does with its compensation tables: how far it moves the axes from what was commanded.
 
-Each class holds what a table says, as a Calibration in the contract's sense (actual minus commanded, mm and
-rad), and works as its control does; so one model serves the predicted residual and the tests.
+Each class holds the content of a table, as a Calibration in the sign convention of this package (actual
+minus commanded, mm and rad), and works as its control does. So one model serves the predicted residual and
+the tests.
 """
 
 from __future__ import annotations
@@ -28,17 +29,17 @@ class Control(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisTables:
-    """Sums of tables of one axis each: linear between rows, the end value outside, no levers.
+    """Sums of tables of one axis each: linear between rows, the end value outside, no lever arms.
 
     LinuxCNC's screw compensation, sag tables of Sinumerik, and axis-error tables of Heidenhain controls work
     like this. A table of both directions is taken by the direction of its own axis, the mean of both where
-    that is unknown; a constant lost motion by half to either side.
+    that is unknown; a constant backlash by half to either side.
     """
 
     calibration: Calibration
 
     def offset(self, axis_mm: Array, tool_mm: Array, direction: Array) -> Array:
-        out = np.zeros(axis_mm.shape)
+        shift = np.zeros(axis_mm.shape)
         for curve in self.calibration.curves:
             j = AXES.index(curve.axis)
             for name in curve.names:
@@ -48,8 +49,8 @@ class AxisTables:
                 half = curve.half_difference(name)
                 if half is not None:
                     error = error + direction[:, j] * np.interp(axis_mm[:, j], curve.position_mm, half)
-                out[:, AXES.index(name[1])] -= error
-        return np.asarray(out + 0.5 * direction * np.array(self.calibration.backlash_mm))
+                shift[:, AXES.index(name[1])] -= error
+        return np.asarray(shift + 0.5 * direction * np.array(self.calibration.backlash_mm))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,11 +61,11 @@ class Shear:
 
     def offset(self, axis_mm: Array, tool_mm: Array, direction: Array) -> Array:
         xy, xz, yz = factors(self.calibration)
-        out = np.zeros(axis_mm.shape)
+        shift = np.zeros(axis_mm.shape)
         y, z = axis_mm[:, 1], axis_mm[:, 2]
-        out[:, 0] = -y * xy - z * (xz - xy * yz)
-        out[:, 1] = -z * yz
-        return out
+        shift[:, 0] = -y * xy - z * (xz - xy * yz)
+        shift[:, 1] = -z * yz
+        return shift
 
 
 def factors(calibration: Calibration) -> tuple[float, float, float]:
@@ -75,8 +76,8 @@ def factors(calibration: Calibration) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Volumetric:
-    """All components of a rigid-body chain with the tool: the control takes the error at the commanded place
-    off the command, in one step. Tables of such controls know no direction."""
+    """All components of a rigid-body chain with the tool: the control subtracts the error at the commanded
+    position from the command, in one step. Tables of such controls have no directions."""
 
     model: ErrorModel
 

@@ -1,4 +1,4 @@
-"""What a machine does with compensation tables in its control, next to what a corrected program leaves.
+"""Residual errors with compensation tables in the control, next to those of a corrected program.
 
 Points of a Latin hypercube over the calibrated box, each approached from a random side, with every tool in
 turn; and points along a program, where the directions are those of its motion.
@@ -23,9 +23,11 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import play_states, plays
 from olp.proof.deviation import Tracer
 
-#: What stands for the machine without tables, and for a corrected program.
-AS_IS, CORRECT = "as it is", "olp correct"
-#: More points along a program than this say no more.
+#: The key of the uncompensated machine.
+UNCOMPENSATED = "as it is"
+#: The key of a corrected program.
+CORRECT = "olp correct"
+#: Points along a program, at most.
 _MOST_POINTS = 100_000
 
 
@@ -43,8 +45,8 @@ class Residual:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Places:
-    """Axis positions (n, 3) that are asked for, tool vectors (3,) or (n, 3), and directions of the last
+class Samples:
+    """Nominal axis positions (n, 3), tool vectors (3,) or (n, 3), and directions of the last
     motion (n, 3); `path` says that the points follow each other, `counted` (n,) which of them count."""
 
     points_mm: Array
@@ -54,17 +56,17 @@ class Places:
     counted: np.ndarray | None = None
 
 
-def in_box(box_mm: Array, tools_mm: Array, count: int, seed: int) -> Places:
+def in_box(box_mm: Array, tools_mm: Array, count: int, seed: int) -> Samples:
     """A Latin hypercube over a box (3, 2), the tools (k, 3) in turn, the sides at random."""
     random = np.random.default_rng(seed)
     cells = np.array([random.permutation(count) for _ in range(3)]).T
     share = (cells + random.random((count, 3))) / count
     points = box_mm[:, 0] + share * (box_mm[:, 1] - box_mm[:, 0])
     direction = random.choice([-1.0, 1.0], (count, 3))
-    return Places(points, np.resize(tools_mm, (count, 3)), direction)
+    return Samples(points, np.resize(tools_mm, (count, 3)), direction)
 
 
-def along(path: Toolpath, box_mm: Array, chain: str, step_mm: float = 1.0) -> Places:
+def along(path: Toolpath, box_mm: Array, chain: str, step_mm: float = 1.0) -> Samples:
     """Points along the moves of a program whose axes are all known; cutting moves count."""
     still = build(Calibration(machine="", box_mm=box_mm), chain, outside="hold")
     length = float(np.nansum(np.sqrt(((path.end_mm - path.starts_mm()) ** 2).sum(axis=1))))
@@ -74,34 +76,34 @@ def along(path: Toolpath, box_mm: Array, chain: str, step_mm: float = 1.0) -> Pl
     tool = path.tool_mm()
     direction = play_states(points, np.zeros(3))
     counted = np.isin(path.kind[move], (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW))
-    return Places(points, tool if tool.ndim == 1 else tool[move], direction, True, counted)
+    return Samples(points, tool if tool.ndim == 1 else tool[move], direction, True, counted)
 
 
 def residuals_by(
-    model: ErrorModel, controls: Mapping[str, Control], places: Places, increment_mm: Array | None = None
+    model: ErrorModel, controls: Mapping[str, Control], samples: Samples, increment_mm: Array | None = None
 ) -> dict[str, Residual]:
-    """What is left by name: the machine as it is, with each control's tables and, where `increment_mm` (3,)
-    is given, by corrected commands that are rounded to it."""
-    out = {}
-    for name, control in {AS_IS: Uncompensated(), **controls}.items():
-        command = places.points_mm + control.offset(places.points_mm, places.tool_mm, places.direction)
-        out[name] = _left(model, command, places)
+    """The residuals by name: of the uncompensated machine, with each control's tables and, where
+    `increment_mm` (3,) is given, with corrected commands that are rounded to it."""
+    residuals = {}
+    for name, control in {UNCOMPENSATED: Uncompensated(), **controls}.items():
+        command = samples.points_mm + control.offset(samples.points_mm, samples.tool_mm, samples.direction)
+        residuals[name] = _residual(model, command, samples)
     if increment_mm is not None:
-        play = _play(model, places.points_mm, places)
-        command = invert(model, places.points_mm, places.tool_mm, play)
-        out[CORRECT] = _left(model, np.round(command / increment_mm) * increment_mm, places)
-    return out
+        play = _play(model, samples.points_mm, samples)
+        command = invert(model, samples.points_mm, samples.tool_mm, play)
+        residuals[CORRECT] = _residual(model, np.round(command / increment_mm) * increment_mm, samples)
+    return residuals
 
 
-def _play(model: ErrorModel, command: Array, places: Places) -> Array | None:
-    return plays(model, command) if places.path else places.direction
+def _play(model: ErrorModel, command: Array, samples: Samples) -> Array | None:
+    return plays(model, command) if samples.path else samples.direction
 
 
-def _left(model: ErrorModel, command: Array, places: Places) -> Residual:
-    actual = command + model.error(command, places.tool_mm, _play(model, command, places))
-    wanted = places.points_mm
-    if places.counted is not None:
-        actual, wanted = actual[places.counted], wanted[places.counted]
+def _residual(model: ErrorModel, command: Array, samples: Samples) -> Residual:
+    actual = command + model.error(command, samples.tool_mm, _play(model, command, samples))
+    wanted = samples.points_mm
+    if samples.counted is not None:
+        actual, wanted = actual[samples.counted], wanted[samples.counted]
     if not len(wanted):
         return Residual(0.0, 0.0, 0.0)
     distance = np.sqrt(((actual - wanted) ** 2).sum(axis=1)) * UM_PER_MM

@@ -19,17 +19,23 @@ from olp.errormodel.calibration import Calibration, Curve, Cyclic, Reference
 from olp.errormodel.lever_arms import LeverArm
 from olp.errormodel.sources.cyclic import cyclic_value
 
-#: Between rows a table may miss the curve by this much, in mm or rad times a metre, where its size allows.
+#: Between rows a table may miss the curve by this much where its size allows, mm.
 MISS_MM = 5e-5
+#: The same of an angle, rad.
 MISS_RAD = 5e-8
 #: Rows that may stand between two positions of a curve.
 _MOST_PARTS = 32
 #: Rows of a table with equal steps, where nothing limits it and the positions of the curve do not fit.
 _MOST_EVEN = 1001
-#: Rows for each period of a cyclic term, so that straight lines miss 2 % of its amplitude, and rows in all.
-_ROWS_A_PERIOD, _MOST_DENSE = 16, 10_001
-#: Places of a millimetre, and of a radian, that are kept of computed values.
-_MM_DECIMALS, _RAD_DECIMALS = 8, 12
+#: Rows per period of a cyclic term, so that straight lines miss 2 % of its amplitude.
+_ROWS_PER_PERIOD = 16
+#: Rows of a table that follows cyclic terms, at most.
+_MOST_DENSE = 10_001
+#: Decimals of computed values in mm.
+_MM_DECIMALS = 8
+#: Decimals of computed values in rad.
+_RAD_DECIMALS = 12
+#: In mm.
 _MICROMETRE = Decimal("0.001")
 
 
@@ -56,7 +62,7 @@ class Rows:
 def component_rows(
     calibration: Calibration, name: str, *, most: int | None = None, even: bool = False
 ) -> Rows | None:
-    """Rows of a component as its curve states it, on its own line, with the lost motion of its axis; None
+    """Rows of a component as its curve states it, on its own line, with the backlash of its axis; None
     where the calibration does not hold it.
 
     Positions are the curve's own where straight lines between them are good enough, more where they are not,
@@ -65,11 +71,11 @@ def component_rows(
     get too few rows.
     """
     j = AXES.index(name[2])
-    lost = calibration.backlash_mm[j] if name[1] == name[2] else 0.0
+    backlash = calibration.backlash_mm[j] if name[1] == name[2] else 0.0
     curve = next((c for c in calibration.curves if name in c.names), None)
     terms = [c for c in calibration.cyclic if c.component == name and c.amplitude]
     if curve is None:
-        if not lost and not terms:
+        if not backlash and not terms:
             return None
         zeros = {name: np.zeros(2)}
         curve = Curve(name[2], np.array(calibration.box_mm[j]), zeros, interpolation="linear")
@@ -79,15 +85,15 @@ def component_rows(
     dense = _dense(position, terms, most, even)
     position = position if dense is None else dense
     miss = max(_miss(curve, part, position) for part in parts)
-    values = [_at(curve, part, position, name) for part in parts]
+    values = [_values_at(curve, part, position, name) for part in parts]
     if terms and dense is not None:
         repeating = sum((cyclic_value(term, position) for term in terms), np.zeros(len(position)))
         values = [_rounded(part + repeating, name) for part in values]
     forward, backward = values[0], values[-1]
-    if lost:
-        forward = _rounded(forward - 0.5 * lost, name)
-        backward = _rounded(backward + 0.5 * lost, name)
-    both = len(parts) == 2 or bool(lost)
+    if backlash:
+        forward = _rounded(forward - 0.5 * backlash, name)
+        backward = _rounded(backward + 0.5 * backlash, name)
+    both = len(parts) == 2 or bool(backlash)
     return Rows(name, position, forward, backward, both, miss, not terms or dense is not None)
 
 
@@ -96,7 +102,7 @@ def _dense(position: Array, terms: Sequence[Cyclic], most: int | None, even: boo
     if not terms:
         return None
     low, high = float(position[0]), float(position[-1])
-    step = min(term.period_mm for term in terms) / _ROWS_A_PERIOD
+    step = min(term.period_mm for term in terms) / _ROWS_PER_PERIOD
     count = math.ceil((high - low) / step) + 1
     limit = _MOST_DENSE if most is None else most
     if count + (0 if even else len(position)) > limit:
@@ -107,20 +113,20 @@ def _dense(position: Array, terms: Sequence[Cyclic], most: int | None, even: boo
 
 
 def common_rows(calibration: Calibration, curve: Curve) -> list[Rows]:
-    """Rows of the components of one curve, all at the same positions, without lost motion."""
+    """Rows of the components of one curve, all at the same positions, without backlash."""
     position = _fine(calibration, [curve])
-    out = []
+    table = []
     for name in (n for n in COMPONENTS if n in curve.names):
         terms = [c for c in calibration.cyclic if c.component == name and c.amplitude]
         rows = [component_rows(replace(calibration, backlash_mm=ZERO), name)]
-        held = all(found is not None and found.cyclic for found in rows)
-        values = [_at(curve, part, position, name) for part in _parts(curve, name)]
+        held = all(row is not None and row.cyclic for row in rows)
+        values = [_values_at(curve, part, position, name) for part in _parts(curve, name)]
         if terms and held:
             repeating = sum((cyclic_value(term, position) for term in terms), np.zeros(len(position)))
             values = [_rounded(part + repeating, name) for part in values]
         miss = max(_miss(curve, part, position) for part in _parts(curve, name))
-        out.append(Rows(name, position, values[0], values[-1], len(values) == 2, miss, held))
-    return out
+        table.append(Rows(name, position, values[0], values[-1], len(values) == 2, miss, held))
+    return table
 
 
 def _fine(calibration: Calibration, curves: Sequence[Curve]) -> Array:
@@ -131,7 +137,7 @@ def _fine(calibration: Calibration, curves: Sequence[Curve]) -> Array:
 
 
 def along_axes(calibration: Calibration) -> Calibration:
-    """The same without angular cyclic terms, which need levers of their own, and with a curve of zeros for
+    """The same without angular cyclic terms, which need their own lever arms, and with a curve of zeros for
     each component that is cyclic only."""
     cyclic = tuple(term for term in calibration.cyclic if term.component[1] in AXES)
     held = {name for curve in calibration.curves for name in curve.names}
@@ -142,7 +148,7 @@ def along_axes(calibration: Calibration) -> Calibration:
 
 
 def as_straightness(calibration: Calibration) -> Calibration:
-    """The same with squareness as slopes of straightness: what a control takes that knows no squareness."""
+    """The same with squareness as slopes of straightness: for a control without squareness."""
     square = calibration.squareness
     slopes = {
         "EXY": -square.get("C0Y", 0.0), "EXZ": square.get("B0Z", 0.0), "EYZ": -square.get("A0Z", 0.0)
@@ -163,7 +169,7 @@ def as_straightness(calibration: Calibration) -> Calibration:
         position = _fine(replace(calibration, cyclic=()), [curve])
         lean = slope * (position - calibration.datum_mm[j])
         sides = [
-            {n: _at(curve, v, position, n) + (lean if n == name else 0.0) for n, v in side.items()}
+            {n: _values_at(curve, v, position, n) + (lean if n == name else 0.0) for n, v in side.items()}
             for side in (curve.columns, curve.forward, curve.backward)
         ]
         sides = [{n: _rounded(v, n) if n == name else v for n, v in side.items()} for side in sides]
@@ -175,11 +181,11 @@ def as_straightness(calibration: Calibration) -> Calibration:
 
 
 def zeroed(calibration: Calibration, chain: str, reference: Reference = "functional-point") -> Calibration:
-    """The same errors as they would have been measured on lines through axis position 0 with no tool: what a
-    control takes that counts all levers from the machine's zero.
+    """The same errors as they would have been measured on lines through axis position 0 with no tool: for a
+    control that counts all lever arms from the machine's zero.
 
-    Lines that stand elsewhere add angle times lever to the translations of their curves, to first order;
-    where no lever changes, values stay as they are. With `reference` "table" the errors of axes that carry
+    Lines elsewhere add angle times lever arm to the translations of their curves, to first order; where no
+    lever arm changes, values do not change. With `reference` "table" the errors of axes that carry
     the workpiece are those at a point fixed on it, at its zero. Squareness counts from 0 as well: what that
     shifts goes into EXX and EYY.
     """
@@ -222,7 +228,8 @@ def _joined(
     sides: list[dict[str, Array]] = []
     for side in (0, -1) if both else (0,):
         values = {
-            name: _at(curve, _parts(curve, name)[side], position, name) for name, curve in holder.items()
+            name: _values_at(curve, _parts(curve, name)[side], position, name)
+            for name, curve in holder.items()
         }
         none = np.zeros(len(position))
         angles = np.column_stack([values.get(f"E{d}{axis}", none) for d in "ABC"])
@@ -250,14 +257,14 @@ def _parts(curve: Curve, name: str) -> tuple[Array, ...]:
     return (curve.columns[name],) if curve.columns else (curve.forward[name], curve.backward[name])
 
 
-def _at(curve: Curve, values: Array, position: Array, name: str) -> Array:
+def _values_at(curve: Curve, values: Array, position: Array, name: str) -> Array:
     """(m,) values at positions: those of the curve where they are its own, else rounded interpolated ones."""
     through = Interpolant.through(curve.position_mm, values[:, None], curve.interpolation)
-    found = _rounded(through(position)[:, 0], name)
+    result = _rounded(through(position)[:, 0], name)
     own = np.clip(np.searchsorted(curve.position_mm, position), 0, len(values) - 1)
     same = curve.position_mm[own] == position
-    found[same] = values[own[same]]
-    return found
+    result[same] = values[own[same]]
+    return result
 
 
 def _rounded(values: Array, name: str) -> Array:
@@ -267,32 +274,32 @@ def _rounded(values: Array, name: str) -> Array:
 def _positions(curve: Curve, parts: tuple[Array, ...], most: int | None, even: bool, good: float) -> Array:
     own = curve.position_mm
     if even and not _is_even(own):
-        found = _common(own, most or _MOST_EVEN)
-        if found is None:
+        position = _common(own, most or _MOST_EVEN)
+        if position is None:
             return _even(own[0], own[-1], most or _MOST_EVEN)
-        own = found
+        own = position
     if most is not None and len(own) > most:
         return _even(own[0], own[-1], most)
     if curve.interpolation == "linear":
         return own
     if even:
-        found, count = own, 2
-        while max(_miss(curve, part, found) for part in parts) > good and count <= _MOST_PARTS:
+        position, count = own, 2
+        while max(_miss(curve, part, position) for part in parts) > good and count <= _MOST_PARTS:
             rows = (len(own) - 1) * count + 1
             if most is not None and rows > most:
                 break
-            found, count = _even(own[0], own[-1], rows), 2 * count
-        return found
-    found = own
-    while max(_misses(curve, part, found).max() for part in parts) > good:
-        worst = np.max([_misses(curve, part, found) for part in parts], axis=0)
+            position, count = _even(own[0], own[-1], rows), 2 * count
+        return position
+    position = own
+    while max(_misses(curve, part, position).max() for part in parts) > good:
+        worst = np.max([_misses(curve, part, position) for part in parts], axis=0)
         split = np.flatnonzero(worst > good)
         if most is not None:
-            split = split[np.argsort(-worst[split], kind="stable")][: most - len(found)]
-        if not len(split) or len(found) > _MOST_PARTS * len(own):
+            split = split[np.argsort(-worst[split], kind="stable")][: most - len(position)]
+        if not len(split) or len(position) > _MOST_PARTS * len(own):
             break
-        found = np.unique(np.concatenate([found, 0.5 * (found[split] + found[split + 1])]))
-    return found
+        position = np.unique(np.concatenate([position, 0.5 * (position[split] + position[split + 1])]))
+    return position
 
 
 def _misses(curve: Curve, values: Array, position: Array) -> Array:
@@ -302,8 +309,8 @@ def _misses(curve: Curve, values: Array, position: Array) -> Array:
     inside = (curve.position_mm > position[0]) & (curve.position_mm < position[-1])
     pieces = np.union1d(position, curve.position_mm[inside])
     share = np.arange(8) / 8.0
-    at = (pieces[:-1, None] + share * np.diff(pieces)[:, None]).ravel()
-    off = np.abs(through(at)[:, 0] - np.interp(at, position, through(position)[:, 0]))
+    samples = (pieces[:-1, None] + share * np.diff(pieces)[:, None]).ravel()
+    off = np.abs(through(samples)[:, 0] - np.interp(samples, position, through(position)[:, 0]))
     starts = np.searchsorted(pieces, position[:-1]) * len(share)
     return np.asarray(np.maximum.reduceat(off, starts), float)
 

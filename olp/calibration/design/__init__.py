@@ -1,1 +1,1 @@
-"""What to measure: where, in which order, and what it would tell."""
+"""What to measure: where, in which order, and what the readings would determine."""

@@ -1,4 +1,4 @@
-"""Where to measure: targets of lines, places of points, stations; as measurements with nominal readings."""
+"""Where to measure: targets of lines, points, stations; as measurements with nominal readings."""
 
 from __future__ import annotations
 
@@ -20,18 +20,35 @@ from olp.core.errors import CannotCompute
 from olp.core.machine import Vector
 from olp.core.units import AXES
 
-#: Lines: mm between targets, targets at least, runs there and back.
-STEP_MM, FEWEST, RUNS = 100.0, 11, 5
-#: Targets leave equal steps by a random part of this where no period is stated.
+#: Distance between the targets of a line, mm.
+STEP_MM = 100.0
+#: Targets of a line, at least.
+FEWEST = 11
+#: Runs of a line, each in both directions.
+RUNS = 5
+#: Targets are off equal steps by a random part of this (mm) where no period is stated.
 PITCH_MM = 10.0
-#: Noise of readings: laser in mm and growing with the distance (mm/mm), angles and squares in rad.
-LASER, LASER_SCALE, ANGLE, SQUARE = 0.5e-3, 0.5e-6, 1e-6, 5e-6
-#: Second offset of the reflector for roll of the vertical axis.
+#: Noise of a laser reading, mm.
+LASER = 0.5e-3
+#: Noise of a laser reading that grows with the distance, mm/mm.
+LASER_SCALE = 0.5e-6
+#: Noise of an angle reading, rad.
+ANGLE = 1e-6
+#: Standard uncertainty of the error of a square, rad.
+SQUARE = 5e-6
+#: Second offset of the reflector for roll of the vertical axis, mm.
 ASIDE_MM = 150.0
-#: Interferometer: mm, mm/mm. Pods: rad; their known distance, mm.
-LENGTH, LENGTH_SCALE, POD, BASELINE = 0.2e-3, 0.3e-6, 10e-6, 0.01
-#: Stations stand so far off the box, as a share of its longest side.
+#: Noise of a length of a tracking interferometer, mm.
+LENGTH = 0.2e-3
+#: Noise of such a length that grows with it, mm/mm.
+LENGTH_SCALE = 0.3e-6
+#: Noise of an angle of a pod, rad.
+POD = 10e-6
+#: Standard uncertainty of the known distance between two pods, mm.
+BASELINE = 0.01
+#: Stations are so far off the box, as a share of its longest side.
 _OFF = 0.4
+#: Random sets of targets that are tried.
 _TRIES = 40
 #: Drift of a line over one run, as a share of the noise of a reading.
 _DRIFT = 0.5
@@ -39,7 +56,7 @@ _DRIFT = 0.5
 
 def hypercube(box_mm: Array, n: int, seed: int) -> Array:
     """(n, 3) axis positions of a Latin hypercube in a box (3, 2), to a tenth of a millimetre: as many levels
-    of each axis as points, which a lattice has not (M. D. McKay, R. J. Beckman, W. J. Conover, 1979)."""
+    of each axis as points, unlike a lattice (M. D. McKay, R. J. Beckman, W. J. Conover, 1979)."""
     from scipy.stats import qmc
 
     share = qmc.LatinHypercube(3, seed=seed).random(n)
@@ -49,26 +66,26 @@ def hypercube(box_mm: Array, n: int, seed: int) -> Array:
 
 def points(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
     """Points of a tracker with each tool vector in turn."""
-    at, tool = _scattered(box_mm, tools, n, seed)
-    return Planned(machine, (PointsState(Points(at, tool, at + tool, sigma, source="points")),))
+    axis, tool = _scattered(box_mm, tools, n, seed)
+    return Planned(machine, (PointsState(Points(axis, tool, axis + tool, sigma, source="points")),))
 
 
 def lengths(
     machine: str, box_mm: Array, tools: Sequence[Vector], n: int, stations: int, sigma: float, seed: int
 ) -> Planned:
-    """Lengths from stations about the box, one after the other, with n points each."""
-    at, tool = _scattered(box_mm, tools, n, seed)
+    """Lengths from stations around the box, one after the other, with n points each."""
+    axis, tool = _scattered(box_mm, tools, n, seed)
     rays = []
     for k, place in enumerate(_around(box_mm, stations)):
-        far = np.linalg.norm(at + tool - place, axis=1)
-        read = Lengths(at, tool, far, sigma + LENGTH_SCALE * far, source=f"station {k + 1}")
+        distance = np.linalg.norm(axis + tool - place, axis=1)
+        read = Lengths(axis, tool, distance, sigma + LENGTH_SCALE * distance, source=f"station {k + 1}")
         rays.append(LengthsState(read, Station(place, 0.0)))
     return Planned(machine, tuple(rays))
 
 
 def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
-    """Directions from two pods before the longest side of the box, with their distance known."""
-    at, tool = _scattered(box_mm, tools, n, seed)
+    """Directions from two pods in front of the longest side of the box, with their distance known."""
+    axis, tool = _scattered(box_mm, tools, n, seed)
     long = int(np.argmax(np.ptp(box_mm[:2], axis=1)))
     across = 1 - long
     size = float(np.ptp(box_mm, axis=1).max())
@@ -78,12 +95,12 @@ def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: fl
         place = middle.copy()
         place[long] += side * size
         place[across] = box_mm[across, 0] - _OFF * size
-        ray = at + tool - place
+        ray = axis + tool - place
         poses.append(Pose(place, np.eye(3)))
         azimuth.append(np.arctan2(ray[:, 1], ray[:, 0]))
         elevation.append(np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1])))
     directions = Pods(
-        at, tool, np.stack(azimuth, axis=1), np.stack(elevation, axis=1), sigma,
+        axis, tool, np.stack(azimuth, axis=1), np.stack(elevation, axis=1), sigma,
         ((0, 1, size, BASELINE),), "pods",
     )  # fmt: skip
     return Planned(machine, (PodsState(directions, tuple(poses)),))
@@ -97,18 +114,18 @@ def lines(
     middle = np.round(box_mm.mean(axis=1), 1)
     place = (float(middle[0]), float(middle[1]), float(middle[2]))
     targets = [_targets(box_mm[k], periods_mm[k], seed + k) for k in range(3)]
-    found: list[LineState] = []
+    states: list[LineState] = []
 
     def add(name: str, square: str | None = None, reflector: Vector = tool) -> None:
         axis = AXES.index(name[2])
-        there = np.concatenate([targets[axis], targets[axis][::-1]])
+        both_ways = np.concatenate([targets[axis], targets[axis][::-1]])
         side = np.repeat([1, -1], len(targets[axis]))
-        n = len(there)
+        n = len(both_ways)
         half = 0.5 * float(np.ptp(targets[axis]))
         sigma = ANGLE if name[1] in "ABC" else LASER if name[1] == name[2] else LASER + LASER_SCALE * half
         line = Line(
             name,
-            np.tile(there, RUNS),
+            np.tile(both_ways, RUNS),
             np.zeros(n * RUNS),
             np.repeat(np.arange(1, RUNS + 1), n),
             np.tile(side, RUNS),
@@ -119,7 +136,7 @@ def lines(
             sigma_scale=LASER_SCALE if name[1] == name[2] else 0.0,
             source=f"{name.lower()}.csv",
         )
-        found.append(LineState(line, Noise(sigma, _DRIFT * sigma, None)))
+        states.append(LineState(line, Noise(sigma, _DRIFT * sigma, None)))
 
     for a in AXES:
         add(f"E{a}{a}")
@@ -132,7 +149,7 @@ def lines(
     add("EYZ", "square YZ", (tool[0] + ASIDE_MM, tool[1], tool[2]))
     squares = tuple(Square(f"square {a}{b}", 0.0, SQUARE) for a, b in itertools.combinations(AXES, 2))
     x, y, z = (tuple(map(float, p)) for p in periods_mm)
-    return Planned(machine, tuple(found), squares, (x, y, z))
+    return Planned(machine, tuple(states), squares, (x, y, z))
 
 
 def together(first: Planned, second: Planned) -> Planned:
@@ -145,7 +162,7 @@ def _scattered(box_mm: Array, tools: Sequence[Vector], n: int, seed: int) -> tup
 
 
 def _around(box_mm: Array, stations: int) -> Array:
-    """(stations, 3) places about the box, at several heights: a golden spiral about its middle."""
+    """(stations, 3) positions around the box, at several heights: a golden spiral about its middle."""
     middle, side = box_mm.mean(axis=1), np.ptp(box_mm, axis=1)
     k = np.arange(stations)
     angle = 2.399963 * k + 0.4
@@ -158,8 +175,8 @@ def _around(box_mm: Array, stations: int) -> Array:
 
 
 def _targets(side: Array, periods_mm: Sequence[float], seed: int) -> Array:
-    """Targets off equal steps by random parts of a period, as ISO 230-2 asks, at which no period hides.
-    Raises CannotCompute where there are none."""
+    """Targets off equal steps by random parts of a period, as ISO 230-2 asks, at which every period is
+    observable. Raises CannotCompute where there are none."""
     low, high = side.tolist()
     count = max(FEWEST, int((high - low) / STEP_MM) + 1)
     step = (high - low) / (count - 1)
@@ -172,7 +189,7 @@ def _targets(side: Array, periods_mm: Sequence[float], seed: int) -> Array:
         if all(aliased(q, period) is None for period in periods_mm):
             return np.asarray(q, float)
     raise CannotCompute(
-        f"no targets between {low:g} and {high:g} mm tell errors of "
-        f"{', '.join(f'{p:g}' for p in periods_mm)} mm from smooth "
-        "ones; add a fine sweep over two periods instead, and leave the period out here"
+        f"no targets between {low:g} and {high:g} mm separate errors with a period of "
+        f"{', '.join(f'{p:g}' for p in periods_mm)} mm from smooth ones; leave the period out here, and add "
+        "a fine sweep over two periods"
     )

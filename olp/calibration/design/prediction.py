@@ -1,5 +1,5 @@
-"""What a set of measurements would know of a machine, before anybody has measured: the covariance of the
-adjustment for its geometry, with curves of the size and smoothness that machines have."""
+"""What a set of measurements would determine about a machine, predicted before measuring: the covariance of
+the adjustment for its geometry, with curves of the size and smoothness that machines have."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES
 
-#: Places in the box where the uncertainty is judged, by tool.
-_PLACES = 150
+#: Positions in the box where the uncertainty is computed, for each tool.
+_POSITIONS = 150
 #: Size and second differences of curves of machines that are off by 0.1 mm or so (mm, rad).
 TYPICAL = {"positioning": (0.03, 6e-3), "straightness": (0.012, 2.5e-3), "angle": (2e-5, 5e-6)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Planned:
-    """Observations with nominal readings, and where their stations and pods would stand."""
+    """Observations with nominal readings, and where their stations and pods would be."""
 
     machine: str
     states: tuple[State, ...]
@@ -47,9 +47,9 @@ class Planned:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """`rms_mm` is the predicted rms length of what a correction leaves at fresh places with the tools judged,
-    in the frame that fits best, `worst_mm` its largest value at one place. `hidden` are errors that nothing
-    would tell of."""
+    """`rms_mm` is the predicted rms length of the residual after correction, at fresh positions with the
+    given tools, in the frame that fits best; `worst_mm` is its largest value at one position. `hidden` are
+    errors that would not be observable."""
 
     rms_mm: float
     worst_mm: float
@@ -70,12 +70,12 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
         normal.add(state.block(parameters, theta))
     precision, logdet = prior.precision()
     solved = solve(normal, precision, logdet)
-    found = Fit(
+    predicted = Fit(
         taken, parameters, theta, solved.covariance, prior, (), (), box_mm,
         mean_slopes(parameters), 0.0, 1.0, {},
     )  # fmt: skip
     after, worst = _spread(parameters, solved.covariance, box_mm, tools)
-    return Prediction(after, worst, (*unobservable(found), *squareness_unobservable(found)))
+    return Prediction(after, worst, (*unobservable(predicted), *squareness_unobservable(predicted)))
 
 
 def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
@@ -89,10 +89,10 @@ def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
         spaces[name] = CurveSpace.of(spline, (), datum[axis], kind)
         if name[1] in AXES:
             own = [line for line in taken.lines if line.component == name]
-            at = list(own[0].line_mm if own else datum)
-            at[axis] = datum[axis]
+            line_mm = list(own[0].line_mm if own else datum)
+            line_mm[axis] = datum[axis]
             tool = own[0].tool_mm if own else (0.0, 0.0, 0.0)
-            places[name] = Place((at[0], at[1], at[2]), tool)
+            places[name] = Place((line_mm[0], line_mm[1], line_mm[2]), tool)
     shared = sorted({n for line in taken.lines if line.square is not None for n in square_names(line)})
     return Parameters(chain, datum, spaces, places, shared=tuple(shared))
 
@@ -100,15 +100,17 @@ def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
 def _spread(
     parameters: Parameters, covariance: Array, box_mm: Array, tools: Sequence[Vector]
 ) -> tuple[float, float]:
-    """rms and largest expected length of the error at places in the box, less the best-fit frame."""
+    """rms and largest expected length of the error at positions in the box, less the best-fit frame."""
     rng = np.random.default_rng(1)
-    at = rng.uniform(box_mm[:, 0], box_mm[:, 1], (_PLACES, 3))
-    square = np.zeros((len(tools), _PLACES))
+    position = rng.uniform(box_mm[:, 0], box_mm[:, 1], (_POSITIONS, 3))
+    square = np.zeros((len(tools), _POSITIONS))
     for k, tool in enumerate(tools):
         vector = np.asarray(tool, float)
-        rows = parameters.design(at, vector).reshape(3 * _PLACES, -1)
-        frame = frame_columns(at + vector - (at + vector).mean(axis=0)).reshape(3 * _PLACES, -1)
+        rows = parameters.design(position, vector).reshape(3 * _POSITIONS, -1)
+        frame = frame_columns(position + vector - (position + vector).mean(axis=0)).reshape(
+            3 * _POSITIONS, -1
+        )
         basis, _ = np.linalg.qr(frame)
         rows = rows - basis @ (basis.T @ rows)
-        square[k] = np.einsum("nk,nk->n", rows @ covariance, rows).reshape(_PLACES, 3).sum(axis=1)
+        square[k] = np.einsum("nk,nk->n", rows @ covariance, rows).reshape(_POSITIONS, 3).sum(axis=1)
     return float(np.sqrt(square.mean())), float(np.sqrt(square.max()))

@@ -1,4 +1,4 @@
-"""In which order to visit places, and how long a machine takes for it."""
+"""The order in which to visit positions, and the time that a machine takes."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from olp.core.arrays import Array
 from olp.core.machine import Axis
 from olp.core.units import AXES
 
-#: Exchanges of two legs are tried so often over all places.
+#: Exchanges of two legs are tried at most so often over all positions.
 _ROUNDS = 6
 
 
-def move_s(way_mm: Array, axes: Mapping[str, Axis]) -> Array:
+def move_s(distance_mm: Array, axes: Mapping[str, Axis]) -> Array:
     """(n,) seconds of straight moves by (n, 3) from rest to rest: the slowest axis, jerk, acceleration and
     velocity limited."""
-    times = [_rest_to_rest(np.abs(way_mm[:, k]), axes[a]) for k, a in enumerate(AXES)]
+    times = [_rest_to_rest(np.abs(distance_mm[:, k]), axes[a]) for k, a in enumerate(AXES)]
     return np.asarray(np.max(times, axis=0))
 
 
-def _rest_to_rest(way: Array, axis: Axis) -> Array:
+def _rest_to_rest(distance: Array, axis: Axis) -> Array:
     v, a, j = axis.velocity_mm_s, axis.acceleration_mm_s2, axis.jerk_mm_s3
     # ramps of constant jerk that reach neither a nor v; that reach a; that reach v
     corner = min(a * a / j, v)
     ramp = v / a + a / j if v > a * a / j else 2.0 * np.sqrt(v / j)
-    short = 4.0 * np.cbrt(way / (2.0 * j))
-    # 2 (v^2 / a + v a / j) / 2 = way, for the velocity that is reached
-    peak = 0.5 * (-a * a / j + np.sqrt((a * a / j) ** 2 + 4.0 * a * way))
+    short = 4.0 * np.cbrt(distance / (2.0 * j))
+    # 2 (v^2 / a + v a / j) / 2 = distance, for the velocity that is reached
+    peak = 0.5 * (-a * a / j + np.sqrt((a * a / j) ** 2 + 4.0 * a * distance))
     middle = 2.0 * (peak / a + a / j)
     to_corner = corner * 2.0 * np.sqrt(corner / j)
-    found = np.where(way <= to_corner, short, middle)
-    return np.asarray(np.where(way >= v * ramp, way / v + ramp, found))
+    time = np.where(distance <= to_corner, short, middle)
+    return np.asarray(np.where(distance >= v * ramp, distance / v + ramp, time))
 
 
 def order(places_mm: Array, axes: Mapping[str, Axis]) -> npt.NDArray[np.intp]:
-    """(n,) an order of visiting places (n, 3) that takes little time: nearest first, then legs exchanged
+    """(n,) an order of visiting positions (n, 3) that takes little time: nearest first, then legs exchanged
     where that is shorter (2-opt)."""
     n = len(places_mm)
     if n < 3:
@@ -45,23 +45,23 @@ def order(places_mm: Array, axes: Mapping[str, Axis]) -> npt.NDArray[np.intp]:
     first, second = np.divmod(np.arange(n * n), n)
     cost = move_s(places_mm[first] - places_mm[second], axes).reshape(n, n)
     tour = [int(np.argmin(places_mm[:, 0]))]
-    left = np.ones(n, bool)
-    left[tour[0]] = False
+    waiting = np.ones(n, bool)
+    waiting[tour[0]] = False
     for _ in range(n - 1):
-        nearest = int(np.argmin(np.where(left, cost[tour[-1]], np.inf)))
+        nearest = int(np.argmin(np.where(waiting, cost[tour[-1]], np.inf)))
         tour.append(nearest)
-        left[nearest] = False
-    found = np.array(tour)
+        waiting[nearest] = False
+    best = np.array(tour)
     for _ in range(_ROUNDS):
         better = False
         for i in range(n - 2):
-            a, b = found[i], found[i + 1]
-            c, d = found[i + 2 : -1], found[i + 3 :]
+            a, b = best[i], best[i + 1]
+            c, d = best[i + 2 : -1], best[i + 3 :]
             gain = cost[a, b] + cost[c, d] - cost[a, c] - cost[b, d]
             if len(gain) and gain.max() > 1e-9:
                 k = i + 2 + int(np.argmax(gain))
-                found[i + 1 : k + 1] = found[i + 1 : k + 1][::-1]
+                best[i + 1 : k + 1] = best[i + 1 : k + 1][::-1]
                 better = True
         if not better:
             break
-    return found
+    return best

@@ -1,5 +1,5 @@
-"""Blunders that change the curves of one axis as a whole: columns in each other's place, positions counted
-from the other end, a reflector that stood on the table."""
+"""Blunders that change the curves of one axis as a whole: exchanged columns, positions counted from the other
+end, a reflector that stood on the table."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from olp.errormodel.calibration import Calibration, Curve
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """A way in which the curves of `axis` (0, 1, 2) may be meant other than they are stated. `renames` says
-    which curve is which then."""
+    """One meaning of the curves of `axis` (0, 1, 2) other than as stated. `renames` maps the names of curves
+    to those that they have then."""
 
     axis: int
     words: str
@@ -34,7 +34,7 @@ def arrangements(calibration: Calibration, chain: str) -> Iterator[Arrangement]:
         for group in ("ABC", "".join(a for a in AXES if a != letter)):
             for a, b in combinations([f"E{d}{letter}" for d in group], 2):
                 if a in names or b in names:
-                    words = f"{a} and {b} in each other's place"
+                    words = f"{a} and {b} exchanged"
                     yield Arrangement(axis, words, _swap(a, b), {a: b, b: a})
         if own:
             yield Arrangement(axis, f"positions of {letter} counted from the other end", _mirror(letter))
@@ -45,7 +45,7 @@ def arrangements(calibration: Calibration, chain: str) -> Iterator[Arrangement]:
 
 
 def scaled(calibration: Calibration, factors: Mapping[str, float]) -> Calibration:
-    """The calibration with curves and squareness times these factors; cyclic terms go with their curve."""
+    """The calibration with curves and squareness times these factors; cyclic terms like their curve."""
 
     def times(columns: Mapping[str, Array]) -> dict[str, Array]:
         return {name: _times(values, factors.get(name, 1.0)) for name, values in columns.items()}
@@ -97,7 +97,7 @@ def _swap(a: str, b: str) -> Callable[[Calibration], Calibration]:
 def _mirror(letter: str) -> Callable[[Calibration], Calibration]:
     def change(curve: Curve) -> Curve:
         q = curve.position_mm
-        # to the digits of a file, so that faces of the box stay covered
+        # to the digits of a file, so that the faces of the box are still covered
         turned = np.round(q[0] + q[-1] - q[::-1], 9)
         return dataclasses.replace(
             curve,

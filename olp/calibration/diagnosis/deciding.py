@@ -1,4 +1,4 @@
-"""Which further points would decide what a diagnosis leaves open."""
+"""Which further points would decide what a diagnosis leaves undecided."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.errormodel.build import build
 
-#: Places that are tried, and points proposed at most.
-PLACES, MOST = 160, 12
-#: Reflectors beside the tools that are known: so far off to each side.
+#: Positions that are tried.
+POSITIONS = 160
+#: Points that are proposed, at most.
+MOST = 12
+#: Offset of further reflectors from the first known tool, to each side; mm.
 REACH_MM = 150.0
-#: A point is worth its time where it makes the sum of log variances smaller by this.
+#: A point is worth its time where it reduces the sum of log variances by this.
 WORTH = 0.02
-#: A margin over the limit, so that noise does not leave it undecided again.
+#: Margin over the limit, so that noise does not make the result undecided again.
 MARGIN = 1.5
 
 
@@ -42,11 +44,11 @@ def advise(diagnosis: Diagnosis, tools: Sequence[Vector], seed: int = 1) -> Advi
     names = diagnosis.factors.names
     calibration, points = diagnosis.calibration, diagnosis.seen.points
     box = np.asarray(calibration.box_mm)
-    share = qmc.LatinHypercube(3, seed=seed).random(PLACES)
-    place = np.round(box[:, 0] + share * np.ptp(box, axis=1), 1)
+    share = qmc.LatinHypercube(3, seed=seed).random(POSITIONS)
+    position = np.round(box[:, 0] + share * np.ptp(box, axis=1), 1)
     vectors = offsets(tools or [tuple(points.tool_mm[0].tolist())])
-    axis = np.repeat(place, len(vectors), axis=0)
-    tool = np.tile(vectors, (len(place), 1))
+    axis = np.repeat(position, len(vectors), axis=0)
+    tool = np.tile(vectors, (len(position), 1))
     model = build(calibration, diagnosis.chain, outside="hold", skip_components=diagnosis.skip)
     columns = contributions_of(model, axis, tool)
     rows = design_of(axis, tool, diagnosis.seen.centre_mm, columns, names)

@@ -1,5 +1,5 @@
-"""Whether each curve of a calibration is stated in the right sense and unit, and at its place: decided by
-independent points, or said to be undecided."""
+"""Whether each curve of a calibration has the right sign, unit and arrangement: decided by independent
+points, or undecided."""
 
 from __future__ import annotations
 
@@ -29,15 +29,17 @@ from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
-#: Prior probability of one arrangement other than stated, and the odds at which one is decided or excluded.
-REARRANGED, DECIDED = math.log(0.01), math.log(2000.0)
-#: A factor beyond the list is told at this probability.
+#: Log of the prior probability of one arrangement other than stated.
+REARRANGED = math.log(0.01)
+#: Log of the odds at which an arrangement is decided or excluded.
+DECIDED = math.log(2000.0)
+#: A factor beyond the list is reported from this probability on.
 LIKELY = 0.9995
-#: Free fits worse by so much chi-square need no closer look.
+#: Arrangements whose free fit is worse by so much chi-square are not examined further.
 HOPELESS = 80.0
-#: Chi-square a degree of freedom beyond which nothing here explains the points.
+#: Reduced chi-square above which no factor explains the points.
 MISFIT = 9.0
-#: A residual so many standard deviations long is told as an outlier.
+#: A residual so many standard deviations long is reported as an outlier.
 OUTLIER = 5.0
 
 Sign = Literal["right", "flipped", "absent", "undecided"]
@@ -45,10 +47,10 @@ Sign = Literal["right", "flipped", "absent", "undecided"]
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Of one curve or squareness. `factor` with `sigma` is what the points say, `applied` the factor that is
-    decided (1 where nothing is, and where the curve is absent: whoever lists it as corrected by the control
-    keeps it), `unit` "right", "undecided", "no factor explains" or what happened, and
-    `effect_mm` the rms of what it does at the points as stated."""
+    """The verdict on one curve or squareness. `factor` with `sigma` is the estimate from the points.
+    `applied` is the decided factor: 1 where nothing is decided, and where the curve is absent, as the control
+    may correct it. `unit` is "right", "undecided", "no factor explains" or the mistake that was found.
+    `effect_mm` is the rms of its effect at the points as stated."""
 
     name: str
     sign: Sign
@@ -65,9 +67,9 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """All verdicts. `arrangements` are what is decided about whole axes; `doubts` pairs of words that the
-    points do not tell apart. `senses` says by axis that carries the workpiece in which sense its curves are
-    stated. `corrected` is the calibration with all that is decided put right."""
+    """All verdicts. `arrangements` are those decided for whole axes; `doubts` names others that the points
+    do not exclude. `senses` gives the sign convention of the curves of each axis that carries the workpiece.
+    `corrected` is the calibration with all that is decided applied."""
 
     calibration: Calibration
     seen: Checkpoints
@@ -92,7 +94,7 @@ class Diagnosis:
         return tuple(v for v in self.verdicts if v.applied != 1.0 or v.sign == "absent")
 
     def uncertainty_of(self, stated: Uncertainty) -> Uncertainty | None:
-        """What is known of the corrected calibration; None where curves have changed places."""
+        """The uncertainty of the corrected calibration; None where curves were rearranged."""
         if self.arrangements:
             return None
         applied = {verdict.name: verdict.applied for verdict in self.verdicts}
@@ -113,8 +115,8 @@ class Diagnosis:
     def outliers(self) -> tuple[tuple[int, float], ...]:
         """Row of the file and standard deviations of points that lie far off."""
         length = np.sqrt(((self.factors.residual_mm / self.factors.sigma_mm) ** 2).sum(axis=1) / 3.0)
-        found = np.flatnonzero(length > OUTLIER)
-        return tuple((int(self.seen.points.row[k]), float(length[k])) for k in found)
+        rows = np.flatnonzero(length > OUTLIER)
+        return tuple((int(self.seen.points.row[k]), float(length[k])) for k in rows)
 
     @property
     def explained(self) -> bool:
@@ -131,38 +133,38 @@ def diagnose(
     skip: frozenset[str] = frozenset(),
     scale: float | None = None,
 ) -> Diagnosis:
-    """Judge every curve and squareness of a calibration by points that had no part in it.
+    """Judge every curve and squareness of a calibration by points that it was not fitted to.
 
-    With `frame_known` points count in the machine's frame. `skip` are errors that the control corrected while
+    With `frame_known` points are in the machine's frame. `skip` are errors that the control corrected while
     the points were taken; `scale` is the standard uncertainty of the instrument's scale against the machine's
-    (mm/mm), axis by axis. Raises CannotCompute where the points make no frame.
+    (mm/mm), axis by axis. Raises CannotCompute where the points determine no frame.
     """
     model = build(calibration, chain, outside="hold", skip_components=skip)
     seen = Checkpoints.of(points, model, frame_known=frame_known, scale=scale)
     search = _Search(calibration, chain, seen, skip)
     chosen, candidates = search.arranged()
     arranged = search.applied(chosen)
-    base, found = search.columns(chosen), search.factors(chosen)
+    base, factors = search.columns(chosen), search.factors(chosen)
     others = [(candidate, search.factors([*chosen, candidate]).marginals) for candidate in candidates]
     verdicts = []
     for name in (*COMPONENTS, *SQUARENESS):
-        if name in found.marginals:
+        if name in factors.marginals:
             same = [o.get(name) for candidate, o in others if name not in candidate.renames]
             doubted = any(name in candidate.renames for candidate in candidates)
-            verdicts.append(_verdict(found.marginals[name], base[name], same, doubted=doubted))
+            verdicts.append(_verdict(factors.marginals[name], base[name], same, doubted=doubted))
     corrected = scaled(arranged, {v.name: v.applied for v in verdicts})
     stated = contributions_of(
         build(corrected, chain, outside="hold", skip_components=skip), points.axis_mm, points.tool_mm
     )
     return Diagnosis(
         calibration, seen, tuple(verdicts), tuple(chosen), tuple(r.words for r in candidates),
-        _senses(verdicts, chain), found, corrected, chain, skip,
-        _left(seen, search.columns([])), _left(seen, stated),
+        _senses(verdicts, chain), factors, corrected, chain, skip,
+        _residual_rms(seen, search.columns([])), _residual_rms(seen, stated),
     )  # fmt: skip
 
 
 class _Search:
-    """Looks for the arrangement that the points speak for; what one axis adds is computed once a change."""
+    """Searches the arrangement that explains the points; computes each axis once per change."""
 
     def __init__(self, calibration: Calibration, chain: str, seen: Checkpoints, skip: frozenset[str]) -> None:
         self.calibration, self.chain, self.seen, self.skip = calibration, chain, seen, skip
@@ -180,16 +182,16 @@ class _Search:
         return calibration
 
     def columns(self, changes: Sequence[Arrangement]) -> dict[str, Array]:
-        found: dict[str, Array] = {}
+        columns: dict[str, Array] = {}
         for axis, letter in enumerate((*AXES, "")):
             key = (letter, *(change.words for change in changes if change.axis == axis))
             if key not in self._of_axis:
                 self._of_axis[key] = self._contributions(letter, self.applied(changes))
-            found |= self._of_axis[key]
-        return found
+            columns |= self._of_axis[key]
+        return columns
 
     def _contributions(self, letter: str, calibration: Calibration) -> dict[str, Array]:
-        """Of the curves of one axis; "" stands for squareness and the rest."""
+        """Contributions of the curves of one axis; "" means squareness and the rest."""
         whole = letter == ""
         part = dataclasses.replace(
             calibration,
@@ -248,10 +250,12 @@ class _Search:
         return chosen, [a for a, score in zip(rest, scores, strict=True) if score > own - DECIDED]
 
 
-def _verdict(found: Marginal, column: Array, others: Sequence[Marginal | None], *, doubted: bool) -> Verdict:
+def _verdict(
+    marginal: Marginal, column: Array, others: Sequence[Marginal | None], *, doubted: bool
+) -> Verdict:
     """`others` are the same under arrangements that are not excluded: they must agree. `doubted`: it may not
     even be this curve."""
-    decided, sign = found.candidate, found.sign
+    decided, sign = marginal.candidate, marginal.sign
     if doubted:
         decided, sign = None, 0
     if any(o is not None and o.sign != sign for o in others):
@@ -268,32 +272,38 @@ def _verdict(found: Marginal, column: Array, others: Sequence[Marginal | None], 
         if decided is not None:
             applied = decided.factor
             unit = decided.words or "right"
-        elif found.odds[-1] > LIKELY:
+        elif marginal.odds[-1] > LIKELY:
             unit = "no factor explains"
     return Verdict(
-        found.name, words, unit, found.factor, found.sigma, applied, float(np.sqrt(np.mean(column**2)))
+        marginal.name,
+        words,
+        unit,
+        marginal.factor,
+        marginal.sigma,
+        applied,
+        float(np.sqrt(np.mean(column**2))),
     )
 
 
 def _senses(verdicts: Sequence[Verdict], chain: str) -> dict[str, str]:
-    """Of each axis that carries the workpiece: stated as the table moves, or as the tool does against it."""
-    found = {}
+    """The sign convention of each axis that carries the workpiece: of the table or of the tool."""
+    conventions = {}
     for letter in chain[: chain.index("F")]:
         own = [v for v in verdicts if v.name in COMPONENTS and v.name[2] == letter and v.sign != "absent"]
         signs = {v.sign for v in own if v.sign != "undecided"}
         flipped = [v.name for v in own if v.sign == "flipped"]
         turned = any(name[1] in "ABC" for name in flipped) and any(name[1] in AXES for name in flipped)
         if signs == {"flipped"} and len(flipped) > 2 and turned:
-            found[letter] = "of the table itself"
+            conventions[letter] = "of the table itself"
         elif "right" in signs:
-            found[letter] = "of the tool relative to the workpiece"
+            conventions[letter] = "of the tool relative to the workpiece"
         else:
-            found[letter] = "undecided"
-    return found
+            conventions[letter] = "undecided"
+    return conventions
 
 
-def _left(seen: Checkpoints, columns: Mapping[str, Array]) -> float:
-    """rms length in mm of what a calibration leaves at the points, in the frame that fits best."""
+def _residual_rms(seen: Checkpoints, columns: Mapping[str, Array]) -> float:
+    """rms length in mm of the residual of a calibration at the points, in the frame that fits best."""
     rest = seen.deviation_mm - sum(columns.values(), np.zeros(seen.deviation_mm.shape))
     if not seen.frame_known:
         points = seen.points

@@ -1,8 +1,8 @@
-"""By which factor each curve of a calibration has to be taken, told from independent points: all at once.
+"""The factor that each curve of a calibration needs, from independent points: all at once.
 
 y = sum of s_i c_i + frame + scale + noise, with c_i what curve i adds at a point as it is stated. The sign of
-s_i is the sense of the curve, its size the unit. Estimates are least squares; a factor is decided by the odds
-between what may have happened to a curve, and helps to tell the others once it is.
+s_i shows the sign convention of the curve, its size the unit. Estimates are least squares. A factor is
+decided by the odds between the possible mistakes; once decided, it helps to determine the others.
 """
 
 from __future__ import annotations
@@ -20,40 +20,52 @@ from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.errormodel.base import ErrorModel
 
-#: What may have happened to a curve: factor, words, prior probability (either sign alike where signed).
-AS_STATED, FLIPPED = 0.80, 0.10
+#: Prior probability that a curve is as stated.
+AS_STATED = 0.80
+#: Prior probability that its sign is wrong.
+FLIPPED = 0.10
+#: Prior probability that it is absent.
 ABSENT = 0.02
+#: urad per arcsec.
 ARCSEC = math.pi / 0.648
+#: Wrong units of lengths: factor, words, prior probability.
 UNITS = (
     (1000.0, "mm (or rad) stated as um (urad)", 0.005),
     (1e-3, "um (or urad) stated as mm (rad)", 0.005),
     (25.4, "thousandths of an inch stated as um", 0.0025),
     (1.0 / 25.4, "um stated as thousandths of an inch", 0.0005),
 )
+#: Wrong units of angles: the same.
 ANGLE_UNITS = (
     *UNITS[:2],
     (ARCSEC, "arcsec stated as urad", 0.02),
     (1.0 / ARCSEC, "urad stated as arcsec", 0.02),
 )
-#: Any other factor: its prior probability and standard deviation.
-OTHER, OTHER_SIZE = 0.01, 3.0
-#: Curves change from the day of measuring on (share of a factor), and what they add is not known better than
-#: this (mm).
-CHANGE, KNOWN = 0.1, 1e-3
-#: Decided: so many standard deviations from zero, and these odds against everything else.
-DECIDED_Z, DECIDED = 3.0, 0.9995
-#: That nothing of a curve is there is no sense that may be wrong.
+#: Prior probability of any other factor.
+OTHER = 0.01
+#: Standard deviation of any other factor.
+OTHER_SIZE = 3.0
+#: Change of curves since the day of measuring, as a share of a factor.
+CHANGE = 0.1
+#: The effect of a curve is not known better than this, mm.
+KNOWN = 1e-3
+#: A factor is decided only where it is more than so many standard deviations from zero.
+DECIDED_Z = 3.0
+#: A factor is decided at this probability.
+DECIDED = 0.9995
+#: That a curve is absent is decided at this probability, as then no sign can be wrong.
 DECIDED_ABSENT = 0.95
-#: Nor may a factor that is not on the list be as likely as this.
+#: Nothing is decided where a factor that is not listed is more probable than this.
 UNLISTED = 0.05
-#: Curves that do less than this (mm) are this much less likely.
+#: Curves with an effect below the first number (mm) are less likely by the second.
 NEXT_TO_NOTHING = 3e-4, 0.02
-#: How much wider than its odds say a factor is believed to be that is not decided.
+#: The standard deviation of an undecided factor is wider than its odds say by this factor.
 WIDER = 1.5
 #: Scale of the instrument against the machine's, mm/mm: half a kelvin of steel.
 SCALE = 6e-6
+#: Rounds of estimating and deciding, at most.
 _ROUNDS = 8
-#: A curve that does less than this anywhere (mm rms) is no curve to be judged.
+#: A curve with a smaller effect (mm rms) is not judged.
 NOTHING = 1e-9
 
 
@@ -67,21 +79,20 @@ class Candidate:
 
 
 def candidates(name: str, size: float) -> tuple[Candidate, ...]:
-    """What may have happened to a component or squareness that does `size` (mm rms) as stated: nobody
-    measures curves that do next to nothing, so a unit that makes it one is unlikely."""
+    """The possible factors of a component or squareness with an effect of `size` (mm rms) as stated. Curves
+    with next to no effect are rarely measured, so a unit that makes it one is unlikely."""
     angle = name in SQUARENESS or name[1] in "ABC"
-    found = [Candidate(1.0, "", AS_STATED), Candidate(-1.0, "", FLIPPED), Candidate(0.0, "absent", ABSENT)]
+    listed = [Candidate(1.0, "", AS_STATED), Candidate(-1.0, "", FLIPPED), Candidate(0.0, "absent", ABSENT)]
     for factor, words, prior in ANGLE_UNITS if angle else UNITS:
         prior *= NEXT_TO_NOTHING[1] if factor * size < NEXT_TO_NOTHING[0] else 1.0
-        found += [Candidate(factor, words, 0.8 * prior), Candidate(-factor, words, 0.2 * prior)]
-    return tuple(found)
+        listed += [Candidate(factor, words, 0.8 * prior), Candidate(-factor, words, 0.2 * prior)]
+    return tuple(listed)
 
 
 @dataclass(frozen=True, slots=True)
 class Marginal:
-    """What the points say of one factor: its estimate and standard deviation without a prior of its own,
-    `odds` of the `known` candidates and, last, of any other factor, and the probability that it is above
-    zero."""
+    """The result for one factor: its estimate and standard deviation without its own prior, `odds` of the
+    `known` candidates and, last, of any other factor, and the probability that it is above zero."""
 
     name: str
     factor: float
@@ -99,11 +110,11 @@ class Marginal:
         """The candidate that is decided, if one is."""
         listed = np.array(self.odds[:-1])
         best = int(np.argmax(listed))
-        found = self.known[best]
-        needed = DECIDED if found.factor != 0.0 else DECIDED_ABSENT
+        likeliest = self.known[best]
+        needed = DECIDED if likeliest.factor != 0.0 else DECIDED_ABSENT
         if listed[best] < needed * listed.sum() or self.odds[-1] > UNLISTED:
             return None
-        return found if found.factor == 0.0 or abs(self.z) > DECIDED_Z else None
+        return likeliest if likeliest.factor == 0.0 or abs(self.z) > DECIDED_Z else None
 
     @property
     def sign(self) -> int:
@@ -115,9 +126,9 @@ class Marginal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checkpoints:
-    """Points as the doctor takes them: where they are, how far off the machine was there (n, 3), and the
-    standard uncertainty (n, 3) of that, half of a lost motion that nobody took up included, all in mm; the
-    scale's is in mm/mm. `frame_known`: deviations count in the machine's frame."""
+    """Points of the diagnosis: the deviation of the machine there (n, 3) and its standard uncertainty (n, 3),
+    in mm. As directions of approach are unknown, half of the backlash is part of it. `scale` is the standard
+    uncertainty of the scale, mm/mm. With `frame_known` deviations are in the machine's frame."""
 
     points: Points
     deviation_mm: Array
@@ -129,14 +140,14 @@ class Checkpoints:
     def of(
         cls, points: Points, model: ErrorModel, *, frame_known: bool = False, scale: float | None = None
     ) -> Checkpoints:
-        """Raises CannotCompute where the frame is unknown and the points make none."""
+        """Raises CannotCompute where the frame is unknown and the points determine none."""
         deviation = (
             points.measured_mm - points.axis_mm - points.tool_mm if frame_known else deviations(points)
         )
-        lost = model.backlash_at(points.axis_mm)
+        backlash = model.backlash_at(points.axis_mm)
         sigma = np.full(deviation.shape, points.sigma)
-        if lost is not None:
-            sigma = np.hypot(sigma, 0.5 * np.abs(lost))
+        if backlash is not None:
+            sigma = np.hypot(sigma, 0.5 * np.abs(backlash))
         own = max(SCALE, points.sigma_scale) if scale is None else scale
         return cls(points, deviation, sigma, frame_known, own)
 
@@ -148,7 +159,7 @@ class Checkpoints:
 @dataclass(frozen=True, slots=True, eq=False)
 class Factors:
     """The joint estimate: `marginals` by name, `theta` and `covariance` of factors (in the order of `names`),
-    frame and scale with what is decided put in; `inflation` of the stated uncertainty, residuals (n, 3) and
+    frame and scale with all decisions applied; `inflation` of the stated uncertainty, residuals (n, 3) and
     the standard uncertainty (n, 3) that was used, in mm. `evidence` is the logarithm of the probability of
     the points with what is decided, up to a constant."""
 
@@ -164,12 +175,12 @@ class Factors:
 
 def contributions_of(model: ErrorModel, axis_mm: Array, tool_mm: Array) -> dict[str, Array]:
     """(n, 3) in mm by component or squareness, cyclic terms with their curve; and the rest as "rest"."""
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for source, values in model.contributions(axis_mm, tool_mm):
         name = source.removeprefix("cyclic ")
         name = name if name in COMPONENTS or name in SQUARENESS else "rest"
-        found[name] = found[name] + values if name in found else values
-    return {name: v for name, v in found.items() if float(np.sqrt(np.mean(v**2))) > NOTHING}
+        columns[name] = columns[name] + values if name in columns else values
+    return {name: v for name, v in columns.items() if float(np.sqrt(np.mean(v**2))) > NOTHING}
 
 
 def chi_square(seen: Checkpoints, columns: Mapping[str, Array]) -> tuple[float, float]:
@@ -200,11 +211,11 @@ def factors_of(seen: Checkpoints, columns: Mapping[str, Array], inflation: float
         for i, name in enumerate(names):
             if fixed[i]:
                 continue
-            found = _marginal(
+            marginal = _marginal(
                 name, (solved.theta[i], solved.covariance[i, i]), (mean[i], precision[i]), size[i]
             )
-            marginals[name] = found
-            mean[i], spread[i] = _believed(found, loosest[i], KNOWN / size[i])
+            marginals[name] = marginal
+            mean[i], spread[i] = _believed(marginal, loosest[i], KNOWN / size[i])
         if np.allclose(before[0], mean) and np.allclose(before[1], spread):
             break
     centre = np.pad(mean, (0, len(precision) - n))
@@ -223,7 +234,7 @@ def factors_of(seen: Checkpoints, columns: Mapping[str, Array], inflation: float
 def design_of(
     axis_mm: Array, tool_mm: Array, centre_mm: Array, columns: Mapping[str, Array], names: tuple[str, ...]
 ) -> Array:
-    """(n, 3, factors + 6 + 3) what factors, frame and scales add at places, in mm."""
+    """(n, 3, factors + 6 + 3) what factors, frame and scales add at points, in mm."""
     tip = axis_mm + tool_mm
     zero = np.zeros(tip.shape)
     curves = np.stack([columns.get(name, zero) for name in names], axis=2)
@@ -267,33 +278,36 @@ def _loosest(seen: Checkpoints, columns: Mapping[str, Array], names: tuple[str, 
     return np.maximum(OTHER_SIZE, 3.0 * size / own)
 
 
-def _marginal(name: str, found: tuple[float, float], prior: tuple[float, float], size: float) -> Marginal:
-    """The factor as the readings alone see it: its (mean, variance) without its own prior (mean, precision).
-    `size` is what the curve does at the points as stated, mm rms."""
-    own = max(1.0 / found[1] - prior[1], 1e-9 / found[1])
-    factor = (found[0] / found[1] - prior[0] * prior[1]) / own
+def _marginal(name: str, estimate: tuple[float, float], prior: tuple[float, float], size: float) -> Marginal:
+    """The factor from the readings alone: its (mean, variance) without its own prior (mean, precision).
+    `size` is the effect of the curve at the points as stated, mm rms."""
+    own = max(1.0 / estimate[1] - prior[1], 1e-9 / estimate[1])
+    factor = (estimate[0] / estimate[1] - prior[0] * prior[1]) / own
     sigma = 1.0 / math.sqrt(own)
     known, vague = candidates(name, size), KNOWN / size
     wide = [*(math.hypot(sigma, vague, CHANGE * c.factor) for c in known), math.hypot(sigma, OTHER_SIZE)]
-    at = [*(c.factor for c in known), 0.0]
+    centres = [*(c.factor for c in known), 0.0]
     prior_of = [*(c.prior for c in known), OTHER]
     log = [
-        math.log(p / w) - 0.5 * ((factor - h) / w) ** 2 for p, w, h in zip(prior_of, wide, at, strict=True)
+        math.log(p / w) - 0.5 * ((factor - h) / w) ** 2
+        for p, w, h in zip(prior_of, wide, centres, strict=True)
     ]
     odds = np.exp(np.array(log) - max(log))
     odds /= odds.sum()
-    sides = [float(sum(p for p, h in zip(odds, at, strict=True) if side * h > 0.0)) for side in (1.0, -1.0)]
+    sides = [
+        float(sum(p for p, h in zip(odds, centres, strict=True) if side * h > 0.0)) for side in (1.0, -1.0)
+    ]
     # a factor beyond the list has the sign that its estimate says; one of zero has none
     tail = 0.5 * math.erfc(-factor / sigma / math.sqrt(2.0))
     above, below = sides[0] + odds[-1] * tail, sides[1] + odds[-1] * (1.0 - tail)
     return Marginal(name, factor, sigma, known, tuple(odds.tolist()), float(above / (above + below)))
 
 
-def _believed(found: Marginal, loosest: float, vague: float) -> tuple[float, float]:
+def _believed(marginal: Marginal, loosest: float, vague: float) -> tuple[float, float]:
     """Mean and standard deviation of a factor for the next round."""
-    decided = found.candidate
+    decided = marginal.candidate
     if decided is not None:
         return decided.factor, math.hypot(CHANGE * decided.factor, vague)
-    square = sum(p * c.factor**2 for p, c in zip(found.odds, found.known, strict=False))
-    square += found.odds[-1] * OTHER_SIZE**2
+    square = sum(p * c.factor**2 for p, c in zip(marginal.odds, marginal.known, strict=False))
+    square += marginal.odds[-1] * OTHER_SIZE**2
     return 0.0, min(loosest, WIDER * math.sqrt(max(1.0, square)))

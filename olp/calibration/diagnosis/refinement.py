@@ -1,5 +1,5 @@
-"""A calibration after a measured run: its numbers moved within their covariance, and the covariance that is
-left. The numbers are x + T xi with xi ~ N(0, I); the run reads the error at points, in a frame of its own."""
+"""A calibration refined by a measured run: its numbers change within their covariance, and that shrinks. The
+numbers are x + T xi with xi ~ N(0, I); the run reads the error at points, in an unknown instrument frame."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ Change = Mapping[tuple[str, str, float], tuple[Entry, Array]]
 @dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
     """`calibration` and `uncertainty` after the run. rms lengths at the points in the frame that fits best,
-    in mm: `before_mm` of what the old calibration left, `after_mm` of what the new one leaves, `noise_mm` of
-    the stated noise, `expected_mm` of what noise and the old covariance led to expect.
+    in mm: `before_mm` of the residual with the old calibration, `after_mm` with the new one, `noise_mm` of
+    the stated noise, `expected_mm` as expected from noise and the old covariance.
 
     `chi_square` over `freedom` says how the run fits the old covariance; where it is above 1 the new
     covariance is larger by it. `changes` is the largest change of each number by kind and name, in mm or rad,
@@ -64,20 +64,20 @@ def refine(
 ) -> Refinement:
     """Update a calibration by points of a run (commanded axis positions and where the reflector was).
 
-    `play` (n, 3) in [-1, 1] are the directions of approach; without it half of a lost motion counts as noise.
-    `skip` are errors that the control corrected. `along` (n, 3) are unit directions in which a point says
-    nothing, such as those of a path. Raises CannotCompute where the points make no frame.
+    `play` (n, 3) in [-1, 1] are the directions of approach; without it half of the backlash counts as noise.
+    `skip` are errors that the control corrected. `along` (n, 3) are unit directions without information, such
+    as those of a path. Raises CannotCompute where the points determine no frame.
     """
     model = build(calibration, chain, outside="hold", skip_components=skip)
     meant = points.axis_mm + points.tool_mm + model.error(points.axis_mm, points.tool_mm, play)
-    seen = points.measured_mm if frame_known else fit_frame(points.measured_mm, meant)(points.measured_mm)
+    measured = points.measured_mm if frame_known else fit_frame(points.measured_mm, meant)(points.measured_mm)
     sigma = np.full(meant.shape, points.sigma)
-    lost = model.backlash_at(points.axis_mm) if play is None else None
-    if lost is not None:
-        sigma = np.hypot(sigma, 0.5 * np.abs(lost))
+    backlash = model.backlash_at(points.axis_mm) if play is None else None
+    if backlash is not None:
+        sigma = np.hypot(sigma, 0.5 * np.abs(backlash))
     parts = Sensitivity.of(calibration, chain, uncertainty, skip=skip)
     rows = np.moveaxis(parts.rows(points.axis_mm, points.tool_mm, play), 0, 1).astype(float)
-    misses = seen - meant
+    misses = measured - meant
     blind = np.zeros((len(misses), 3)) if along is None else along
     use = np.ones(len(misses), bool)
     outliers: list[tuple[int, float]] = []
@@ -102,7 +102,7 @@ def refine(
     expected = float((_across(rows, blind)[use] ** 2).sum() + (sigma[use] ** 2).sum())
     return Refinement(
         new,
-        _left(uncertainty, parts, covariance, new),
+        _refined_uncertainty(uncertainty, parts, covariance, new),
         _rms(residuals_of(block, np.zeros(parts.columns))[1]),
         _rms(residual),
         float(np.sqrt((sigma[use] ** 2).sum(axis=1).mean())),
@@ -146,14 +146,14 @@ def _table(parts: Sensitivity, entry: Entry, q: Array) -> Array:
     numbers = sum(len(e.rest) for e in parts.entries)
     own = value_rows(entry, q)
     rank = entry.factor.shape[1]
-    out = np.zeros((len(own), parts.columns))
-    out[:, :rank] = own[:, :rank]
+    table = np.zeros((len(own), parts.columns))
+    table[:, :rank] = own[:, :rank]
     if entry in parts.entries:
         spare = parts.spare[parts.entries.index(entry)]
         if spare >= 0:
             first = rank + spare - numbers
-            out[:, first : first + own.shape[1] - rank] = own[:, rank:]
-    return out
+            table[:, first : first + own.shape[1] - rank] = own[:, rank:]
+    return table
 
 
 def _numbers(parts: Sensitivity, entry: Entry) -> Array:
@@ -170,25 +170,25 @@ def _changes(uncertainty: Uncertainty, parts: Sensitivity, xi: Array) -> Change:
 
 
 def _sizes(change: Change) -> dict[tuple[str, str], tuple[float, float]]:
-    found = {}
+    sizes = {}
     for (kind, name, _), (entry, moved) in change.items():
         sigma = float(np.sqrt(np.mean(entry.sigma**2)))
         largest = float(np.abs(moved).max())
-        found[kind, name] = (largest, float(np.sqrt(np.mean(moved**2))) / sigma if sigma > 0.0 else 0.0)
-    return found
+        sizes[kind, name] = (largest, float(np.sqrt(np.mean(moved**2))) / sigma if sigma > 0.0 else 0.0)
+    return sizes
 
 
-def _left(
+def _refined_uncertainty(
     uncertainty: Uncertainty, parts: Sensitivity, covariance: Array, calibration: Calibration
 ) -> Uncertainty:
     """The uncertainty of the new numbers."""
     tables = [_numbers(parts, entry) for entry in uncertainty.entries]
     factor, dropped = principal(tables, covariance)
-    entries, at = [], 0
+    entries, first = [], 0
     for entry, table in zip(uncertainty.entries, tables, strict=True):
-        own = factor[at : at + len(table)]
-        at += len(table)
-        # what the control corrects was not seen, and stays as unknown as it was
+        own = factor[first : first + len(table)]
+        first += len(table)
+        # what the control corrects is not observable here, so its uncertainty does not change
         rest = np.zeros(len(table)) if entry in parts.entries else entry.rest
         entries.append(dataclasses.replace(entry, factor=own, rest=rest))
     words = f"{uncertainty.source}; refined by a measured run"
@@ -209,7 +209,7 @@ def _applied(calibration: Calibration, change: Change) -> Calibration:
     curves = [_curve(curve, change) for curve in calibration.curves]
     known = {name for curve in curves for name in curve.names}
     for (kind, name, _), (entry, moved) in change.items():
-        # an angle that was zero for want of a reading has no column yet; where it stands does not matter
+        # an angle that was not observable has no column yet; any curve of its axis may take it
         own = [k for k, curve in enumerate(curves) if curve.axis == name[-1]]
         if kind == "mean" and name not in known and name[1] in "ABC" and own and np.any(moved):
             curves[own[0]] = _with_column(curves[own[0]], name, entry, moved)
@@ -223,20 +223,20 @@ def _applied(calibration: Calibration, change: Change) -> Calibration:
             k = AXES.index(name)
             backlash[k] = round(backlash[k] + float(moved[0]), DIGITS[0])
         elif kind == "half" and name == f"E{name[2]}{name[2]}" and backlash[AXES.index(name[2])] != 0.0:
-            # lost motion of b adds -b / 2 in the direction of motion
+            # a backlash of b adds -b / 2 in the direction of motion
             k = AXES.index(name[2])
             backlash[k] = round(backlash[k] - 2.0 * float(np.mean(moved)), DIGITS[0])
         elif kind == "wave":
             cyclic = [_wave(c, moved) if (c.component, c.period_mm) == (name, period) else c for c in cyclic]
-    lost: Vector = (backlash[0], backlash[1], backlash[2])
+    backlash_mm: Vector = (backlash[0], backlash[1], backlash[2])
     return dataclasses.replace(
-        calibration, curves=tuple(curves), squareness=square, backlash_mm=lost, cyclic=tuple(cyclic)
+        calibration, curves=tuple(curves), squareness=square, backlash_mm=backlash_mm, cyclic=tuple(cyclic)
     )
 
 
-def _at(found: tuple[Entry, Array] | None, q: Array) -> Array:
+def _change_at(numbers: tuple[Entry, Array] | None, q: Array) -> Array:
     """(n,) change of a curve at q, straight between the numbers of its entry."""
-    return np.zeros(len(q)) if found is None else np.interp(q, found[0].position_mm, found[1])
+    return np.zeros(len(q)) if numbers is None else np.interp(q, numbers[0].position_mm, numbers[1])
 
 
 def _curve(curve: Curve, change: Change) -> Curve:
@@ -247,8 +247,8 @@ def _curve(curve: Curve, change: Change) -> Curve:
             name: _rounded(
                 name,
                 values
-                + _at(change.get(("mean", name, 0.0)), q)
-                + side * _at(change.get(("half", name, 0.0)), q),
+                + _change_at(change.get(("mean", name, 0.0)), q)
+                + side * _change_at(change.get(("half", name, 0.0)), q),
             )
             for name, values in columns.items()
         }
@@ -262,7 +262,7 @@ def _curve(curve: Curve, change: Change) -> Curve:
 
 
 def _with_column(curve: Curve, name: str, entry: Entry, moved: Array) -> Curve:
-    column = {name: _rounded(name, _at((entry, moved), curve.position_mm))}
+    column = {name: _rounded(name, _change_at((entry, moved), curve.position_mm))}
     if curve.columns:
         return dataclasses.replace(curve, columns={**curve.columns, **column})
     return dataclasses.replace(

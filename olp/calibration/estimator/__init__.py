@@ -1,1 +1,1 @@
-"""One linear Gaussian adjustment of all readings of a machine, and what it found."""
+"""One linear Gaussian adjustment of all readings of a machine, and its results."""

@@ -2,7 +2,7 @@
 
 theta holds the 18 curves, their half differences of directions, cyclic terms and squareness; every reading
 is a linear functional of it and of nuisances (zeros, slopes, squares, drift, scale). The result carries the
-covariance of all of it, so that what was not measured is known as unknown.
+covariance of all of it, so that it also shows what is not observable from these data.
 """
 
 from __future__ import annotations
@@ -25,10 +25,13 @@ from olp.core.machine import Vector
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
 
-#: Cells where no lines but points or lengths tell of an axis, to begin with; they double as long as
-#: chi-square is off by more than MISFIT standard deviations and becomes BETTER by it.
-POINT_CELLS, MISFIT, BETTER = 12, 5.0, 0.8
-#: The adjustment is made anew after cyclic terms or points were left out, so often at most.
+#: Cells of the curves of an axis that has points or lengths but no lines. They double while the fit is bad.
+POINT_CELLS = 12
+#: A fit is bad where chi-square is more than so many standard deviations above its expectation.
+MISFIT = 5.0
+#: More cells are kept where they lower reduced chi-square to less than this share.
+BETTER = 0.8
+#: The adjustment is repeated at most so often, after cyclic terms or points were left out.
 PASSES = 8
 #: A cyclic term below so many standard deviations is noise.
 CYCLIC_SEEN = 4.0
@@ -66,9 +69,9 @@ def fit(
 ) -> Fit:
     """Estimate the errors of a machine from all its readings.
 
-    `travel_mm` bounds the box; the datum is the place in the box nearest to zero if left out. Where points or
-    lengths alone tell of an axis and do not fit, its curves are given more freedom. Raises ConfigError where
-    a line cannot be used, CannotCompute where nothing tells of an axis.
+    `travel_mm` bounds the box; the datum is the position in the box nearest to zero if left out. Where an
+    axis has points or lengths only, and they do not fit, its curves get more cells. Raises ConfigError where
+    a line cannot be used, CannotCompute where no reading depends on an axis.
     """
     tell = progress or silent
 
@@ -77,15 +80,15 @@ def fit(
         return _finish(start, _iterate(start, tell))
 
     cells = POINT_CELLS
-    found = attempt(cells)
+    best = attempt(cells)
     alone = {line.component[2] for line in measurements.lines} != set(AXES)
-    while alone and found.misfit > MISFIT and cells < MOST:
+    while alone and best.misfit > MISFIT and cells < MOST:
         cells *= 2
         finer = attempt(cells)
-        if finer.chi_square / finer.freedom > BETTER * found.chi_square / found.freedom:
+        if finer.chi_square / finer.freedom > BETTER * best.chi_square / best.freedom:
             break
-        found = finer
-    return found
+        best = finer
+    return best
 
 
 def _start(
@@ -96,7 +99,7 @@ def _start(
     tell: Progress,
     cells: int,
 ) -> _Start:
-    """Screens the readings, lays out what is to be estimated, and gives every observation its start."""
+    """Screens the readings, lays out the unknowns, and gives every observation its start."""
     tell("noise", 0.0)
     screened = [taken.screened() for taken in measurements.observations]
     kept = [one.observation for one in screened]
@@ -111,7 +114,7 @@ def _start(
 
 
 def _iterate(start: _Start, tell: Progress) -> _Settled:
-    """Solves, moves what is not linear, leaves out what is noise or no reading, until nothing changes."""
+    """Solves, updates what is not linear, and leaves out noise terms and outliers, until nothing changes."""
     states, outliers, waves = start.states, [*start.outliers], start.model.waves
     theta = np.zeros(0)
     learnt: dict[str, tuple[float, float]] | None = None
@@ -138,14 +141,14 @@ def _iterate(start: _Start, tell: Progress) -> _Settled:
 
 
 def _finish(start: _Start, end: _Settled) -> Fit:
-    """What every observation left, and how well all is known."""
+    """The results of every observation, and the covariance of all unknowns."""
     model, theta, normal = start.model, end.solved.theta, end.normal
     results = [Result.of(state, block, theta) for state, block in zip(end.states, end.blocks, strict=True)]
     chi_square = sum((result.chi_square for result in results), 0.0)
     # readings less what the fit used up of their freedom
     used = float(np.trace(end.solved.covariance @ normal.H))
     freedom = max(normal.count - used - normal.free, 1.0)
-    # readings that fit worse than their noise say that the model is not all there is
+    # readings that fit worse than their noise show that the model is incomplete
     covariance = end.solved.covariance * max(1.0, chi_square / freedom)
     parameters = end.prior.parameters
     return Fit(
@@ -174,8 +177,8 @@ def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave,
     for name, waves in parameters.waves.items():
         start = parameters.slices[f"wave {name}"].start
         for k, wave in enumerate(waves):
-            at = slice(start + 2 * k, start + 2 * k + 2)
-            sigma = float(np.sqrt(np.trace(solved.covariance[at, at]) / 2.0))
-            if float(np.hypot(*solved.theta[at])) > CYCLIC_SEEN * sigma:
+            pair = slice(start + 2 * k, start + 2 * k + 2)
+            sigma = float(np.sqrt(np.trace(solved.covariance[pair, pair]) / 2.0))
+            if float(np.hypot(*solved.theta[pair])) > CYCLIC_SEEN * sigma:
                 seen[name] = (*seen.get(name, ()), wave)
     return seen

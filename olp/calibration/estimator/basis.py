@@ -78,11 +78,11 @@ class Spline:
             ],
             axis=1,
         ) / 6.0  # fmt: skip
-        out = np.zeros((len(q), self.count))
+        table = np.zeros((len(q), self.count))
         rows = np.arange(len(q))
         for k in range(4):
-            out[rows, cell + k] = four[:, k]
-        return out
+            table[rows, cell + k] = four[:, k]
+        return table
 
     def roughness(self) -> Array:
         """(count, count) sum of squares of second differences of the coefficients."""
@@ -94,8 +94,8 @@ class Spline:
 class CurveSpace:
     """All functions that one curve may be: `spline` and `features`, restricted by the gauge.
 
-    `gauge` (spline + features, size) spans what is left: without "free" the value at the datum is zero, with
-    "straight" the least-squares slope over the spline's range is zero too, because it is squareness.
+    `gauge` (spline + features, size) spans the functions allowed: except for "free" the value at the datum is
+    zero. For "straight" the least-squares slope over the spline's range is zero too, as it is squareness.
     """
 
     spline: Spline
@@ -138,6 +138,7 @@ class CurveSpace:
         return np.asarray(self.gauge.T @ full @ self.gauge)
 
 
+#: Positions over which a least-squares slope is taken.
 _SLOPE_POINTS = 401
 
 

@@ -18,23 +18,22 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.entry import Entry
 from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
-#: Positions of a curve in each cell of its spline: between them its factor is straight.
+#: Positions of a curve in each cell of its spline: between them its factor is linear.
 _PER_CELL = 3
-#: Places in a step, whose uncertainty is a half circle over it, as shares of it.
+#: Positions in a step, as shares of its length. Its uncertainty over this length is a half circle.
 _IN_STEP = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9))
 #: The factor drops no more than this share of the variance of a number.
 DROPPED = 1e-3
-#: Numbers that are known far better than the rest of their curve (at the datum) count as if known only so
-#: well, as a share of the largest sigma of the curve.
+#: No number of a curve counts as known better than this share of its largest sigma. At the datum it may be.
 _FLOOR = 0.2
 
 
 def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
-    """All 18 mean curves, also those that no reading saw and that are zero in the calibration, half
-    differences, cyclic terms and squareness, each a linear functional of what was adjusted.
+    """All 18 mean curves, half differences, cyclic terms and squareness, each a linear functional of the
+    unknowns. Curves that are not observable, and zero in the calibration, are included.
 
-    The factor holds the leading principal components, `rest` that nobody knows where between two targets a
-    step is.
+    The factor holds the leading principal components; `rest` is the uncertainty of where between two targets
+    a step is.
     """
     parts: list[tuple[str, str, Array, float]] = []
     rows: list[Array] = []
@@ -59,10 +58,10 @@ def covariance_of(fit: Fit, calibration: Calibration) -> Uncertainty:
         rows.append(fit.squareness(name)[None, :])
     factor, dropped = principal(rows, fit.covariance)
     entries = []
-    at = 0
+    first = 0
     for (kind, name, q, period), table in zip(parts, rows, strict=True):
-        own = slice(at, at + len(table))
-        at = own.stop
+        own = slice(first, first + len(table))
+        first = own.stop
         variance = fit.between_targets(name, q) if kind == "mean" else np.zeros(len(table))
         entries.append(Entry(kind, name, factor[own], np.sqrt(variance), q, period))
     kinds = Counter(result.state.noun for result in fit.results if result.state.noun)
@@ -85,7 +84,7 @@ def _positions(fit: Fit, name: str) -> Array:
             [feature.at_mm] if isinstance(feature, Kink) else _IN_STEP * (feature.high_mm - feature.low_mm)
         )
         start = 0.0 if isinstance(feature, Kink) else feature.low_mm
-        breaks.update(float(start + at) for at in inside if low < start + at < high)
+        breaks.update(float(start + offset) for offset in inside if low < start + offset < high)
     spline = space.spline
     step = (spline.high_mm - spline.low_mm) / (spline.cells * _PER_CELL)
     parts = [
@@ -110,20 +109,20 @@ def principal(rows: list[Array], covariance: Array) -> tuple[Array, float]:
     _, turned = np.linalg.eigh(scaled.T @ scaled)
     turned = turned[:, ::-1]
     share = (scaled @ turned) ** 2
-    # what is left of each number once the first k components are taken
-    left = np.maximum(share.sum(axis=1)[:, None] - np.cumsum(share, axis=1), 0.0)
-    worst = left.max(axis=0, initial=0.0)
+    # the share of each number's variance that the first k components drop
+    dropped = np.maximum(share.sum(axis=1)[:, None] - np.cumsum(share, axis=1), 0.0)
+    worst = dropped.max(axis=0, initial=0.0)
     count = int(np.argmax(worst <= DROPPED)) + 1 if (worst <= DROPPED).any() else len(worst)
     return table @ turned[:, :count], float(worst[count - 1])
 
 
 def sigmas_at(calibration: Calibration, uncertainty: Uncertainty) -> dict[str, Array]:
     """Standard uncertainties of components at the positions of their curves, mm or rad."""
-    found = {}
+    sigmas = {}
     for curve in calibration.curves:
         for name in curve.names:
             entry = uncertainty.find("mean", name)
             if entry is not None:
                 sigma = np.interp(curve.position_mm, entry.position_mm, entry.sigma)
-                found[name] = np.round(sigma, DIGITS[name[1] in "ABC"])
-    return found
+                sigmas[name] = np.round(sigma, DIGITS[name[1] in "ABC"])
+    return sigmas

@@ -1,4 +1,5 @@
-"""From an adjustment to the calibration that corrects programs: curves on a grid that loses nothing."""
+"""From an adjustment to the calibration that corrects programs: curves on a grid fine enough for
+interpolation."""
 
 from __future__ import annotations
 
@@ -18,18 +19,20 @@ from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
 
-#: Interpolation of the grid stays this close to the fitted curve: 0.02 um, 0.02 urad.
-GRID_MM, GRID_RAD = 2e-5, 2e-8
-#: Cells over an axis: the fewest that reach that, between these.
+#: Interpolation of the grid is this close to a fitted curve of displacements: 0.02 um.
+GRID_MM = 2e-5
+#: The same of angles: 0.02 urad.
+GRID_RAD = 2e-8
+#: Cells over an axis: the fewest of these that reach it.
 CELLS = (40, 80, 160, 320, 640, 1280, 2560)
-#: What is written ends here: 0.1 nm, 0.1 nrad.
+#: Decimals of what is written, mm and rad: 0.1 nm, 0.1 nrad.
 DIGITS = 7, 10
 
 
 def calibration_of(fit: Fit, valid_until: datetime.date | None = None) -> Calibration:
     """The calibration: each displacement curve on the line where it was measured, in the gauge of the datum.
 
-    The mean slopes of straightness on lines through the datum stand in the squareness, and nowhere else.
+    The mean slopes of straightness on lines through the datum are in the squareness, and nowhere else.
     """
     m = fit.measurements
     curves: list[Curve] = []
@@ -58,11 +61,11 @@ def calibration_of(fit: Fit, valid_until: datetime.date | None = None) -> Calibr
 
 def sigmas_of(fit: Fit, calibration: Calibration) -> dict[str, Array]:
     """Standard uncertainty of every component at the positions of its curve, mm or rad."""
-    out: dict[str, Array] = {}
+    sigmas: dict[str, Array] = {}
     for curve in calibration.curves:
         for name in curve.names:
-            out[name] = np.round(sigma_of(fit, name, curve.position_mm), DIGITS[name[1] in "ABC"])
-    return out
+            sigmas[name] = np.round(sigma_of(fit, name, curve.position_mm), DIGITS[name[1] in "ABC"])
+    return sigmas
 
 
 def sigma_of(fit: Fit, name: str, q: Array) -> Array:
@@ -81,7 +84,7 @@ def half_of(fit: Fit, name: str, q: Array) -> Array:
 
 
 def _directed(fit: Fit, letter: str) -> bool:
-    """Whether an axis needs curves by direction: any but a constant lost motion along itself."""
+    """Whether an axis needs curves by direction: any reversal but a constant backlash along itself."""
     own = f"E{letter}{letter}"
     return any(
         name != own or fit.prior.shapes[name].half == "curve"
@@ -95,7 +98,7 @@ def _backlash(fit: Fit, letter: str) -> float:
 
 
 def _groups(fit: Fit, letter: str, directed: bool) -> Mapping[tuple[Place, bool], list[str]]:
-    """Components that share a file: measured at the same place, and with or without directions."""
+    """Components that share a file: measured on the same line, and with or without directions."""
     groups: dict[tuple[Place, bool], list[str]] = {}
     own = fit.parameters.places[f"E{letter}{letter}"]
     for kind in "XYZABC":
@@ -165,13 +168,13 @@ def _grid(values: Callable[[Array], Array], breaks: list[float], *, linear: bool
 
 
 def _cyclic(fit: Fit) -> list[Cyclic]:
-    found = []
+    terms = []
     for name, waves in fit.parameters.waves.items():
         pairs = fit.theta[fit.parameters.slices[f"wave {name}"]].reshape(-1, 2)
         for wave, (sine, cosine) in zip(waves, pairs, strict=True):
             size = round(math.hypot(sine, cosine), DIGITS[name[1] in "ABC"])
-            found.append(Cyclic(name, wave.period_mm, size, round(math.atan2(cosine, sine), 6)))
-    return found
+            terms.append(Cyclic(name, wave.period_mm, size, round(math.atan2(cosine, sine), 6)))
+    return terms
 
 
 def joints_of(fit: Fit, name: str) -> list[tuple[Step, float]]:

@@ -1,9 +1,9 @@
 """A smooth field over a box as a Gaussian process: Matern 5/2 with a length of its own along each axis.
 
-The process stands in reduced rank: products of sines that vanish outside the box, whose coefficients are
+The process has reduced rank: products of sines that vanish outside the box, whose coefficients are
 independent with the variance that the spectral density of the kernel gives (A. Solin and S. Sarkka, Hilbert
 space methods for reduced-rank Gaussian process regression, 2020). So it is linear in few unknowns, as curves
-are, and its covariance between any two places is at hand.
+are, and its covariance between any two positions follows directly.
 """
 
 from __future__ import annotations
@@ -16,13 +16,19 @@ import numpy as np
 
 from olp.core.arrays import Array
 
-#: How far out the sines vanish, in half lengths of the box: near that the process would be held to zero.
+#: Where the sines vanish, in half lengths of the box: well outside, as they hold the process to zero there.
 REACH = 2.0
-#: Sines along an axis: so many for a cube root of points, between these.
-A_ROOT, FEWEST, MOST = 1.1, 5, 8
-#: Lengths of the kernel in shares of the box. The shortest sine has to resolve the shortest.
-SHORTEST, LONGEST = 0.25, 1.0
-# 8 pi^(3/2) Gamma(4) / Gamma(5/2) * 5^(5/2), of the spectral density in three dimensions
+#: Sines along an axis, per cube root of the number of points.
+A_ROOT = 1.1
+#: Sines along an axis, at least.
+FEWEST = 5
+#: Sines along an axis, at most.
+MOST = 8
+#: Shortest length of the kernel, as a share of the box: the shortest sine resolves it.
+SHORTEST = 0.25
+#: Longest length of the kernel, as a share of the box.
+LONGEST = 1.0
+#: 8 pi^(3/2) Gamma(4) / Gamma(5/2) * 5^(5/2), of the spectral density in three dimensions
 _DENSITY = 8.0 * math.pi**1.5 * 6.0 / (0.75 * math.sqrt(math.pi)) * 5.0**2.5
 
 
@@ -36,7 +42,7 @@ class Modes:
 
     @classmethod
     def over(cls, box_mm: Array, points: int) -> Modes:
-        """As many as so many points can tell of, the slow ones first."""
+        """As many as this number of points supports, the slow ones first."""
         box = np.asarray(box_mm, float)
         most = int(np.clip(round(A_ROOT * points ** (1.0 / 3.0)), FEWEST, MOST))
         cube = np.array(list(product(range(1, most + 1), repeat=3)), float)
@@ -49,12 +55,12 @@ class Modes:
 
     def values(self, position: Array) -> Array:
         """(n, m) the sines at positions (n, 3)."""
-        out = np.ones((len(position), self.size))
+        values = np.ones((len(position), self.size))
         for k in range(3):
             share = (position[:, k] - self.centre_mm[k] + self.reach_mm[k]) / (2.0 * self.reach_mm[k])
             sines = np.sin(np.pi * np.outer(share, np.arange(1, int(self.orders.max()) + 1)))
-            out *= sines[:, self.orders[:, k].astype(int) - 1]
-        return np.asarray(out / math.sqrt(float(np.prod(self.reach_mm))))
+            values *= sines[:, self.orders[:, k].astype(int) - 1]
+        return np.asarray(values / math.sqrt(float(np.prod(self.reach_mm))))
 
     def log_variance(self, log_size: float, log_lengths: Array) -> tuple[Array, Array]:
         """(m,) log variance of each coefficient for a standard deviation and lengths in mm (as logarithms),

@@ -1,4 +1,4 @@
-"""What a person should know about an adjustment: what was not seen, readings left out, misfits."""
+"""The findings about an adjustment: what is not observable, readings left out, misfits."""
 
 from __future__ import annotations
 
@@ -25,19 +25,22 @@ from olp.core.machine import COMPONENTS, SQUARENESS, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 
-#: Correlations from here on are told, the strongest of them.
-STRONG, MOST_PAIRS = 0.9, 8
-#: A square is as stated up to so many standard deviations.
+#: Correlations above this are reported.
+STRONG = 0.9
+#: At most so many correlations are reported, the strongest.
+MOST_PAIRS = 8
+#: The error of a square agrees with the stated one up to so many standard deviations.
 SQUARE_OFF = 4.0
 #: Offsets of the reflector that differ by less than this are one.
 ONE_OFFSET_MM = 1.0
+#: Readings that one finding lists, at most.
 _LISTED = 10
 
 
 def findings_of(
     fit: Fit, tools: Sequence[Vector], travel_mm: Sequence[tuple[float, float]] | None
 ) -> tuple[Finding, ...]:
-    """What a person should know about an adjustment."""
+    """All findings about an adjustment."""
     return (
         *_unobservable_findings(fit, tools),
         *_scale_findings(fit),
@@ -57,34 +60,36 @@ def findings_of(
 def _unobservable_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
     for name, sigma in unobservable(fit).items():
         unit, scale = unit_of(name)
-        arm = f", and {sigma * 1e5:.2g} um more for 100 mm of tool" if name[1] in "ABC" else ""
+        arm = f", plus {sigma * 1e5:.2g} um per 100 mm of tool" if name[1] in "ABC" else ""
         like = {"angle": "angles", "straightness": "straightness", "positioning": "positioning"}[
             class_of(name)
         ]
         yield Finding(
             "OLP801",
-            f"{name} stands as zero: as large as other {like} of this machine ({sigma * scale:.2g} {unit}) "
-            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever in the box{arm}"
+            f"{name} is taken as zero: as large as other {like} of this machine ({sigma * scale:.2g} {unit}) "
+            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever arm in the box{arm}"
             + _why(fit, name),
         )
     for name in squareness_unobservable(fit):
         yield Finding(
             "OLP806",
-            f"{name} stands as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
+            f"{name} is taken as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
         )
 
 
 def _scale_findings(fit: Fit) -> Iterator[Finding]:
     scale = scale_unobservable(fit)
     if scale is not None:
-        yield Finding("OLP809", f"the scale of all axes together is known to {scale * 1e6:.2g} um/m only")
+        yield Finding(
+            "OLP809", f"the common scale of all axes has a standard uncertainty of {scale * 1e6:.2g} um/m"
+        )
         return
     changes, known = scales_open(fit)
     if len(changes) == 1:
-        yield Finding("OLP809", f"scales that change by {_of_scales(changes[0])} change no reading")
+        yield Finding("OLP809", f"a change of the scales by {_of_scales(changes[0])} changes no reading")
     elif len(changes) == 2:
         words = _of_scales(known[0])
-        yield Finding("OLP809", f"of the scales of X, Y and Z one combination is known alone: {words}")
+        yield Finding("OLP809", f"of the scales of X, Y and Z only one combination is observable: {words}")
 
 
 def _of_scales(row: Array) -> str:
@@ -92,11 +97,11 @@ def _of_scales(row: Array) -> str:
 
 
 def _why(fit: Fit, name: str) -> str:
-    """What points with too few offsets of the reflector have to do with an angle that they do not see."""
-    seen = [result.state.observation.tool_mm for result in fit.scattered]
-    if not seen or name[1] in AXES:
+    """Why points with too few offsets of the reflector do not determine an angle."""
+    offsets = [result.state.observation.tool_mm for result in fit.scattered]
+    if not offsets or name[1] in AXES:
         return ""
-    tools = np.concatenate(seen)
+    tools = np.concatenate(offsets)
     size = np.linalg.svd(tools - tools.mean(axis=0), compute_uv=False)
     if size[0] < ONE_OFFSET_MM * math.sqrt(len(tools)):
         return "; the points have one offset of the reflector"
@@ -138,7 +143,7 @@ def _step_findings(fit: Fit) -> Iterator[Finding]:
 
 
 def _correlation_findings(fit: Fit) -> Iterator[Finding]:
-    """Of squareness, and of what each curve does from one end of the box to the other."""
+    """Correlations of squareness, and of the change of each curve from one end of the box to the other."""
     functionals = {name: fit.squareness(name) for name in SQUARENESS}
     hidden = {**unobservable(fit), **squareness_unobservable(fit)}
     for name in COMPONENTS:
@@ -171,7 +176,7 @@ def _box_findings(fit: Fit, travel_mm: Sequence[tuple[float, float]] | None) -> 
 
 
 def _misfit_findings(fit: Fit) -> Iterator[Finding]:
-    # one square among thousands of readings is nothing to chi-square as a whole
+    # one wrong square among thousands of readings hardly changes chi-square
     for square in fit.measurements.squares:
         part = fit.parameters.slices.get(f"error of square {square.name}")
         if part is None:
@@ -181,8 +186,8 @@ def _misfit_findings(fit: Fit) -> Iterator[Finding]:
         if off > SQUARE_OFF * math.sqrt(max(square.sigma_rad**2 - variance, 0.01 * square.sigma_rad**2)):
             yield Finding(
                 "OLP808",
-                f"the error of square {square.name} comes out as {value / RAD_PER_URAD:.1f} urad, "
-                f"{square.error_rad / RAD_PER_URAD:.1f} +- {square.sigma_rad / RAD_PER_URAD:.2g} is stated",
+                f"the error of square {square.name} is estimated as {value / RAD_PER_URAD:.1f} urad, stated "
+                f"as {square.error_rad / RAD_PER_URAD:.1f} +- {square.sigma_rad / RAD_PER_URAD:.2g} urad",
             )
     if fit.misfit > MISFIT:
         named = [result for result in fit.results if result.state.noun]
@@ -190,5 +195,5 @@ def _misfit_findings(fit: Fit) -> Iterator[Finding]:
         value, source = max(parts)
         yield Finding(
             "OLP808",
-            f"chi-square is {fit.chi_square / fit.freedom:.2f} a degree of freedom, {value:.2f} in {source}",
+            f"reduced chi-square is {fit.chi_square / fit.freedom:.2f}, {value:.2f} per reading of {source}",
         )

@@ -1,4 +1,4 @@
-"""What an adjustment gives: the errors of a machine with their covariance, and what each observation left."""
+"""The result of an adjustment: the errors of a machine with their covariance, and all residuals."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Fit:
     observations.
 
     `slopes` are the mean slopes of the straightness curves on lines through the datum, as functionals of
-    theta: the gauge takes them as squareness. `box_mm` (3, 2) is what the lines covered. `cyclic_unseen` says
-    by component why a period was not fitted.
+    theta: the gauge takes them as squareness. `box_mm` (3, 2) is what the lines covered.
+    `cyclic_unobservable` says by component why a period was not fitted.
     """
 
     measurements: Measurements
@@ -59,18 +59,18 @@ class Fit:
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         """(n, 3, size) dependence of the error on theta, in the frame of the machine where some points were
-        seen in it, else in the gauge of the datum: on lines through it X has no mean slope, nor has Y towards
-        Z."""
+        measured in it, else in the gauge of the datum: on lines through it X has no mean slope, nor has Y
+        towards Z."""
         position = np.atleast_2d(np.asarray(axis_mm, float))
-        out = self.parameters.design(position, np.asarray(tool_mm, float), play)
+        table = self.parameters.design(position, np.asarray(tool_mm, float), play)
         if self.parameters.framed:
-            return out
+            return table
         turn = self.turn
         arm = position - np.array(self.parameters.datum_mm)
         for row in range(3):
             k, m = (row + 1) % 3, (row + 2) % 3
-            out[:, row] += arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
-        return out
+            table[:, row] += arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
+        return table
 
     @property
     def turn(self) -> Array:
@@ -100,8 +100,8 @@ class Fit:
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def between_targets(self, name: str, q: Array) -> Array:
-        """(n,) variance of a component at q (n,) because nobody knows where between two targets a step is:
-        with probability u it lies before q, so J^2 u (1 - u)."""
+        """(n,) variance of a component at q (n,), as the position of a step between two targets is unknown: a
+        step of height J lies before q with probability u, so it is J^2 u (1 - u)."""
         space = self.parameters.spaces[name]
         raw = space.gauge @ self.theta[self.parameters.slices[name]]
         total = np.zeros(len(q))
@@ -114,47 +114,47 @@ class Fit:
     def curve(self, name: str, q: Array) -> Array:
         """(n, size) mean of a component at q (n,) on its own line, in the gauge of the datum, without cyclic
         terms, as functionals of theta."""
-        out = np.zeros((len(q), self.parameters.size))
-        out[:, self.parameters.slices[name]] = self.parameters.spaces[name].values(q)
+        rows = np.zeros((len(q), self.parameters.size))
+        rows[:, self.parameters.slices[name]] = self.parameters.spaces[name].values(q)
         if name in self.slopes:
             axis = AXES.index(name[2])
-            out -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+            rows -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
         if self.parameters.framed:
-            out += self._of_frame(name, q)
-        return out
+            rows += self._of_frame(name, q)
+        return rows
 
     def _of_frame(self, name: str, q: Array) -> Array:
         """(n, size) what the frame adds to a component: its shift to X, its turn to straightness, and that
         of the tool to the angles of the axis that bears it."""
-        out = np.zeros((len(q), self.parameters.size))
+        rows = np.zeros((len(q), self.parameters.size))
         start, axis = self.parameters.slices["frame"].start, AXES.index(name[2])
         if name[1] not in AXES:
             if not self.parameters.after(axis):
-                out[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_ARM_MM
-            return out
+                rows[:, start + 6 + "ABC".index(name[1])] = 1.0 / LEVER_ARM_MM
+            return rows
         row = AXES.index(name[1])
         if not self.parameters.after(axis):
             # its angles count from the tool of its line
             tool = np.array([self.parameters.places[name].tool_mm])
-            out[:, start + 6 : start + 9] = frame_columns(tool)[0, row, 3:]
+            rows[:, start + 6 : start + 9] = frame_columns(tool)[0, row, 3:]
         if axis == 0:
-            out[:, start + row] = 1.0
+            rows[:, start + row] = 1.0
         if row != axis:
-            # the turn that the gauge took out comes back
+            # the turn that the gauge removed is added again
             k = 3 - row - axis
             sign = 1.0 if (axis - k) % 3 == 1 else -1.0
             turn = -self.turn[k]
             turn[start + 3 + k] += 1.0 / LEVER_ARM_MM
-            out += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
-        return out
+            rows += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
+        return rows
 
     def squareness(self, name: str) -> Array:
         """(size,) a squareness in the gauge of the datum, as functional of theta."""
-        out = np.zeros(self.parameters.size)
-        out[self.parameters.slices[name]] = 1.0
+        functional = np.zeros(self.parameters.size)
+        functional[self.parameters.slices[name]] = 1.0
         first, second, sign = {
             "C0Y": ("EXY", "EYX", -1.0),
             "B0Z": ("EXZ", "EZX", 1.0),
             "A0Z": ("EYZ", "EZY", -1.0),
         }[name]
-        return np.asarray(out + sign * (self.slopes[first] + self.slopes[second]))
+        return np.asarray(functional + sign * (self.slopes[first] + self.slopes[second]))

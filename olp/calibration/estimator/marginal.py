@@ -16,11 +16,15 @@ from olp.core.arrays import Array
 
 Noise = Literal["learnt", "stated"]
 
-#: Sizes of a process in mm, from here to there.
-SMALLEST, LARGEST = 2e-4, 1.0
-#: The factor on stated noise is between these.
-QUIET, LOUD = 0.5, 10.0
-#: A coefficient of which readings would tell less than this share of its variance is left out.
+#: Smallest size of a process, mm.
+SMALLEST = 2e-4
+#: Largest size of a process, mm.
+LARGEST = 1.0
+#: Smallest factor on stated noise.
+QUIET = 0.5
+#: Largest factor on stated noise.
+LOUD = 10.0
+#: A coefficient is left out where readings would reduce its variance by less than this share.
 NEGLIGIBLE = 1e-3
 
 
@@ -120,7 +124,9 @@ def learn(
         return -value, -np.append(slope.ravel(), 0.0 if fixed else by_noise)
 
     x0 = np.append(first.ravel(), 0.0 if fixed else first_noise)
-    found = minimize(
+    optimum = minimize(
         cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40, "ftol": 1e-6}
     )
-    return Learnt(coordinates, found.x[:-1].reshape(-1, 4), math.exp(float(found.x[-1])), -float(found.fun))
+    return Learnt(
+        coordinates, optimum.x[:-1].reshape(-1, 4), math.exp(float(optimum.x[-1])), -float(optimum.fun)
+    )

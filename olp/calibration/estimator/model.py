@@ -1,5 +1,5 @@
-"""Which unknowns the readings of a machine ask for: the reach of its curves, their cells and shapes, cyclic
-terms, and the places where displacements were measured. Lines say most of it: they read one curve alone."""
+"""The unknowns that the readings of a machine need: the ranges of its curves, their cells and shapes, cyclic
+terms, and where displacements were measured. Most of it follows from lines, as each reads one curve only."""
 
 from __future__ import annotations
 
@@ -22,17 +22,20 @@ from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.progress import Progress
 from olp.core.units import AXES
 
-#: Cells of the spline of a curve: as many as a line has targets between these.
-FEWEST, MOST = 6, 48
+#: Cells of the spline of a curve, at least; else as many as a line has targets.
+FEWEST = 6
+#: Cells of the spline of a curve, at most.
+MOST = 48
+#: Cells of the spline of a half difference.
 HALF_CELLS = 5
-#: A line shorter than this share of its axis' longest one is a sweep: it makes the box no smaller.
+#: A line shorter than this share of the longest one of its axis is a sweep: it does not limit the box.
 SWEEP = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
     """What holds throughout an adjustment. `lines` each with its noise, `box_mm` (3, 2) what the readings
-    cover, `waves` the cyclic terms to begin with and `unseen` why others cannot be seen."""
+    cover, `waves` the cyclic terms to begin with, `unobservable` why others are not observable."""
 
     chain: str
     datum_mm: Vector
@@ -51,7 +54,7 @@ class Model:
         datum_mm: Vector | None, cells: int, tell: Progress,
     ) -> Model:  # fmt: skip
         """The model for observations; `cells` are those of axes without lines. Raises CannotCompute where
-        nothing tells of an axis."""
+        no reading depends on an axis."""
         own = [line for line, _ in lines]
         ranges, box = _ranges(own, observations, travel_mm)
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
@@ -78,9 +81,9 @@ class Model:
                 own = [line for line in own_lines if line.component == name]
                 near = own or [line for line in own_lines if line.axis == axis and line.quantity != "angle"]
                 place = _place(near[0]) if near else Place(self.datum_mm, ZERO)
-                at = list(place.line_mm)
-                at[axis] = self.datum_mm[axis]
-                places[name] = Place((at[0], at[1], at[2]), place.tool_mm)
+                line_mm = list(place.line_mm)
+                line_mm[axis] = self.datum_mm[axis]
+                places[name] = Place((line_mm[0], line_mm[1], line_mm[2]), place.tool_mm)
         shared = sorted({n for line in own_lines if line.square is not None for n in square_names(line)})
         return Parameters(
             self.chain, self.datum_mm, spaces, places, halves, dict(waves), tuple(shared), self.framed
@@ -98,8 +101,8 @@ def _ranges(
     observations: Sequence[Observation],
     travel_mm: Sequence[tuple[float, float]] | None,
 ) -> tuple[list[tuple[float, float]], Array]:
-    """What the readings of each axis reach together, and the box: what every component with lines covers, or
-    the points where an axis has no lines."""
+    """The range of all readings of each axis, and the box: what every component with lines covers, or the
+    points where an axis has no lines."""
     ranges, box = [], np.zeros((3, 2))
     for axis in range(3):
         own = [line for line in lines if line.axis == axis]
@@ -125,8 +128,8 @@ def _ranges(
         box[axis] = max(*(s[0] for s in sides), limits[0]), min(*(s[1] for s in sides), limits[1])
         if box[axis, 0] >= box[axis, 1]:
             raise CannotCompute(
-                f"the readings along {AXES[axis]} have no length in common in the travel; expected them over "
-                "the same length"
+                f"the readings along {AXES[axis]} have no common range within the travel; expected all "
+                "of them over one range"
             )
     return ranges, box
 
@@ -175,7 +178,7 @@ def _shapes(
 def _waves(
     measurements: Measurements, lines: Sequence[Line], observations: Sequence[Observation]
 ) -> tuple[dict[str, tuple[Wave, ...]], dict[tuple[str, float], str]]:
-    """Cyclic terms that the targets can see, and why others cannot be seen."""
+    """Cyclic terms that are observable at the targets, and why others are not."""
     waves: dict[str, tuple[Wave, ...]] = {}
     unobservable: dict[tuple[str, float], str] = {}
     for name in COMPONENTS:
@@ -193,7 +196,7 @@ def _waves(
 
 
 def _own_lines(name: str, lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Line, Noise]]:
-    """The lines of a component that were taken at its own place."""
+    """The lines of a component that were taken where its first line was."""
     own = [(line, noise) for line, noise in lines if line.component == name]
     if not own:
         return []
@@ -202,9 +205,9 @@ def _own_lines(name: str, lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Lin
 
 
 def _place(line: Line) -> Place:
-    at = list(line.line_mm)
-    at[line.axis] = 0.0
-    return Place((at[0], at[1], at[2]), line.tool_mm)
+    line_mm = list(line.line_mm)
+    line_mm[line.axis] = 0.0
+    return Place((line_mm[0], line_mm[1], line_mm[2]), line.tool_mm)
 
 
 def mean_slopes(parameters: Parameters) -> dict[str, Array]:
@@ -217,9 +220,9 @@ def mean_slopes(parameters: Parameters) -> dict[str, Array]:
         spline = parameters.spaces[name].spline
         position = np.tile(np.array(parameters.datum_mm), (len(slope_grid(spline)), 1))
         position[:, axis] = slope_grid(spline)
-        out = np.zeros(parameters.size)
+        functional = np.zeros(parameters.size)
         for part, values in parameters.displacement(row, axis, position, np.zeros(3)):
             if part != parameters.slices.get(f"wave {name}"):
-                out[part] += slope_weights(spline) @ values
-        slopes[name] = out
+                functional[part] += slope_weights(spline) @ values
+        slopes[name] = functional
     return slopes

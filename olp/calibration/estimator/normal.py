@@ -1,7 +1,7 @@
 """Normal equations of a linear Gaussian adjustment, gathered block by block.
 
-What only one block knows (the zero of a line, its drift, the scale of its laser) is eliminated at once, by
-the Schur complement; so a hundred thousand readings cost one matrix of the size of the model.
+Unknowns of one block alone (the zero of a line, its drift, the scale of its laser) are eliminated at once, by
+the Schur complement. So a hundred thousand readings need one matrix of the size of the model.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Readings that share local unknowns nu, in as many chunks as memory likes; `chunks` makes them anew.
+    """Readings that share local unknowns nu, in chunks that limit memory; each call of `chunks` builds them.
 
     `columns` (k,) of theta that they depend on, `precision` (l,) the prior precision of nu, whose mean is
     zero; a precision of 0 leaves it free.
@@ -120,8 +120,8 @@ def solve(normal: Normal, prior: Array, prior_logdet: float = 0.0) -> Solved:
     covariance = cho_solve((factor, True), np.eye(len(scale))) / np.outer(scale, scale)
     explained = _forward(factor, normal.g / scale)
     logdet = 2.0 * float(np.log(np.diag(factor)).sum() + np.log(scale).sum())
-    found = -0.5 * (normal.square - float(explained @ explained)) - 0.5 * logdet + 0.5 * prior_logdet
-    return Solved(theta, 0.5 * (covariance + covariance.T), found)
+    log_evidence = -0.5 * (normal.square - float(explained @ explained)) - 0.5 * logdet + 0.5 * prior_logdet
+    return Solved(theta, 0.5 * (covariance + covariance.T), log_evidence)
 
 
 def _factor(matrix: Array) -> tuple[Array, Array]:

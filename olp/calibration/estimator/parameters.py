@@ -1,7 +1,7 @@
 """What an adjustment estimates, and how the error of a pose depends on it: linear, to first order.
 
 A displacement curve is parametrised as it was measured, at the functional point on its own line and with its
-own reflector; so an angle that nobody measured changes nothing there. The contribution of axis j at axis
+own reflector. So an angle that was not measured changes nothing there. The contribution of axis j at axis
 positions P with tool t is E_j(q) + eps_j(q) x [L_j(P, t) - L_j(line)], see `olp.errormodel.bodies`.
 """
 
@@ -18,11 +18,11 @@ from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
 
-#: An angle about a adds sign * angle * lever_k to row i: (i, a, k, sign).
+#: An angle about a adds sign * angle * lever arm k to row i: (i, a, k, sign).
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 #: Row, axis and sign of what a squareness adds, times the distance of that axis from the datum.
 SHEAR = {"C0Y": (0, 1, -1.0), "B0Z": (0, 2, 1.0), "A0Z": (1, 2, -1.0)}
-#: Turns of the frame count per metre of lever, so that all unknowns are of one size.
+#: Turns of the frame are multiplied by this lever arm (1 m), so that all unknowns have one size.
 LEVER_ARM_MM = 1000.0
 
 Part = tuple[slice, Array]
@@ -50,10 +50,10 @@ class Parameters:
     """The layout of theta: `spaces` of the means of all 18 curves, `halves` of those whose half difference of
     directions is estimated, `waves` of cyclic terms, the three squareness errors, and `shared` nuisances.
 
-    `places` holds the place of each displacement curve. `slices` says where each stands: "EXX", "half EXX",
-    "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were seen in the machine's
-    frame: "frame" is by how much the axes as a whole are shifted (mm) and turned about the datum (rad times
-    LEVER_MM), and the tool vectors turned (the same), in it.
+    `places` holds the place of each displacement curve. `slices` says where in theta each is: "EXX",
+    "half EXX", "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were measured
+    in the machine's frame. "frame" then is the shift (mm) and turn about the datum (rad times LEVER_ARM_MM)
+    of all axes in it, and the turn of the tool vectors (the same).
     """
 
     chain: str
@@ -69,17 +69,17 @@ class Parameters:
 
     def __post_init__(self) -> None:
         slices: dict[str, slice] = {}
-        at = 0
+        offset = 0
         sizes = [(name, self.spaces[name].size) for name in COMPONENTS]
         sizes += [(f"half {name}", space.size) for name, space in self.halves.items()]
         sizes += [(f"wave {name}", 2 * len(terms)) for name, terms in self.waves.items()]
         sizes += [(name, 1) for name in (*SQUARENESS, *self.shared)]
         sizes += [("frame", 9)] if self.framed else []
         for name, size in sizes:
-            slices[name] = slice(at, at + size)
-            at += size
+            slices[name] = slice(offset, offset + size)
+            offset += size
         object.__setattr__(self, "slices", slices)
-        object.__setattr__(self, "size", at)
+        object.__setattr__(self, "size", offset)
 
     def after(self, axis: int) -> tuple[int, ...]:
         """The axes that `axis` carries toward the tool."""
@@ -104,7 +104,7 @@ class Parameters:
         *, on_table: bool = False,
     ) -> Iterator[Part]:  # fmt: skip
         """The parts of what `axis` adds to displacement `row` at axis positions (n, 3) with tool vectors (3,)
-        or (n, 3); `on_table`: as seen from a reflector that stays on the table. `direction` is (n,)."""
+        or (n, 3); `on_table`: as read at a reflector that is fixed on the table. `direction` is (n,)."""
         q = position[:, axis]
         yield from self.curve(f"E{AXES[row]}{AXES[axis]}", q, direction)
         for i, a, k, sign in CROSS:
@@ -118,7 +118,7 @@ class Parameters:
                     yield part, sign * lever_arm[:, None] * values
 
     def lever_arm(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
-        """(n,) coordinate `k` of the lever by which angles of `axis` act on displacement `row`."""
+        """(n,) coordinate `k` of the lever arm by which angles of `axis` act on displacement `row`."""
         place = self.places[f"E{AXES[row]}{AXES[axis]}"]
         lever_arm = np.broadcast_to(tool[..., k] - place.tool_mm[k], (len(position),))
         return lever_arm + (position[:, k] - place.line_mm[k]) if k in self.after(axis) else lever_arm
@@ -132,43 +132,43 @@ class Parameters:
     def design(self, position: Array, tool: Array, play: Array | None = None) -> Array:
         """(n, 3, size) dependence of the error on theta at axis positions (n, 3), tool vectors (3,) or
         (n, 3) and directions `play` (n, 3) in [-1, 1]."""
-        out = np.zeros((len(position), 3, self.size))
+        table = np.zeros((len(position), 3, self.size))
         tool = np.asarray(tool, float)
         for row in range(3):
             for axis in range(3):
                 side = None if play is None else play[:, axis]
                 for part, values in self.displacement(row, axis, position, tool, side):
-                    out[:, row, part] += values
+                    table[:, row, part] += values
             for part, values in self.shear(row, position):
-                out[:, row, part] += values
+                table[:, row, part] += values
         if self.framed:
             start = self.slices["frame"].start
-            out[:, :, start : start + 6] = frame_columns(position - np.array(self.datum_mm))
+            table[:, :, start : start + 6] = frame_columns(position - np.array(self.datum_mm))
             turned = frame_columns(np.broadcast_to(tool, position.shape))[:, :, 3:]
-            out[:, :, start + 6 : start + 9] = turned
-        return out
+            table[:, :, start + 6 : start + 9] = turned
+        return table
 
 
 def frame_columns(arm: Array, *, scale: bool = False) -> Array:
     """(n, 3, 6 or 7) what shifts, turns and the scale of the frame do to points at `arm` from the centre."""
-    out = np.zeros((len(arm), 3, 7 if scale else 6))
+    columns = np.zeros((len(arm), 3, 7 if scale else 6))
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        out[:, k, k] = 1.0
-        out[:, i, 3 + k] = -arm[:, j] / LEVER_ARM_MM
-        out[:, j, 3 + k] = arm[:, i] / LEVER_ARM_MM
+        columns[:, k, k] = 1.0
+        columns[:, i, 3 + k] = -arm[:, j] / LEVER_ARM_MM
+        columns[:, j, 3 + k] = arm[:, i] / LEVER_ARM_MM
     if scale:
-        out[:, :, 6] = arm / LEVER_ARM_MM
-    return out
+        columns[:, :, 6] = arm / LEVER_ARM_MM
+    return columns
 
 
 def gathered(parts: Sequence[Part], n: int) -> tuple[Array, np.ndarray]:
-    """Parts as one (n, k) matrix and the (k,) columns of theta that it stands on."""
+    """Parts as one (n, k) matrix and the (k,) columns of theta that it depends on."""
     used = sorted({(part.start, part.stop) for part, _ in parts})
     columns = np.concatenate([np.arange(*span) for span in used])
     start = dict(zip([span[0] for span in used], np.cumsum([0, *(b - a for a, b in used)]), strict=False))
     rows = np.zeros((n, len(columns)))
     for part, values in parts:
-        at = int(start[part.start])
-        rows[:, at : at + values.shape[1]] += values
+        first = int(start[part.start])
+        rows[:, first : first + values.shape[1]] += values
     return rows, columns

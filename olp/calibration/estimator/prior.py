@@ -1,5 +1,5 @@
-"""What is believed before any reading: smooth curves of a size that machines have, from their own lines where
-there are some, by class where there are none."""
+"""The prior of an adjustment: smooth curves of a size that machines have, learnt from their own lines where
+there are some, else by class."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from olp.calibration.observations.points import FRAME_MM
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 
-#: Standard deviation of a squareness and of the pose of a square that nobody knows, rad.
+#: Standard deviation of a squareness, rad.
 SQUARE = 1e-3
+#: Standard deviation of the unknown pose of a square, rad.
 POSE = 0.1
-#: Of a curve that no line reads, where no other curve of the machine tells: size and second differences.
+#: Size and second differences (mm or rad) of a curve without lines, if no other curve of its class has any.
 UNKNOWN = {"positioning": (0.1, 2e-3), "straightness": (0.03, 1e-3), "angle": (6e-5, 2e-6)}
-#: No curve is smaller than this.
+#: No curve is smaller than this (mm, rad).
 LEAST_SIZE = 1e-4, 1e-7
-#: How far the roughness of a class may leave its start, as a standard deviation of its logarithm.
+#: How far the roughness of a class may differ from its start, as a standard deviation of its logarithm.
 LOOSE = 1.5
 
 
@@ -52,7 +53,7 @@ class Prior:
     def precision(self, classes: Mapping[str, tuple[float, float]] | None = None) -> tuple[Array, float]:
         """(n, n) prior precision and its log determinant; the prior mean of all but squares is zero."""
         p = self.parameters
-        out = np.zeros((p.size, p.size))
+        precision = np.zeros((p.size, p.size))
         logdet = 0.0
         classes = self.classes if classes is None else classes
         for name in COMPONENTS:
@@ -63,21 +64,23 @@ class Prior:
             if shape is not None:
                 amplitude, roughness = AMPLITUDE[name[1] in "ABC"], shape.roughness
             block = p.spaces[name].prior(roughness, amplitude)
-            out[p.slices[name], p.slices[name]] = block
+            precision[p.slices[name], p.slices[name]] = block
             logdet += float(np.linalg.slogdet(block)[1])
         for name, space in p.halves.items():
-            at = p.slices[f"half {name}"]
-            out[at, at] = space.prior(self.shapes[name].half_roughness or 1.0, HALF[name[1] in "ABC"])
+            part = p.slices[f"half {name}"]
+            precision[part, part] = space.prior(
+                self.shapes[name].half_roughness or 1.0, HALF[name[1] in "ABC"]
+            )
         for name in p.waves:
-            at = p.slices[f"wave {name}"]
-            out[at, at] = np.eye(at.stop - at.start) / FEATURE[name[1] in "ABC"] ** 2
+            part = p.slices[f"wave {name}"]
+            precision[part, part] = np.eye(part.stop - part.start) / FEATURE[name[1] in "ABC"] ** 2
         for name in SQUARENESS:
-            out[p.slices[name], p.slices[name]] = 1.0 / SQUARE**2
+            precision[p.slices[name], p.slices[name]] = 1.0 / SQUARE**2
         for name in p.shared:
-            out[p.slices[name], p.slices[name]] = 1.0 / self.squares[name][1] ** 2
+            precision[p.slices[name], p.slices[name]] = 1.0 / self.squares[name][1] ** 2
         if p.framed:
-            out[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
-        return out, logdet
+            precision[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
+        return precision, logdet
 
     def push(self, normal: Normal) -> None:
         """Add the prior means to the right side."""
@@ -95,31 +98,31 @@ class Prior:
                 rough = float(np.exp(np.median([np.log(shape.roughness) for shape in known])))
                 self.classes[kind] = (self.classes[kind][0], rough)
         for kind in self.classes:
-            seen = [
+            names = [
                 name
                 for name in COMPONENTS
                 if class_of(name) == kind
                 and name not in self.shapes
                 and normal.H[p.slices[name], p.slices[name]].any()
             ]
-            if seen:
+            if names:
                 self._choose(kind, normal, 1)
                 if not known_to(self.shapes, kind):
-                    # nothing but these readings tells the size of such curves
+                    # only these readings determine the size of such curves
                     for _ in range(2):
                         self._choose(kind, normal, 0)
                         self._choose(kind, normal, 1)
 
     def size_from(self, theta: Array) -> bool:
         """Take the size of curves without lines of their own to be that of the largest of their class with
-        lines; says whether there are such curves."""
-        found = False
+        lines; True where there are such curves."""
+        changed = False
         for kind, (_, roughness) in self.classes.items():
             own = [name for name in self.shapes if class_of(name) == kind]
             if own and any(class_of(name) == kind and name not in self.shapes for name in COMPONENTS):
                 self.classes[kind] = (max(self.rms(name, theta) for name in own), roughness)
-                found = True
-        return found
+                changed = True
+        return changed
 
     def rms(self, name: str, theta: Array) -> float:
         """Root mean square of a curve over its length."""

@@ -1,5 +1,5 @@
-"""The non-rigid field of a machine as a deviation map: a grid so fine that interpolation at run time loses
-less than is wanted, with standard uncertainties."""
+"""The non-rigid field of a machine as a deviation map: a grid fine enough for interpolation at run time,
+with standard uncertainties."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.sources.maps import DeviationMap
 from olp.findings.catalogue import Finding
 
-#: What interpolation may lose where nobody says it, in mm.
+#: How far interpolation may be off where the user states nothing, mm.
 WITHIN_MM = 2e-4
-#: Levels along an axis: the fewest that lose no more, between these.
-FEWEST, MOST = 5, 41
-#: Levels along an axis at which uncertainties are worked out.
+#: Levels along an axis, at least.
+FEWEST = 5
+#: Levels along an axis, at most.
+MOST = 41
+#: Levels along an axis at which uncertainties are computed.
 SIGMA_LEVELS = 7
 #: Offsets of the reflector that differ by less than this are one.
 _ONE_MM = 1.0
 
 
-def residual_map(found: NonRigid, calibration: Calibration, within_mm: float = WITHIN_MM) -> DeviationMap:
+def residual_map(result: NonRigid, calibration: Calibration, within_mm: float = WITHIN_MM) -> DeviationMap:
     """The map of a field over the box of its calibration, smooth between nodes ("cubic"), and nowhere more
     than `within_mm` from the field in any coordinate, as checked between all nodes.
 
@@ -40,21 +42,21 @@ def residual_map(found: NonRigid, calibration: Calibration, within_mm: float = W
     counts = [FEWEST, FEWEST, FEWEST]
     while True:
         knots = [np.linspace(low, high, n) for (low, high), n in zip(box.tolist(), counts, strict=True)]
-        grid = Grid.through(knots, _values(found, knots), "cubic")
-        missed = [_missed(found, grid, axis) for axis in range(3)]
-        # what is lost along each axis adds up within a cell
+        grid = Grid.through(knots, _values(result, knots), "cubic")
+        missed = [_missed(result, grid, axis) for axis in range(3)]
+        # interpolation errors along the axes add up within a cell
         if sum(missed) <= within_mm:
             break
         worst = int(np.argmax(missed))
         counts[worst] += max(2, counts[worst] // 4)
         if counts[worst] > MOST:
             raise CannotCompute(
-                f"a grid of {MOST} levels along {'XYZ'[worst]} still loses {missed[worst] * UM_PER_MM:.2g} "
-                f"um of the map; expected {within_mm * UM_PER_MM:g} um; state within_um larger"
+                f"a grid of {MOST} levels along {'XYZ'[worst]} is {missed[worst] * UM_PER_MM:.2g} um off the "
+                f"map; expected at most {within_mm * UM_PER_MM:g} um; state a larger within_um"
             )
     x, y, z = (np.asarray(np.round(k, 6), float) for k in knots)
-    tool = tool_of(found)
-    sigma = _sigma(found, knots, np.array(tool))
+    tool = tool_of(result)
+    sigma = _sigma(result, knots, np.array(tool))
     return DeviationMap(
         knots_mm=(x, y, z),
         values=np.round(grid.values, 7) + 0.0,
@@ -65,9 +67,9 @@ def residual_map(found: NonRigid, calibration: Calibration, within_mm: float = W
     )
 
 
-def tool_of(found: NonRigid) -> Vector:
+def tool_of(result: NonRigid) -> Vector:
     """The offset of the reflector nearest to the mean of all."""
-    tools = found.tools_mm
+    tools = result.tools_mm
     x, y, z = tools[int(np.argmin(np.linalg.norm(tools - tools.mean(axis=0), axis=1)))].tolist()
     return (x, y, z)
 
@@ -76,38 +78,38 @@ def _places(knots: list[Array]) -> Array:
     return np.array(list(product(*(k.tolist() for k in knots))))
 
 
-def _values(found: NonRigid, knots: list[Array]) -> Array:
-    return found.value(_places(knots)).reshape(*(len(k) for k in knots), 3)
+def _values(result: NonRigid, knots: list[Array]) -> Array:
+    return result.value(_places(knots)).reshape(*(len(k) for k in knots), 3)
 
 
-def _sigma(found: NonRigid, knots: list[Array], tool: Array) -> Array:
+def _sigma(result: NonRigid, knots: list[Array], tool: Array) -> Array:
     """At the nodes, from a coarser grid: uncertainties change slowly."""
     coarse = [np.linspace(k[0], k[-1], SIGMA_LEVELS) for k in knots]
-    at = _places(coarse)
-    rest = found.sigma(at, tool) ** 2 - found.fit.sigma(at, tool) ** 2
+    positions = _places(coarse)
+    rest = result.sigma(positions, tool) ** 2 - result.fit.sigma(positions, tool) ** 2
     values = np.sqrt(np.maximum(rest, 0.0)).reshape(*(len(k) for k in coarse), 3)
     return Grid.through(coarse, values, "linear")(_places(knots)).reshape(*(len(k) for k in knots), 3)
 
 
-def _missed(found: NonRigid, grid: Grid, axis: int) -> float:
+def _missed(result: NonRigid, grid: Grid, axis: int) -> float:
     """By how much the grid misses the field between its levels along one axis, the others at their levels."""
     knots = list(grid.knots)
     k = knots[axis]
     knots[axis] = (k[:-1, None] + np.diff(k)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
-    return float(np.abs(grid(_places(knots)) - _values(found, knots).reshape(-1, 3)).max())
+    return float(np.abs(grid(_places(knots)) - _values(result, knots).reshape(-1, 3)).max())
 
 
-def map_summary(found: NonRigid, described: DeviationMap | None) -> dict[str, Any]:
-    """What is told of a map, or of why there is none."""
-    out: dict[str, Any] = {"written": described is not None}
+def map_summary(result: NonRigid, described: DeviationMap | None) -> dict[str, Any]:
+    """The report of a map, or of why there is none."""
+    report: dict[str, Any] = {"written": described is not None}
     if described is None:
-        out["why_not"] = found.reason
-    if found.best is not None:
-        out["log_evidence"] = found.best.evidence
-    out["noise_over_stated"] = found.noise
-    if found.figures is not None:
-        figures = found.figures
-        out |= {
+        report["why_not"] = result.reason
+    if result.best is not None:
+        report["log_evidence"] = result.best.evidence
+    report["noise_over_stated"] = result.noise
+    if result.figures is not None:
+        figures = result.figures
+        report |= {
             "residual_before_sigma": figures.residual_before,
             "residual_after_sigma": figures.residual_after,
             "held_out_before_sigma": figures.held_out_before,
@@ -115,7 +117,7 @@ def map_summary(found: NonRigid, described: DeviationMap | None) -> dict[str, An
         }
     if described is not None:
         assert described.sigma is not None
-        out |= {
+        report |= {
             "nodes": " x ".join(str(len(k)) for k in described.knots_mm),
             "max_um": float(np.linalg.norm(described.values, axis=-1).max()) * UM_PER_MM,
             "sigma_um": float(np.sqrt(np.mean((described.sigma**2).sum(axis=-1)))) * UM_PER_MM,
@@ -127,33 +129,33 @@ def map_summary(found: NonRigid, described: DeviationMap | None) -> dict[str, An
                     "length_mm": list(p.lengths_mm),
                     "log_evidence": p.evidence,
                 }
-                for p in found.processes
+                for p in result.processes
             ],
         }
-    return out
+    return report
 
 
-def map_findings(found: NonRigid, described: DeviationMap | None) -> Iterator[Finding]:
-    """What a person should know about a map."""
+def map_findings(result: NonRigid, described: DeviationMap | None) -> Iterator[Finding]:
+    """The findings about a map."""
     if described is None:
-        yield Finding("OLP842", found.reason)
+        yield Finding("OLP842", result.reason)
         return
-    assert found.figures is not None
-    figures = found.figures
+    assert result.figures is not None
+    figures = result.figures
     largest = float(np.linalg.norm(described.values, axis=-1).max()) * UM_PER_MM
-    names = ", ".join(process.coordinate for process in found.processes)
+    names = ", ".join(process.coordinate for process in result.processes)
     yield Finding(
         "OLP841",
-        f"{names}: up to {largest:.1f} um that no curve holds; readings held out are foretold within "
-        f"{figures.held_out_after:.2f} of their sigma instead of {figures.held_out_before:.2f}",
+        f"{names}: up to {largest:.1f} um that no curve holds; held-out readings are predicted within "
+        f"{figures.held_out_after:.2f} of their sigma, without the map within {figures.held_out_before:.2f}",
     )
-    size = np.linalg.svd(found.tools_mm - found.tools_mm.mean(axis=0), compute_uv=False)
-    offsets = int(np.sum(size > _ONE_MM * np.sqrt(len(found.tools_mm))))
+    size = np.linalg.svd(result.tools_mm - result.tools_mm.mean(axis=0), compute_uv=False)
+    offsets = int(np.sum(size > _ONE_MM * np.sqrt(len(result.tools_mm))))
     if offsets < 2:
         tool = ", ".join(f"{v:g}" for v in described.tool_mm)
         what = "lie on one line" if offsets else "are one"
         yield Finding(
             "OLP843",
             f"the offsets of the reflector {what}: curves and map together hold for tools near [{tool}] mm; "
-            f"what a turn that no point shows does to another tool is in neither",
+            "effects of angles that are not observable on other tools are in neither",
         )

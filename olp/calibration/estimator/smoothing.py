@@ -19,16 +19,21 @@ from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lines import Line, drift_ramps, targets_of
 from olp.core.arrays import Array
 
-#: Candidates for the standard deviation of second differences: mm or rad.
+#: Candidates for the standard deviation of second differences (mm, rad).
 ROUGHNESS = np.geomspace(1e-7, 1e-1, 37), np.geomspace(1e-10, 1e-4, 37)
-#: How large a curve may be: standard deviation of its coefficients, of a step or kink, of a half difference.
+#: Standard deviation of the coefficients of a curve (mm, rad).
 AMPLITUDE = 0.3, 3e-4
+#: Standard deviation of a step or kink (mm, rad).
 FEATURE = 0.02, 20e-6
+#: Standard deviation of a half difference (mm, rad).
 HALF = 0.02, 20e-6
-#: What one more feature must gain beyond its own cost, in nats; the same of a step where another error of the
-#: axis has one; and the most features of a curve.
-GAIN, SHARED_GAIN, MOST = 2.0, 0.0, 8
-#: Steps and kinks are looked for between so many targets at most.
+#: What one more feature must gain beyond its own cost, nats.
+GAIN = 2.0
+#: The same of a step where another error of the axis has one, nats.
+SHARED_GAIN = 0.0
+#: Features of a curve, at most.
+MOST = 8
+#: Steps and kinks are tried between so many targets at most.
 FINEST = 80
 
 Half = Literal["none", "constant", "curve"]
@@ -36,7 +41,7 @@ Half = Literal["none", "constant", "curve"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """What the lines of one curve say: standard deviation of second differences, features, dependence on
+    """The shape of a curve from its lines: standard deviation of second differences, features, dependence on
     direction and its roughness."""
 
     roughness: float
@@ -62,7 +67,7 @@ def shape_of(
     candidates: list[Feature] = [
         Step(float(a), float(b)) for a, b in itertools.pairwise(targets) if b - a > 1.0
     ]
-    candidates += [Kink(float(at), spline.high_mm - spline.low_mm) for at in targets[1:-1]]
+    candidates += [Kink(float(start), spline.high_mm - spline.low_mm) for start in targets[1:-1]]
     two_way = all(len(np.unique(line.direction)) == 2 for line, _ in lines)
     halves = half_spline.count if two_way else 0
     m, c = spline.count, len(candidates)
@@ -142,8 +147,8 @@ class _Choice:
         """(len(rest),) best evidence with each of `rest` in addition, at this roughness or a lower one."""
         tries = [roughness * factor for factor in (1.0, 0.3, 0.1, 0.03)]
         sets = [[*chosen, extra] for extra in rest]
-        found = [self._values(sets, np.full(len(sets), rough)) for rough in tries]
-        return np.asarray(np.max(found, axis=0))
+        values = [self._values(sets, np.full(len(sets), rough)) for rough in tries]
+        return np.asarray(np.max(values, axis=0))
 
     def direction(
         self, chosen: Sequence[int], roughness: float, plain: float, half: Spline, start: int
@@ -177,10 +182,10 @@ class _Choice:
     def _prior(self, features: int, roughness: Array) -> Array:
         """(r, k, k) precisions."""
         m = self.spline.count
-        out = np.zeros((len(roughness), m + features, m + features))
-        out[:, :m, :m] = self.penalty / roughness[:, None, None] ** 2 + np.eye(m) / self.amplitude**2
-        out[:, m:, m:] = np.eye(features) / self.feature**2
-        return out
+        precision = np.zeros((len(roughness), m + features, m + features))
+        precision[:, :m, :m] = self.penalty / roughness[:, None, None] ** 2 + np.eye(m) / self.amplitude**2
+        precision[:, m:, m:] = np.eye(features) / self.feature**2
+        return precision
 
     def _values(self, sets: Sequence[Sequence[int]], roughness: Array) -> Array:
         """(r,) evidences of one set of features each, all of one size."""

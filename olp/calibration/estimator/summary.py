@@ -1,4 +1,4 @@
-"""What an adjustment found, as data: sizes, uncertainties, what was not seen and its cost."""
+"""The results of an adjustment as data: sizes, uncertainties, what is not observable and its cost."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from olp.core.machine import COMPONENTS, SQUARENESS, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration
 
-#: A curve whose uncertainty the readings lowered by less than this factor was not seen.
+#: A curve is not observable where its standard uncertainty is above this share of the prior one.
 UNOBSERVABLE = 0.7
+#: Positions at which a curve is evaluated.
 _POINTS = 41
-#: Sums and tables of a report that are there whatever was measured, in their order; the frame only where some
-#: points were taken in it.
+#: Sums of every report, in their order.
 TALLIES = ("readings", "points", "lengths")
+#: Tables of every report, in their order; the frame only where some points were measured in it.
 SECTIONS = (
     *("lines_of_lengths", "lines_of_angles", "frame", "sets_of_points", "stations", "sets_of_pods"),
     "diagonals_and_circles",
@@ -37,24 +38,24 @@ def grid_of(fit: Fit, name: str) -> Array:
 
 
 def unobservable(fit: Fit) -> dict[str, float]:
-    """Components that no reading tells of, with the standard deviation that they may have (mm or rad)."""
-    found: dict[str, float] = {}
+    """Components that are not observable, with the standard deviation that they may have (mm or rad)."""
+    sigmas: dict[str, float] = {}
     matrix, _ = fit.prior.precision()
     for name in COMPONENTS:
         if name in fit.prior.shapes:
             continue
-        at = fit.parameters.slices[name]
+        part = fit.parameters.slices[name]
         q = grid_of(fit, name)
         rows = fit.parameters.spaces[name].values(q)
-        before = np.einsum("nk,kl,nl->n", rows, np.linalg.inv(matrix[at, at]), rows, optimize=True)
-        after = np.einsum("nk,kl,nl->n", rows, fit.covariance[at, at], rows, optimize=True)
+        before = np.einsum("nk,kl,nl->n", rows, np.linalg.inv(matrix[part, part]), rows, optimize=True)
+        after = np.einsum("nk,kl,nl->n", rows, fit.covariance[part, part], rows, optimize=True)
         if after.mean() > UNOBSERVABLE**2 * before.mean():
-            found[name] = math.sqrt(float(after.mean()))
-    return found
+            sigmas[name] = math.sqrt(float(after.mean()))
+    return sigmas
 
 
 def scale_unobservable(fit: Fit) -> float | None:
-    """Standard deviation of the common scale of all axes, where no reading tells of it."""
+    """Standard deviation of the common scale of all axes; None where the readings determine it."""
     prior = np.linalg.inv(fit.prior.precision()[0])
     row = np.zeros(fit.parameters.size)
     for axis, letter in enumerate(AXES):
@@ -65,8 +66,8 @@ def scale_unobservable(fit: Fit) -> float | None:
 
 
 def scales_open(fit: Fit) -> tuple[Array, Array]:
-    """(k, 3) changes of the scales of X, Y, Z that no reading tells of, and (3 - k, 3) the combinations of
-    them that are known, each with a largest part of 1: what the readings left of the prior covariance."""
+    """(k, 3) changes of the scales of X, Y, Z that are not observable, and (3 - k, 3) the combinations of
+    them that are, each with a largest part of 1; from the prior and posterior covariance."""
     prior = np.linalg.inv(fit.prior.precision()[0])
     rows = np.zeros((3, fit.parameters.size))
     for axis, letter in enumerate(AXES):
@@ -82,23 +83,23 @@ def scales_open(fit: Fit) -> tuple[Array, Array]:
 
 
 def _largest_one(rows: Array) -> Array:
-    at = np.argmax(np.abs(rows), axis=1)
-    return np.asarray(rows / rows[np.arange(len(rows)), at][:, None])
+    columns = np.argmax(np.abs(rows), axis=1)
+    return np.asarray(rows / rows[np.arange(len(rows)), columns][:, None])
 
 
 def squareness_unobservable(fit: Fit) -> dict[str, float]:
-    """Values of squareness that no reading tells of, with their standard deviation in rad."""
+    """Values of squareness that are not observable, with their standard deviation in rad."""
     matrix, _ = fit.prior.precision()
-    found = {}
+    sigmas = {}
     for name in SQUARENESS:
-        at = fit.parameters.slices[name].start
-        if fit.covariance[at, at] * matrix[at, at] > UNOBSERVABLE**2:
-            found[name] = math.sqrt(float(fit.covariance[at, at]))
-    return found
+        index = fit.parameters.slices[name].start
+        if fit.covariance[index, index] * matrix[index, index] > UNOBSERVABLE**2:
+            sigmas[name] = math.sqrt(float(fit.covariance[index, index]))
+    return sigmas
 
 
 def cost_um(fit: Fit, name: str, sigma: float, tools: Sequence[Vector]) -> float:
-    """What a component of standard deviation sigma costs at the longest lever in the box, in um."""
+    """The error in um from a component of standard deviation sigma, at the longest lever arm in the box."""
     if name in SQUARENESS:
         _, axis, _ = SHEAR[name]
         return sigma * float(np.ptp(fit.box_mm[axis])) * UM_PER_MM
@@ -118,7 +119,7 @@ def cost_um(fit: Fit, name: str, sigma: float, tools: Sequence[Vector]) -> float
 
 
 def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict[str, Any]:
-    """Everything that was found, with units in the keys."""
+    """All results, with units in the keys."""
     hidden = unobservable(fit)
     return {
         "schema": "olp-fit-1",
@@ -189,16 +190,16 @@ def _tallies(fit: Fit) -> dict[str, int]:
 
 def _sections(fit: Fit) -> dict[str, Any]:
     """The tables of observations; those of SECTIONS also where they are empty."""
-    out: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
     for section in SECTIONS:
         if section != "frame":
-            out[section] = []
+            tables[section] = []
         elif fit.parameters.framed:
-            out[section] = _frame_row(fit)
+            tables[section] = _frame_row(fit)
     for result in fit.results:
         if result.state.section:
-            out.setdefault(result.state.section, []).append(result.row())
-    return out
+            tables.setdefault(result.state.section, []).append(result.row())
+    return tables
 
 
 def _square_row(fit: Fit, name: str) -> dict[str, Any]:

@@ -1,5 +1,8 @@
-"""The adjustment of a fit with a smooth field beside the curves: what each set of volumetric readings says of
-curves, field, and the unknowns that it has for itself, kept apart by folds so that any may be held out."""
+"""The adjustment of a fit with a smooth field beside the curves.
+
+The normal equations of volumetric readings cover curves, field and the own unknowns of each set. They are
+stored by folds, so that any fold may be held out.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from olp.calibration.estimator.field import Modes
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.estimator.parameters import Parameters
-from olp.calibration.observations.base import Result, ScatteredState, left
+from olp.calibration.observations.base import Result, ScatteredState, residual_and_chi_square
 from olp.core.arrays import Array, Index
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
@@ -24,7 +27,7 @@ FOLDS = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Both:
-    """Curves and field together, as the blocks see them."""
+    """Curves and field together, as the unknowns of blocks."""
 
     parameters: Parameters
     modes: Modes
@@ -40,20 +43,20 @@ class Both:
 def wide(modes: Modes, position: Array) -> Array:
     """(n, 3, 3 m) the field's dependence on its coefficients at axis positions (n, 3)."""
     values, m = modes.values(position), modes.size
-    out = np.zeros((len(position), 3, 3 * m))
+    table = np.zeros((len(position), 3, 3 * m))
     for i in range(3):
-        out[:, i, i * m : (i + 1) * m] = values
-    return out
+        table[:, i, i * m : (i + 1) * m] = values
+    return table
 
 
 def straight(parameters: Parameters, position: Array) -> Array:
     """The design of what moves every tool alike: displacement curves and squareness, no angles."""
-    out = parameters.design(position, np.zeros(3))
+    table = parameters.design(position, np.zeros(3))
     keep = np.zeros(parameters.size, bool)
     for name, part in parameters.slices.items():
         keep[part] = name in (*SQUARENESS, "frame") or (name in parameters.spaces and name[1] in AXES)
-    out[:, :, ~keep] = 0.0
-    return out
+    table[:, :, ~keep] = 0.0
+    return table
 
 
 @dataclass(slots=True, eq=False)
@@ -67,8 +70,8 @@ class _Sums:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """What the readings say of the field alone: precision G and right side v with all else free, the weighted
-    square that the curves leave, and the readings behind it."""
+    """The readings reduced to the field: precision G and right side v with all else eliminated, the weighted
+    residual square without a field, and its degrees of freedom."""
 
     G: Array
     v: Array
@@ -77,7 +80,7 @@ class Reduced:
 
 
 class Adjustment:
-    """The normal equations; `other` are lines and priors, which the field is no part of."""
+    """The normal equations. Lines and priors have no part in the field."""
 
     def __init__(self, fit: Fit, modes: Modes) -> None:
         self.fit, self.modes = fit, modes
@@ -91,10 +94,10 @@ class Adjustment:
         gram = np.zeros((FOLDS + 1, self.total + 1, self.total + 1))
         counts = np.zeros(FOLDS + 1)
         nuisance = np.zeros(self.total)
-        at = both.size
+        offset = both.size
         for (state, block), count in zip(sets, local, strict=True):
-            nuisance[at : at + count] = block.precision
-            columns = [*range(both.size), *range(at, at + count), self.total]
+            nuisance[offset : offset + count] = block.precision
+            columns = [*range(both.size), *range(offset, offset + count), self.total]
             folds = _folds(state)
             start = 0
             for chunk in block.chunks():
@@ -104,7 +107,7 @@ class Adjustment:
                     table = _table(chunk, part == k)
                     gram[k][np.ix_(columns, columns)] += table.T @ table
                     counts[k] += len(table)
-            at += count
+            offset += count
         self.sums = _Sums(gram, counts)
         self.free = int(np.sum(nuisance[both.size :] == 0.0))
         other = Normal.of(self.size)
@@ -136,8 +139,8 @@ class Adjustment:
         solved = factor(np.column_stack([across.T, g[rest]]))
         G = H[np.ix_(field, field)] - across @ solved[:, :-1]
         v = g[field] - across @ solved[:, -1]
-        left = square - float(g[rest] @ solved[:, -1])
-        return Reduced(0.5 * (G + G.T), v, left, count - self.free)
+        residual_square = square - float(g[rest] @ solved[:, -1])
+        return Reduced(0.5 * (G + G.T), v, residual_square, count - self.free)
 
     def columns(self, coordinates: Sequence[int]) -> Index:
         m = self.modes.size
@@ -158,26 +161,26 @@ class Adjustment:
         return inverse[:, -1], inverse[:, :-1], keep
 
     def misses(self, x: Array, keep: Index, folds: Sequence[int]) -> tuple[float, float]:
-        """Weighted square of what x leaves of the readings of folds, and how many these are."""
+        """Weighted residual square of the readings of folds at x, and their number."""
         whole = np.zeros(self.total + 1)
         whole[keep], whole[-1] = x, -1.0
         gram = self.sums.gram[list(folds)].sum(axis=0)
         return max(float(whole @ gram @ whole), 0.0), float(self.sums.counts[list(folds)].sum())
 
     def believed(self, coordinates: Sequence[int], log_variance: Array, noise: float) -> Array:
-        """The prior precision alone of what `solve` solves for."""
+        """The prior precision alone of the unknowns of `solve`."""
         field = self.columns(coordinates)
         rest = np.arange(self.size + self.own, self.total)
         keep = np.concatenate([np.arange(self.size), field, rest])
-        out = self.prior[np.ix_(keep, keep)] / noise**2
-        out[: self.size, : self.size] -= self.lines / noise**2
+        precision = self.prior[np.ix_(keep, keep)] / noise**2
+        precision[: self.size, : self.size] -= self.lines / noise**2
         inner = np.arange(self.size, self.size + len(field))
-        out[inner, inner] += np.exp(-log_variance)
-        return np.asarray(out)
+        precision[inner, inner] += np.exp(-log_variance)
+        return np.asarray(precision)
 
-    def left(self, x: Array) -> tuple[tuple[Result[Any], ...], float]:
-        """The results of all observations, with what curves and field x leave of the scattered ones, and
-        chi-square of all readings."""
+    def results_of(self, x: Array) -> tuple[tuple[Result[Any], ...], float]:
+        """The results of all observations, those of scattered ones with curves and field x, and chi-square of
+        all readings."""
         blocks = iter(self.blocks)
         results, chi_square = [], 0.0
         for result in self.fit.results:
@@ -186,11 +189,11 @@ class Adjustment:
                 chi_square += result.chi_square
             results.append(result)
         for block in self._other_blocks():
-            chi_square += left(block, x)[1]
+            chi_square += residual_and_chi_square(block, x)[1]
         return tuple(results), chi_square
 
     def _other_blocks(self) -> list[Block]:
-        """Of the observations that the field is no part of."""
+        """The blocks of the observations that do not depend on the field."""
         fit = self.fit
         states = [r.state for r in fit.results if not isinstance(r.state, ScatteredState)]
         return [state.block(fit.parameters, fit.theta) for state in states]

@@ -1,12 +1,12 @@
 """Circles measured with a ball-bar (ISO 230-4): circular deviation and hysteresis, and squareness, scale
-mismatch, servo mismatch and lost motion out of them.
+mismatch, servo mismatch and backlash from them.
 
 At angle t from the first axis of the plane toward the second, with d = +1 counter-clockwise and -1 clockwise:
 
     dr = r0 + x cos t + y sin t + R (S_1 - S_2) / 2 cos 2t + R g / 2 sin 2t + d v (T_1 - T_2) / 2 sin 2t
          + b_1 / 2 d sgn(sin t) cos t - b_2 / 2 d sgn(cos t) sin t
 
-with g the lean of the second axis toward + of the first one, T the servo lags in time and b the lost motions.
+with g the lean of the second axis toward + of the first one, T the servo lags in time and b the backlash.
 In one direction alone g and the servo mismatch are one column: such a circle gives no squareness.
 """
 
@@ -26,17 +26,23 @@ from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 
-_PLACES = 720
-#: A circle of radius R sees the slope R^2 / 2 of x^3, a mean line over +-s the slope 3 s^2 / 5.
+#: Angles of the circle at which both directions are compared.
+_ANGLES = 720
+#: A circle of radius R shows the slope R^2 / 2 of x^3, a mean line over +-s the slope 3 s^2 / 5.
 _MEAN_LINE = float(np.sqrt(5.0 / 6.0))
-_SHARE, _RANK, _TOO_MUCH = 1e-6, 1e-9, 5.0
+#: Share of an unknown in the null space from which on it is not determined.
+_SHARE = 1e-6
+#: Singular values below this share of the largest count as zero.
+_RANK = 1e-9
+#: A residual of so many times the stated uncertainty is reported.
+_TOO_MUCH = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CircleFit:
     """(8,) `value` and `sigma` of UNKNOWNS, all in mm at the circle: scale R (S_1 - S_2) / 2, square R g / 2,
-    servo v (T_1 - T_2) / 2, lost motions b; what is determined in `determined`. `residual` (n,) in mm of
-    all readings, also those beside the fit (`used` False). G by direction and H in mm."""
+    servo v (T_1 - T_2) / 2, backlash b; `determined` names those that are determined. `residual` (n,) in mm
+    of all readings, also those beside the fit (`used` False). G by direction and H in mm."""
 
     circles: Circles
     value: Array
@@ -58,7 +64,7 @@ class CircleFit:
 
     def reading(self) -> SquarenessReading | None:
         """The squareness as at the centre; None where it is not determined. Its span is that whose mean lines
-        have the slopes that the circle sees, for straightness up to the third order."""
+        have the slopes that the circle shows, for straightness up to the third order."""
         if "square" not in self.determined:
             return None
         c, r = self.circles, self.circles.radius_mm
@@ -90,33 +96,31 @@ class CircleFit:
         if self.circles.sigma > 0.0 and self.noise > _TOO_MUCH * self.circles.sigma:
             yield Finding(
                 "OLP857",
-                f"circle {self.circles.plane}: {self.noise * UM_PER_MM:.2f} um rms left, "
-                f"{self.circles.sigma * UM_PER_MM:.2f} um stated",
+                f"circle {self.circles.plane}: residual {self.noise * UM_PER_MM:.2f} um rms, "
+                f"stated uncertainty {self.circles.sigma * UM_PER_MM:.2f} um",
             )
         for k, axis in zip((6, 7), self.circles.names, strict=True):
             if UNKNOWNS[k] in self.determined and self.value[k] < -3.0 * self.sigma[k]:
-                yield Finding(
-                    "OLP855", f"{axis}: lost motion {self.value[k] * UM_PER_MM:.2f} um on the circle"
-                )
+                yield Finding("OLP855", f"{axis}: backlash {self.value[k] * UM_PER_MM:.2f} um on the circle")
 
     def as_dict(self) -> dict[str, Any]:
         c = self.circles
         first, second = c.names
-        out: dict[str, Any] = {
+        report: dict[str, Any] = {
             "plane": c.plane, "file": c.source, "radius_mm": c.radius_mm, "centre_mm": list(c.centre_mm),
             "noise_um": self.noise * UM_PER_MM,
         }  # fmt: skip
         for d, name in ((1, "G_ccw_um"), (-1, "G_cw_um")):
             if d in self.circular:
-                out[name] = self.circular[d] * UM_PER_MM
+                report[name] = self.circular[d] * UM_PER_MM
         if self.hysteresis is not None:
-            out["H_um"] = self.hysteresis * UM_PER_MM
-        found = []
+            report["H_um"] = self.hysteresis * UM_PER_MM
+        values = []
 
         def add(name: str, key: str, unit: str, factor: float) -> None:
             k = UNKNOWNS.index(key)
             if key in self.determined:
-                found.append({
+                values.append({
                     "name": name, f"value_{unit}": self.value[k] * factor,
                     f"sigma_{unit}": self.sigma[k] * abs(factor),
                 })  # fmt: skip
@@ -130,14 +134,14 @@ class CircleFit:
             add("servo mismatch on the circle", "servo", "um", UM_PER_MM)
         add(f"lost motion {first}", "lost_1", "um", UM_PER_MM)
         add(f"lost motion {second}", "lost_2", "um", UM_PER_MM)
-        out["found"] = found
-        out["not_determined"] = [name for name in UNKNOWNS if name not in self.determined]
-        return out
+        report["found"] = values
+        report["not_determined"] = [name for name in UNKNOWNS if name not in self.determined]
+        return report
 
 
 def fit(circles: Circles, *, skip_deg: float = SKIP_DEG) -> CircleFit:
-    """All of it by least squares. Readings within `skip_deg` of where an axis turns round are not used.
-    Raises ConfigError where too few are left."""
+    """All unknowns by least squares. Readings within `skip_deg` of the reversal of an axis are not used.
+    Raises ConfigError where too few remain."""
     design = columns(circles)
     quarter = np.abs((circles.angle_rad + np.pi / 4) % (np.pi / 2) - np.pi / 4)
     used = quarter > np.radians(skip_deg)
@@ -155,19 +159,19 @@ def fit(circles: Circles, *, skip_deg: float = SKIP_DEG) -> CircleFit:
         name for k, name in enumerate(UNKNOWNS) if not len(null) or np.abs(null[:, k]).max() < _SHARE
     )
     inverse = np.linalg.pinv(part, rcond=_RANK)
-    found = inverse @ value
-    residual = circles.value - design @ found
+    estimate = inverse @ value
+    residual = circles.value - design @ estimate
     dof = len(value) - rank
     noise = float(np.sqrt((residual[used] ** 2).sum() / max(dof, 1)))
-    spread = max(noise * _alike(circles, residual, used), circles.sigma)
+    spread = max(noise * _correlation_factor(circles, residual, used), circles.sigma)
     sigma = spread * np.sqrt(np.diag(inverse @ inverse.T))
-    circular, hysteresis = _figures(circles, found)
-    return CircleFit(circles, found, sigma, determined, residual, used, noise, circular, hysteresis)
+    circular, hysteresis = _figures(circles, estimate)
+    return CircleFit(circles, estimate, sigma, determined, residual, used, noise, circular, hysteresis)
 
 
-def _alike(circles: Circles, residual: Array, used: Array) -> float:
-    """How much more uncertain a mean is because neighbours on the circle are alike: what straightness and
-    scales leave repeats, and is no noise (autocorrelation r of the first order, sqrt((1 + r) / (1 - r)))."""
+def _correlation_factor(circles: Circles, residual: Array, used: Array) -> float:
+    """Factor on the uncertainty of a mean because residuals of neighbours on the circle are correlated, from
+    straightness and scales: sqrt((1 + r) / (1 - r)) with the autocorrelation r of the first order."""
     product = square = 0.0
     for d in (1, -1):
         for run in np.unique(circles.run[circles.direction == d]):
@@ -175,18 +179,18 @@ def _alike(circles: Circles, residual: Array, used: Array) -> float:
             rest = residual[rows[np.argsort(circles.angle_rad[rows] % (2.0 * np.pi))]]
             product += float(rest[:-1] @ rest[1:])
             square += float(rest @ rest)
-    alike = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
-    return float(np.sqrt((1.0 + alike) / (1.0 - alike)))
+    correlation = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
+    return float(np.sqrt((1.0 + correlation) / (1.0 - correlation)))
 
 
-def _figures(circles: Circles, found: Array) -> tuple[dict[int, float], float | None]:
+def _figures(circles: Circles, estimate: Array) -> tuple[dict[int, float], float | None]:
     """Circular deviation G of each direction (the largest of its runs) and hysteresis H (of the mean runs),
     the centre of the least-squares circle taken out (ISO 230-4, 3.2 to 3.4)."""
     t = circles.angle_rad % (2.0 * np.pi)
-    centred = circles.value - found[1] * np.cos(t) - found[2] * np.sin(t)
+    centred = circles.value - estimate[1] * np.cos(t) - estimate[2] * np.sin(t)
     circular: dict[int, float] = {}
     means = {}
-    grid = np.arange(_PLACES) * 2.0 * np.pi / _PLACES
+    grid = np.arange(_ANGLES) * 2.0 * np.pi / _ANGLES
     for d in (1, -1):
         laps = []
         for run in np.unique(circles.run[circles.direction == d]):
@@ -202,7 +206,7 @@ def _figures(circles: Circles, found: Array) -> tuple[dict[int, float], float | 
 
 
 def _whole(angle: Array, direction: Index) -> bool:
-    """No gap above 10 degrees in either direction."""
+    """Whether there is no gap above 10 degrees in either direction."""
     for d in (1, -1):
         turn = np.sort(angle[direction == d])
         if np.diff(turn, append=turn[0] + 2.0 * np.pi).max() > np.radians(10.0):
@@ -212,4 +216,4 @@ def _whole(angle: Array, direction: Index) -> bool:
 
 def readings_of(fits: Sequence[CircleFit]) -> tuple[SquarenessReading, ...]:
     """The squareness of all circles that determine one."""
-    return tuple(r for r in (found.reading() for found in fits) if r is not None)
+    return tuple(r for r in (one.reading() for one in fits) if r is not None)

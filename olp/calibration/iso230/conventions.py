@@ -1,7 +1,7 @@
-"""Senses of squareness that controls, instruments and slicers use, in one table.
+"""Sign conventions of squareness that controls, instruments and slicers use, in one table.
 
-Ours is that of ISO 230-1 as this package writes it: C0Y, B0Z, A0Z turn the line of the later axis
-right-handed about +Z, +Y, +X, so a point moves by (-C0Y y + B0Z z, -A0Z z, 0). C0Y > 0 and A0Z > 0 make the
+This package uses that of ISO 230-1: C0Y, B0Z and A0Z turn the line of the later axis right-handed about +Z,
++Y and +X. So a point moves by (-C0Y y + B0Z z, -A0Z z, 0). C0Y > 0 and A0Z > 0 make the
 angle between the positive axes larger than 90 degrees, B0Z > 0 makes it smaller.
 """
 
@@ -22,7 +22,8 @@ LEAN: Mapping[str, float] = MappingProxyType({"C0Y": -1.0, "B0Z": 1.0, "A0Z": -1
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """`factor` by component: ours = factor * theirs. `says` is what a positive value means."""
+    """`factor` by component: value in this package = factor * value there. `says` is what a positive value
+    means."""
 
     says: str
     factor: Mapping[str, float]
@@ -32,7 +33,7 @@ def _table(says: str, c0y: float, b0z: float, a0z: float) -> Convention:
     return Convention(says, MappingProxyType(dict(zip(SQUARENESS, (c0y, b0z, a0z), strict=True))))
 
 
-#: Small angles and tangents are one here: a squareness acts as the factor of a shear, which is the tangent.
+#: Small angles and tangents are equal here: a squareness acts as the factor of a shear, which is the tangent.
 CONVENTIONS: Mapping[str, Convention] = MappingProxyType(
     {
         "iso": _table("right-handed turn of the later axis: C0Y, B0Z, A0Z", 1.0, 1.0, 1.0),
@@ -54,12 +55,12 @@ CONVENTIONS: Mapping[str, Convention] = MappingProxyType(
 
 
 def to_iso(component: str, value: float, convention: str) -> float:
-    """Our squareness from a value in another convention. Raises UsageError for an unknown name."""
+    """The squareness here from a value in another convention. Raises UsageError for an unknown name."""
     return _factor(component, convention) * value
 
 
 def from_iso(component: str, value: float, convention: str) -> float:
-    """The value of our squareness in another convention. Raises UsageError for an unknown name."""
+    """The value of a squareness in another convention. Raises UsageError for an unknown name."""
     return value / _factor(component, convention)
 
 

@@ -1,9 +1,9 @@
-"""Positioning along face and body diagonals (ISO 230-6), and the scales and squareness that can be told
-from it.
+"""Positioning along face and body diagonals (ISO 230-6), and the scales and squareness that follow from
+it.
 
 The elongation of a diagonal of direction u is  u_x^2 S_x + u_y^2 S_y + u_z^2 S_z - u_x u_y C0Y + u_x u_z B0Z
-- u_y u_z A0Z, with S the scale errors. Angular errors and straightness of the axes take part too, and no set
-of diagonals can tell them apart: so this checks a machine, and gives squareness where the angles are small.
+- u_y u_z A0Z, with S the scale errors. Angular errors and straightness of the axes contribute too, and no set
+of diagonals separates them. So diagonals check a machine; they give squareness where the angles are small.
 """
 
 from __future__ import annotations
@@ -29,16 +29,17 @@ SCALES = ("SX", "SY", "SZ")
 UNKNOWNS = (*SCALES, *SQUARENESS)
 #: Share of an unknown in the null space above which it is not determined.
 _SHARE = 1e-6
+#: Singular values below this share of the largest count as zero.
 _RANK = 1e-9
-#: a residual sum this many standard deviations above its expectation
+#: A residual sum of squares so many standard deviations above its expectation is reported.
 _TOO_MUCH = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiagonalFit:
-    """What diagonals say: (6,) `value` and `sigma` of UNKNOWNS in rad or mm/mm, those that are determined in
-    `determined`; `free` lists the changes of all six that no reading sees; `elongation` by diagonal with its
-    uncertainty and what the fit leaves of it."""
+    """The fit of diagonals: (6,) `value` and `sigma` of UNKNOWNS in rad or mm/mm, those that are determined
+    in `determined`. `free` lists the changes of all six that change no reading; `elongation` by diagonal has
+    its uncertainty and residual."""
 
     diagonals: tuple[Diagonal, ...]
     value: Array
@@ -57,11 +58,11 @@ class DiagonalFit:
         ends = np.array([d.start_mm for d in self.diagonals] + [d.end_mm for d in self.diagonals], float)
         low, high = ends.min(axis=0), ends.max(axis=0)
         middle = (low + high) / 2.0
-        out = []
+        readings = []
         for k, name in enumerate(SQUARENESS):
             if name in self.determined:
                 spans = [(float(low[i]), float(high[i])) for i in AXES_OF[name]]
-                out.append(
+                readings.append(
                     SquarenessReading(
                         name,
                         float(self.value[3 + k]),
@@ -72,24 +73,24 @@ class DiagonalFit:
                         ", ".join(dict.fromkeys(d.source for d in self.diagonals if d.source)),
                     )
                 )
-        return tuple(out)
+        return tuple(readings)
 
     @property
     def findings(self) -> Iterator[Finding]:
         missing = [name for name in UNKNOWNS if name not in self.determined]
         if missing:
-            ways = ", or ".join(_words(change) for change in self.free)
+            changes = ", or ".join(_words(change) for change in self.free)
             yield Finding(
                 "OLP856",
-                f"{', '.join(missing)} not determined by diagonals {self.names}: no reading sees {ways}; "
-                "measure face diagonals, or state scales with their uncertainty",
+                f"{', '.join(missing)} not determined by diagonals {self.names}: no reading changes with "
+                f"{changes}; measure face diagonals, or state scales with their uncertainty",
             )
         if self.dof > 0 and self.chi_square > self.dof + _TOO_MUCH * np.sqrt(2.0 * self.dof):
             worst = int(np.argmax(np.abs(self.residual) / self.sigma_elongation))
             micro = float(self.residual[worst]) * self.diagonals[worst].length_mm * UM_PER_MM
             yield Finding(
                 "OLP857",
-                f"diagonals: chi square {self.chi_square:.1f} at {self.dof} degrees of freedom, most on "
+                f"diagonals: chi-square {self.chi_square:.1f} at {self.dof} degrees of freedom, most on "
                 f"{self.diagonals[worst].name} ({micro:+.2f} um at its end)",
             )
 
@@ -153,7 +154,7 @@ def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] 
     lever_arms = np.array([d.tool_mm for d in diagonals], float)
     if np.ptp(lever_arms, axis=0).max() > 1.0:
         raise ConfigError(
-            "diagonals with different tool vectors; angular errors would differ between them; expected one",
+            "the diagonals have different tool vectors, so angular errors differ between them; expected one",
             file=diagonals[-1].source,
         )
     pairs = [d.elongation() for d in diagonals]
@@ -180,16 +181,16 @@ def fit(diagonals: Sequence[Diagonal], known: Mapping[str, tuple[float, float]] 
     rank = int((singular > _RANK * singular[0]).sum())
     null = _sparse(v[rank:] / np.where(columns > 0, columns, 1.0))
     inverse = np.linalg.pinv(full, rcond=1e-12)
-    found = inverse @ np.append(right, 0.0)
+    estimate = inverse @ np.append(right, 0.0)
     covariance = inverse @ inverse.T
     determined = frozenset(
         name for k, name in enumerate(UNKNOWNS) if not len(null) or np.abs(null[:, k]).max() < _SHARE
     )
-    rest = np.append(right, 0.0) - full @ found
-    left = elongation - design[: len(diagonals)] @ found[:6]
+    rest = np.append(right, 0.0) - full @ estimate
+    residual = elongation - design[: len(diagonals)] @ estimate[:6]
     return DiagonalFit(
-        tuple(diagonals), found[:6], np.sqrt(np.diag(covariance)[:6]), determined,
-        tuple(_change(row) for row in null), elongation, sigma, left, float(rest @ rest),
+        tuple(diagonals), estimate[:6], np.sqrt(np.diag(covariance)[:6]), determined,
+        tuple(_change(row) for row in null), elongation, sigma, residual, float(rest @ rest),
         len(value) - rank, MappingProxyType(known),
     )  # fmt: skip
 
@@ -208,19 +209,19 @@ def _sparse(rows: Array) -> Array:
 
 
 def _change(row: Array) -> Mapping[str, float]:
-    """A direction in which nothing is seen, its largest part 1."""
+    """A change that changes no reading, with a largest part of 1."""
     row = row / row[np.argmax(np.abs(row))]
     return MappingProxyType({name: float(v) for name, v in zip(UNKNOWNS, row, strict=True) if abs(v) > 1e-6})
 
 
 def _words(change: Mapping[str, float]) -> str:
-    return " with ".join(
+    return " and ".join(
         f"{value:+.3g} {'um/m' if name in SCALES else 'urad'} in {name}" for name, value in change.items()
     )
 
 
 def place_words(diagonal: Diagonal) -> str:
-    """Start and end as people read them."""
+    """Start and end as text."""
     a, b = (
         " ".join(f"{axis}{v:g}" for axis, v in zip(AXES, p, strict=True))
         for p in (diagonal.start_mm, diagonal.end_mm)

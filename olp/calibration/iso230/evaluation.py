@@ -1,5 +1,5 @@
-"""Everything that the readings of a machine say by themselves, before any fit: ISO 230-2 figures, parts of
-the lines, squareness of straightness pairs, and what is wrong with how they were taken."""
+"""All figures that the readings of a machine give without a fit: ISO 230-2 figures, parts of the lines,
+squareness of straightness pairs, and what is wrong with how they were taken."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluated:
-    """What was found in `measurements`. `sweeps` are lines over few periods, taken for cyclic errors alone;
+    """The figures of `measurements`. `sweeps` are lines over few periods, taken for cyclic errors alone;
     lines that could not be evaluated are named in `findings`."""
 
     measurements: Measurements
@@ -104,7 +104,7 @@ def evaluate_all(measurements: Measurements, zone: Zone = "least-squares") -> Ev
         evaluations.append(evaluation)
         periods = measurements.periods_mm[line.axis]
         own = [sweep for sweep in sweeps if sweep.component == line.component]
-        # what a sweep covers is no gap of the targets
+        # periods and sweeps deal with cyclic errors at equal steps
         findings += [
             f for f in iso230_2.findings_of(evaluation) if not (f.code == "OLP852" and (own or periods))
         ]
@@ -131,8 +131,8 @@ def _is_sweep(line: Line, measurements: Measurements) -> bool:
 
 
 def _pairs(measurements: Measurements, findings: list[Finding]) -> Iterator[Pair]:
-    """A pair for each square and plane: lines of another tool vector or place stand beside it for another
-    purpose."""
+    """One pair per square and plane. Lines with another tool vector or position may serve another purpose, so
+    they are reported only where the square gives no pair."""
     squares = {square.name: square for square in measurements.squares}
     refused: dict[tuple[str, str], str] = {}
     made: set[tuple[str, str]] = set()

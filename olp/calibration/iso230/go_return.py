@@ -1,8 +1,8 @@
 """Reversal from readings approached from both sides: the paper's test B (go and return), and the reversal
 part of any bidirectional line.
 
-B_i = x_up - x_down as in ISO 230-2. An axis with lost motion b stays behind its command by b/2 on both sides,
-so its B is -b.
+B_i = x_up - x_down as in ISO 230-2. An axis with backlash b lags its command by b/2 on both sides, so its B
+is -b.
 """
 
 from __future__ import annotations
@@ -21,21 +21,23 @@ from olp.core.machine import Machine
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import Finding
 
-#: A reversal whose dependence on position is less likely than this by chance depends on position.
+#: A reversal depends on position where chance explains the differences with less than this probability.
 UNLIKELY = 0.01
-#: Runs from which on they tell their own scatter, and courses along the axis that are looked for.
-_RUNS, _COURSES = 3, 4
-#: an estimate this many standard uncertainties from zero is not zero
-_SURE = 3.0
+#: The scatter between runs is known from so many runs on.
+_RUNS = 3
+#: Courses along the axis that are tested, at most.
+_COURSES = 4
+#: An estimate so many standard uncertainties from zero is significant.
+_SIGNIFICANT = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reversal:
     """B at each target (m,) with its standard uncertainty, and of the line, in mm or rad.
 
-    `constant` says that one number holds for the whole line, within what the readings can tell (`chance`:
-    how likely such differences are where it does). `noise` is the standard deviation of one reading, `drift`
-    the range of the drift that was taken out.
+    `constant` says that one number holds for the whole line, within the noise of the readings (`chance`:
+    how likely such differences are then). `noise` is the standard deviation of one reading, `drift`
+    the range of the drift that was removed.
     """
 
     line: Line
@@ -51,12 +53,12 @@ class Reversal:
 
     @property
     def backlash(self) -> float:
-        """The lost motion of the axis, for a positioning line; mm."""
+        """The backlash of the axis, for a positioning line; mm."""
         return 0.0 - self.mean
 
     def as_dict(self) -> dict[str, Any]:
         unit, scale = scale_of(self.line)
-        out: dict[str, Any] = {
+        report: dict[str, Any] = {
             "component": self.line.component,
             "file": self.line.source,
             f"reversal_{unit}": self.mean * scale,
@@ -72,15 +74,15 @@ class Reversal:
             },
         }
         if self.line.quantity == "positioning":
-            out["lost_motion_um"] = self.backlash * UM_PER_MM
-        return out
+            report["lost_motion_um"] = self.backlash * UM_PER_MM
+        return report
 
 
 def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     """The reversal of a line whose targets were approached from both sides, least squares.
 
     With `drift` the readings count as equally spaced in time, and a continuous drift, straight within each
-    run, is taken out; without it the order of the rows does not matter. Raises ConfigError.
+    run, is removed; without it the order of the rows does not matter. Raises ConfigError.
     """
     target, place = targets_of(line.target_mm)
     side = place * 2 + (line.direction < 0)
@@ -94,8 +96,8 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
         )
     n, m = len(line.value), len(target)
     extra = _drift_columns(line.run) if drift else np.zeros((n, 0))
-    # a mean for each target and side, or a mean for each target and one reversal: both are taken out first
-    found, cofactor, rest, dof = _within(side, extra, line.value)
+    # a mean for each target and side, or a mean for each target and one reversal: both are removed first
+    drift_estimate, cofactor, rest, dof = _within(side, extra, line.value)
     single, spread, rest_one, dof_one = _within(
         place, np.column_stack((0.5 * line.direction, extra)), line.value
     )
@@ -110,11 +112,11 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     chance = 1.0
     if m > 1 and dof > 0:
         chance = _chance(rest_one - rest, dof_one - dof, rest, dof, float(np.abs(line.value).max()))
-    wander = extra @ found
+    wander = extra @ drift_estimate
     sigma = float(noise * np.sqrt(spread[0, 0]))
     between = _between_runs(line, place, line.value - wander) if m > 1 else None
     if between is not None:
-        # a drift that is not straight within a run is no white noise: the runs themselves tell what it does
+        # a drift that is not straight within a run is no white noise: its effect shows between runs
         chance, scatter = between
         sigma = max(sigma, scatter)
     count = np.bincount(side, minlength=2 * m)
@@ -122,21 +124,21 @@ def reversal_of(line: Line, *, drift: bool = True) -> Reversal:
     slope = np.column_stack(
         [np.bincount(side, column) / count for column in extra.T] or [np.zeros((2 * m, 0))]
     )
-    at, lean = level[::2] - level[1::2], slope[::2] - slope[1::2]
+    reversal, lean = level[::2] - level[1::2], slope[::2] - slope[1::2]
     own = 1.0 / count[::2] + 1.0 / count[1::2]
     sigma_at = noise * np.sqrt(own + np.einsum("ik,kl,il->i", lean, cofactor, lean))
     constant = chance >= UNLIKELY
-    mean = float(single[0]) if constant else float(at.mean())
+    mean = float(single[0]) if constant else float(reversal.mean())
     return Reversal(
-        line, target, at, sigma_at, mean, sigma, constant, chance, noise,
+        line, target, reversal, sigma_at, mean, sigma, constant, chance, noise,
         float(np.ptp(wander)) if len(wander) else 0.0,
     )  # fmt: skip
 
 
 def _between_runs(line: Line, place: Index, value: Array) -> tuple[float, float] | None:
-    """How likely the runs' reversals show such a course along the axis by chance, from how the runs differ (t
-    test of the first cosines along the targets, Bonferroni), and the standard uncertainty of their mean. None
-    for fewer than three runs, or where a run lacks a target."""
+    """The probability that the runs' reversals show such a course along the axis by chance, and the standard
+    uncertainty of their mean. Both follow from the differences between runs (t test of the first cosines
+    along the targets, Bonferroni). None for fewer than three runs, or where a run lacks a target."""
     runs, row = np.unique(line.run, return_inverse=True)
     m = int(place.max()) + 1
     total, count = np.zeros((len(runs), m, 2)), np.zeros((len(runs), m, 2))
@@ -161,8 +163,8 @@ def _between_runs(line: Line, place: Index, value: Array) -> tuple[float, float]
 
 
 def _drift_columns(run: Index) -> Array:
-    """(n, k) hat functions over the rows with a knot where each run begins, the first left out: a drift is
-    seen against its start."""
+    """(n, k) hat functions over the rows with a knot where each run begins, the first left out: a drift
+    counts from its start."""
     starts = np.flatnonzero(np.diff(run, prepend=run[0] - 1) != 0)
     if len(starts) < 2:
         return np.zeros((len(run), 0))
@@ -173,8 +175,8 @@ def _drift_columns(run: Index) -> Array:
 
 
 def _within(group: Index, columns: Array, value: Array) -> tuple[Array, Array, float, int]:
-    """Least squares of value (n,) on columns (n, k) beside a mean of its own for each group (n,): (k,)
-    estimates of least norm, (k, k) cofactors, sum of squares left and its degrees of freedom."""
+    """Least squares of value (n,) on columns (n, k) beside one mean per group (n,): (k,) estimates of
+    least norm, (k, k) cofactors, residual sum of squares and its degrees of freedom."""
     count = np.bincount(group)
 
     def free(one: Array) -> Array:
@@ -182,11 +184,11 @@ def _within(group: Index, columns: Array, value: Array) -> tuple[Array, Array, f
 
     design = np.column_stack([free(column) for column in columns.T] or [np.zeros((len(value), 0))])
     inverse = np.linalg.pinv(design, rcond=1e-10)
-    found = inverse @ free(value)
-    rest = free(value) - design @ found
+    estimate = inverse @ free(value)
+    rest = free(value) - design @ estimate
     rank = round(float(np.einsum("ij,ji->", design, inverse)))
     return (
-        found,
+        estimate,
         np.asarray(inverse @ inverse.T),
         float(rest @ rest),
         len(value) - int((count > 0).sum()) - rank,
@@ -194,7 +196,7 @@ def _within(group: Index, columns: Array, value: Array) -> tuple[Array, Array, f
 
 
 def _chance(more: float, more_dof: int, rest: float, dof: int, size: float) -> float:
-    """How likely so much less is left by chance when `more_dof` parameters are added (F test)."""
+    """The probability that `more_dof` added parameters reduce the residual so much by chance (F test)."""
     floor = dof * (1e-12 * size) ** 2
     if more_dof <= 0 or more <= floor:
         return 1.0
@@ -204,13 +206,13 @@ def _chance(more: float, more_dof: int, rest: float, dof: int, size: float) -> f
 
 
 def findings_of(reversal: Reversal) -> Iterator[Finding]:
-    """A reversal that depends on position, and one that is no play."""
+    """A reversal that depends on position, and one whose sign is not that of backlash."""
     unit, scale = scale_of(reversal.line)
     name = reversal.line.component
     if not reversal.constant:
         low, high = reversal.at.min() * scale, reversal.at.max() * scale
         yield Finding("OLP854", f"{name}: B from {low:.2f} to {high:.2f} {unit} along the axis")
-    if reversal.line.quantity == "positioning" and reversal.mean > _SURE * reversal.sigma:
+    if reversal.line.quantity == "positioning" and reversal.mean > _SIGNIFICANT * reversal.sigma:
         value, sigma = reversal.mean * scale, reversal.sigma * scale
         yield Finding("OLP855", f"{name}: B = +{value:.2f} {unit}, standard uncertainty {sigma:.2f}")
 
@@ -236,12 +238,13 @@ def program(
     machine: Machine, axis: str, targets_mm: Sequence[float], *, over_mm: float, feed_mm_min: float,
     runs: int = 5, dwell_s: float = 2.0,
 ) -> str:  # fmt: skip
-    """RS-274 text that goes to each target from below and from above, in axis positions (G53): `over_mm`
-    away, back, stop. Readings are due in each dwell. Raises UsageError where it leaves the travel."""
+    """RS-274 text that goes to each target from below and from above, in axis positions (G53): first
+    `over_mm` away from it, then to it. You read the instrument in each dwell. Raises UsageError
+    where it leaves the travel."""
     if axis not in machine.axes:
         raise UsageError(f"axis {axis!r}; expected X, Y or Z")
     if over_mm <= 0.0 or feed_mm_min <= 0.0 or runs < 1 or dwell_s < 0.0 or not len(targets_mm):
-        raise UsageError("expected targets, a way past them, a feed and a number of runs, all above zero")
+        raise UsageError("expected targets; and a distance past them, a feed and runs above zero")
     low, high = machine.axes[axis].travel_mm
     x = sorted(targets_mm)
     if x[0] - over_mm < low or x[-1] + over_mm > high:

@@ -1,10 +1,10 @@
 """Accuracy and repeatability of positioning after ISO 230-2, of lengths and of angles; straightness of both
 directions about one reference line after ISO 230-1.
 
-At target i, from the n readings of each direction: mean x (up, down), standard uncertainty estimate s with
-n - 1, reversal B_i = x_up - x_down, repeatability R_i = max(2 s_up + 2 s_down + |B_i|, 4 s_up, 4 s_down). Of
-the axis: E spans all means of both directions, M the means of the two, A all x + 2 s to x - 2 s, B is the
-largest |B_i|.
+At target i, the n readings of each direction have the mean x (up, down) and the standard deviation s with
+n - 1. Reversal is B_i = x_up - x_down.
+Repeatability is R_i = max(2 s_up + 2 s_down + |B_i|, 4 s_up, 4 s_down). Of the axis: E spans all means of
+both directions, M the means of the two, A all x + 2 s to x - 2 s, B is the largest |B_i|.
 """
 
 from __future__ import annotations
@@ -26,12 +26,26 @@ Zone = Literal["least-squares", "minimum-zone"]
 
 #: Positions this close to the next one are one target.
 SAME_MM = 0.05
-#: What ISO 230-2 asks for: readings of a target from one side, and targets (a metre, and in all up to 2 m).
-RUNS, PER_METRE, TARGETS, STEP_MM, LONG_MM = 5, 5, 5, 250.0, 2000.0
+#: Readings of a target from each side that ISO 230-2 asks for.
+RUNS = 5
+#: Targets per metre that it asks for, of an axis up to LONG_MM.
+PER_METRE = 5
+#: Targets that it asks for, at least.
+TARGETS = 5
+#: Largest step between targets that it asks for, of an axis above LONG_MM; mm.
+STEP_MM = 250.0
+#: Length above which ISO 230-2 counts an axis as long, mm.
+LONG_MM = 2000.0
 #: Steps between targets that differ by less than this share of their mean are equal.
 _EQUAL = 0.01
-#: A reading so many usual deviations from at least so many repetitions is told, the first of them.
-_FAR, _REPEATED, _KEPT, _MOST = 7.0, 3, 0.95, 10
+#: A reading so many usual deviations from its repetitions is reported.
+_FAR = 7.0
+#: Repetitions that this needs, at least.
+_REPEATED = 3
+#: Share of the deviations from which the usual one is computed, the smallest ones.
+_KEPT = 0.95
+#: Readings reported, at most.
+_MOST = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +80,7 @@ class Side:
 @dataclass(frozen=True, slots=True, eq=False)
 class Statistics:
     """Readings at targets (m,), evaluated; columns in mm or rad. `up` is the approach in +, `down` that in -;
-    of readings from one side the other one is None, and so is all that needs both."""
+    of readings from one side the other one is None, and so are all figures that need both."""
 
     target_mm: Array
     runs: int
@@ -97,29 +111,29 @@ class Statistics:
 
     def figures(self) -> dict[str, float]:
         """A, E, R, M, B and the mean of B_i of the axis, and A, E, R of each direction; mm or rad."""
-        out: dict[str, float] = {}
+        figures: dict[str, float] = {}
         reversal = self.reversal_at
         if reversal is not None:
             means = np.array([side.mean for side in self.sides])
             spread = 2.0 * np.array([side.s for side in self.sides])
-            out["A"] = float((means + spread).max() - (means - spread).min())
-            out["E"] = float(np.ptp(means))
-            out["R"] = float(self.repeatability_at.max())
-            out["M"] = float(np.ptp(self.mean))
-            out["B"] = float(np.abs(reversal).max())
-            out["B_mean"] = float(reversal.mean())
+            figures["A"] = float((means + spread).max() - (means - spread).min())
+            figures["E"] = float(np.ptp(means))
+            figures["R"] = float(self.repeatability_at.max())
+            figures["M"] = float(np.ptp(self.mean))
+            figures["B"] = float(np.abs(reversal).max())
+            figures["B_mean"] = float(reversal.mean())
         for name, side in (("up", self.up), ("down", self.down)):
             if side is not None:
-                out[f"A_{name}"] = side.accuracy
-                out[f"E_{name}"] = side.systematic
-                out[f"R_{name}"] = side.repeatability
-        return out
+                figures[f"A_{name}"] = side.accuracy
+                figures[f"E_{name}"] = side.systematic
+                figures[f"R_{name}"] = side.repeatability
+        return figures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation(Statistics):
-    """A line evaluated. Of a straightness the reference line `slope` (rad) was taken out of everything
-    first, once for both directions."""
+    """A line evaluated. Of a straightness, one reference line with `slope` (rad) was removed from the
+    readings of both directions first."""
 
     line: Line
     slope: float = 0.0
@@ -137,7 +151,7 @@ class Evaluation(Statistics):
         for name, side in (("up", self.up), ("down", self.down)):
             if side is not None:
                 columns |= {f"mean_{name}": side.mean, f"s_{name}": side.s}
-        out: dict[str, Any] = {
+        report: dict[str, Any] = {
             "component": self.component,
             "quantity": self.line.quantity,
             "file": self.line.source,
@@ -150,8 +164,8 @@ class Evaluation(Statistics):
             },
         }
         if self.line.quantity == "straightness":
-            out["slope_urad"] = self.slope / RAD_PER_URAD
-        return out
+            report["slope_urad"] = self.slope / RAD_PER_URAD
+        return report
 
 
 def scale_of(line: Line) -> tuple[str, float]:
@@ -176,8 +190,8 @@ def evaluate(line: Line, zone: Zone = "least-squares") -> Evaluation:
         target, place = targets_of(line.target_mm)
         slope, offset = reference_line(target, np.bincount(place, value) / np.bincount(place), zone)
         value = value - (offset + slope * line.target_mm)
-    found = statistics(line.target_mm, value, line.direction, label, line.source)
-    return Evaluation(found.target_mm, found.runs, found.up, found.down, line, slope)
+    result = statistics(line.target_mm, value, line.direction, label, line.source)
+    return Evaluation(result.target_mm, result.runs, result.up, result.down, line, slope)
 
 
 def statistics(target_mm: Array, value: Array, direction: Index, label: str, source: str = "") -> Statistics:
@@ -270,12 +284,12 @@ def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
     if len(x) > 2 and line.quantity != "straightness":
         step = np.diff(x)
         if np.ptp(step) < _EQUAL * step.mean():
-            yield Finding("OLP852", f"{_named(line)}: all {len(x)} targets stand {step.mean():g} mm apart")
+            yield Finding("OLP852", f"{_named(line)}: all {len(x)} targets are {step.mean():g} mm apart")
 
 
 def _outliers(line: Line) -> Iterator[Finding]:
-    """Readings that their own repetitions speak against: from the median of their target and direction, the
-    level of their run taken out, in units of the usual deviation."""
+    """Readings far from their repetitions: the deviation from the median of their target and direction, with
+    the level of their run removed, in units of the usual deviation."""
     place = targets_of(line.target_mm)[1] * 2 + (line.direction > 0)
     run = np.unique(line.run, return_inverse=True)[1]
     rest = line.value.copy()
@@ -291,7 +305,7 @@ def _outliers(line: Line) -> Iterator[Finding]:
     for k in far[:_MOST]:
         yield Finding(
             "OLP859",
-            f"{_named(line)}: the reading at {line.target_mm[k]:g} mm in run {line.run[k]} stands "
+            f"{_named(line)}: the reading at {line.target_mm[k]:g} mm in run {line.run[k]} is "
             f"{rest[k] * scale:+.1f} {unit} off its repetitions",
             int(line.row[k]),
         )

@@ -1,10 +1,10 @@
 """The paper's test A: the tool point is held on one point while the machine takes several postures, and the
 errors of the tool vectors follow.
 
-With axis positions P, tool vector t in the frame of the head, and R the turn of the head (the identity on a
-machine that cannot turn it), every posture says  P + e(P, R t) + R (t + dt) = s, the point. Unknown are s and
-dt of each tool. Where the head never turns, a shift of s and of all tools together changes nothing: then only
-the differences between tools are determined.
+P are axis positions, t is the tool vector in the frame of the head, and R the turn of the head (the identity
+on a machine that cannot turn it). Every posture gives  P + e(P, R t) + R (t + dt) = s, the point. Unknown are
+s and dt of each tool. Where the head never turns, a shift of s and of all tools together changes nothing:
+then only the differences between tools are determined.
 """
 
 from __future__ import annotations
@@ -21,7 +21,12 @@ from olp.core.machine import Vector
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import Finding
 
-_SHARE, _RANK, _TOO_MUCH = 1e-6, 1e-9, 5.0
+#: Share of an unknown in the null space from which on it is not determined.
+_SHARE = 1e-6
+#: Singular values below this share of the largest count as zero.
+_RANK = 1e-9
+#: A residual of so many times the stated uncertainty is reported.
+_TOO_MUCH = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +68,8 @@ class Postures:
 @dataclass(frozen=True, slots=True, eq=False)
 class PostureFit:
     """`point_mm` (3,), and by tool the error of its vector (3,) with standard uncertainty, in the frame of
-    the head; a coordinate that is not determined is NaN. `before` and `residual` (n, 3) in mm: how far each
-    posture is from the mean point, as the tools were, and with their errors taken out."""
+    the head; a coordinate that is not determined is NaN. `before` and `residual` (n, 3) in mm: the deviation
+    of each posture from the mean point, with the nominal tools, and with their errors removed."""
 
     postures: Postures
     point_mm: Array
@@ -89,9 +94,9 @@ class PostureFit:
         if self.postures.sigma > 0.0 and self.dof > 0 and self.noise > _TOO_MUCH * self.postures.sigma:
             yield Finding(
                 "OLP857",
-                f"postures: {self.noise * UM_PER_MM:.2f} um rms left, "
-                f"{self.postures.sigma * UM_PER_MM:.2f} um stated; geometric "
-                "errors of the machine between the postures are among it",
+                f"postures: residual {self.noise * UM_PER_MM:.2f} um rms, stated uncertainty "
+                f"{self.postures.sigma * UM_PER_MM:.2f} um; the residual includes errors of the machine "
+                "between the postures",
             )
 
     def as_dict(self) -> dict[str, Any]:
@@ -125,7 +130,7 @@ def fit(postures: Postures, error_mm: Array | None = None, reference: str | None
 
     `error_mm` (n, 3) is the error of the machine at each posture where a calibration gives it. `reference`
     names a tool whose vector is right; without one, and where the head never turns, the first tool is taken,
-    as differences are all that there is. Raises ConfigError.
+    as only differences are determined. Raises ConfigError.
     """
     names = postures.tools
     if reference is not None and reference not in names:
@@ -150,8 +155,8 @@ def fit(postures: Postures, error_mm: Array | None = None, reference: str | None
     rank = int((singular > _RANK * singular[0]).sum())
     hidden = np.abs(v[rank:]).max(axis=0, initial=0.0) > _SHARE
     inverse = np.linalg.pinv(system, rcond=_RANK)
-    found = inverse @ right
-    residual = (right - system @ found).reshape(n, 3)
+    estimate = inverse @ right
+    residual = (right - system @ estimate).reshape(n, 3)
     dof = 3 * n - rank
     noise = float(np.sqrt((residual**2).sum() / dof)) if dof > 0 else postures.sigma
     if dof <= 0 and postures.sigma == 0.0:
@@ -161,7 +166,7 @@ def fit(postures: Postures, error_mm: Array | None = None, reference: str | None
             file=postures.source,
         )
     sigma = max(noise, postures.sigma) * np.sqrt(np.diag(inverse @ inverse.T))
-    value, spread = np.where(hidden, np.nan, found), np.where(hidden, np.nan, sigma)
+    value, spread = np.where(hidden, np.nan, estimate), np.where(hidden, np.nan, sigma)
     errors = {name: value[3 + 3 * k : 6 + 3 * k] for k, name in enumerate(fitted)}
     sigmas = {name: spread[3 + 3 * k : 6 + 3 * k] for k, name in enumerate(fitted)}
     return PostureFit(
@@ -185,7 +190,7 @@ def program(
     tools: Sequence[int], point_mm: Vector, *, clearance_mm: float, feed_mm_min: float, runs: int = 3
 ) -> str:
     """RS-274 text that brings each tool, its length active, to one point of the active work offset from above
-    and stops there, so that the axes can be set until the tip sits, and read."""
+    and stops there. You then set the axes until the tip is on the point, and read them."""
     x, y, z = (f"{v:.4f}" for v in point_mm)
     above = f"{point_mm[2] + clearance_mm:.4f}"
     lines = [

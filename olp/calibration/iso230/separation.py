@@ -1,9 +1,9 @@
-"""The parts of a line: what is not cyclic, cyclic errors by period, and reversal; and whether targets can
-see a period at all.
+"""The parts of a line: what is not cyclic, cyclic errors by period, and reversal; and whether a period is
+observable at the targets.
 
 All estimates are linear in the readings: harmonic pairs beside columns that stand for any curve which is
-smooth at the density of the targets. So parts add as the readings do, and a period that the targets cannot
-tell from a smooth curve is refused by the same numbers that would have estimated it.
+smooth at the density of the targets. So parts add as the readings do. A period that cannot be separated from
+a smooth curve at the targets is refused by the same numbers that would have estimated it.
 """
 
 from __future__ import annotations
@@ -24,13 +24,15 @@ from olp.errormodel.calibration import Cyclic
 from olp.findings.catalogue import Finding
 
 #: A pair of harmonic columns must keep this share of its length beside all smooth columns, else its period is
-#: not seen: the amplitude would be uncertain by more than four times what the same readings could give.
+#: not observable: the amplitude would be uncertain by more than four times what the same readings could give.
 SEEN = 0.25
-#: A smooth curve changes on no less than so many steps between targets, and so many periods.
-_STEPS, _PERIODS = 6.0, 3.0
-#: half-waves that stand for a smooth curve, at most
+#: A smooth curve changes on no less than so many steps between targets.
+_STEPS = 6.0
+#: A smooth curve changes on no less than so many periods.
+_PERIODS = 3.0
+#: Half-waves that represent a smooth curve, at most.
 _WAVES = 200
-#: Steps between targets this near to a multiple of half a period are called such in words.
+#: Steps this near to a multiple of half a period are named so in messages, in half periods.
 _NEAR = 0.35
 
 
@@ -59,7 +61,7 @@ class Harmonic:
 class Separation:
     """A line in its parts; (m,) columns over its targets, in mm or rad. `noncyclic` + the harmonics are the
     mean of both directions. `reversal` is None for readings from one side. `refused` names each period that
-    was asked for and is not seen, with the reason."""
+    was asked for and is not observable, with the reason."""
 
     line: Line
     target_mm: Array
@@ -102,7 +104,7 @@ class Separation:
 
 
 def aliased(targets_mm: npt.ArrayLike, period_mm: float) -> str | None:
-    """Why an error of this period cannot be told from a smooth curve at these targets; None where it can.
+    """Why an error of this period cannot be separated from a smooth curve at these targets; None if it can.
 
     `targets_mm` (n,) are axis positions, repeated or not, in any order. Raises ConfigError for a period that
     is not above zero.
@@ -131,9 +133,9 @@ def separate(
     drift: bool = True,
 ) -> Separation:  # fmt: skip
     """The parts of a line with cyclic errors of the given periods (each with its harmonics: the period over
-    1, 2 ... `harmonics`), seen by the line and by fine sweeps of the same component together.
+    1, 2 ... `harmonics`), from the line and fine sweeps of the same component together.
 
-    A period that they do not see is refused, never fitted. `drift` as in `reversal_of`. Raises ConfigError.
+    A period that is not observable is refused, never fitted. `drift` as in `reversal_of`. Raises ConfigError.
     """
     for sweep in sweeps:
         if sweep.component != line.component:
@@ -158,11 +160,11 @@ def separate(
         else:
             refused.append((period, _reason(blocks[0], period)))
     target, mean = parts[0]
-    found = _fit((line, *sweeps), parts, taken)
-    cyclic = sum((h.at(target) for h in found), np.zeros(len(target)))
+    fitted = _fit((line, *sweeps), parts, taken)
+    cyclic = sum((h.at(target) for h in fitted), np.zeros(len(target)))
     both = (line.direction > 0).any() and (line.direction < 0).any()
     reversal = reversal_of(line, drift=drift) if both else None
-    return Separation(line, target, mean, mean - cyclic, found, reversal, tuple(refused))
+    return Separation(line, target, mean, mean - cyclic, fitted, reversal, tuple(refused))
 
 
 def _fit(
@@ -172,7 +174,7 @@ def _fit(
         return ()
     x = np.concatenate([part[0] for part in parts])
     y = np.concatenate([part[1] for part in parts])
-    # lines weigh by their stated uncertainty, never by what is left of them: the estimate stays linear
+    # lines weigh by their stated uncertainty, never by their residuals: so the estimate is linear
     stated = all(line.sigma > 0.0 for line in lines)
     weight = np.concatenate([
         np.full(len(part[0]), np.sqrt(len(line.value) / len(part[0])) / (line.sigma if stated else 1.0))
@@ -186,7 +188,7 @@ def _fit(
     dof = len(y) - round(float(np.einsum("ij,ji->", design, inverse)))
     variance = float(rest @ rest) / dof if dof > 0 else 0.0
     covariance = inverse @ inverse.T * max(variance, 1.0 if stated else 0.0)
-    out = []
+    harmonics = []
     for k, period in enumerate(periods):
         s, c = estimate[2 * k], estimate[2 * k + 1]
         part = covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
@@ -197,8 +199,8 @@ def _fit(
         turn = float(np.sqrt(across @ part @ across))
         phase = min(turn / amplitude, np.pi) if amplitude > 0.0 else np.pi
         name = lines[0].component
-        out.append(Harmonic(name, period, amplitude, float(np.arctan2(c, s)), sigma, float(phase)))
-    return tuple(out)
+        harmonics.append(Harmonic(name, period, amplitude, float(np.arctan2(c, s)), sigma, float(phase)))
+    return tuple(harmonics)
 
 
 def _means(line: Line) -> tuple[Array, Array]:
@@ -242,12 +244,12 @@ def _smooth_columns(x: Array, period: float) -> Array:
 
 
 def _block_diagonal(parts: Sequence[Array]) -> Array:
-    out = np.zeros((sum(len(p) for p in parts), sum(p.shape[1] for p in parts)))
+    matrix = np.zeros((sum(len(p) for p in parts), sum(p.shape[1] for p in parts)))
     row = column = 0
     for part in parts:
-        out[row : row + len(part), column : column + part.shape[1]] = part
+        matrix[row : row + len(part), column : column + part.shape[1]] = part
         row, column = row + len(part), column + part.shape[1]
-    return out
+    return matrix
 
 
 def _projected(columns: Array, values: Array) -> Array:
@@ -258,7 +260,7 @@ def _reason(x: Array, period: float) -> str:
     """In words, what these targets do to an error of this period."""
     remedy = "move each target by a random part of the period, or add a fine sweep over two periods"
     if len(x) < 5:
-        return f"{len(x)} targets cannot tell it from a curve; {remedy}"
+        return f"it cannot be separated from a curve at {len(x)} targets; {remedy}"
     step = np.diff(x)
     turns = float(np.median(step)) / period
     halves = round(2.0 * turns)
@@ -269,4 +271,4 @@ def _reason(x: Array, period: float) -> str:
             f"the targets step by {np.median(step):g} mm, {'' if exact else 'nearly '}{times} times the "
             f"period, so all are at {'one phase' if halves % 2 == 0 else 'two phases'} of it; {remedy}"
         )
-    return f"at these targets it looks like a smooth curve or like nothing; {remedy}"
+    return f"at these targets it looks like a smooth curve or like zero; {remedy}"

@@ -1,8 +1,8 @@
 """Squareness from straightness lines that share a square, from a precision square with an indicator, from a
 square turned round, and from the sides and diagonals of a printed or drilled frame.
 
-Each gives a reading in the one sense of this package, with the place and the lever that it holds for: away
-from there the angular errors of the axes between add to it.
+Each gives a reading in the sign convention of this package, with the position and tool vector that it holds
+for. Elsewhere the angular errors of the axes between add to it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD
 
-#: Two lines of a pair may stand this far apart in what is to be the same for both.
+#: Positions and tool vectors of the two lines of a pair are equal within this.
 SAME_PLACE_MM = 1.0
 
 
@@ -36,11 +36,11 @@ class Slope:
 
 def slope_of(line: Line) -> Slope:
     """The slope of a straightness line. Its uncertainty is that of one reading (from repeated runs, or
-    `line.sigma` where that is more; from how far targets stand off the line where nothing was repeated).
+    `line.sigma` where that is more; from the deviations of targets from the line where nothing was repeated).
     Raises ConfigError."""
     if line.quantity != "straightness":
         raise ConfigError(
-            f"line {line.component} is no straightness; expected one such as EYX", file=line.source
+            f"line {line.component} is not a straightness; expected one such as EYX", file=line.source
         )
     x = line.target_mm - line.target_mm.mean()
     spread = float(x @ x)
@@ -79,7 +79,7 @@ def from_straightness_pair(first: Line, second: Line, square: Square) -> Squaren
     """Squareness from two straightness lines, in any order, read against the legs of one square.
 
     The lean of the later axis toward + of the earlier one is the sum of both slopes less the error of the
-    square (the paper's figures 8 and 9). Both lines must stand at the same place of the third axis, with one
+    square (the paper's figures 8 and 9). Both lines must be at the same position of the third axis, with one
     tool vector. Raises ConfigError.
     """
     component = component_of(first, second)
@@ -90,21 +90,21 @@ def from_straightness_pair(first: Line, second: Line, square: Square) -> Squaren
     for line in (a, b):
         if line.reference == "table":
             raise ConfigError(
-                f"line {line.component} was read at a reflector that stayed on the table, so the angles of "
-                f"{AXES[line.axis]} lean it; give both lines to olp calibrate fit, which takes that out",
+                f"line {line.component} was read at a reflector fixed on the table, so angles of "
+                f"{AXES[line.axis]} tilt it; use olp calibrate fit for both lines, which models that",
                 file=line.source,
             )
     apart = abs(a.line_mm[third] - b.line_mm[third])
     lever_arms = max(abs(p - q) for p, q in zip(a.tool_mm, b.tool_mm, strict=True))
     if max(apart, lever_arms) > SAME_PLACE_MM:
         what = (
-            f"stand {apart:g} mm apart in {AXES[third]}"
+            f"are {apart:g} mm apart in {AXES[third]}"
             if apart > SAME_PLACE_MM
             else f"have tool vectors {lever_arms:g} mm apart"
         )
         raise ConfigError(
-            f"lines {a.component} and {b.component} {what}; angular errors between would be counted as "
-            "squareness; give both lines to olp calibrate fit, which carries their levers",
+            f"lines {a.component} and {b.component} {what}, so angular errors would count as "
+            "squareness; use olp calibrate fit for both lines, which models their lever arms",
             file=b.source,
         )
     one, other = slope_of(a), slope_of(b)
@@ -123,7 +123,7 @@ def from_straightness_pair(first: Line, second: Line, square: Square) -> Squaren
 
 
 def indicator_sense(pointing: str, carried_by: str) -> str:
-    """The sense (a word of the file formats) of an indicator's readings of the straightness along the
+    """The value of the key `sense` in a file with an indicator's readings of the straightness along the
     direction in which it points, "+X" to "-Z". A reading grows as the plunger is pushed in.
 
     Carried by the tool, the indicator pushes against the square when the tool is too far in the direction
@@ -141,8 +141,8 @@ def indicator_sense(pointing: str, carried_by: str) -> str:
 def from_turned_square(
     normal: SquarenessReading, turned: SquarenessReading
 ) -> tuple[SquarenessReading, Square]:
-    """Squareness free of the error of the square, and that error, from two readings made with it: the second
-    after it was turned by 180 degrees about its later leg, so that its earlier leg points the other way.
+    """Squareness without the error of the square, and that error, from two readings made with it. For the
+    second one the square is turned by 180 degrees about its later leg, which reverses its earlier leg.
 
     Both readings must take the square as perfect (`Square.error_rad` 0). Raises ConfigError.
     """
@@ -154,7 +154,7 @@ def from_turned_square(
     reading = SquarenessReading(
         normal.component, mean, normal.line_mm, normal.span_mm, normal.tool_mm, sigma, normal.source
     )
-    # a square of 90 degrees + e shows its error e too much lean, turned as much too little
+    # a square of 90 degrees + e shows a lean that is too large by e; turned, too small by e
     return reading, Square("turned", LEAN[normal.component] * half, sigma)
 
 
@@ -207,7 +207,9 @@ def readings_toml(readings: Sequence[SquarenessReading]) -> str:
     parts = []
     for r in readings:
         earlier, later = (AXES[i] for i in AXES_OF[r.component])
-        place = ", ".join(f"{axis} = {at!r}" for axis, at in zip(AXES, map(float, r.line_mm), strict=True))
+        place = ", ".join(
+            f"{axis} = {value!r}" for axis, value in zip(AXES, map(float, r.line_mm), strict=True)
+        )
         spans = ", ".join(
             f"{axis} = [{float(low)!r}, {float(high)!r}]"
             for axis, (low, high) in zip((earlier, later), r.span_mm, strict=True)

@@ -175,8 +175,8 @@ class Result(Generic[S]):
 
 
 class Scattered(Observation):
-    """Readings at positions all over the volume: `axis_mm` (n, 3) axis positions, `tool_mm` (n, 3) the vectors
-    to the reflector. The search for a smooth field beside the curves uses these."""
+    """Readings at positions all over the volume: `axis_mm` (n, 3) axis positions, `tool_mm` (n, 3) the
+    vectors to the reflector. The search for a smooth field beside the curves uses these."""
 
     __slots__ = ()
     axis_mm: Array

@@ -44,7 +44,9 @@ class Diagonal(Observation):
     def __post_init__(self) -> None:
         length = self.length_mm
         if not np.isfinite(length) or length <= 0.0:
-            raise ConfigError("diagonal: start_mm and end_mm are equal; expected two positions", file=self.source)
+            raise ConfigError(
+                "diagonal: start_mm and end_mm are equal; expected two positions", file=self.source
+            )
         if np.count_nonzero(np.abs(self.unit) > 1e-9) < 2:
             raise ConfigError(
                 f"diagonal: only {self.name.strip('0')} moves; expected a diagonal in two or three axes",

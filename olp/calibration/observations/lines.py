@@ -54,8 +54,9 @@ class Line(Observation):
     the reflector was fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
     straightness. Straightness lines that name the same `square` were read against its two legs.
     `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
-    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then
-    follows from the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it. Raises ConfigError.
+    all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then follows from
+    the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it. Raises
+    ConfigError.
     """
 
     component: str

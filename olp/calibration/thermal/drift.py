@@ -4,11 +4,11 @@ A reading of component c at position q and time t is modelled as
 
     sum over sensors i and shapes k of a_cik shape_k(q) (theta_i(t) - reference_i) + offset of its channel
 
-with theta_i the lagged temperature of sensor i. It is linear but for the lags: for given lags the
-coefficients follow by least squares (variable projection, G. Golub and V. Pereyra 1973), and the lags are
-found one after the other by the residual that is left. The offset of each channel in each log takes up the
-zero of its instrument. Held out of a first fit, the last log (or the last quarter of the only one) tells
-what the model is worth.
+with theta_i the lagged temperature of sensor i. It is linear except for the lags. For given lags the
+coefficients follow by least squares (variable projection, G. Golub and V. Pereyra 1973); the lags are found
+one after the other from the smallest residual. The offset of each channel in each log absorbs the zero of its
+instrument. The last log (or the last quarter of the only one) is held out of a first fit and shows how good
+the model is.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from olp.errormodel.distortion import SHAPES
 from olp.errormodel.sources.structure import Distortion, Sensor, Structure
 from olp.findings.catalogue import Finding
 
-#: Sensors whose histories are so nearly combinations of one another tell nothing apart.
+#: Above this condition number the histories of sensors are too similar to separate their effects.
 MOST_CONDITION = 1e3
 #: A share of the axis that positions should reach over.
 _COVERED = 0.7
-#: More than this share of the drift left where it was not fitted is poor.
+#: Where the model was not fitted, a residual above this share of the drift is poor.
 _POOR = 0.3
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentFit:
     """How well one component is described, rms in mm or rad: of the drift (each channel about its mean), of
-    what the model leaves, and both in what was held out (NaN where nothing of it was). `covered` is the
-    share of the span that its positions reach over, `shapes` the shapes that they can tell."""
+    the residual, and both in the held-out readings (NaN where there are none). `covered` is the share of the
+    span that its positions reach over, `shapes` the shapes that they determine."""
 
     component: str
     shapes: tuple[str, ...]
@@ -67,8 +67,10 @@ class ThermalFit:
     def removed(self) -> float:
         """Share of the drift that the model removes where it was not fitted, over all components, each scaled
         by its own drift; NaN where nothing was held out."""
-        left = [c.held_out_rms / c.held_out_drift_rms for c in self.components if c.held_out_drift_rms > 0.0]
-        return 1.0 - float(np.sqrt(np.mean(np.square(left)))) if left else float("nan")
+        shares = [
+            c.held_out_rms / c.held_out_drift_rms for c in self.components if c.held_out_drift_rms > 0.0
+        ]
+        return 1.0 - float(np.sqrt(np.mean(np.square(shares)))) if shares else float("nan")
 
 
 def identify(
@@ -81,7 +83,7 @@ def identify(
     """The structure of logs with readings, over `box_mm` (3, 2). `reference_degC` is the temperature at
     which the machine was calibrated, of all sensors or by name; `sensors` chooses some of them.
 
-    Raises ConfigError for logs that do not fit together and CannotCompute where they do not tell enough.
+    Raises ConfigError for logs that do not fit together and CannotCompute where they do not determine it.
     """
     names = _names(logs, sensors)
     logs = [thinned(log) for log in logs]
@@ -112,7 +114,7 @@ def _names(logs: Sequence[DriftLog], chosen: Sequence[str]) -> list[str]:
             )
     unknown = [name for name in chosen if name not in names]
     if unknown:
-        raise ConfigError(f"{unknown[0]} is no sensor of the logs; expected some of {', '.join(names)}")
+        raise ConfigError(f"{unknown[0]} is not a sensor of the logs; expected some of {', '.join(names)}")
     if not any(log.readings for log in logs):
         raise ConfigError("no log holds readings of drift; expected columns such as EXX@500_um")
     return list(chosen) or names
@@ -126,9 +128,8 @@ def _result(
     condition = problem.condition(rises)
     if condition > MOST_CONDITION:
         raise CannotCompute(
-            f"the sensors {', '.join(problem.names)} change together (condition {condition:.0f}), so "
-            f"what each of "
-            "them does cannot be told apart; log a day on which they differ, or choose some with --sensor"
+            f"the sensors {', '.join(problem.names)} change together (condition {condition:.0f}), so their "
+            "effects cannot be separated; log a day on which they differ, or choose some with --sensor"
         )
     used = sorted({c.log for c in problem.channels})
     every = np.concatenate([rises[i] for i in used])
@@ -155,53 +156,55 @@ def _result(
             raise CannotCompute(
                 f"{component} has {len(values)} readings for {columns.shape[1]} coefficients; log for longer"
             )
-        found = problem.solve(columns, values)
-        left = values - columns @ found
+        coefficients = problem.solve(columns, values)
+        residual = values - columns @ coefficients
         size = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300)
         inverse = np.linalg.pinv((columns / size).T @ (columns / size))
-        spread = np.sqrt(np.diag(inverse) * float(left @ left) / freedom) / size
+        spread = np.sqrt(np.diag(inverse) * float(residual @ residual) / freedom) / size
         log = problem.logs[used[0]]
         for i, name in enumerate(problem.names):
             a = [0.0, 0.0, 0.0]
             s = [0.0, 0.0, 0.0]
             for k in range(count):
-                a[k], s[k] = (float(v[k * len(problem.names) + i]) for v in (found, spread))
+                a[k], s[k] = (float(v[k * len(problem.names) + i]) for v in (coefficients, spread))
             distortions.append(
                 Distortion(
                     component, name, problem.span(component), a[0], a[1], a[2], log.line_mm, log.tool_mm
                 )
             )
             sigma.append((s[0], s[1], s[2]))
-        drift, unobservable = held.get(component, (float("nan"), float("nan")))
+        drift, held_out_rms = held.get(component, (float("nan"), float("nan")))
         places = sorted({c.position_mm for c in problem.channels if c.component == component})
         low, high = problem.span(component)
         fits.append(
             ComponentFit(
-                component, SHAPES[:count], len(places), len(values), rms(values), rms(left), drift,
-                unobservable, (places[-1] - places[0]) / (high - low),
+                component, SHAPES[:count], len(places), len(values), rms(values), rms(residual), drift,
+                held_out_rms, (places[-1] - places[0]) / (high - low),
             )
         )  # fmt: skip
     return ThermalFit(Structure(sensors, tuple(distortions)), condition, tuple(fits), tuple(sigma), what)
 
 
 def findings(fit: ThermalFit) -> tuple[Finding, ...]:
-    """What a person should know before using the fit."""
-    out = []
+    """The findings about a fit."""
+    results = []
     for c in fit.components:
         if len(c.shapes) < len(SHAPES):
             missing = " and ".join(SHAPES[len(c.shapes) :])
             what = f"{c.component} was read at {c.positions} positions: its {missing} is not known"
-            out.append(Finding("OLP881", what))
+            results.append(Finding("OLP881", what))
         elif c.covered < _COVERED:
-            what = f"{c.component} was read over {c.covered:.0%} of its axis; beyond, its shape is continued"
-            out.append(Finding("OLP881", what))
+            what = (
+                f"{c.component} was read over {c.covered:.0%} of its axis; beyond, its shape is extrapolated"
+            )
+            results.append(Finding("OLP881", what))
         if c.held_out_drift_rms > 0.0 and c.held_out_rms > _POOR * c.held_out_drift_rms:
             share = c.held_out_rms / c.held_out_drift_rms
-            what = f"{c.component}: {share:.0%} of the drift is left where the model was not fitted"
-            out.append(Finding("OLP883", what))
+            what = f"{c.component}: the residual is {share:.0%} of the drift where the model was not fitted"
+            results.append(Finding("OLP883", what))
     known = {c.component for c in fit.components}
     for axis in AXES:
         bent = sorted(n for n in known if n[2] == axis and n[1] in AXES and n[1] != axis)
         if bent and not any(n[2] == axis and n[1] in "ABC" for n in known):
-            out.append(Finding("OLP882", f"{', '.join(bent)} was read, and no angle of {axis}"))
-    return tuple(out)
+            results.append(Finding("OLP882", f"{', '.join(bent)} was read, and no angle of {axis}"))
+    return tuple(results)

@@ -18,13 +18,15 @@ Index = npt.NDArray[np.intp]
 
 #: Lags that are tried first, as shares of the length of the longest log; 0 besides.
 _LAGS = np.geomspace(2e-3, 0.5, 14)
-#: A part may be ahead of its sensor by so much of the log: a sensor that is glued on badly.
+#: A part may be ahead of its sensor by this share of the log, as with a sensor that is glued on badly.
 _LONGEST_LEAD = 0.05
+#: Rounds over all sensors, at most.
 _ROUNDS = 4
-#: Longer logs are thinned: half a minute on a day.
+#: Longer logs are thinned to so many rows: half a minute on a day.
 _MOST_ROWS = 3000
+#: Steps of the golden section.
 _REFINED = 12
-#: What is held out of the only log.
+#: Share of the only log that is held out.
 _HELD_OUT = 0.25
 
 
@@ -77,6 +79,8 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
+    """The channels of logs over `box_mm` (3, 2), with the sensors `names` and their reference in degC."""
+
     logs: tuple[DriftLog, ...]
     names: tuple[str, ...]
     reference: Mapping[str, float]
@@ -98,8 +102,7 @@ class Problem:
         if len(lines) > 1:
             raise ConfigError(
                 "the logs were measured on different lines or with different tools; expected the same "
-                "line_mm and "
-                "tool_mm in all, or a fit for each"
+                "line_mm and tool_mm in all, or a fit for each"
             )
         if not channels:
             raise CannotCompute("no channel of drift has two readings or more")
@@ -111,7 +114,8 @@ class Problem:
         return max(c.log for c in self.channels)
 
     def parts(self) -> tuple[list[Channel], list[Channel] | None]:
-        """What a first fit may see, and what not: the last log, or the last quarter of the only one."""
+        """The channels of a first fit, and those held out: of the last log, or of the last quarter of the
+        only one."""
         used = sorted({c.log for c in self.channels})
         if len(used) > 1:
             return (
@@ -124,9 +128,9 @@ class Problem:
         after: list[Channel] = []
         for c in self.channels:
             early = time[c.row] <= cut
-            for pick, out in ((early, before), (~early, after)):
+            for pick, channels in ((early, before), (~early, after)):
                 if pick.sum() >= 2:
-                    out.append(Channel(c.log, c.component, c.position_mm, c.row[pick], c.value[pick]))
+                    channels.append(Channel(c.log, c.component, c.position_mm, c.row[pick], c.value[pick]))
         return before, after or None
 
     def held_out_name(self) -> str:
@@ -151,11 +155,11 @@ class Problem:
 
     def span(self, component: str) -> tuple[float, float]:
         low, high = self.box_mm[AXES.index(component[2])]
-        at = [c.position_mm for c in self.channels if c.component == component]
-        return min(float(low), *at), max(float(high), *at)
+        positions = [c.position_mm for c in self.channels if c.component == component]
+        return min(float(low), *positions), max(float(high), *positions)
 
     def count(self, component: str) -> int:
-        """How many shapes the positions of a component can tell apart."""
+        """How many shapes the positions of a component determine."""
         return min(len({c.position_mm for c in self.channels if c.component == component}), len(SHAPES))
 
     def design(
@@ -238,21 +242,21 @@ class Problem:
         k = int(np.argmin(costs))
         return inner[k], costs[k]
 
-    # -- what came of it ---------------------------------------------------------------------------
+    # -- quality -----------------------------------------------------------------------------------
 
     def judge(
         self, lags: Mapping[str, float], training: Sequence[Channel], held_out: Sequence[Channel]
     ) -> dict[str, tuple[float, float]]:
-        """rms of the drift and of what is left of it, of each component where it was not fitted."""
+        """rms of the drift and of the residual of each component, where it was not fitted."""
         rises = self.rises(lags)
-        out = {}
+        figures = {}
         for component in self.components:
             columns, values = self.design(component, training, rises)
-            unobservable, drift = self.design(component, held_out, rises)
+            held_out_columns, drift = self.design(component, held_out, rises)
             if len(values) > columns.shape[1] and len(drift):
-                left = drift - unobservable @ self.solve(columns, values)
-                out[component] = (rms(drift), rms(left))
-        return out
+                residual = drift - held_out_columns @ self.solve(columns, values)
+                figures[component] = (rms(drift), rms(residual))
+        return figures
 
     def condition(self, rises: Sequence[Array]) -> float:
         """Of the sensors' histories, each about its mean in each log and scaled to the same size."""
@@ -264,9 +268,8 @@ class Problem:
         ]
         if still:
             raise CannotCompute(
-                f"the temperature of sensor {still[0]} does not change in the logs, so nothing can be "
-                f"told of it; "
-                "log it while it changes, or leave it out with --sensor"
+                f"the temperature of sensor {still[0]} does not change in the logs, so its effect is not "
+                "observable; log it while it changes, or leave it out with --sensor"
             )
         return float(np.linalg.cond(history / size))
 

@@ -43,7 +43,8 @@ class NamesFile(Protocol):
 
 class CurveColumns(Protocol):
     """A CSV file of component errors along one axis: (n,) positions in mm, and (n,) errors and standard
-    uncertainties by ISO 230-1 name in mm or rad; `forward` and `backward` where it has a direction column."""
+    uncertainties by ISO 230-1 name in mm or rad. `forward` and `backward` are None without a direction
+    column."""
 
     @property
     def axis(self) -> str: ...

@@ -1,8 +1,8 @@
 """Deflection and slope of a beam under a load that moves along it, as compliance tables.
 
-A load P at a from one end and b from the other of a beam of length L = a + b, downward deflection and slope
-of the elastic line at the load (Euler-Bernoulli; solved from E I w'''' = 0 with the conditions of each
-support):
+A beam of length L = a + b has a load P at distance a from one end and b from the other. Downward deflection
+and slope of the elastic line at the load (Euler-Bernoulli, from E I w'''' = 0 with the conditions of each
+support) are:
 
     simple       P a^2 b^2 / (3 E I L)        P a b (b - a) / (3 E I L)
     fixed        P a^3 b^3 / (3 E I L^3)      P a^2 b^2 (b - a) / (2 E I L^3)
@@ -38,7 +38,7 @@ from olp.errormodel.sources.compliance import OnLine
 
 #: Standard gravity (CGPM 1901), in N per kg.
 GRAVITY_N_KG = 9.80665
-#: Nodes of the table of a beam: a cubic misses less than 1e-4 of the deflection between them.
+#: Nodes of the table of a beam: between them a cubic is wrong by less than 1e-4 of the deflection.
 _NODES = 65
 
 
@@ -50,9 +50,9 @@ def tube_mm4(width_mm: float, height_mm: float, wall_mm: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Beam:
-    """A beam along `axis`, loaded where the axis stands; `span_mm` holds the axis positions over its two ends
-    (a cantilever is clamped at the first). `line_mm` and `tool_mm` say where the neutral line lies: there
-    the tip moves by the deflection alone. `direction` is where the weight pulls. Raises ConfigError."""
+    """A beam along `axis`, loaded at the position of the axis. `span_mm` holds the axis positions over its
+    two ends (a cantilever is clamped at the first). `line_mm` and `tool_mm` say where the neutral line lies:
+    there the tip moves by the deflection alone. `direction` is that of the weight. Raises ConfigError."""
 
     axis: str
     support: Literal["simple", "fixed", "cantilever"]
@@ -69,7 +69,9 @@ class Beam:
                 f"beam of axis {self.axis} with weight along {self.direction}; expected a direction across it"
             )
         if self.span_mm[0] == self.span_mm[1] or min(self.youngs_modulus_GPa, self.second_moment_mm4) <= 0.0:
-            raise ConfigError(f"beam of axis {self.axis}: expected a span, modulus and section above 0")
+            raise ConfigError(
+                f"beam of axis {self.axis}: expected two different ends, and modulus and section above 0"
+            )
 
     def bends(self, q: Array) -> tuple[Array, Array]:
         """Deflection in mm and slope in rad, both per kg and along `direction`, at axis positions q (n,)."""
@@ -95,14 +97,13 @@ class Beam:
         if low >= least - COVER_MM and high <= most + COVER_MM:
             return []
         return [
-            f"beam of axis {self.axis} spans {least:g} to {most:g} mm; expected all of the box, {low:g} "
-            f"to {high:g} mm, "
-            "between its ends"
+            f"beam of axis {self.axis} spans {least:g} to {most:g} mm; expected all of the box, {low:g} to "
+            f"{high:g} mm, between its ends"
         ]
 
     def table(self, box_mm: Array, chain: str) -> ComponentTable:
-        """The compliance that it makes. On an axis that carries the workpiece the beam takes the workpiece
-        down, so the tool up; its slope is seen along a coordinate that runs against the table."""
+        """The compliance of the beam. On an axis that carries the workpiece the beam lowers the workpiece,
+        so relative to it the tool rises. The slope is then along a coordinate opposite to the table's."""
         j, i = AXES.index(self.axis), AXES.index(self.direction[1])
         q = np.linspace(float(box_mm[j, 0]), float(box_mm[j, 1]), _NODES)
         deflection, slope = self.bends(q)
@@ -129,8 +130,7 @@ class BeamTable(OnLine):
     axis: Literal["X", "Y", "Z"] = Field(description="the axis that moves the load along the beam")
     support: Literal["simple", "fixed", "cantilever"] = Field(
         description='"simple" (rests on both ends), "fixed" (clamped at both ends), or "cantilever" '
-        "(clamped at "
-        "the first end of span_mm; a ram that comes out farther)"
+        "(clamped at the first end of span_mm; a ram that comes out farther)"
     )
     span_mm: Annotated[tuple[float, float], Field(strict=False)] = Field(
         description="the axis positions at which the load stands over the two supports, [first, second] in mm"
@@ -145,7 +145,7 @@ class BeamTable(OnLine):
         description="a rectangular tube instead: [width, height in the direction of bending, wall] in mm",
     )
     direction: Literal["+X", "-X", "+Y", "-Y", "+Z", "-Z"] = Field(
-        default="-Z", description='where the weight pulls, "-Z" if left out'
+        default="-Z", description='the direction of the weight, "-Z" if left out'
     )
 
     @field_validator("span_mm")

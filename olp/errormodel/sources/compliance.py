@@ -48,7 +48,7 @@ class ComplianceTable(OnLine):
     )
     reference: Literal["functional-point", "table"] = Field(
         default="functional-point",
-        description='"functional-point" (measured at the tip on its line) or "table" (the reflector stayed '
+        description='"functional-point" (measured at the tip on its line) or "table" (the reflector was '
         "fixed on a moving table)",
     )
     interpolation: Literal["linear", "cubic"] = Field(default="cubic", description='"linear" or "cubic"')

@@ -39,8 +39,8 @@ from olp.errormodel.sources.base import (
 
 Reference = Literal["functional-point", "table"]
 Interpolation = Literal["linear", "pchip"]
-#: A curve of which only standard uncertainties are known is independent from one of so many equal parts of it
-#: to the next: the cautious side, as then nothing of it cancels in a touch-off elsewhere.
+#: Where only standard uncertainties are known, so many equal parts of a curve are taken as independent of
+#: each other. This is cautious, as then a touch-off elsewhere cancels nothing of it.
 CELLS = 16
 
 
@@ -52,7 +52,7 @@ class Curve:
     `backward` with the same names, each (n,) in mm or rad. `line_mm` says where the other axes stood
     (the entry of the own axis is ignored), None means the datum; `tool_mm` is the tool vector then.
     A value is what was measured at the functional point on that line; with `reference` "table" the
-    reflector stayed fixed on a moving table. Raises ConfigError.
+    reflector was fixed on a moving table. Raises ConfigError.
     """
 
     axis: str
@@ -127,7 +127,7 @@ class CurveTable(Table):
     )
     reference: Literal["functional-point", "table"] = Field(
         default="functional-point",
-        description='"functional-point" (measured at the tip on its line) or "table" (the reflector stayed '
+        description='"functional-point" (measured at the tip on its line) or "table" (the reflector was '
         "fixed on a moving table)",
     )
     interpolation: Literal["linear", "pchip"] = Field(default="pchip", description='"linear" or "pchip"')
@@ -158,7 +158,7 @@ class Mean(Numbers):
         return _cells(entry) + 1
 
     def part_weights(self, entry: Entry, q: Array) -> Iterator[Slot]:
-        """As stated at every position, wherever in a cell that is."""
+        """As stated at every position, wherever in a cell it lies."""
         x, cells = entry.position_mm, _cells(entry)
         sigma = np.interp(q, x, entry.rest)
         cells_passed = np.clip((q - x[0]) / (x[-1] - x[0]), 0.0, 1.0) * cells
@@ -277,7 +277,7 @@ class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
 
 
 def _size(curves: tuple[Curve, ...], name: str, unit: str, scale: float) -> dict[str, Any]:
-    """Largest absolute value and range; the points hold both, interpolation stays between them."""
+    """Largest absolute value and range, from the points: interpolation does not leave their range."""
     values = [
         value for curve in curves if name in curve.names for value in (curve.mean(name) * scale).tolist()
     ] or [0.0]

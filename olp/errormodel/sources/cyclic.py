@@ -1,7 +1,7 @@
 """Errors that repeat with the pitch of a screw or the period of a scale.
 
-They act on components, so an angular one has its levers too (`olp.errormodel.components`). They are evaluated
-directly: no table of affordable size resolves a period of some hundredths of a millimetre.
+They act on components, so an angular one has its lever arms too (`olp.errormodel.components`). They are
+evaluated directly: no table of affordable size resolves a period of some hundredths of a millimetre.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, floats, vector
 
-#: ISO 1: geometrical product specifications hold at this temperature.
+#: degC; geometrical product specifications hold at this temperature (ISO 1).
 REFERENCE_DEGC = 20.0
 
 
@@ -106,8 +106,7 @@ class ThermalTable(Table):
     structure: Text | None = Field(
         default=None,
         description="the path of an olp-thermal-1 file, which `olp calibrate thermal` writes: how the "
-        "structure "
-        "distorts with the temperatures of sensors",
+        "structure distorts with the temperatures of sensors",
     )
     fixed_at_mm: Triple = Field(
         default=(0.0, 0.0, 0.0), description="the axis positions where the scales are fixed, [X, Y, Z] in mm"

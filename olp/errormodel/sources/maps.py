@@ -142,7 +142,7 @@ class MapTable(Table):
     )
     kind: Literal["residual", "total"] = Field(
         description='"residual" (adds to the curves) or "total" (all that was measured; no curves, '
-        'squareness or cyclic errors beside it)'
+        "squareness or cyclic errors beside it)"
     )
     tool_mm: Triple = Field(
         default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"

@@ -17,6 +17,7 @@ from olp.errormodel.sources.repeatability import Repeatability
 from olp.errormodel.sources.squareness import Squareness
 from olp.errormodel.sources.structure import ThermalStructure
 
+#: Every error source; nothing else lists them.
 SOURCES: tuple[ErrorSource[Any, Any], ...] = (
     Curves(),
     Squareness(),

@@ -1,5 +1,5 @@
-"""Repeatability: the random part of each axis. No correction removes it, so it has no model; whoever states
-an uncertainty counts it in (`olp.uncertainty`)."""
+"""Repeatability: the random part of each axis. No correction removes it, so it has no model. A stated
+uncertainty includes it (`olp.uncertainty`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class RepeatabilityTable(Table):
 
 
 class Repeatability(ErrorSource[RepeatabilityTable | None, Vector | None]):
-    """The table [repeatability]; values are standard deviations in mm at one place."""
+    """The table [repeatability]; values are standard deviations in mm at one position."""
 
     key, field = "repeatability", "repeatability_mm"
     correctable = False

@@ -25,7 +25,7 @@ _SHEAR = {"C0Y": (0, -1.0), "B0Z": (0, 1.0), "A0Z": (1, -1.0)}
 
 
 def shears(angles: Angles, skip: frozenset[str]) -> dict[str, Vector]:
-    """By axis, what each mm from the datum adds to the error."""
+    """By axis, the error that each mm from the datum adds."""
     square = {name: 0.0 if name in skip else angle for name, angle in angles.items()}
     c0y, b0z, a0z = (square.get(name, 0.0) for name in ("C0Y", "B0Z", "A0Z"))
     return {"X": ZERO, "Y": (0.0 - c0y, 0.0, 0.0), "Z": (b0z, 0.0 - a0z, 0.0)}

@@ -43,9 +43,9 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Distortion:
-    """What one K of one sensor's part adds to a component over `span_mm` of its axis, in mm or rad per K:
-    offset + growth * (q - middle) + bow * (1 - ((q - middle) / half)^2), the growth per mm.
+    """What one K of one sensor's part adds to a component over `span_mm` of its axis, in mm or rad per K.
 
+    It is offset + growth * (q - middle) + bow * (1 - ((q - middle) / half)^2), the growth per mm.
     `line_mm` and `tool_mm` as of a curve: where the other axes stood and the tool vector while measuring."""
 
     component: str
@@ -141,8 +141,8 @@ class Structure:
             name, value = next(iter(wrong.items()))
             low, high = ranges[name]
             raise ConfigError(
-                f"sensor {name}: the structure is at {value:.2f} degC; expected a temperature in the identified "
-                f"range, {low:.2f} to {high:.2f} degC; log the drift there too, or take the end of the range "
+                f"sensor {name}: the structure is at {value:.2f} degC; expected {low:.2f} to {high:.2f} "
+                "degC, the range that was identified; log the drift there too, or take the end of the range "
                 "with --outside-box hold"
             )
         return {

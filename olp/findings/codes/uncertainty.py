@@ -33,10 +33,10 @@ RULES = (
         "OLP433",
         "part tolerance not assured",
         Severity.WARNING,
-        "The part tolerance of --within-um is small against the uncertainty of the calibration. All "
+        "The part tolerance of --part-tolerance-um is small against the uncertainty of the calibration. All "
         "waypoints of the corrected program are within it with a probability below 95 %.",
         "Widen the tolerance, or lower the uncertainty. The report lists its contributions.",
-        "--within-um 5 with an expanded uncertainty of 8 um.",
+        "--part-tolerance-um 5 with an expanded uncertainty of 8 um.",
     ),
     _rule(
         "OLP434",

@@ -45,8 +45,8 @@ _PLANE_OF = np.array([2, 1, 0])
 @dataclass(frozen=True, slots=True)
 class ArcForm:
     """One arc as read, in the unit of the program: `angle_rad` where it is stated. `begins` is the direction
-    in which CATIA begins, and `second` whether the arc ends where it meets the line again. Not `confirmed`: no
-    known program of that form shows that it turns right-handed about its normal."""
+    in which CATIA begins, and `second` whether the arc ends where it meets the line again. Not `confirmed`:
+    no known program of that form shows that it turns right-handed about its normal."""
 
     text: ArcText
     line: int
@@ -94,7 +94,9 @@ def circle(statement: Statement, collector: StatementCollector) -> ArcForm:
             turns = max(int(number.number[0] / 10 ** number.number[1]), 1)
     a, b, c = (collector.word(f) for f in fields[:3])
     has_radius = len(values) > 6
-    text = ArcText(statement.begin, statement.end, ((a, b, c),), collector.word(fields[6]) if has_radius else -1)
+    text = ArcText(
+        statement.begin, statement.end, ((a, b, c),), collector.word(fields[6]) if has_radius else -1
+    )
     return ArcForm(
         text, statement.line, tuple(values[:3]), tuple(values[3:6]), values[6] if has_radius else None,
         turns=turns, confirmed=len(values) < 8,
@@ -108,7 +110,8 @@ def _plain_circle(statement: Statement, match: re.Match[bytes], collector: State
     radius = groups[6]
     spans = [match.span(k) for k in ((1, 2, 3) if radius is None else (1, 2, 3, 7))]
     words = [
-        collector.word(Field(statement.text[a:b], statement.place(a), statement.place(b - 1) + 1)) for a, b in spans
+        collector.word(Field(statement.text[a:b], statement.place(a), statement.place(b - 1) + 1))
+        for a, b in spans
     ]
     text = ArcText(
         statement.begin, statement.end, ((words[0], words[1], words[2]),), words[3] if radius else -1
@@ -129,7 +132,11 @@ def movarc(statement: Statement, collector: StatementCollector) -> ArcForm:
         raise ProgramError("MOVARC has no ANGLE; expected ANGLE and degrees", line=statement.line)
     a, b, c = (collector.word(f) for f in fields[:3])
     text = ArcText(
-        statement.begin, statement.end, ((a, b, c),), collector.word(fields[6]), collector.word(fields[angle_word + 1])
+        statement.begin,
+        statement.end,
+        ((a, b, c),),
+        collector.word(fields[6]),
+        collector.word(fields[angle_word + 1]),
     )
     return ArcForm(
         text, statement.line, tuple(values[:3]), tuple(values[3:6]), values[6],
@@ -159,7 +166,9 @@ def tlon(statement: Statement, collector: StatementCollector) -> tuple[ArcForm, 
     centres = tuple(
         (a, b, c) for a, b, c in ([collector.word(f) for f in fields[:3]] for fields in (round_, straight))
     )
-    text = ArcText(statement.begin, statement.end, centres, collector.word(round_[size - 1]), whole=True, long=long)
+    text = ArcText(
+        statement.begin, statement.end, centres, collector.word(round_[size - 1]), whole=True, long=long
+    )
     form = ArcForm(
         text, statement.line, tuple(values[:3]), normal, values[size - 1], second=again is not None
     )
@@ -246,7 +255,10 @@ def _catia(form: ArcForm, start: Array, end: Array, centre: Array, axes: Array, 
     if not abs(turning) > 0.1 * float(np.hypot(arm[first], arm[second])) * float(
         np.hypot(*direction[[first, second]])
     ):
-        raise ProgramError("INDIRV does not say in which direction the arc turns; expected one along the arc at its start", line=form.line)
+        raise ProgramError(
+            "INDIRV does not say in which direction the arc turns; expected one along the arc at its start",
+            line=form.line,
+        )
     to = end - centre
     angle = np.arctan2(to[second], to[first]) - np.arctan2(arm[second], arm[first])
     angle = float(angle if turning > 0 else -angle) % (2 * np.pi) or 2 * np.pi

@@ -47,8 +47,8 @@ class Cycle:
 
 
 class Events:
-    """The state while one program is read, and a handler for each statement that changes it. `_resolve`, which
-    the reader defines, turns the points before an event into positions."""
+    """The state while one program is read, and a handler for each statement that changes it. `_resolve`,
+    which the reader defines, turns the points before an event into positions."""
 
     def __init__(self, data: bytes, setup: Setup, dialect: Dialect, options: Options, words: bool) -> None:
         self.data, self.setup, self.options = data, setup, options
@@ -153,18 +153,26 @@ class Events:
         elif words[:1] in ([b"INCH"], [b"INCHES"], [b"IN"]):
             self.unit_mm = MM_PER_INCH
         else:
-            raise ProgramError("UNITS names a unit that is not read; expected MM or INCH", line=statement.line)
+            raise ProgramError(
+                "UNITS names a unit that is not read; expected MM or INCH", line=statement.line
+            )
         self.unit_stated = True
 
     def _circle(self, statement: Statement, row: int) -> None:
         form = (movarc if statement.head()[1] == b"MOVARC" else circle)(statement, self.collector)
         if self.arcs and self.arcs[-1][0] == row:
-            raise ProgramError("an arc follows an arc without a GOTO between them; expected a GOTO to the end of the first", line=statement.line)
+            raise ProgramError(
+                "an arc follows an arc without a GOTO between them; expected a GOTO to the end of the first",
+                line=statement.line,
+            )
         self.arcs.append((row, form))
 
     def _tlon(self, statement: Statement, row: int) -> None:
         if self.direction is None:
-            raise ProgramError("no INDIRV comes before TLON, so its direction is not known; expected one before each TLON", line=statement.line)
+            raise ProgramError(
+                "no INDIRV comes before TLON, so its direction is not known; expected one before each TLON",
+                line=statement.line,
+            )
         form = directed(self.driven.pop(statement.line), self.direction, self.collector)
         self.direction = None
         self.arcs.append((row, form))
@@ -229,11 +237,16 @@ class Events:
         self._resolve(row)
         numbers = [f.number for f in statement.fields()]
         if len(numbers) != 3 or None in numbers:
-            raise ProgramError("TLAXIS is read with three numbers only: the direction from tip to gauge point", line=statement.line)
+            raise ProgramError(
+                "TLAXIS is read with three numbers only: the direction from tip to gauge point",
+                line=statement.line,
+            )
         x, y, z = (n[0] / 10.0 ** n[1] for n in numbers if n is not None)
         size = (x * x + y * y + z * z) ** 0.5
         if not abs(size - 1.0) < UNIT:
-            raise ProgramError(f"TLAXIS has length {size:.6g}; expected a direction of length 1", line=statement.line)
+            raise ProgramError(
+                f"TLAXIS has length {size:.6g}; expected a direction of length 1", line=statement.line
+            )
         self.axis = axis_of(x / size, y / size, z / size)
 
     def _csys(self, statement: Statement, row: int) -> None:
@@ -314,7 +327,8 @@ class Events:
         block = re.sub(rb"(?i)\A\s*INSERT\s*/?", b"", statement.text)
         if _BLOCK.match(block) and _MOVING.search(block):
             raise ProgramError(
-                "INSERT gives the control a block that may move the machine; leave such blocks to the post-processor",
+                "INSERT gives the control a block that may move the machine; "
+                "leave such blocks to the post-processor",
                 line=statement.line,
             )
 

@@ -1,8 +1,8 @@
 """Reads APT and cutter-location data: statements to a nominal toolpath and the words that can be edited.
 
-A chunk is read in steps: plain GOTOs in columns, all other statements one by one (`text.statements`); then the
-events between the points in their order, and the points between two changes of frame at once. Nothing here
-knows an error model.
+A chunk is read in steps. Plain GOTOs are read in columns, and all other statements one by one
+(`text.statements`). Then come the events between the points in their order, and the points between two
+changes of frame at once. Nothing here knows an error model.
 """
 
 from __future__ import annotations
@@ -118,7 +118,9 @@ class _Reader(Events):
         if handler is not None:
             handler(statement, row)
             return
-        support, why = TABLE.get(first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine"))
+        support, why = TABLE.get(
+            first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
+        )
         if first == b"TLON":
             self._tlon(statement, row)
         if first in (b"TLON", b"GODLTA"):
@@ -189,14 +191,19 @@ class _Reader(Events):
         self.arcs = [(row, form) for row, form in self.arcs if row >= upto]
         if self.cycle is not None:
             if arcs:
-                raise ProgramError("an arc is not read while a CYCLE is in force; end the cycle with CYCLE/OFF", line=int(line[arcs[0][0]]))
+                raise ProgramError(
+                    "an arc is not read while a CYCLE is in force; end the cycle with CYCLE/OFF",
+                    line=int(line[arcs[0][0]]),
+                )
             self._holes(self.cycle, line, frame, end, slot, begin, stop, up)
         else:
             if arcs:
                 rows = np.array([row for row, _ in arcs])
                 if (kind[rows] == Kind.RAPID).any() or (flag[rows] & ~np.uint8(Flag.INCREMENTAL)).any():
                     bad = rows[(kind[rows] == Kind.RAPID) | (flag[rows] != 0)][0]
-                    raise ProgramError("an arc is at rapid, or its tool axis changes, which is not read", line=int(line[bad]))
+                    raise ProgramError(
+                        "an arc is at rapid, or its tool axis changes, which is not read", line=int(line[bad])
+                    )
                 start = np.where(rows[:, None] > 0, end[np.maximum(rows - 1, 0)], np.array(self.position))
                 geometry = resolved(
                     [form for _, form in arcs], start, end[rows], line[rows], self.unit_mm,
@@ -204,7 +211,9 @@ class _Reader(Events):
                 )  # fmt: skip
                 self._check_turns(arcs, geometry, start, end, rows, kind)
                 kind[rows] = np.where(geometry.sweep > 0, Kind.ARC_CCW, Kind.ARC_CW)
-                self.collector.put_arcs(rows + self.collector.moves, geometry.centre, geometry.plane, geometry.sweep)
+                self.collector.put_arcs(
+                    rows + self.collector.moves, geometry.centre, geometry.plane, geometry.sweep
+                )
                 for row, form in arcs:
                     self.collector.arcs[row + self.collector.moves] = form.text
             self.collector.put_stated_moves(kind, flag, line, frame, end, slot, begin, stop)

@@ -14,7 +14,7 @@ _R = Support.READ
 _X = Support.UNCHANGED
 _NO = Support.REFUSED
 
-_CONTOUR = "drives the tool along geometry that only an APT processor knows; send its output (CLDATA)"
+_CONTOUR = "drives the tool along geometry that only an APT processor resolves; send its output (CLDATA)"
 _LOGIC = "branches or repeats; send the output of the APT processor (CLDATA)"
 _TURNS = "turns the part or the head, and the position of the part afterwards is not known"
 _GEOMETRY = "defines geometry; send the output of the APT processor (CLDATA), which has points"
@@ -46,7 +46,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"ORIGIN": (_R, "a coordinate system: a frame of the job"),
     b"$$-> CSYS": (_R, "Creo's coordinate system, in a comment: a frame of the job"),
     b"TRACUT": (_R, "NOMORE only"),
-    b"COPY": (_NO, "repeats moves at other positions from the same text; send the output of the APT processor"),
+    b"COPY": (_NO, "repeats moves at other positions; send the output of the APT processor (CLDATA)"),
     b"SPINDL": (_R, "the spindle, for feeds per turn"),
     b"DELAY": (_R, "a dwell in seconds"),
     b"STOP": (_R, "the motion rests"),

@@ -47,8 +47,8 @@ class Text:
     """The lines of a text, and the numbers of each, as columns.
 
     (n,) `start`, `end` of lines without their ends; (m,) `first`..`last` bytes of numbers with their
-    `mantissa` and `decimals`, and where each stands in its line without digits, `offset`; (n + 1,) `token`
-    leads from line to numbers; (n,) `plain`: each number of the line was read as one.
+    `mantissa` and `decimals`. `offset` (m,) is where each number is in its line without digits. `token`
+    (n + 1,) leads from line to numbers. (n,) `plain`: each number of the line was read as one.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -122,7 +122,12 @@ class SameForm:
 def same_form_of(text: Text, line: Line, bare: Line, rule: Rule, match: re.Match[str]) -> SameForm | None:
     """What the lines that are similar to this one state; None where more than the numbers of named fields
     could differ."""
-    if len(line.starts) > 1 or rule.does not in ("line", "rapid") or rule.incremental or rule.enters is not None:
+    if (
+        len(line.starts) > 1
+        or rule.does not in ("line", "rapid")
+        or rule.incremental
+        or rule.enters is not None
+    ):
         return None
     index = line.number - 1
     if not text.plain[index]:
@@ -183,7 +188,8 @@ def _tokens(text: Bytes) -> tuple[Index, Index, Index, npt.NDArray[np.int8], Mas
 
 
 def _within(what: Mask, begin: Index, end: Index) -> Index:
-    """(n,) how many bytes from `begin` up to `end` are set; the stretches do not overlap, and none is empty."""
+    """(n,) how many bytes from `begin` up to `end` are set; the stretches do not overlap, and none is
+    empty."""
     if not len(begin):
         return np.zeros(0, np.int64)
     edges = np.column_stack((begin, end)).ravel()

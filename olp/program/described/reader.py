@@ -19,8 +19,8 @@ from olp.core.toolpath import Flag, Kind
 from olp.program.described.language import Rule, UserDialect
 from olp.program.described.lines import Line, SameForm, Text, same_form_of
 from olp.program.dialect import Dialect, Options
+from olp.program.frame_index import frame_index
 from olp.program.frames import FrameTable
-from olp.program.places import frame_index
 from olp.program.program import Program
 from olp.program.text.delimited import MM, MM_S
 from olp.program.text.numbers import number
@@ -48,7 +48,8 @@ class _Point:
 def read_described(
     data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
 ) -> Program:
-    """Read a program. Raises ProgramError with the line of the first statement that cannot be read correctly."""
+    """Read a program. Raises ProgramError with the line of the first statement that cannot be read
+    correctly."""
     assert isinstance(dialect, UserDialect)
     return _Reader(data, setup, dialect).run(words=words)
 
@@ -127,7 +128,12 @@ class _Reader:
         index = 0
         while index < len(keys):
             form = here.get(keys[index])
-            if form is not None and plain[index] and form.count == count[index] and form.places == places[index]:
+            if (
+                form is not None
+                and plain[index]
+                and form.count == count[index]
+                and form.places == places[index]
+            ):
                 if open_ is None:
                     open_ = _SimilarLines([], [])
                     items.append(open_)
@@ -193,13 +199,13 @@ class _Reader:
         where = self.table.frames[frame]
         stated = text.value[pick] * unit_mm
         turned = stated if where.turn is None else stated @ np.array(where.turn).T
-        places = turned + np.array(where.offset_mm)
+        axis_mm = turned + np.array(where.offset_mm)
         self.moves.put_all(
-            kind=kind, flag=np.zeros(count), line=line, frame=np.full(count, frame), end=places,
+            kind=kind, flag=np.zeros(count), line=line, frame=np.full(count, frame), end=axis_mm,
             slot=self.moves.number_count + np.arange(3 * count), bounds=bounds, feed=feed,
             spans=np.column_stack((text.first[pick.ravel()], text.last[pick.ravel()])),
         )  # fmt: skip
-        self.position = places[-1].tolist()
+        self.position = axis_mm[-1].tolist()
 
     def _rule(self, line: Line) -> tuple[Line, Rule, re.Match[str]]:
         """A statement without its label, its rule and its fields; follows the sections. Raises ProgramError
@@ -224,8 +230,8 @@ class _Reader:
             bare = replace(line, begin=line.place(start), end=line.place(last - 1) + 1)
             return bare, rule, match
         raise ProgramError(
-            f"`{text.strip()[:60]}` is not a statement of the dialect {dialect.name}, and may move the machine; "
-            "describe it in the dialect file, or take it out",
+            f"`{text.strip()[:60]}` is not a statement of the dialect {dialect.name}, and may move the "
+            "machine; describe it in the dialect file, or take it out",
             line=line.number,
         )
 

@@ -26,8 +26,8 @@ MACHINE_FRAME = "MCS"
 
 
 class Events:
-    """The state while one program is read, and a handler for each statement that changes it. `_resolve`, which
-    the reader defines, turns the points before an event into positions."""
+    """The state while one program is read, and a handler for each statement that changes it. `_resolve`,
+    which the reader defines, turns the points before an event into positions."""
 
     def __init__(self, data: bytes, setup: Setup, dialect: Dialect, words: bool) -> None:
         self.data, self.setup = data, setup
@@ -74,7 +74,8 @@ class Events:
         elif self.setup.machine.default_tool:
             tool = self.setup.machine.default_tool
             tool_vector = tool_vector_of(self.setup, tool, line)
-        # the control counts its axes at the end of the ram: the tip is at that point plus the offset of the stylus
+        # the control counts its axes at the end of the ram: the tip is at that point plus the offset of the
+        # stylus
         x, y, z = (0.0 - v for v in tool_vector)
         return self.table.index(
             work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), tool_vector=tool_vector
@@ -153,7 +154,7 @@ class Events:
         name = _name(label)
         if name is None:
             raise ProgramError(
-                f"{shown(statement.head()[1])} has no label D(), so its frame has no name; expected D(name) = …",
+                f"{shown(statement.head()[1])} has no label, so its frame has no name; expected D(name) = …",
                 line=statement.line,
             )
         self._settled(statement)
@@ -191,7 +192,9 @@ class Events:
         if fields and fields[0].text in self.speed and numbers:
             self.speed[fields[0].text] = numbers[0][0] / 10.0 ** numbers[0][1] * unit
         if fields and fields[0].text == b"MESVEL":
-            self.collector.put_feed(self.collector.moves + row - self.done, self.speed[b"MESVEL"], statement.line)
+            self.collector.put_feed(
+                self.collector.moves + row - self.done, self.speed[b"MESVEL"], statement.line
+            )
 
     def _meas(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is not None:
@@ -242,7 +245,11 @@ class Events:
         fields = statement.fields()
         name = next((n for f in fields if (n := _name(f.text)) is not None), None)
         if name is None or name.upper() not in self.macros:
-            raise ProgramError("CALL runs a macro that is not in this program and may move the machine; put the macro into this program", line=statement.line)
+            raise ProgramError(
+                "CALL runs a macro that is not in this program and may move the machine; "
+                "put the macro into this program",
+                line=statement.line,
+            )
 
     def _endfil(self, statement: Statement, label: bytes, row: int) -> None:
         self._resolve(row)

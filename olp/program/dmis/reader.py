@@ -83,7 +83,8 @@ class _Reader(Events):
         return was or self.header
 
     def _check_comment(self, chunk: Chunk, comment: Comment) -> None:
-        """Refuse a line after a comment that ends with `$`, unless it is a comment too: it may belong to it."""
+        """Refuse a line after a comment that ends with `$`, unless it is a comment too: it may belong to
+        it."""
         if not comment.text.rstrip().endswith(b"$") or comment.text.strip() == b"$$":
             return
         line = comment.line - chunk.first_line
@@ -108,7 +109,9 @@ class _Reader(Events):
             return
         if first == b"PTMEAS":
             if self.feature is None:
-                raise ProgramError("PTMEAS is outside MEAS and ENDMES; expected MEAS before it", line=statement.line)
+                raise ProgramError(
+                    "PTMEAS is outside MEAS and ENDMES; expected MEAS before it", line=statement.line
+                )
             self.feature = (self.feature[0], True)
             return
         if label and b"/" not in statement.text:
@@ -119,7 +122,10 @@ class _Reader(Events):
         known = TABLE.get(first)
         if known is None and not text:
             return
-        support, why = known or (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
+        support, why = known or (
+            Support.REFUSED,
+            "is not a statement that olp knows, and may move the machine",
+        )
         if support is Support.REFUSED:
             raise ProgramError(f"{shown(first)} {why}", line=statement.line)
 
@@ -162,7 +168,10 @@ class _Reader(Events):
         if wide.any():
             raise ProgramError("GOTO has 6 numbers; expected x,y,z", line=int(line[np.flatnonzero(wide)[0]]))
         if self.macro is not None:
-            raise ProgramError(f"the macro {self.macro} moves the machine, which is not read; write its moves into the program", line=int(line[0]))
+            raise ProgramError(
+                f"the macro {self.macro} moves the machine, which is not read; write out its moves",
+                line=int(line[0]),
+            )
         number = self._frame(int(line[0]))
         frame = self.table.frames[number]
         value = self.points.value[part] * self.unit_mm

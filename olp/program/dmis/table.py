@@ -77,7 +77,9 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys(
         (b"ASSIGN", b"OBTAIN", b"PROMPT"), (_X, "a motion that uses the value is refused")
     ),
-    **dict.fromkeys((b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves an axis that is not read")),
+    **dict.fromkeys(
+        (b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves an axis that is not read")
+    ),
 }  # fmt: skip
 
 #: majors of assignments that run and input statements make; their value is text or logic, never motion

@@ -205,7 +205,9 @@ def _refuse(missing: Mask, line: Index, inverse: Mask) -> None:
         return
     i = int(np.flatnonzero(missing)[0])
     if inverse[i]:
-        raise ProgramError("in G93 each feed move needs an F word in its own block; give F", line=int(line[i]))
+        raise ProgramError(
+            "in G93 each feed move needs an F word in its own block; give F", line=int(line[i])
+        )
     raise ProgramError(
         "a feed move has no feed: no F word comes after the feed mode (G93, G94, G95) was set; give F",
         line=int(line[i]),

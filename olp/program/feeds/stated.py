@@ -43,7 +43,8 @@ def feed_words(program: Program, words: Words, *, block_delete: bool) -> FeedWor
 
 def programmed(program: Program, *, block_delete: bool = False) -> Array:
     """(n,) feed of each move in mm/s: inf for rapids, NaN for moves that the control makes by itself and
-    where it is not known. Raises ProgramError for a feed move without a feed, UsageError for a program read without words."""
+    where it is not known. Raises ProgramError for a feed move without a feed, UsageError for a program read
+    without words."""
     if program.statements is not None:
         return _stated(program, program.statements)
     if program.words is None:

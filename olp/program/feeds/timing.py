@@ -1,7 +1,8 @@
 """What a program states about time: feeds, path modes, dwells and rests, beside the moves of its toolpath.
 
-The words of a program that has been read are read again, for re-timing only: a correction does not need this. Sources: NIST IR 6556 (3.5, 3.8: order of execution, G93 to G95, G61 and G64), LinuxCNC's
-interpreter (tests/program/feeds/test_timing.py asks it), and the manuals of Fanuc, Haas and Grbl for what
+The words of a program that has been read are read again, for re-timing only: a correction does not need this.
+Sources: NIST IR 6556 (3.5, 3.8: order of execution, G93 to G95, G61 and G64), LinuxCNC's interpreter
+(tests/program/feeds/test_timing.py compares with it), and the manuals of Fanuc, Haas and Grbl for what
 differs there.
 """
 
@@ -34,7 +35,7 @@ class PathControl(IntEnum):
     """How a control goes from block to block."""
 
     BLEND = 0  #: G64: rounds corners within a path tolerance
-    EXACT_PATH = 1  #: G61 of RS-274: stays on the path, rests only where that has a corner
+    EXACT_PATH = 1  #: G61 of RS-274: keeps to the path, rests only at its corners
     EXACT_STOP = 2  #: G61.1, and G61 of ISO controls: rests at the end of each block
 
 
@@ -53,9 +54,9 @@ class Timing:
     """The time of n moves.
 
     (n,) `feed_mm_s`: inf for rapids, NaN where the control moves by itself or a time has no length. (n,)
-    `control`: values of `PathControl`. (n,) `blend_mm`: the path tolerance of G64 where it is in force, else 0.
-    Before, between and after the moves: `rest` (n + 1,), whether the motion has to rest there, and `dwell_s`
-    (n + 1,), for how long at least.
+    `control`: values of `PathControl`. (n,) `blend_mm`: the path tolerance of G64 where it is in force, else
+    0. Before, between and after the moves: `rest` (n + 1,), whether the motion has to rest there, and
+    `dwell_s` (n + 1,), for how long at least.
     """
 
     feed_mm_s: Array
@@ -70,7 +71,8 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
 
     `blend_mm` is the path tolerance where G64 states none; `block_delete` as in the reading. Raises
     ProgramError with its line for a feed move without a feed, and for a feed or a dwell that cannot be read
-    correctly; UsageError for a tolerance that is not above zero, and where the program was read without words.
+    correctly. Raises UsageError for a tolerance that is not above zero, and where the program was read without
+    words.
     """
     if not blend_mm > 0:
         raise UsageError(f"the path tolerance of G64 is {blend_mm:g} mm; expected a length above zero")
@@ -189,7 +191,8 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     stated = np.bincount(owner, minlength=len(pauses))
     if (stated > 1).any():
         raise ProgramError(
-            "a dwell has two times in one block; expected one", line=int(pauses[np.flatnonzero(stated > 1)[0]])
+            "a dwell has two times in one block; expected one",
+            line=int(pauses[np.flatnonzero(stated > 1)[0]]),
         )
     if not axis_dwell and (stated == 0).any():
         raise ProgramError(
@@ -202,5 +205,7 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     bare = ~pointed & ((words.letter[word] == ord("P")) | (not program.calculator))
     seconds[owner] = np.where(bare & axis_dwell, number / 1000.0, number)
     if (seconds < 0).any():
-        raise ProgramError("a dwell is negative; expected zero or more", line=int(pauses[np.flatnonzero(seconds < 0)[0]]))
+        raise ProgramError(
+            "a dwell is negative; expected zero or more", line=int(pauses[np.flatnonzero(seconds < 0)[0]])
+        )
     return seconds

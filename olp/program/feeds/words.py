@@ -109,7 +109,8 @@ def write_feeds(
 
 
 def _written(program: Program, words: Words, word: int, share: float, line: int) -> bytes | None:
-    """The number of an F word times a share, in the form of the word; None where rounding gives the old one."""
+    """The number of an F word times a share, in the form of the word; None where rounding gives the old
+    one."""
     old = program.data[int(words.number[word]) : int(words.end[word])].replace(b" ", b"").replace(b"\t", b"")
     decimals = int(words.decimals[word])
     value = float(numbers(words, np.array([word]))[0])

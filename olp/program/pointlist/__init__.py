@@ -1,1 +1,1 @@
-"""Lists of positions: tables whose rows are places, in order."""
+"""Lists of positions: tables whose rows are waypoints, in order."""

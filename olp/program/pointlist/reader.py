@@ -18,8 +18,8 @@ from olp.core.errors import InputError, ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect, Options, Row, Support
+from olp.program.frame_index import frame_index
 from olp.program.frames import FrameTable
-from olp.program.places import frame_index
 from olp.program.pointlist.columns import columns
 from olp.program.program import Program
 from olp.program.text.delimited import AXES, MM_S, Layout, detected_layout, first_lines, stated_frame
@@ -85,7 +85,7 @@ def read_list(
         layout = dialect.layout or detected_layout(first_lines(data))
         if layout is None:
             raise ProgramError(
-                "does not show which columns are X, Y and Z; give their names or numbers with --column X=.. "
+                "does not show which columns hold X, Y and Z; give their names or numbers with --column X=.. "
                 "--column Y=.. --column Z=.., or give a profile with --profile"
                 if data.strip()
                 else "has no positions; expected one row per waypoint"
@@ -209,9 +209,7 @@ def _rows(data: bytes, layout: Layout) -> _Rows:
     return table
 
 
-def _remarks(
-    layout: Layout, rows: _Rows, frame_name: str | None, setup: Setup
-) -> list[tuple[str, int, str]]:
+def _remarks(layout: Layout, rows: _Rows, frame_name: str | None, setup: Setup) -> list[tuple[str, int, str]]:
     line = int(rows.line[0]) if len(rows.line) else 1
     remarks = [("told", line, assumption) for assumption in layout.assumed]
     if frame_name is None:
@@ -219,7 +217,9 @@ def _remarks(
     if len(rows.turns) > 1:
         remarks.append(("turning", list(rows.turns.values())[1], "the orientation changes from row to row"))
     if not layout.stamp:
-        remarks.append(("unmarked", line, "the profile allows no comment, so nothing marks the corrected list"))
+        remarks.append(
+            ("unmarked", line, "the profile allows no comment, so nothing marks the corrected list")
+        )
     if layout.joined == "points":
         remarks.append(("joined", line, "how the machine goes from row to row is not stated"))
     return remarks

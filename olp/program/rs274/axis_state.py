@@ -197,7 +197,8 @@ class AxisState(State):
     # -- events ------------------------------------------------------------------------------------
 
     def run(self, line: int, words: Sequence[Word], codes: Sequence[int], moves: int) -> Effect:
-        """Carry out the events of one block in the order of the control; returns what its axis words mean then."""
+        """Carry out the events of one block in the order of the control; returns what its axis words mean
+        then."""
         by_letter = {w.letter: w for w in words}
         axis_words = [(i, by_letter[a]) for i, a in enumerate("XYZ") if a in by_letter]
         m_codes = [round(w.value * 10) for w in words if w.letter == "M"]
@@ -220,7 +221,8 @@ class AxisState(State):
         return effect
 
     def may_move(self, m10: int) -> bool:
-        """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they are."""
+        """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they
+        are."""
         if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.m61_sets_tool):
             return False
         return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
@@ -263,7 +265,8 @@ class AxisState(State):
         return effect
 
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
-        """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still move."""
+        """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still
+        move."""
         if not self.profile.axis_dwell:
             return Effect()
         if any(a in by_letter for a in "YZ") or any(

@@ -16,11 +16,11 @@ from olp.program.rs274.lexer import WordChunk
 
 
 class Collector(PathColumns):
-    """The columns of one program while it is read. Without `keep_words` those that only writing needs are left
-    out.
+    """The columns of one program while it is read. Without `keep_words` those that only writing needs are
+    left out.
 
-    `moves` and `word_count` count the moves and words so far, `start` is the axis position before the first move.
-    `remarks` leads from a name to the first line of it and a text.
+    `moves` and `word_count` count the moves and words so far, `start` is the axis position before the first
+    move. `remarks` leads from a name to the first line of it and a text.
     """
 
     def __init__(self, data: bytes, start: tuple[float, float, float], *, keep_words: bool) -> None:

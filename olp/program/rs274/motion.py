@@ -39,7 +39,8 @@ def values(chunk: WordChunk) -> Array:
 
 
 def modal(chunk_lines: int, lines: Index, codes: Index, before: int) -> npt.NDArray[np.int16]:
-    """Per line the code in force, `before` until the first of `codes`, which take effect on their own line."""
+    """Per line the code in force, `before` until the first of `codes`, which take effect on their own
+    line."""
     if not len(lines):
         return np.full(chunk_lines, before, np.int16)
     spans = np.diff(np.concatenate(([0], lines, [chunk_lines])))
@@ -48,8 +49,9 @@ def modal(chunk_lines: int, lines: Index, codes: Index, before: int) -> npt.NDAr
 
 @dataclass(slots=True, eq=False)
 class Blocks:
-    """Motion lines of a chunk: (n,) line in the chunk, (n, 3) index of the X, Y, Z word or -1, whether
-    another axis moves too, and per arc its row and (m, 5) index of the I, J, K, R, P word or -1."""
+    """Motion lines of a chunk: (n,) `line` in the chunk, (n, 3) `slot`, index of the X, Y, Z word or -1, and
+    `other`, whether another axis moves too. `arc_row` are the rows of arcs, and `arc_slot` (m, 5) the indices
+    of their I, J, K, R, P words or -1."""
 
     line: Index
     slot: Index
@@ -117,7 +119,12 @@ def _slots(
 
 
 def fill(
-    slot: Index, value: Array, incremental: Mask | None, offset: Array, unit: Array | float, start: list[float]
+    slot: Index,
+    value: Array,
+    incremental: Mask | None,
+    offset: Array,
+    unit: Array | float,
+    start: list[float],
 ) -> Array:
     """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units scalar or (n,
     1)."""
@@ -194,7 +201,8 @@ def arc_geometry(
     )
     turns = np.where(np.isnan(turns), 1.0, turns)
     refuse(
-        (turns != np.rint(turns)) | (turns < 1), "P of an arc is its number of turns; expected an integer from 1"
+        (turns != np.rint(turns)) | (turns < 1),
+        "P of an arc is its number of turns; expected an integer from 1",
     )
     base0, base1 = (np.where(absolute, offset[rows, f], s) for f, s in ((first, s0), (second, s1)))
     centre0, centre1 = np.nan_to_num(c0) + base0, np.nan_to_num(c1) + base1

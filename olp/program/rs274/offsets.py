@@ -17,8 +17,9 @@ def _zeros() -> list[float]:
 
 @dataclass(slots=True)
 class Offsets:
-    """The offsets in force, in mm: `name` of the work offset, those that the program has `written` by name,
-    the `shift` of G92 and the one `saved` for G92.3, the `local` one of G52, and the tool `length`."""
+    """The offsets in force, in mm. `name` is the work offset, `written` are those that the program has
+    written, by name. `shift` is that of G92, `saved` the one for G92.3, `local` that of G52, `length` that of
+    the tool."""
 
     name: str
     written: dict[str, list[float]] = field(default_factory=dict)

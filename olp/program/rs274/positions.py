@@ -24,8 +24,8 @@ def positions_program(
     """Rapids in machine coordinates (G53) through axis positions (n, 3), each with a dwell after it.
 
     A position is followed by no dwell where `dwell_s` (n,) is 0. `digits` are the decimals of words, `notes`
-    become comments. At first Z alone goes to the height of the first position, which has to be a clear one. Raises
-    CannotCompute for a control that is not of this family.
+    become comments. At first Z alone goes to the height of the first position, which has to be a clear one.
+    Raises CannotCompute for a control that is not of this family.
     """
     if 530 not in profile.codes:
         raise CannotCompute(f"{profile.title} has no G53; take the points from the CSV file")

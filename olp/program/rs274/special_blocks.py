@@ -1,5 +1,5 @@
-"""Blocks that are carried out one by one: canned cycles, probes, G53 moves, the move to the intermediate point
-of G28, and moves that the control makes by itself; and the checks of a block with an event.
+"""Blocks that are carried out one by one: canned cycles, probes, G53 moves, homing, and moves that the
+control makes by itself. Also the checks of a block with an event.
 
 What an event does to frames and tools is in `axis_state`, the strokes of one hole are in `cycles`.
 """
@@ -86,7 +86,8 @@ def _checked(
 
 
 class SpecialBlocks:
-    """Carries these blocks out from the position in `state`, and puts their moves and holes into `collector`."""
+    """Carries these blocks out from the position in `state`, and puts their moves and holes into
+    `collector`."""
 
     def __init__(self, state: AxisState, collector: Collector, switches: Directives) -> None:
         self._state = state
@@ -258,7 +259,8 @@ class SpecialBlocks:
         times = 1 if word is None else round(float(context.value[word]))
         if times < 1:
             raise ProgramError(
-                "a canned cycle with zero repeats only stores values, which is not read; give one repeat or more", line=line
+                "a canned cycle with zero repeats only stores values, which is not read; give one or more",
+                line=line,
             )
         return times
 

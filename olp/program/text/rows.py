@@ -53,7 +53,8 @@ class Form:
         return bool(line.strip()) and not line.lstrip().startswith(self.comments)
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line, without blanks around them. Raises InputError where the line cannot be split."""
+        """The cells of a line, without blanks around them. Raises InputError where the line cannot be
+        split."""
         if self.mark is None:
             return line.split()
         try:

@@ -104,8 +104,8 @@ class Statement:
         return label.strip().upper(), b" ".join(major.upper().split())
 
     def fields(self) -> list[Field]:
-        """The minor words after the slash. Commas separate them, and blanks between two numbers; a comma at the
-        end means nothing. Brackets keep a group together."""
+        """The minor words after the slash. Commas separate them, and blanks between two numbers; a comma at
+        the end means nothing. Brackets keep a group together."""
         begin = self.text.find(b"/") + 1
         if not begin:
             return []
@@ -237,7 +237,10 @@ class Chunk:
             if mark is None:
                 break
             if last + 1 >= len(self.line_start):
-                raise ProgramError("the last line ends with `$`, so it should go on; remove the `$`", line=number + last - line)
+                raise ProgramError(
+                    "the last line ends with `$`, so it should go on; remove the `$`",
+                    line=number + last - line,
+                )
             last += 1
         end = int(self.line_end[last])
         return Statement(
@@ -281,7 +284,9 @@ def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
     if is_cards(data):
         data = _CARD.sub(rb"\1        ", data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise ProgramError("the text is UTF-16; expected one byte per character; save it as plain text", line=1)
+        raise ProgramError(
+            "the text is UTF-16; expected one byte per character; save it as plain text", line=1
+        )
     if data[:3] == b"\xef\xbb\xbf":
         # the lexer reads a byte order mark as blanks; it stays in the text
         data = b"   " + data[3:]

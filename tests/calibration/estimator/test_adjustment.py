@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from cases.calibration import FRESH, TOOLS, case, cloud, left, line_of, measurements_of, rays, two_pods
+from cases.calibration import FRESH, TOOLS, case, cloud, line_of, measurements_of, rays, residual_of, two_pods
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import simulated
@@ -37,8 +37,8 @@ def one() -> tuple[simulated.Machine, Measurements, Fit]:
     return machine, measurements, fit(measurements, "FXYZ")
 
 
-def told(found: Fit, code: str) -> list[Finding]:
-    return [f for f in findings_of(found, [(0.0, 0.0, -120.0)], None) if f.code == code]
+def findings_with(fitted: Fit, code: str) -> list[Finding]:
+    return [f for f in findings_of(fitted, [(0.0, 0.0, -120.0)], None) if f.code == code]
 
 
 def without(measurements: Measurements, *names: str) -> Measurements:
@@ -51,13 +51,13 @@ def without(measurements: Measurements, *names: str) -> Measurements:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "seeds"), [("smooth", SMOOTH), ("rough", ROUGH)])
-def test_what_is_left_of_simulated_machines(family: str, seeds: range) -> None:
+def test_residuals_of_simulated_machines(family: str, seeds: range) -> None:
     """All chains of the benchmark, tables too; the uncertainty is neither too small nor too large."""
     rows = []
     for seed in seeds:
         machine, measurements = case(seed, family)
-        found = fit(measurements, machine.chain)
-        rows += [dataclasses.astuple(left(machine, found, tool, 400)) for tool in TOOLS]
+        fitted = fit(measurements, machine.chain)
+        rows += [dataclasses.astuple(residual_of(machine, fitted, tool, 400)) for tool in TOOLS]
     before, before_framed, after, after_framed, z = np.array(rows).T
     assert np.median(before) > 70.0
     assert np.median(before_framed) > 40.0
@@ -68,46 +68,46 @@ def test_what_is_left_of_simulated_machines(family: str, seeds: range) -> None:
 
 def test_the_files_say_what_the_fit_says(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
     """The exact model of the written curves against the linear one of the fit."""
-    machine, _, found = one
-    model = build(calibration_of(found), "FXYZ")
-    at = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (500, 3))
+    machine, _, fitted = one
+    model = build(calibration_of(fitted), "FXYZ")
+    position = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (500, 3))
     for tool in TOOLS:
-        assert np.abs(model.error(at, np.array(tool)) - found.error(at, tool)).max() < 0.15 * UM
+        assert np.abs(model.error(position, np.array(tool)) - fitted.error(position, tool)).max() < 0.15 * UM
 
 
 @pytest.mark.slow
 def test_curves_of_a_rough_machine_are_written_true() -> None:
-    """Steps and kinks are straight pieces in the file; cyclic terms stand beside the curves."""
+    """Steps and kinks are straight pieces in the file; cyclic terms are beside the curves."""
     machine, measurements = case(2, "rough", "YFXZ")
-    found = fit(measurements, "YFXZ")
-    calibration = calibration_of(found)
+    fitted = fit(measurements, "YFXZ")
+    calibration = calibration_of(fitted)
     assert {c.component for c in calibration.cyclic} >= {"EXX", "EYY", "EZZ"}
     for term in calibration.cyclic:
         if term.component[1] == term.component[2]:
             assert term.period_mm == simulated.PITCH["XYZ".index(term.component[2])]
     assert "linear" in {curve.interpolation for curve in calibration.curves}
     model = build(calibration, "YFXZ")
-    at = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (500, 3))
-    differ = np.abs(model.error(at, np.array(TOOLS[0])) - found.error(at, TOOLS[0]))
+    position = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (500, 3))
+    differ = np.abs(model.error(position, np.array(TOOLS[0])) - fitted.error(position, TOOLS[0]))
     assert differ.max() < 0.3 * UM
-    assert told(found, "OLP804")
+    assert findings_with(fitted, "OLP804")
 
 
 def test_the_gauge_of_the_datum(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
     """On lines through the datum X has no mean slope, and the three values of squareness hold the slopes of
     the others."""
-    _, _, found = one
-    datum = np.array([found.parameters.datum_mm])
+    _, _, fitted = one
+    datum = np.array([fitted.parameters.datum_mm])
     slopes = {}
     for axis in range(3):
-        at = np.repeat(datum, 301, axis=0)
-        at[:, axis] = np.linspace(*found.box_mm[axis], 301)
-        error = found.error(at, np.zeros(3))
+        position = np.repeat(datum, 301, axis=0)
+        position[:, axis] = np.linspace(*fitted.box_mm[axis], 301)
+        error = fitted.error(position, np.zeros(3))
         for row in range(3):
-            slopes[row, axis] = np.polyfit(at[:, axis], error[:, row], 1)[0]
+            slopes[row, axis] = np.polyfit(position[:, axis], error[:, row], 1)[0]
     for row, axis in ((1, 0), (2, 0), (2, 1)):
         assert abs(slopes[row, axis]) < 1e-7
-    square = {name: found.squareness(name) @ found.theta for name in ("C0Y", "B0Z", "A0Z")}
+    square = {name: fitted.squareness(name) @ fitted.theta for name in ("C0Y", "B0Z", "A0Z")}
     assert slopes[0, 1] == pytest.approx(-square["C0Y"], abs=1e-7)
     assert slopes[0, 2] == pytest.approx(square["B0Z"], abs=1e-7)
     assert slopes[1, 2] == pytest.approx(-square["A0Z"], abs=1e-7)
@@ -117,7 +117,7 @@ def test_zeros_and_slopes_of_instruments_mean_nothing(
     one: tuple[simulated.Machine, Measurements, Fit],
 ) -> None:
     """Another zero of every line, and another pose of every square, change no estimate."""
-    machine, measurements, found = one
+    machine, measurements, fitted = one
     moved = []
     for k, line in enumerate(measurements.lines):
         tilt = 0.0
@@ -126,25 +126,25 @@ def test_zeros_and_slopes_of_instruments_mean_nothing(
         value = line.value + (0.01 * k if line.quantity != "angle" else 1e-5 * k) + tilt * line.target_mm
         moved.append(dataclasses.replace(line, value=value))
     again = fit(measurements.with_lines(tuple(moved)), "FXYZ")
-    at = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (100, 3))
-    assert np.abs(again.error(at, TOOLS[1]) - found.error(at, TOOLS[1])).max() < 0.01 * UM
+    position = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (100, 3))
+    assert np.abs(again.error(position, TOOLS[1]) - fitted.error(position, TOOLS[1])).max() < 0.01 * UM
 
 
 # -- points of a tracker ---------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
-def test_what_points_leave_alone_and_with_lines() -> None:
+def test_residuals_with_points_alone_and_with_lines() -> None:
     """The frame of the instrument is far away and turned; fresh tools."""
     alone, both = [], []
     for seed in range(2):
         machine, measurements = case(seed, "smooth")
         points = cloud(machine, seed, 120, 5.0)
-        found = fit(Measurements("m", (points,)), machine.chain)
-        alone += [left(machine, found, tool, 400) for tool in FRESH]
+        fitted = fit(Measurements("m", (points,)), machine.chain)
+        alone += [residual_of(machine, fitted, tool, 400) for tool in FRESH]
         few = cloud(machine, seed, 40, 8.0)
-        found = fit(measurements.also((few,)), machine.chain)
-        both += [left(machine, found, tool, 400) for tool in FRESH]
+        fitted = fit(measurements.also((few,)), machine.chain)
+        both += [residual_of(machine, fitted, tool, 400) for tool in FRESH]
     assert np.median([one.after_framed for one in alone]) <= 6.0
     assert np.median([one.after_framed for one in both]) <= 3.5
     assert 0.5 < np.sqrt(np.mean([one.z**2 for one in alone])) < 1.5
@@ -159,11 +159,11 @@ def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None
     machine = simulated.machine(1, "smooth", chain)
     one = fit(Measurements("m", (cloud(machine, 1, 250, 5.0, [(30.0, 0.0, 9.0)]),)), chain)
     assert set(unobservable(one)) == {hidden, *(f"E{d}{last}" for d in "ABC")}
-    assert all("one offset" in finding.message for finding in told(one, "OLP801"))
+    assert all("one offset" in finding.message for finding in findings_with(one, "OLP801"))
     line = [(0.0, 0.0, -80.0), (0.0, 0.0, -400.0)]
     along_z = fit(Measurements("m", (cloud(machine, 1, 250, 5.0, line),)), chain)
     assert set(unobservable(along_z)) == {f"EC{last}", *([hidden] if hidden[1] == "C" else [])}
-    assert "on one line" in told(along_z, "OLP801")[0].message
+    assert "on one line" in findings_with(along_z, "OLP801")[0].message
     three = fit(Measurements("m", (cloud(machine, 1, 250, 5.0),)), chain)
     assert not unobservable(three)
 
@@ -174,8 +174,8 @@ def test_where_the_instrument_stands_means_nothing() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     moved = dataclasses.replace(points, measured_mm=points.measured_mm @ turn.T + 1234.5)
     first, second = (fit(Measurements("m", (p,)), "FXYZ") for p in (points, moved))
-    at = np.random.default_rng(1).uniform(first.box_mm[:, 0], first.box_mm[:, 1], (50, 3))
-    assert first.error(at, FRESH[0]) == pytest.approx(second.error(at, FRESH[0]), abs=1e-6)
+    position = np.random.default_rng(1).uniform(first.box_mm[:, 0], first.box_mm[:, 1], (50, 3))
+    assert first.error(position, FRESH[0]) == pytest.approx(second.error(position, FRESH[0]), abs=1e-6)
 
 
 def test_a_point_that_slipped_is_left_out_and_named() -> None:
@@ -183,9 +183,9 @@ def test_a_point_that_slipped_is_left_out_and_named() -> None:
     points = cloud(machine, 2, 150, 5.0)
     measured = points.measured_mm.copy()
     measured[17] += 0.2
-    found = fit(Measurements("m", (dataclasses.replace(points, measured_mm=measured),)), "FXYZ")
-    assert [outlier.row for outlier in found.outliers] == [18]
-    assert "points.csv: row 18" in told(found, "OLP802")[0].message
+    fitted = fit(Measurements("m", (dataclasses.replace(points, measured_mm=measured),)), "FXYZ")
+    assert [outlier.row for outlier in fitted.outliers] == [18]
+    assert "points.csv: row 18" in findings_with(fitted, "OLP802")[0].message
 
 
 def test_a_forgotten_scale_is_caught_by_chi_square() -> None:
@@ -194,27 +194,27 @@ def test_a_forgotten_scale_is_caught_by_chi_square() -> None:
     points = cloud(machine, 0, 60, 5.0)
     points = dataclasses.replace(points, measured_mm=points.measured_mm * (1.0 + 5e-5))
     forgotten = fit(measurements.also((points,)), "FXYZ")
-    assert told(forgotten, "OLP808") or forgotten.outliers
+    assert findings_with(forgotten, "OLP808") or forgotten.outliers
     known = dataclasses.replace(points, sigma_scale=5e-5)
-    assert not told(fit(measurements.also((known,)), "FXYZ"), "OLP808")
+    assert not findings_with(fit(measurements.also((known,)), "FXYZ"), "OLP808")
 
 
 # -- lengths from stations -------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
-def test_what_lengths_leave() -> None:
-    """Six stations of 250 lengths, places and dead lengths unknown; the stations are found too."""
+def test_residuals_with_lengths() -> None:
+    """Six stations of 250 lengths, positions and dead lengths unknown; the stations are estimated too."""
     left_same, left_other = [], []
     for seed in range(2):
         machine = simulated.machine(seed, "smooth", ("FXYZ", "YFXZ")[seed])
-        found = fit(Measurements("m", rays(machine, seed, 6, 250)), machine.chain)
-        left_same.append(left(machine, found, simulated.OFFSETS[0], 400).after_framed)
-        left_other.append(left(machine, found, FRESH[1], 400).after_framed)
+        fitted = fit(Measurements("m", rays(machine, seed, 6, 250)), machine.chain)
+        left_same.append(residual_of(machine, fitted, simulated.OFFSETS[0], 400).after_framed)
+        left_other.append(residual_of(machine, fitted, FRESH[1], 400).after_framed)
         places = simulated.stations(machine, seed, 6)
-        for result, place in zip(found.of(LengthsState), places, strict=True):
+        for result, place in zip(fitted.of(LengthsState), places, strict=True):
             assert result.state.station.place_mm == pytest.approx(place, abs=0.05)
-        assert not told(found, "OLP808")
+        assert not findings_with(fitted, "OLP808")
     assert np.median(left_same) <= 0.9
     assert np.median(left_other) <= 1.2
 
@@ -225,9 +225,9 @@ def test_a_length_that_slipped_is_left_out_and_named() -> None:
     wrong = all_rays[2].length_mm.copy()
     wrong[33] += 0.05
     bad = (*all_rays[:2], dataclasses.replace(all_rays[2], length_mm=wrong), *all_rays[3:])
-    found = fit(Measurements("m", bad), "FXYZ")
-    assert [(outlier.source, outlier.row) for outlier in found.outliers] == [("station-2.csv", 34)]
-    assert not told(found, "OLP808")
+    fitted = fit(Measurements("m", bad), "FXYZ")
+    assert [(outlier.source, outlier.row) for outlier in fitted.outliers] == [("station-2.csv", 34)]
+    assert not findings_with(fitted, "OLP808")
 
 
 def test_lengths_of_points_in_a_plane_are_refused() -> None:
@@ -242,55 +242,55 @@ def test_lengths_of_points_in_a_plane_are_refused() -> None:
 # -- directions from pods --------------------------------------------------------------------------------
 
 
-def test_what_two_pods_leave() -> None:
-    """Poses unknown, one distance known: 10 urad at 4 m; the pods are found too."""
+def test_residuals_with_two_pods() -> None:
+    """Poses unknown, one distance known: 10 urad at 4 m; the pods are estimated too."""
     rows = []
     for seed, n in ((0, 250), (1, 250)):
         machine = simulated.machine(seed, "smooth", "FXYZ")
-        found = fit(Measurements("m", (two_pods(machine, seed, n),)), "FXYZ")
-        rows += [left(machine, found, tool, 400).after_framed for tool in FRESH]
-        for pose, place in zip(found.of(PodsState)[0].state.poses, simulated.PODS, strict=True):
+        fitted = fit(Measurements("m", (two_pods(machine, seed, n),)), "FXYZ")
+        rows += [residual_of(machine, fitted, tool, 400).after_framed for tool in FRESH]
+        for pose, place in zip(fitted.of(PodsState)[0].state.poses, simulated.PODS, strict=True):
             assert pose.place_mm == pytest.approx(place, abs=0.5)
-        assert not told(found, "OLP808")
+        assert not findings_with(fitted, "OLP808")
     assert np.median(rows) <= 25.0
 
 
-def test_without_a_distance_the_scale_stays_unknown() -> None:
-    """With one offset of the reflector nobody knows the mean of the three scales then, but their
-    differences."""
+def test_without_a_distance_the_scale_is_not_observable() -> None:
+    """With one offset of the reflector the mean of the three scales is not observable then, but their
+    differences are."""
     machine = simulated.machine(1, "smooth", "FXYZ")
     pods = two_pods(machine, 1, 1000, [(0.0, 0.0, -100.0)])
     known = fit(Measurements("m", (pods,)), "FXYZ")
     free = fit(Measurements("m", (dataclasses.replace(pods, baselines=()),)), "FXYZ")
 
-    def scales(found: Fit, weights: tuple[float, float, float]) -> float:
+    def scales(fitted: Fit, weights: tuple[float, float, float]) -> float:
         """Standard uncertainty of a combination of the scales of X, Y, Z, in um/m."""
-        row = np.zeros(found.parameters.size)
+        row = np.zeros(fitted.parameters.size)
         for axis, weight in enumerate(weights):
-            ends = found.curve(f"E{'XYZ'[axis]}{'XYZ'[axis]}", found.box_mm[axis])
-            row += weight * (ends[1] - ends[0]) / np.ptp(found.box_mm[axis])
-        return float(np.sqrt(row @ found.covariance @ row)) * 1e6
+            ends = fitted.curve(f"E{'XYZ'[axis]}{'XYZ'[axis]}", fitted.box_mm[axis])
+            row += weight * (ends[1] - ends[0]) / np.ptp(fitted.box_mm[axis])
+        return float(np.sqrt(row @ fitted.covariance @ row)) * 1e6
 
-    assert told(free, "OLP809") and not told(known, "OLP809")
+    assert findings_with(free, "OLP809") and not findings_with(known, "OLP809")
     third = 1.0 / 3.0
     assert scales(free, (third, third, third)) > 3.0 * scales(known, (third, third, third))
     assert scales(free, (1.0, -1.0, 0.0)) < 1.3 * scales(known, (1.0, -1.0, 0.0))
 
 
-# -- what was not seen -----------------------------------------------------------------------------------
+# -- what is not observable ------------------------------------------------------------------------------
 
 
-def test_roll_of_z_without_its_lines_is_said_to_be_unknown() -> None:
+def test_roll_of_z_without_its_lines_is_reported_as_unknown() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     kept = [line for line in measurements.lines if abs(line.tool_mm[0]) < 1.0]
-    found = fit(measurements.with_lines(tuple(kept)), "FXYZ")
-    assert list(unobservable(found)) == ["ECZ"]
-    (finding,) = told(found, "OLP801")
+    fitted = fit(measurements.with_lines(tuple(kept)), "FXYZ")
+    assert list(unobservable(fitted)) == ["ECZ"]
+    (finding,) = findings_with(fitted, "OLP801")
     assert "ECZ" in finding.message and "um" in finding.message
-    assert "ECZ" not in {name for curve in calibration_of(found).curves for name in curve.names}
-    # known with the tool of the lines; far to the side its uncertainty knows of the roll
+    assert "ECZ" not in {name for curve in calibration_of(fitted).curves for name in curve.names}
+    # known with the tool of the lines; far to the side its uncertainty contains the roll
     middle = machine.box.mean(axis=1)[None]
-    near, far = (float(found.sigma(middle, tool)[0, 1]) for tool in (TOOLS[0], (300.0, 0.0, -120.0)))
+    near, far = (float(fitted.sigma(middle, tool)[0, 1]) for tool in (TOOLS[0], (300.0, 0.0, -120.0)))
     assert far > 2.0 * near
 
 
@@ -298,34 +298,34 @@ def test_straightness_without_a_square_leaves_squareness_unknown() -> None:
     _, measurements = case(0, "smooth", "FXYZ")
     lines = [dataclasses.replace(line, square=None) for line in measurements.lines]
     plain = dataclasses.replace(measurements.with_lines(tuple(lines)), squares=())
-    found = fit(plain, "FXYZ")
-    assert {f.message.split()[0] for f in told(found, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
+    fitted = fit(plain, "FXYZ")
+    assert {f.message.split()[0] for f in findings_with(fitted, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
 
 
 def test_a_reading_of_squareness_does_what_a_square_does() -> None:
-    """The true mean slopes at the place of the lines, given as a value, in place of the square."""
+    """The true mean slopes at the position of the lines, given as a value, instead of the square."""
     machine, measurements = case(0, "smooth", "FXYZ")
     with_square = fit(measurements, "FXYZ")
     readings = []
     for name, first, second, sign in (("C0Y", 0, 1, -1.0), ("B0Z", 0, 2, 1.0), ("A0Z", 1, 2, -1.0)):
         total = 0.0
         for moving, row in ((first, second), (second, first)):
-            at = np.tile(np.array(simulated.LINE), (201, 1))
-            at[:, moving] = np.linspace(*machine.box[moving], 201)
-            total += np.polyfit(at[:, moving], machine.error(at, np.array(simulated.TOOL))[:, row], 1)[0]
+            position = np.tile(np.array(simulated.LINE), (201, 1))
+            position[:, moving] = np.linspace(*machine.box[moving], 201)
+            total += np.polyfit(
+                position[:, moving], machine.error(position, np.array(simulated.TOOL))[:, row], 1
+            )[0]
         spans = (tuple(machine.box[first].tolist()), tuple(machine.box[second].tolist()))
         readings.append(
             SquarenessReading(name, sign * total, simulated.LINE, spans, simulated.TOOL, 1e-6)  # type: ignore[arg-type]
         )
     lines = [dataclasses.replace(line, square=None) for line in measurements.lines]
-    found = fit(
-        dataclasses.replace(measurements.with_lines(lines).also(readings), squares=()), "FXYZ"
-    )
+    fitted = fit(dataclasses.replace(measurements.with_lines(lines).also(readings), squares=()), "FXYZ")
     for name in ("C0Y", "B0Z", "A0Z"):
-        functional = found.squareness(name)
-        assert functional @ found.theta == pytest.approx(machine.square[name], abs=6e-6)
-        assert np.sqrt(functional @ found.covariance @ functional) < 3e-6
-        assert functional @ found.theta == pytest.approx(
+        functional = fitted.squareness(name)
+        assert functional @ fitted.theta == pytest.approx(machine.square[name], abs=6e-6)
+        assert np.sqrt(functional @ fitted.covariance @ functional) < 3e-6
+        assert functional @ fitted.theta == pytest.approx(
             with_square.squareness(name) @ with_square.theta, abs=20e-6
         )
 
@@ -333,23 +333,23 @@ def test_a_reading_of_squareness_does_what_a_square_does() -> None:
 def test_an_aliased_period_is_never_fitted() -> None:
     machine = simulated.machine(3, "rough", "FXYZ")
     taken = simulated.all_lines(machine, 3, jitter=0.0)
-    found = fit(measurements_of(taken, simulated.PITCH), "FXYZ")
-    assert not found.parameters.waves
-    assert {f.message[:3] for f in told(found, "OLP853")} >= {"EXX", "EYY", "EZZ"}
-    assert not calibration_of(found).cyclic
+    fitted = fit(measurements_of(taken, simulated.PITCH), "FXYZ")
+    assert not fitted.parameters.waves
+    assert {f.message[:3] for f in findings_with(fitted, "OLP853")} >= {"EXX", "EYY", "EZZ"}
+    assert not calibration_of(fitted).cyclic
 
 
-def test_a_fine_sweep_shows_what_the_targets_cannot_see() -> None:
+def test_a_fine_sweep_shows_what_is_not_observable_at_the_targets() -> None:
     """Targets at multiples of the pitch, and a sweep over two pitches: amplitude and phase of X, judged by
-    what the machine does in the sweep's place and far from it."""
+    what the machine does at the sweep and far from it."""
     machine = simulated.machine(3, "rough", "FXYZ")
     taken = simulated.all_lines(machine, 3, jitter=0.0)
     sweep = simulated.take(
         machine, np.random.default_rng(8), "EXX", targets=np.arange(1400.0, 1440.5, 1.0), runs=3
     )
-    found = fit(measurements_of([*taken, sweep], simulated.PITCH), "FXYZ")
-    assert set(found.parameters.waves) == {"EXX"}
-    (term,) = calibration_of(found).cyclic
+    fitted = fit(measurements_of([*taken, sweep], simulated.PITCH), "FXYZ")
+    assert set(fitted.parameters.waves) == {"EXX"}
+    (term,) = calibration_of(fitted).cyclic
     for start in (1410.0, 130.0):
         q = start + np.linspace(0.0, 20.0, 81)
         true = machine.curves["EXX"](q)
@@ -368,16 +368,16 @@ def test_an_axis_without_lines_has_no_answer() -> None:
 # -- directions, noise, slips ----------------------------------------------------------------------------
 
 
-def test_lost_motion_that_is_constant(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
-    machine, _, found = one
-    calibration = calibration_of(found)
+def test_backlash_that_is_constant(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
+    machine, _, fitted = one
+    calibration = calibration_of(fitted)
     for axis, letter in enumerate("XYZ"):
         true = -2.0 * machine.half[f"E{letter}{letter}"]
         assert calibration.backlash_mm[axis] == pytest.approx(true, abs=0.2 * UM)
     assert not any(curve.forward for curve in calibration.curves)
 
 
-def test_lost_motion_that_is_not_becomes_a_direction_column(
+def test_backlash_that_is_not_constant_becomes_a_direction_column(
     one: tuple[simulated.Machine, Measurements, Fit],
 ) -> None:
     _, measurements, _ = one
@@ -387,8 +387,8 @@ def test_lost_motion_that_is_not_becomes_a_direction_column(
             more = line.direction * 4.0 * UM * np.sin(np.pi * line.target_mm / 3000.0)
             line = dataclasses.replace(line, value=line.value + more)
         lines.append(line)
-    found = fit(measurements.with_lines(tuple(lines)), "FXYZ")
-    calibration = calibration_of(found)
+    fitted = fit(measurements.with_lines(tuple(lines)), "FXYZ")
+    calibration = calibration_of(fitted)
     assert calibration.backlash_mm[0] == 0.0
     assert calibration.backlash_mm[1] > 0.0
     (curve,) = [curve for curve in calibration.curves if curve.forward]
@@ -399,7 +399,7 @@ def test_lost_motion_that_is_not_becomes_a_direction_column(
 
 
 def test_a_slip_is_left_out_and_named(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
-    machine, measurements, found = one
+    machine, measurements, fitted = one
     lines = list(measurements.lines)
     k = next(i for i, line in enumerate(lines) if line.component == "EYX")
     value = lines[k].value.copy()
@@ -407,13 +407,13 @@ def test_a_slip_is_left_out_and_named(one: tuple[simulated.Machine, Measurements
     lines[k] = dataclasses.replace(lines[k], value=value)
     again = fit(measurements.with_lines(tuple(lines)), "FXYZ")
     assert [(o.source, o.row) for o in again.outliers] == [("eyx.csv", 78)]
-    (finding,) = told(again, "OLP802")
+    (finding,) = findings_with(again, "OLP802")
     assert finding.lines == (78,) and "eyx.csv" in finding.message
-    at = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (100, 3))
-    assert np.abs(again.error(at, TOOLS[0]) - found.error(at, TOOLS[0])).max() < 0.3 * UM
+    position = np.random.default_rng(1).uniform(machine.box[:, 0], machine.box[:, 1], (100, 3))
+    assert np.abs(again.error(position, TOOLS[0]) - fitted.error(position, TOOLS[0])).max() < 0.3 * UM
 
 
-def test_runs_that_scatter_more_than_stated_are_said(
+def test_runs_that_scatter_more_than_stated_are_reported(
     one: tuple[simulated.Machine, Measurements, Fit],
 ) -> None:
     _, measurements, _ = one
@@ -421,8 +421,8 @@ def test_runs_that_scatter_more_than_stated_are_said(
         dataclasses.replace(line, sigma=0.1 * UM) if line.component == "EXX" else line
         for line in measurements.lines
     ]
-    found = fit(measurements.with_lines(tuple(lines)), "FXYZ")
-    (finding,) = told(found, "OLP803")
+    fitted = fit(measurements.with_lines(tuple(lines)), "FXYZ")
+    (finding,) = findings_with(fitted, "OLP803")
     assert finding.message.startswith("exx.csv")
 
 
@@ -433,15 +433,15 @@ def test_noise_and_drift_of_a_line() -> None:
     line = line_of(simulated.take(machine, np.random.default_rng(3), "EXX", targets=q))
     groups, ramps = group_of(line), drift_ramps(line)
     table = np.hstack([np.eye(groups.max() + 1)[groups], ramps])
-    found, _, rank, _ = np.linalg.lstsq(table, line.value, rcond=1e-9)
-    rest = line.value - table @ found
+    solution, _, rank, _ = np.linalg.lstsq(table, line.value, rcond=1e-9)
+    rest = line.value - table @ solution
     noise = noise_of(line)
     assert noise.spread == pytest.approx(np.sqrt(rest @ rest / (len(rest) - rank)), rel=1e-6)
     assert noise.sigma == pytest.approx(0.5 * UM, rel=0.2)
 
 
 @pytest.mark.slow
-def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
+def test_one_run_in_both_directions_is_no_reversal_but_drift() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
     lines = []
     for a in "XYZ":
@@ -454,18 +454,18 @@ def test_one_run_there_and_back_is_no_reversal_but_drift() -> None:
 
 @pytest.mark.slow
 def test_recordings_of_many_samples_are_read_in_reasonable_memory() -> None:
-    """Sweeps of 2000 places there and back: no table of samples by places."""
+    """Sweeps of 2000 targets in both directions: no table of samples by targets."""
     machine = simulated.machine(0, "smooth", "FXYZ")
     rng = np.random.default_rng(3)
     fine = [
         line_of(simulated.take(machine, rng, f"E{a}{a}", targets=np.linspace(*machine.box[k], 2000), runs=3))
         for k, a in enumerate("XYZ")
     ]
-    found = fit(Measurements("m", tuple(fine)), "FXYZ")
+    fitted = fit(Measurements("m", tuple(fine)), "FXYZ")
     q = np.linspace(100.0, 2900.0, 50)
-    at = np.tile(np.array(simulated.LINE), (len(q), 1))
-    at[:, 0] = q
-    rest = found.curve("EXX", q) @ found.theta - machine.error(at, np.array(simulated.TOOL))[:, 0]
+    position = np.tile(np.array(simulated.LINE), (len(q), 1))
+    position[:, 0] = q
+    rest = fitted.curve("EXX", q) @ fitted.theta - machine.error(position, np.array(simulated.TOOL))[:, 0]
     assert np.std(rest - np.polyval(np.polyfit(q, rest, 1), q)) < 0.3 * UM
 
 
@@ -477,24 +477,24 @@ def test_one_run_without_sigma_is_refused() -> None:
         fit(Measurements("m", (line,)), "FXYZ")
 
 
-def test_a_wrong_sense_of_one_line_does_not_fit() -> None:
-    """Two lines of one straightness at two heights contradict each other when one is turned round."""
+def test_a_wrong_sign_of_one_line_does_not_fit() -> None:
+    """Two lines of one straightness at two heights contradict each other when one is reversed."""
     machine, measurements = case(0, "smooth", "FXYZ")
     rng = np.random.default_rng(5)
     q = np.linspace(*machine.box[0], 31)
     other = line_of(
-        simulated.take(machine, rng, "EYX", targets=q, at=(0.0, 700.0, -100.0), tool=simulated.TOOL)
+        simulated.take(machine, rng, "EYX", targets=q, line_mm=(0.0, 700.0, -100.0), tool=simulated.TOOL)
     )
     for sign, expected in ((1.0, 0), (-1.0, 1)):
         turned = dataclasses.replace(other, value=sign * other.value)
-        found = fit(measurements.with_lines((*measurements.lines, turned)), "FXYZ")
-        assert len(told(found, "OLP808")) == expected
+        fitted = fit(measurements.with_lines((*measurements.lines, turned)), "FXYZ")
+        assert len(findings_with(fitted, "OLP808")) == expected
 
 
 def test_sigmas_stand_at_every_position(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
-    _, _, found = one
-    calibration = calibration_of(found)
-    sigmas = sigmas_of(found, calibration)
+    _, _, fitted = one
+    calibration = calibration_of(fitted)
+    sigmas = sigmas_of(fitted, calibration)
     for curve in calibration.curves:
         for name in curve.names:
             assert sigmas[name].shape == curve.position_mm.shape

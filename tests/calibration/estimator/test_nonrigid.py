@@ -29,7 +29,7 @@ from olp.errormodel.build import build
 BOX = np.array(simulated.BOX)
 
 
-def places(n: int = 500) -> np.ndarray:
+def positions(n: int = 500) -> np.ndarray:
     return np.random.default_rng(99).uniform(BOX[:, 0], BOX[:, 1], (n, 3))
 
 
@@ -44,36 +44,38 @@ def bent() -> tuple[simulated.Machine, Fit, NonRigid]:
     return machine, before, nonrigid(before)
 
 
-def left_um(machine: simulated.Machine, error: np.ndarray, tool: np.ndarray) -> float:
-    at = places(len(error))
-    return simulated.rms_um(simulated.off_frame(at, machine.error(at, tool) - error))
+def residual_um(machine: simulated.Machine, error: np.ndarray, tool: np.ndarray) -> float:
+    position = positions(len(error))
+    return simulated.rms_um(simulated.off_frame(position, machine.error(position, tool) - error))
 
 
 # -- what it finds ---------------------------------------------------------------------------------------
 
 
-def test_a_sag_is_found_and_leaves_less_with_tools_not_measured_with(
+def test_a_sag_is_found_and_the_residual_falls_with_tools_not_measured_with(
     bent: tuple[simulated.Machine, Fit, NonRigid],
 ) -> None:
-    machine, before, found = bent
-    assert "DZ" in [process.coordinate for process in found.processes]
+    machine, before, result = bent
+    assert "DZ" in [process.coordinate for process in result.processes]
     for tool in np.array(FRESH):
-        at = places()
-        rigid = left_um(machine, before.error(at, tool), tool)
-        both = left_um(machine, found.fit.error(at, tool) + found.value(at), tool)
+        position = positions()
+        rigid = residual_um(machine, before.error(position, tool), tool)
+        both = residual_um(machine, result.fit.error(position, tool) + result.value(position), tool)
         assert both < 0.9 * rigid
         assert both < 6.5
 
 
-def test_its_uncertainty_is_that_of_what_it_leaves(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
-    machine, _, found = bent
-    at, tool = places(200), np.array(FRESH[0])
-    z = (machine.error(at, tool) - found.fit.error(at, tool) - found.value(at)) / found.sigma(at, tool)
+def test_its_uncertainty_is_that_of_its_residual(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
+    machine, _, result = bent
+    position, tool = positions(200), np.array(FRESH[0])
+    z = (
+        machine.error(position, tool) - result.fit.error(position, tool) - result.value(position)
+    ) / result.sigma(position, tool)
     assert 0.5 < np.sqrt(np.mean(z**2)) < 1.5
     assert np.mean(np.abs(z) < 2.0) > 0.88
 
 
-def test_what_was_held_out_is_foretold_better(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
+def test_held_out_readings_are_predicted_better(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
     figures = bent[2].figures
     assert figures is not None
     assert figures.held_out_after < figures.held_out_before
@@ -85,30 +87,30 @@ def test_what_was_held_out_is_foretold_better(bent: tuple[simulated.Machine, Fit
 @pytest.mark.parametrize("family", ["smooth", "rough"])
 @pytest.mark.parametrize("seed", [200, 201])
 def test_nothing_is_invented_on_rigid_machines(family: str, seed: int) -> None:
-    found = nonrigid(before := of_points(simulated.machine(seed, family, CHAINS[seed % 6]), seed, 120))
-    assert not found.processes
-    assert found.fit is before
-    assert "evidence" in found.reason
-    assert not found.value(places()).any()
+    result = nonrigid(before := of_points(simulated.machine(seed, family, CHAINS[seed % 6]), seed, 120))
+    assert not result.processes
+    assert result.fit is before
+    assert "evidence" in result.reason
+    assert not result.value(positions()).any()
 
 
 @pytest.mark.slow
 def test_noise_that_was_stated_too_small_is_no_field() -> None:
     points = cloud(simulated.machine(203, "smooth"), 203, 120, 5.0)
     lying = dataclasses.replace(points, sigma=0.5 * points.sigma)
-    found = nonrigid(fit(Measurements("simulated", (lying,)), "FXYZ"))
-    assert not found.processes
-    assert found.noise > 1.2
+    result = nonrigid(fit(Measurements("simulated", (lying,)), "FXYZ"))
+    assert not result.processes
+    assert result.noise > 1.2
 
 
 @pytest.mark.slow
 def test_directions_of_pods_show_a_sag_too() -> None:
     machine = simulated.bent(simulated.machine(2, "smooth"), sag_mm=0.15)
-    found = nonrigid(before := fit(Measurements("simulated", (two_pods(machine, 2, 250),)), "FXYZ"))
-    assert "DZ" in [process.coordinate for process in found.processes]
-    at, tool = places(), np.array(FRESH[0])
-    after = left_um(machine, found.fit.error(at, tool) + found.value(at), tool)
-    assert after < 0.9 * left_um(machine, before.error(at, tool), tool)
+    result = nonrigid(before := fit(Measurements("simulated", (two_pods(machine, 2, 250),)), "FXYZ"))
+    assert "DZ" in [process.coordinate for process in result.processes]
+    position, tool = positions(), np.array(FRESH[0])
+    after = residual_um(machine, result.fit.error(position, tool) + result.value(position), tool)
+    assert after < 0.9 * residual_um(machine, before.error(position, tool), tool)
 
 
 def test_too_few_points_or_points_in_a_plane_make_no_map() -> None:
@@ -119,8 +121,8 @@ def test_too_few_points_or_points_in_a_plane_make_no_map() -> None:
     whole = cloud(machine, 3, 200, 5.0)
     use = whole.axis_mm[:, 2] > -200.0
     low = Points(whole.axis_mm[use], whole.tool_mm[use], whole.measured_mm[use], whole.sigma)
-    found = fit(Measurements("simulated", (low,)), "FXYZ")
-    wide = dataclasses.replace(found, box_mm=BOX)
+    fitted = fit(Measurements("simulated", (low,)), "FXYZ")
+    wide = dataclasses.replace(fitted, box_mm=BOX)
     assert "along Z" in nonrigid(wide).reason
 
 
@@ -128,11 +130,11 @@ def test_too_few_points_or_points_in_a_plane_make_no_map() -> None:
 
 
 def test_the_sines_make_the_kernel() -> None:
-    modes, at = Modes.over(BOX, 1000), places(200)
+    modes, position = Modes.over(BOX, 1000), positions(200)
     lengths = 0.3 * np.ptp(BOX, axis=1)
     log_variance, _ = modes.log_variance(np.log(2.0), np.log(lengths))
-    rows = modes.values(at)
-    apart = np.linalg.norm((at[:, None] - at[None]) / lengths, axis=2)
+    rows = modes.values(position)
+    apart = np.linalg.norm((position[:, None] - position[None]) / lengths, axis=2)
     ours, true = (rows * np.exp(log_variance)) @ rows.T, 4.0 * matern(apart)
     assert np.sqrt(np.mean((ours - true) ** 2)) < 0.02 * 4.0
     assert matern(np.array([0.0, 1.0]))[1] == pytest.approx(0.523994, abs=1e-6)  # by hand
@@ -186,11 +188,13 @@ def test_derivatives_of_the_evidence() -> None:
 def test_without_a_field_the_adjustment_is_that_of_the_fit() -> None:
     before = of_points(simulated.machine(6, "rough"), 6, 80)
     x, covariance, _ = Adjustment(before, Modes.over(BOX, 80)).solve((), np.zeros(0), 1.0)
-    at, tool, size = places(50), np.array(FRESH[1]), before.parameters.size
+    position, tool, size = positions(50), np.array(FRESH[1]), before.parameters.size
     again = dataclasses.replace(before, theta=x[:size], covariance=covariance[:size, :size])
-    assert again.error(at, tool) == pytest.approx(before.error(at, tool), abs=1e-6)
+    assert again.error(position, tool) == pytest.approx(before.error(position, tool), abs=1e-6)
     grown = max(1.0, before.chi_square / before.freedom)
-    assert again.sigma(at, tool) * np.sqrt(grown) == pytest.approx(before.sigma(at, tool), rel=1e-3)
+    assert again.sigma(position, tool) * np.sqrt(grown) == pytest.approx(
+        before.sigma(position, tool), rel=1e-3
+    )
 
 
 # -- maps and files --------------------------------------------------------------------------------------
@@ -198,34 +202,34 @@ def test_without_a_field_the_adjustment_is_that_of_the_fit() -> None:
 
 @pytest.mark.slow
 def test_the_map_loses_no_more_than_stated(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
-    _, before, found = bent
+    _, before, result = bent
     wanted = Measurements("simulated", before.measurements.observations, map=MapWish(within_mm=2e-4))
     fitted = olp.fit_calibration(dataclasses.replace(wanted, chain=before.parameters.chain))
     (described,) = fitted.calibration.maps
     assert described.sigma is not None
-    at = places(2000)
-    at = fitted.calibration.box_mm[:, 0] + (at - BOX[:, 0]) / np.ptp(BOX, axis=1) * np.ptp(
+    position = positions(2000)
+    position = fitted.calibration.box_mm[:, 0] + (position - BOX[:, 0]) / np.ptp(BOX, axis=1) * np.ptp(
         fitted.calibration.box_mm, axis=1
     )
     model = build(dataclasses.replace(fitted.calibration, curves=(), squareness={}), before.parameters.chain)
-    assert np.abs(model.error(at, np.zeros(3)) - found.value(at)).max() < 2.5e-4
+    assert np.abs(model.error(position, np.zeros(3)) - result.value(position)).max() < 2.5e-4
     with pytest.raises(CannotCompute, match="within_um"):
-        residual_map(found, fitted.calibration, 1e-9)
+        residual_map(result, fitted.calibration, 1e-9)
 
 
 def test_sigmas_of_curves_and_map_add_up_to_that_of_both(
     bent: tuple[simulated.Machine, Fit, NonRigid],
 ) -> None:
-    _, before, found = bent
+    _, before, result = bent
     fitted = olp.fit_calibration(
         dataclasses.replace(before.measurements, chain=before.parameters.chain), map=MapWish(within_mm=1e-3)
     )
     (described,) = fitted.calibration.maps
     assert described.sigma is not None
-    tool, at = np.array(described.tool_mm), np.array([[k[0] for k in described.knots_mm]])
-    whole = np.sqrt(described.sigma[0, 0, 0] ** 2 + found.fit.sigma(at, tool)[0] ** 2)
-    assert np.all(whole >= found.sigma(at, tool)[0] - 1e-6)
-    assert whole == pytest.approx(found.sigma(at, tool)[0], rel=0.15)
+    tool, position = np.array(described.tool_mm), np.array([[k[0] for k in described.knots_mm]])
+    whole = np.sqrt(described.sigma[0, 0, 0] ** 2 + result.fit.sigma(position, tool)[0] ** 2)
+    assert np.all(whole >= result.sigma(position, tool)[0] - 1e-6)
+    assert whole == pytest.approx(result.sigma(position, tool)[0], rel=0.15)
 
 
 def written(
@@ -247,9 +251,9 @@ def test_from_points_to_a_calibration_with_a_map(tmp_path: Path) -> None:
     machine = simulated.bent(simulated.machine(1, "smooth", "YFXZ"))
     plan = written(tmp_path, machine, "[map]\nwithin_um = 0.5\n")
     target = tmp_path / "calibration.toml"
-    said = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "-o", str(target), "--json", "-q"])
-    assert said.exit_code == 0, said.output
-    report = json.loads(said.stdout)
+    result = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "-o", str(target), "--json", "-q"])
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
     assert report["map"]["written"]
     assert report["map"]["held_out_after_sigma"] < report["map"]["held_out_before_sigma"]
     assert "OLP841" in [finding["code"] for finding in report["findings"]]
@@ -262,9 +266,11 @@ def test_from_points_to_a_calibration_with_a_map(tmp_path: Path) -> None:
     tool = np.array(FRESH[0])
     model = build(read, "YFXZ", outside="hold")
     rigid = build(dataclasses.replace(read, maps=()), "YFXZ", outside="hold")
-    at = places()
-    assert left_um(machine, model.error(at, tool), tool) < 6.5
-    assert left_um(machine, model.error(at, tool), tool) < left_um(machine, rigid.error(at, tool), tool)
+    position = positions()
+    assert residual_um(machine, model.error(position, tool), tool) < 6.5
+    assert residual_um(machine, model.error(position, tool), tool) < residual_um(
+        machine, rigid.error(position, tool), tool
+    )
     plain = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "--no-map", "--json", "-q"])
     assert "map" not in json.loads(plain.stdout)
 
@@ -272,13 +278,15 @@ def test_from_points_to_a_calibration_with_a_map(tmp_path: Path) -> None:
 def test_one_offset_says_what_the_map_holds_for(tmp_path: Path) -> None:
     machine = simulated.bent(simulated.machine(1, "smooth", "YFXZ"))
     plan = written(tmp_path, machine, tools=[simulated.OFFSETS[0]])
-    said = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "--map"])
-    assert "OLP843" in said.output
-    assert "[0, 0, -120] mm" in " ".join(said.output.split())
+    result = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "--map"])
+    assert "OLP843" in result.output
+    assert "[0, 0, -120] mm" in " ".join(result.output.split())
 
 
-def test_no_map_is_said(tmp_path: Path) -> None:
+def test_no_map_is_reported(tmp_path: Path) -> None:
     plan = written(tmp_path, simulated.machine(1, "smooth", "YFXZ"))
-    said = CliRunner().invoke(main, ["calibrate", "fit", str(plan), "--map", "-o", str(tmp_path / "c.toml")])
-    assert "OLP842" in said.output
+    result = CliRunner().invoke(
+        main, ["calibrate", "fit", str(plan), "--map", "-o", str(tmp_path / "c.toml")]
+    )
+    assert "OLP842" in result.output
     assert not list(tmp_path.glob("c-map*"))

@@ -1,5 +1,5 @@
-"""What a fit says that no reading saw is what no reading can see: by ranks of the judge, all chains;
-and what was forgotten of an instrument does not fit."""
+"""What a fit reports as not observable is so by the ranks of the judge, for all chains; and readings with a
+forgotten unknown of an instrument do not fit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from calibration.observations.test_instruments import CENTRE, LEVER, circles_of, diagonals_of, no_square, told
+from calibration.observations.test_instruments import (
+    CENTRE,
+    LEVER,
+    circles_of,
+    diagonals_of,
+    messages_of,
+    no_square,
+)
 from cases.calibration import case, cloud, two_pods
 from judge import nullspace, simulated
 
@@ -23,7 +30,7 @@ from olp.calibration.observations.measurements import Measurements
 
 ORDERS = ["".join(order) for order in permutations("XYZ")]
 CHAINS = [order[:k] + "F" + order[k:] for k in range(4) for order in ORDERS]
-#: every order of the axes in the fast suite, with the workpiece at all places of the chain in the slow one
+#: Every order of the axes in the fast suite; all positions of the workpiece in the chain in the slow one.
 EACH = [
     pytest.param(chain, marks=[] if k in (0, 7, 14, 21, 4, 11) else pytest.mark.slow)
     for k, chain in enumerate(CHAINS)
@@ -50,17 +57,17 @@ def angles(names: set[str]) -> set[str]:
 def test_angles_that_offsets_of_the_reflector_hide(chain: str, offsets: str) -> None:
     machine = simulated.machine(1, "smooth", chain)
     points = cloud(machine, 1, 200, 5.0, TOOLS_OF[offsets])
-    at, tool = points.axis_mm, points.tool_mm
-    table, names = nullspace.columns(chain, lambda m: m.error(at, tool).ravel())
-    changes = nullspace.open_changes(table, nullspace.frame(at + tool))
+    axis, tool = points.axis_mm, points.tool_mm
+    table, names = nullspace.columns(chain, lambda m: m.error(axis, tool).ravel())
+    changes = nullspace.open_changes(table, nullspace.frame(axis + tool))
     hidden = nullspace.open_names(changes, names)
     assert len(changes) == 4 * len(angles(hidden))
     assert len(changes) in {"one offset": (16,), "collinear": (4, 8), "three": (0,)}[offsets]
-    found = fit(Measurements("m", (points,)), chain)
-    said = set(unobservable(found))
-    assert said == angles(hidden)
+    fitted = fit(Measurements("m", (points,)), chain)
+    reported = set(unobservable(fitted))
+    assert reported == angles(hidden)
     words = {"one offset": "one offset", "collinear": "on one line", "three": ""}[offsets]
-    assert all(words in message for message in told(found, "OLP801"))
+    assert all(words in message for message in messages_of(fitted, "OLP801"))
 
 
 def open_scales(changes: np.ndarray, names: list[str]) -> np.ndarray:
@@ -69,38 +76,38 @@ def open_scales(changes: np.ndarray, names: list[str]) -> np.ndarray:
     first = np.stack(
         [changes[:, names.index(n)] / s for n, s in zip(("EXX", "EYY", "EZZ"), spans, strict=True)]
     )
-    left, size, _ = np.linalg.svd(first * 3000.0 / np.abs(changes).max())
-    rows = left[:, : int((size > 1e-7).sum())].T
+    axes, size, _ = np.linalg.svd(first * 3000.0 / np.abs(changes).max())
+    rows = axes[:, : int((size > 1e-7).sum())].T
     return np.stack([row / row[np.argmax(np.abs(row))] for row in rows])
 
 
-def directions(machine: simulated.Machine, at: np.ndarray, tool: np.ndarray) -> np.ndarray:
+def directions(machine: simulated.Machine, axis: np.ndarray, tool: np.ndarray) -> np.ndarray:
     """Azimuths and elevations from both pods, upright."""
-    out = []
+    angles_of_pods = []
     for pod in np.array(simulated.PODS):
-        x, y, z = (at + tool + machine.error(at, tool) - pod).T
-        out += [np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]
-    return 1e6 * np.concatenate(out)
+        x, y, z = (axis + tool + machine.error(axis, tool) - pod).T
+        angles_of_pods += [np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]
+    return 1e6 * np.concatenate(angles_of_pods)
 
 
-def of_poses(at: np.ndarray) -> np.ndarray:
+def of_poses(tip: np.ndarray) -> np.ndarray:
     """What shifts and turns of each pod do to its angles, by differences."""
-    out = []
+    columns = []
     for k, pod in enumerate(np.array(simulated.PODS)):
         for unknown in range(6):
             sides = []
             for sign in (1.0, -1.0):
-                ray = at - pod
+                ray = tip - pod
                 if unknown < 3:
                     ray = ray - sign * 0.1 * np.eye(3)[unknown]
                 else:
                     ray = ray + sign * np.cross(1e-5 * np.eye(3)[unknown - 3], ray)
                 x, y, z = ray.T
                 sides.append(np.concatenate([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]))
-            column = np.zeros((2, 2 * len(at)))
+            column = np.zeros((2, 2 * len(tip)))
             column[k] = sides[0] - sides[1]
-            out.append(column.ravel() * 1e6)
-    return np.stack(out, axis=1)
+            columns.append(column.ravel() * 1e6)
+    return np.stack(columns, axis=1)
 
 
 @pytest.mark.slow
@@ -110,9 +117,9 @@ def test_angles_alone_leave_the_scale_open(chain: str) -> None:
     three axes alike."""
     machine = simulated.machine(1, "smooth", chain)
     pods = two_pods(machine, 1, 400, [(0.0, 0.0, 0.0)])
-    at, tool = pods.axis_mm, pods.tool_mm
-    table, names = nullspace.columns(chain, lambda m: directions(m, at, tool))
-    changes = nullspace.open_changes(table, of_poses(at + tool))
+    axis, tool = pods.axis_mm, pods.tool_mm
+    table, names = nullspace.columns(chain, lambda m: directions(m, axis, tool))
+    changes = nullspace.open_changes(table, of_poses(axis + tool))
     (stretch,) = open_scales(changes, names)
     assert stretch == pytest.approx([1.0, 1.0, 1.0], abs=1e-3)
     assert len(changes) == 17
@@ -121,13 +128,13 @@ def test_angles_alone_leave_the_scale_open(chain: str) -> None:
     assert scale_unobservable(free) is not None and scale_unobservable(known) is None
     (change,) = scales_open(free)[0]
     assert change == pytest.approx([1.0, 1.0, 1.0], abs=0.15)
-    assert len(told(free, "OLP809")) == 1 and not told(known, "OLP809")
+    assert len(messages_of(free, "OLP809")) == 1 and not messages_of(known, "OLP809")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("chain", EACH)
 def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None:
-    """Of three scales and three values of squareness four diagonals see four: the squareness, and one
+    """Of three scales and three values of squareness four diagonals determine four: the squareness, and one
     combination of scales."""
     machine = simulated.machine(1, "smooth", chain)
     lines = diagonals_of(machine, 1)
@@ -135,8 +142,8 @@ def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None
     def reading(m: simulated.Machine) -> np.ndarray:
         parts = []
         for d in lines:
-            at = np.array(d.start_mm) + d.distance_mm[:, None] * d.unit
-            parts.append(m.error(at, np.array(LEVER)) @ d.unit)
+            axis = np.array(d.start_mm) + d.distance_mm[:, None] * d.unit
+            parts.append(m.error(axis, np.array(LEVER)) @ d.unit)
         return np.concatenate(parts)
 
     table, names = nullspace.columns(chain, reading)
@@ -145,21 +152,21 @@ def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None
     changes = nullspace.open_changes(table[:, first], zeros)
     assert len(changes) == 2
     assert np.abs(changes[:, 3:]).max() < 1e-6 * np.abs(changes).max()
-    found = fit(Measurements("m", lines), chain)
-    assert not squareness_unobservable(found)
-    changes_said, (seen,) = scales_open(found)
-    assert len(changes_said) == 2
-    # what no diagonal sees is at right angles to the combination that they see
+    fitted = fit(Measurements("m", lines), chain)
+    assert not squareness_unobservable(fitted)
+    reported, (seen,) = scales_open(fitted)
+    assert len(reported) == 2
+    # what is not observable is at right angles to the combination that is
     rows = changes[:, :3] / [high - low for low, high in simulated.BOX]
     expected = np.linalg.svd(rows)[2][2]
     assert abs(seen @ expected) / np.linalg.norm(seen) > 0.97
-    (message,) = told(found, "OLP809")
-    assert "one combination is known alone" in message
+    (message,) = messages_of(fitted, "OLP809")
+    assert "only one combination is observable" in message
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("chain", EACH)
-def test_a_ball_bar_in_one_direction_cannot_tell_squareness(chain: str) -> None:
+def test_a_ball_bar_in_one_direction_does_not_determine_squareness(chain: str) -> None:
     machine, measurements = case(2, "smooth", chain)
     bare = no_square(measurements)
     for both, closed in ((False, 0), (True, 3)):
@@ -169,16 +176,16 @@ def test_a_ball_bar_in_one_direction_cannot_tell_squareness(chain: str) -> None:
             i, j = ("XYZ".index(letter) for letter in circle.plane)
             outward = np.zeros((len(circle.angle_rad), 3))
             outward[:, i], outward[:, j] = np.cos(circle.angle_rad), np.sin(circle.angle_rad)
-            at = np.array(CENTRE) + circle.radius_mm * outward
+            axis = np.array(CENTRE) + circle.radius_mm * outward
             one = nullspace.blank(chain)
             one.square[square] = 1e-6
-            column = (one.error(at, np.array(LEVER)) * outward).sum(axis=1)
-            own = [np.ones(len(at)), outward[:, i], outward[:, j]]
+            column = (one.error(axis, np.array(LEVER)) * outward).sum(axis=1)
+            own = [np.ones(len(axis)), outward[:, i], outward[:, j]]
             own.append(circle.direction * np.sin(2.0 * circle.angle_rad))
             seen += 1 - len(nullspace.open_changes(column[:, None], np.stack(own, axis=1)))
         assert seen == closed
-        found = fit(bare.also(runs), chain)
-        assert len(squareness_unobservable(found)) == 3 - closed
+        fitted = fit(bare.also(runs), chain)
+        assert len(squareness_unobservable(fitted)) == 3 - closed
 
 
 # -- forgotten nuisances ---------------------------------------------------------------------------------
@@ -189,7 +196,7 @@ def forgotten(kind: str, seed: int) -> tuple[Measurements, Measurements]:
     machine, lines = case(seed, "smooth", "FXYZ")
     if kind == "a tracker that was moved":
         first = cloud(machine, seed, 60, 5.0)
-        # each point twice, the second time with the tracker 30 um aside
+        # each point is read twice, the second time with the tracker 30 um aside
         joined = dataclasses.replace(
             first,
             axis_mm=np.tile(first.axis_mm, (2, 1)),
@@ -234,5 +241,5 @@ def forgotten(kind: str, seed: int) -> tuple[Measurements, Measurements]:
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_what_was_forgotten_does_not_fit(kind: str, seed: int) -> None:
     bad, good = forgotten(kind, seed)
-    assert told(fit(bad, "FXYZ"), "OLP808") or told(fit(bad, "FXYZ"), "OLP802")
-    assert not told(fit(good, "FXYZ"), "OLP808")
+    assert messages_of(fit(bad, "FXYZ"), "OLP808") or messages_of(fit(bad, "FXYZ"), "OLP802")
+    assert not messages_of(fit(good, "FXYZ"), "OLP808")

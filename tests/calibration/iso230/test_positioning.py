@@ -18,7 +18,7 @@ UM = 1e-3
 
 
 def line(up: object, down: object, target: object, component: str = "EXX", scale: float = UM) -> Line:
-    """(runs, targets) values of each direction in um or urad; run by run, to and fro."""
+    """(runs, targets) values of each direction in um or urad; run by run, in both directions."""
     x = np.asarray(target, float)
     rows: list[tuple[float, float, int, int]] = []
     for sign, table in ((1, up), (-1, down)):
@@ -42,17 +42,17 @@ def test_by_hand() -> None:
     R_i: max(2 sqrt2 + 2, 4 sqrt2) = 5.657, max(2 sqrt2 + 3, 4 sqrt2) = 5.828,
     max(4 sqrt2 + 3, 8 sqrt2) = 11.31.
     """
-    found = evaluate(line([[0, 4, 6], [2, 4, 10]], [[-1, 0, 5], [-1, 2, 5]], [0, 100, 200]))
+    result = evaluate(line([[0, 4, 6], [2, 4, 10]], [[-1, 0, 5], [-1, 2, 5]], [0, 100, 200]))
     root = math.sqrt(2)
     wanted = {
         "A": 7 + 6 * root, "E": 9.0, "R": 8 * root, "M": 6.5, "B": 3.0, "B_mean": 8 / 3,
         "A_up": 7 + 6 * root, "E_up": 7.0, "R_up": 8 * root,
         "A_down": 4 + 2 * root, "E_down": 6.0, "R_down": 4 * root,
     }  # fmt: skip
-    assert {k: v / UM for k, v in found.figures().items()} == pytest.approx(wanted, rel=1e-12)
-    assert found.repeatability_at / UM == pytest.approx([4 * root, 2 * root + 3, 8 * root])
-    assert found.reversal_at is not None
-    assert found.reversal_at / UM == pytest.approx([2, 3, 3])
+    assert {k: v / UM for k, v in result.figures().items()} == pytest.approx(wanted, rel=1e-12)
+    assert result.repeatability_at / UM == pytest.approx([4 * root, 2 * root + 3, 8 * root])
+    assert result.reversal_at is not None
+    assert result.reversal_at / UM == pytest.approx([2, 3, 3])
 
 
 def test_angles_are_the_same_in_urad() -> None:
@@ -89,23 +89,23 @@ STATED = {
 
 
 def test_published_readings() -> None:
-    found = evaluate(line(np.transpose(FORWARD), np.transpose(BACKWARD), TARGET, scale=1e-8))
-    figures = found.figures()
+    result = evaluate(line(np.transpose(FORWARD), np.transpose(BACKWARD), TARGET, scale=1e-8))
+    figures = result.figures()
     for key, value in STATED.items():
         # the report rounds to 1e-8 mm, its mean of B to 1e-7
         assert figures[key] == pytest.approx(value, abs=5.5e-8 if key == "B_mean" else 1.1e-8), key
     assert figures["A"] == pytest.approx(8.881e-05, abs=1.1e-8)
 
 
-def test_straightness_stands_about_one_line() -> None:
+def test_straightness_refers_to_one_line() -> None:
     x = np.array([0.0, 100.0, 200.0, 300.0])
     bow = np.array([0.0, 2.0, 2.0, 0.0])
     tilted = bow + 0.05 * x + 7.0
-    found = evaluate(line([tilted + 1, tilted + 1], [tilted - 1, tilted - 1], x, "EYX"))
-    assert found.slope == pytest.approx(0.05e-3, rel=1e-9)
-    assert found.figures()["M"] / UM == pytest.approx(2.0)
-    assert found.figures()["B"] / UM == pytest.approx(2.0)
-    assert found.figures()["E"] / UM == pytest.approx(4.0)
+    result = evaluate(line([tilted + 1, tilted + 1], [tilted - 1, tilted - 1], x, "EYX"))
+    assert result.slope == pytest.approx(0.05e-3, rel=1e-9)
+    assert result.figures()["M"] / UM == pytest.approx(2.0)
+    assert result.figures()["B"] / UM == pytest.approx(2.0)
+    assert result.figures()["E"] / UM == pytest.approx(4.0)
 
 
 @given(
@@ -148,10 +148,10 @@ def test_laws(seed: int, shift: float, runs: int, targets: int) -> None:
 
 
 def test_one_direction_gives_the_unidirectional_figures() -> None:
-    found = evaluate(line([[0, 4, 6], [2, 4, 10]], None, [0, 100, 200]))
-    assert set(found.figures()) == {"A_up", "E_up", "R_up"}
-    assert found.reversal_at is None
-    [lacking, equal] = findings_of(found)
+    result = evaluate(line([[0, 4, 6], [2, 4, 10]], None, [0, 100, 200]))
+    assert set(result.figures()) == {"A_up", "E_up", "R_up"}
+    assert result.reversal_at is None
+    [lacking, equal] = findings_of(result)
     assert "from one side only" in lacking.message and "2 runs, 5 are asked for" in lacking.message
     assert equal.code == "OLP852" and "100 mm apart" in equal.message
 
@@ -162,22 +162,22 @@ def test_enough_readings_at_unequal_steps_are_no_finding() -> None:
     assert list(findings_of(evaluate(line(values, values, x)))) == []
 
 
-def test_a_slip_is_told_with_its_place_and_noise_is_not() -> None:
+def test_a_slip_is_reported_with_its_position_and_noise_is_not() -> None:
     random = np.random.default_rng(4)
     x = np.cumsum(random.uniform(40, 60, 12))
-    told = 0
+    reported = 0
     for _ in range(30):
         noise = random.normal(0, 1, (2, 5, 12)) * (0.5 + x / 600.0)
         one = line(noise[0], noise[1], x)
-        told += sum(f.code == "OLP859" for f in findings_of(evaluate(one)))
-    assert told == 0
+        reported += sum(f.code == "OLP859" for f in findings_of(evaluate(one)))
+    assert reported == 0
     noise[0, 2, 7] += 31.0
-    [found] = findings_of(evaluate(line(noise[0], noise[1], x)))
-    assert found.code == "OLP859"
-    assert f"at {x[7]:g} mm in run 3" in found.message
+    [finding] = findings_of(evaluate(line(noise[0], noise[1], x)))
+    assert finding.code == "OLP859"
+    assert f"at {x[7]:g} mm in run 3" in finding.message
 
 
-def test_incomplete_readings_are_refused_with_their_place() -> None:
+def test_incomplete_readings_are_refused_with_their_position() -> None:
     one = line([[0, 4, 6], [2, 4, 10]], [[-1, 0, 5], [-1, 2, 5]], [0, 100, 200])
     kept = np.arange(len(one.value)) != 4
     lacking = Line("EXX", one.target_mm[kept], one.value[kept], one.run[kept], one.direction[kept], (0, 0, 0))

@@ -36,18 +36,18 @@ ERRORS = {"down": (0.010, -0.004, 0.021), "left": (-0.030, 0.012, 0.003), "front
 
 
 def test_without_a_turning_head_only_differences_are_known() -> None:
-    found = postures.fit(held(STYLI, ERRORS, ["down", "left", "front"] * 4, noise=1e-3))
-    assert found.reference == "down"
+    result = postures.fit(held(STYLI, ERRORS, ["down", "left", "front"] * 4, noise=1e-3))
+    assert result.reference == "down"
     for name in ("left", "front"):
         wanted = np.subtract(ERRORS[name], ERRORS["down"])
-        assert np.abs(found.error_mm[name] - wanted).max() < 4 * found.sigma_mm[name].max()
-        assert 3e-4 < found.sigma_mm[name].max() < 1.5e-3
-    assert list(found.findings) == []
-    assert found.as_dict()["before_rms_um"] > 10 * found.as_dict()["after_rms_um"]
-    [left, _] = found.as_dict()["tools"]
-    assert left["gauge_to_tip_mm"] == pytest.approx([-80.04, 0.016, -60.018], abs=4e-3)
+        assert np.abs(result.error_mm[name] - wanted).max() < 4 * result.sigma_mm[name].max()
+        assert 3e-4 < result.sigma_mm[name].max() < 1.5e-3
+    assert list(result.findings) == []
+    assert result.as_dict()["before_rms_um"] > 10 * result.as_dict()["after_rms_um"]
+    [left_stylus, _] = result.as_dict()["tools"]
+    assert left_stylus["gauge_to_tip_mm"] == pytest.approx([-80.04, 0.016, -60.018], abs=4e-3)
     other = postures.fit(held(STYLI, ERRORS, ["down", "left", "front"] * 4, noise=1e-3), reference="front")
-    gap = found.error_mm["left"] - found.error_mm["front"]
+    gap = result.error_mm["left"] - result.error_mm["front"]
     assert other.error_mm["left"] == pytest.approx(gap, abs=1e-12)
 
 
@@ -57,21 +57,21 @@ ANGLES = np.array([[0, 0, 0], [30, 0, 0], [-30, 0, 90], [0, 40, 45], [20, -35, 1
 def test_a_turning_head_gives_the_vector_itself() -> None:
     turn = postures.turn_of(*ANGLES)
     taken = held({"probe": (5, 2, -200)}, {"probe": (0.05, -0.02, 0.08)}, ["probe"] * 6, turn)
-    found = postures.fit(taken)
-    assert found.error_mm["probe"] == pytest.approx([0.05, -0.02, 0.08], abs=1e-9)
-    assert found.point_mm == pytest.approx(POINT, abs=1e-9)
-    assert found.reference is None
+    result = postures.fit(taken)
+    assert result.error_mm["probe"] == pytest.approx([0.05, -0.02, 0.08], abs=1e-9)
+    assert result.point_mm == pytest.approx(POINT, abs=1e-9)
+    assert result.reference is None
 
 
 def test_turns_about_one_axis_hide_the_part_along_it() -> None:
     zero = np.zeros(4)
     turn = postures.turn_of(zero, zero, np.array([0.0, 90.0, 180.0, 270.0]))
-    found = postures.fit(held({"probe": (5, 2, -200)}, {"probe": (0.05, -0.02, 0.08)}, ["probe"] * 4, turn))
-    assert found.error_mm["probe"][:2] == pytest.approx([0.05, -0.02], abs=1e-9)
-    assert np.isnan(found.error_mm["probe"][2])
-    [finding] = found.findings
+    result = postures.fit(held({"probe": (5, 2, -200)}, {"probe": (0.05, -0.02, 0.08)}, ["probe"] * 4, turn))
+    assert result.error_mm["probe"][:2] == pytest.approx([0.05, -0.02], abs=1e-9)
+    assert np.isnan(result.error_mm["probe"][2])
+    [finding] = result.findings
     assert finding.code == "OLP856" and "error in Z" in finding.message
-    assert found.as_dict()["tools"][0]["gauge_to_tip_mm"] is None
+    assert result.as_dict()["tools"][0]["gauge_to_tip_mm"] is None
 
 
 def test_turns_are_right_handed() -> None:
@@ -88,10 +88,10 @@ def test_errors_of_the_machine_are_taken_out() -> None:
     names = ["down", "left", "front"] * 3
     off = np.random.default_rng(4).normal(0, 0.05, (9, 3))
     taken = held(STYLI, ERRORS, names, machine=off)
-    raw, known = postures.fit(taken), postures.fit(taken, off)
+    uncompensated, known = postures.fit(taken), postures.fit(taken, off)
     assert known.as_dict()["after_rms_um"] < 1e-6
-    assert raw.as_dict()["after_rms_um"] > 10
-    assert [f.code for f in raw.findings] == ["OLP857"]
+    assert uncompensated.as_dict()["after_rms_um"] > 10
+    assert [f.code for f in uncompensated.findings] == ["OLP857"]
     assert known.error_mm["left"] == pytest.approx(np.subtract(ERRORS["left"], ERRORS["down"]), abs=1e-9)
 
 
@@ -101,8 +101,8 @@ def test_without_repetition_an_uncertainty_must_be_stated() -> None:
     with pytest.raises(ConfigError, match="sigma_um is not stated"):
         postures.fit(bare)
     assert postures.fit(once).sigma_mm["left"] == pytest.approx([2**0.5 * 1e-6] * 3)
-    two, way = np.array([0.0, 100.0]), np.ones(2, int)
-    plain = Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), way, way)
+    two, ones = np.array([0.0, 100.0]), np.ones(2, int)
+    plain = Diagonal((0, 0, 0), (60, 80, 0), two, np.array([0.0, 0.002]), ones, ones)
     with pytest.raises(ConfigError, match="nothing is repeated"):
         diagonals.fit([plain])
 
@@ -121,12 +121,12 @@ def test_file_of_a_ball_bar(tmp_path: Path) -> None:
     head = "# plane = ZX\n# radius_mm = 100\n# centre_mm = [1, 2, 3]\n# tool_mm = [0, 0, -50]\n"
     rows = ["angle_deg,run,direction,deviation_um"]
     rows += [f"{a},1,{d},{a / 10}" for d in (1, -1) for a in range(0, 360, 9)]
-    found = read_circles(write(tmp_path / "c.csv", head, rows))
-    assert (found.plane, found.centre_mm, found.tool_mm) == ("ZX", (1, 2, 3), (0, 0, -50))
-    assert found.value[1] == pytest.approx(0.9e-3)
-    assert ballbar.fit(found).reading() is not None
+    result = read_circles(write(tmp_path / "c.csv", head, rows))
+    assert (result.plane, result.centre_mm, result.tool_mm) == ("ZX", (1, 2, 3), (0, 0, -50))
+    assert result.value[1] == pytest.approx(0.9e-3)
+    assert ballbar.fit(result).reading() is not None
     other = read_circles(write(tmp_path / "s.csv", head + "# sense = shorter-is-positive\n", rows))
-    assert other.value == pytest.approx(-found.value)
+    assert other.value == pytest.approx(-result.value)
     with pytest.raises(ConfigError) as caught:
         read_circles(write(tmp_path / "w.csv", head.replace("radius_mm", "radius"), rows))
     assert "did you mean radius_mm" in str(caught.value)
@@ -153,9 +153,9 @@ def test_file_of_a_diagonal(tmp_path: Path) -> None:
 def test_file_of_postures(tmp_path: Path) -> None:
     rows = ["X_mm,Y_mm,Z_mm,tool", "0,0,100,1", "80,0,60,2", "0,0,100.01,1"]
     tools = {1: Tool(1, (0, 0, 100.0)), 2: Tool(2, gauge_to_tip_mm=(-80.0, 0.0, -60.0))}
-    found = read_postures(write(tmp_path / "a.csv", "# sigma_um = 2\n", rows), tools)
-    assert found.vector_mm.tolist() == [[0, 0, -100], [-80, 0, -60], [0, 0, -100]]
+    result = read_postures(write(tmp_path / "a.csv", "# sigma_um = 2\n", rows), tools)
+    assert result.vector_mm.tolist() == [[0, 0, -100], [-80, 0, -60], [0, 0, -100]]
     # the point is at Z 0.005 by the mean of tool 1, at 0 by tool 2: tool 2 ends 0.005 higher than it says
-    assert postures.fit(found).error_mm["2"] == pytest.approx([0, 0, 0.005], abs=1e-9)
+    assert postures.fit(result).error_mm["2"] == pytest.approx([0, 0, 0.005], abs=1e-9)
     with pytest.raises(ConfigError, match="line 4: tool 2 has no vector"):
         read_postures(tmp_path / "a.csv", {1: tools[1]})

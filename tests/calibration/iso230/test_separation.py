@@ -1,4 +1,4 @@
-"""Parts of a line: laws, recovery, and periods that targets cannot see; reversal from both sides."""
+"""Parts of a line: laws, recovery, and periods that are not observable; reversal from both sides."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UM = 1e-3
 
 
 def line(x: np.ndarray, up: np.ndarray, down: np.ndarray | None = None, runs: int = 5) -> Line:
-    """Values in um at targets; the same in every run, to and fro."""
+    """Values in um at targets; the same in every run, in both directions."""
     down = up if down is None else down
     n = len(x)
     return Line(
@@ -75,29 +75,29 @@ def test_few_targets_say_so() -> None:
     st.integers(0, 2**31), st.floats(0.5, 9.0), st.floats(-3.1, 3.1), st.floats(-6, 6),
     st.sampled_from([8.0, 10.0]),
 )  # fmt: skip
-def test_recovery(seed: int, amplitude: float, phase: float, lost: float, period: float) -> None:
-    """A smooth curve, a cyclic error and lost motion come back apart."""
+def test_recovery(seed: int, amplitude: float, phase: float, backlash: float, period: float) -> None:
+    """A smooth curve, a cyclic error and backlash are separated again."""
     random = np.random.default_rng(seed)
     x = np.arange(0.0, 1000.0, 40.0) + random.uniform(0, period, 25)
     assume(seen([x], period) > SEEN and seen([x], period / 2, [period]) > SEEN)
     smooth = 8.0 * (x / 1000.0) - 3.0
     cyclic = amplitude * np.sin(2 * np.pi * x / period + phase)
-    found = separate(line(x, smooth + cyclic - lost / 2, smooth + cyclic + lost / 2), [period])
-    first, second = found.harmonics
+    result = separate(line(x, smooth + cyclic - backlash / 2, smooth + cyclic + backlash / 2), [period])
+    first, second = result.harmonics
     assert first.amplitude / UM == pytest.approx(amplitude, abs=1e-6)
     assert np.cos(first.phase_rad - phase) == pytest.approx(1.0, abs=1e-9)
     assert second.amplitude / UM == pytest.approx(0.0, abs=1e-6)
-    assert found.noncyclic / UM == pytest.approx(smooth, abs=1e-6)
-    assert found.reversal is not None
-    assert found.reversal.constant
-    assert found.reversal.backlash / UM == pytest.approx(lost, abs=1e-6)
+    assert result.noncyclic / UM == pytest.approx(smooth, abs=1e-6)
+    assert result.reversal is not None
+    assert result.reversal.constant
+    assert result.reversal.backlash / UM == pytest.approx(backlash, abs=1e-6)
     assert first.cyclic.period_mm == period
 
 
-def parts(found: Separation) -> np.ndarray:
-    assert found.reversal is not None
-    waves = [h.at(found.target_mm) for h in found.harmonics]
-    return np.concatenate([found.mean, found.noncyclic, *waves, found.reversal.at])
+def parts(result: Separation) -> np.ndarray:
+    assert result.reversal is not None
+    waves = [h.at(result.target_mm) for h in result.harmonics]
+    return np.concatenate([result.mean, result.noncyclic, *waves, result.reversal.at])
 
 
 @settings(max_examples=30)
@@ -117,18 +117,18 @@ def test_superposition_and_order(seed: int) -> None:
         "EXX", one.target_mm[order], one.value[order] + other[order], one.run[order], one.direction[order],
         one.line_mm,
     )  # fmt: skip
-    left = separate(add(one, other), [10.0], drift=False)
-    assert parts(separate(mixed, [10.0], drift=False)) == pytest.approx(parts(left), abs=1e-9)
+    separated = separate(add(one, other), [10.0], drift=False)
+    assert parts(separate(mixed, [10.0], drift=False)) == pytest.approx(parts(separated), abs=1e-9)
 
 
 def test_an_aliased_period_is_never_fitted() -> None:
     """4 um at 10 mm pitch, targets at 50 mm: the readings show nothing of it, and it must not be claimed."""
     x = np.arange(0.0, 1001.0, 50.0)
-    found = separate(line(x, 4.0 * np.sin(2 * np.pi * x / 10.0 + 0.7)), [10.0])
-    assert found.harmonics == ()
-    assert [period for period, _ in found.refused] == [10.0, 5.0]
-    assert {f.code for f in found.findings} == {"OLP853"}
-    assert "5 times the period" in found.findings[0].message
+    result = separate(line(x, 4.0 * np.sin(2 * np.pi * x / 10.0 + 0.7)), [10.0])
+    assert result.harmonics == ()
+    assert [period for period, _ in result.refused] == [10.0, 5.0]
+    assert {f.code for f in result.findings} == {"OLP853"}
+    assert "5 times the period" in result.findings[0].message
 
 
 def test_a_fine_sweep_rescues_an_aliased_line() -> None:
@@ -139,39 +139,39 @@ def test_a_fine_sweep_rescues_an_aliased_line() -> None:
         curve = 6.0 * np.sin(q / 400.0) + 4.0 * np.sin(2 * np.pi * q / 10.0 + 0.7)
         return np.asarray(curve + random.normal(0, 0.15, len(q)))
 
-    found = separate(line(x, truth(x)), [10.0], [line(s, truth(s), runs=1)])
-    assert found.refused == ()
-    first, second = found.harmonics
+    result = separate(line(x, truth(x)), [10.0], [line(s, truth(s), runs=1)])
+    assert result.refused == ()
+    first, second = result.harmonics
     assert first.amplitude / UM == pytest.approx(4.0, abs=4 * first.sigma_amplitude / UM + 0.02)
     assert first.sigma_amplitude / UM < 0.2
     assert first.phase_rad == pytest.approx(0.7, abs=0.06)
     assert second.amplitude < 4 * second.sigma_amplitude + 1e-4
-    assert found.noncyclic / UM == pytest.approx(6.0 * np.sin(x / 400.0), abs=0.8)
+    assert result.noncyclic / UM == pytest.approx(6.0 * np.sin(x / 400.0), abs=0.8)
 
 
 def test_two_periods_that_look_alike_are_not_both_fitted() -> None:
     """At steps of a third of the period, it and its half lie at the same phases."""
     x = np.arange(0.0, 400.0, 10.0)
-    found = separate(line(x, np.zeros(len(x))), [30.0])
-    assert len(found.harmonics) == 1
-    assert "looks like the period of 30 mm" in found.findings[0].message
+    result = separate(line(x, np.zeros(len(x))), [30.0])
+    assert len(result.harmonics) == 1
+    assert "looks like the period of 30 mm" in result.findings[0].message
 
 
 def test_stated_uncertainty_covers() -> None:
-    """Amplitude and lost motion against the truth, in units of their stated standard uncertainty."""
+    """Amplitude and backlash against the truth, in units of their stated standard uncertainty."""
     random = np.random.default_rng(11)
     z = []
     for _ in range(60):
         x = np.arange(0.0, 1000.0, 40.0) + random.uniform(0, 10, 25)
         one = line(x, 3 * np.sin(2 * np.pi * x / 10.0) - 2, 3 * np.sin(2 * np.pi * x / 10.0) + 2)
-        found = separate(add(one, random.normal(0, 1e-3, len(one.value))), [10.0])
-        assert found.reversal is not None
-        z.append((found.harmonics[0].amplitude - 3e-3) / found.harmonics[0].sigma_amplitude)
-        z.append((found.reversal.backlash - 4e-3) / found.reversal.sigma)
+        result = separate(add(one, random.normal(0, 1e-3, len(one.value))), [10.0])
+        assert result.reversal is not None
+        z.append((result.harmonics[0].amplitude - 3e-3) / result.harmonics[0].sigma_amplitude)
+        z.append((result.reversal.backlash - 4e-3) / result.reversal.sigma)
     assert 0.75 < np.std(z) < 1.3
 
 
-def test_reversal_along_the_axis_is_told_from_a_constant_one() -> None:
+def test_reversal_along_the_axis_differs_from_a_constant_one() -> None:
     random = np.random.default_rng(2)
     x = np.linspace(0.0, 900.0, 10)
     constant = line(x, np.full(10, -2.0), np.full(10, 2.0))
@@ -223,12 +223,12 @@ def test_program_of_go_and_return() -> None:
 @settings(max_examples=25)
 @given(st.integers(0, 2**31), st.booleans())
 def test_reversal_is_the_least_squares_of_all_readings(seed: int, drift: bool) -> None:
-    """Held against one large system: a mean and a reversal a target, and a drift with a knot a run."""
+    """Held against one large system: a mean and a reversal per target, and a drift with a knot per run."""
     random = np.random.default_rng(seed)
     m, runs = int(random.integers(2, 6)), int(random.integers(2, 5))
     x = np.cumsum(random.uniform(10, 50, m))
     one = add(line(x, np.zeros(m), runs=runs), random.normal(0, 1e-3, 2 * m * runs))
-    found = reversal_of(one, drift=drift)
+    result = reversal_of(one, drift=drift)
     place = np.searchsorted(x, one.target_mm)
     own = np.eye(m)[place]
     knots = np.append(np.arange(runs) * 2 * m, 2 * m * runs - 1)
@@ -237,12 +237,12 @@ def test_reversal_is_the_least_squares_of_all_readings(seed: int, drift: bool) -
     system = np.hstack((own, own * 0.5 * one.direction[:, None], extra))
     inverse = np.linalg.pinv(system)
     estimate = inverse @ one.value
-    assert found.at == pytest.approx(estimate[m : 2 * m], abs=1e-9)
+    assert result.at == pytest.approx(estimate[m : 2 * m], abs=1e-9)
     dof = len(place) - np.linalg.matrix_rank(system)
     noise = np.sqrt(((one.value - system @ estimate) ** 2).sum() / dof)
-    assert found.noise == pytest.approx(noise, rel=1e-6)
+    assert result.noise == pytest.approx(noise, rel=1e-6)
     sigma = noise * np.sqrt(np.diag(inverse @ inverse.T)[m : 2 * m])
-    assert found.sigma_at == pytest.approx(sigma, rel=1e-6)
+    assert result.sigma_at == pytest.approx(sigma, rel=1e-6)
 
 
 def test_a_drift_that_swings_within_a_run_makes_no_reversal_along_the_axis() -> None:
@@ -262,7 +262,7 @@ def test_a_recording_of_many_targets_needs_no_large_system() -> None:
     random = np.random.default_rng(1)
     x = np.arange(20_000) * 0.1
     one = add(line(x, np.full(20_000, -2.0), np.full(20_000, 2.0), runs=2), random.normal(0, 1e-3, 80_000))
-    found = separate(one, [10.0])
-    assert found.reversal is not None
-    assert found.reversal.backlash / UM == pytest.approx(4.0, abs=0.1)
-    assert found.refused == ()
+    result = separate(one, [10.0])
+    assert result.reversal is not None
+    assert result.reversal.backlash / UM == pytest.approx(4.0, abs=0.1)
+    assert result.refused == ()

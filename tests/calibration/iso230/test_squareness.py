@@ -1,5 +1,5 @@
-"""Squareness from every source has the sense of the error model, which the golden files fix; what a source
-cannot tell it says."""
+"""Squareness from every source has the sign convention of the error model, which the golden files fix; a
+source reports what it does not determine."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def straightness(machine, component: str, place: tuple[float, float, float], leg
     """A line read from a reference that leans by `leg` toward + of the direction."""
     j, i = "XYZ".index(component[2]), "XYZ".index(component[1])
     x = np.linspace(*BOX[j], 11)
-    at = np.tile(np.array(place, float), (11, 1))
-    at[:, j] = x
-    value = machine.error(at, np.array(TOOL))[:, i] - leg * x
+    axis = np.tile(np.array(place, float), (11, 1))
+    axis[:, j] = x
+    value = machine.error(axis, np.array(TOOL))[:, i] - leg * x
     columns = [np.tile(c, 2) for c in (x, value)]
     return Line(
         component, *columns, np.repeat([1, 2], 11), np.ones(22, int), place, TOOL, square="granite",
@@ -69,12 +69,12 @@ def test_straightness_pair(component: str, tilt: float) -> None:
     first = straightness(machine, f"E{b}{a}", place, tilt * URAD)
     second = straightness(machine, f"E{a}{b}", place, -(tilt + error) * URAD)
     for pair in ((first, second), (second, first)):
-        found = squareness.from_straightness_pair(*pair, Square("granite", error * URAD, 5e-6))
-        assert found.component == component
-        assert found.value_rad / URAD == pytest.approx(ANGLES[component], abs=1e-6)
-        assert found.sigma_rad == pytest.approx(5e-6, rel=1e-6)
-        assert found.line_mm == place
-        assert found.span_mm == tuple(tuple(BOX[i]) for i in AXES_OF[component])
+        result = squareness.from_straightness_pair(*pair, Square("granite", error * URAD, 5e-6))
+        assert result.component == component
+        assert result.value_rad / URAD == pytest.approx(ANGLES[component], abs=1e-6)
+        assert result.sigma_rad == pytest.approx(5e-6, rel=1e-6)
+        assert result.line_mm == place
+        assert result.span_mm == tuple(tuple(BOX[i]) for i in AXES_OF[component])
     assert list(squareness.pairs_of([first, second])) == [(first, second)]
 
 
@@ -85,8 +85,8 @@ def test_turned_square_gives_its_own_error() -> None:
         # turned about its later leg, 90 degrees + e opens to the other side
         pair = straightness(machine, "EZX", place), straightness(machine, "EXZ", place, -error * URAD)
         readings.append(squareness.from_straightness_pair(*pair, Square("granite", 0.0, 1e-6)))
-    found, square = squareness.from_turned_square(*readings)
-    assert found.value_rad / URAD == pytest.approx(-7.5, abs=1e-6)
+    result, square = squareness.from_turned_square(*readings)
+    assert result.value_rad / URAD == pytest.approx(-7.5, abs=1e-6)
     assert square.error_rad / URAD == pytest.approx(40.0, abs=1e-6)
 
 
@@ -98,7 +98,7 @@ def test_pairs_that_are_none_are_refused() -> None:
             straightness(machine, "EZX", here), straightness(machine, "EXZ", there), Square("granite")
         )
     table = dataclasses.replace(straightness(machine, "EXZ", here), reference="table")
-    with pytest.raises(ConfigError, match="stayed on the table"):
+    with pytest.raises(ConfigError, match="fixed on the table"):
         squareness.from_straightness_pair(straightness(machine, "EZX", here), table, Square("granite"))
     with pytest.raises(ConfigError, match="no pair"):
         squareness.from_straightness_pair(
@@ -126,13 +126,13 @@ PRINTED = {
 
 def test_printed_frame_and_klipper_numbers() -> None:
     """Klipper's documented example, and the exact inverse of its shear at (100, 200, 50)."""
-    found = {}
+    values = {}
     for name, (lengths, skew) in PRINTED.items():
         reading = squareness.from_frame(name, *lengths, line_mm=(0, 0, 0), span_mm=((0, 100), (0, 100)))
         assert from_iso(name, reading.value_rad, "acute") == pytest.approx(skew, abs=1e-12)
-        found[name] = reading.value_rad
+        values[name] = reading.value_rad
     box = np.array([[-500.0, 500.0]] * 3)
-    machine = build(Calibration("printer", box, squareness=found), "FXYZ")
+    machine = build(Calibration("printer", box, squareness=values), "FXYZ")
     command = invert(machine, np.array([[100.0, 200.0, 50.0]]), np.zeros(3))
     assert command[0] == pytest.approx([103.30808952450865, 199.32831781656063, 50.0], abs=1e-9)
 
@@ -178,10 +178,10 @@ def diagonal(  # type: ignore[no-untyped-def]
 ) -> Diagonal:
     share = np.linspace(0.0, 1.0, 11)
     start, end = np.array(start, float), np.array(end, float)
-    at = start + share[:, None] * (end - start)
+    axis = start + share[:, None] * (end - start)
     unit = (end - start) / np.linalg.norm(end - start)
     distance = share * np.linalg.norm(end - start)
-    value = machine.error(at, np.array(TOOL)) @ unit + laser * distance
+    value = machine.error(axis, np.array(TOOL)) @ unit + laser * distance
     value = np.tile(value, 2) + np.random.default_rng(seed).normal(0, 1, 22) * noise
     return Diagonal(
         tuple(start), tuple(end), np.tile(distance, 2), value, np.repeat([1, 2], 11), np.ones(22, int), TOOL,
@@ -193,65 +193,65 @@ LOW, HIGH = BOX[:, 0], BOX[:, 1]
 
 
 def body(machine, **options: float) -> list[Diagonal]:  # type: ignore[no-untyped-def]
-    out = []
+    diagonals_ = []
     for k, signs in enumerate(((1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, 1))):
         s = np.array(signs)
         start, end = np.where(s > 0, LOW, HIGH), np.where(s > 0, HIGH, LOW)
-        out.append(diagonal(machine, start, end, seed=k, **options))
-    return out
+        diagonals_.append(diagonal(machine, start, end, seed=k, **options))
+    return diagonals_
 
 
 def faces(machine) -> list[Diagonal]:  # type: ignore[no-untyped-def]
-    out = []
+    diagonals_ = []
     for i, j in AXES_OF.values():
         for sign in (1, -1):
             start, end = BOX.mean(axis=1), BOX.mean(axis=1)
             start[i], end[i] = BOX[i] if sign > 0 else BOX[i][::-1]
             start[j], end[j] = BOX[j]
-            out.append(diagonal(machine, start, end))
-    return out
+            diagonals_.append(diagonal(machine, start, end))
+    return diagonals_
 
 
 def test_body_diagonals_give_squareness_but_no_scales() -> None:
     """Rank 4 of 6: all three squareness errors, and one combination of the scales."""
     machine = model(ANGLES, (30.0, -20.0, 10.0))
-    found = diagonals.fit(body(machine))
-    assert found.determined == set(SQUARENESS)
-    for reading in found.readings():
+    result = diagonals.fit(body(machine))
+    assert result.determined == set(SQUARENESS)
+    for reading in result.readings():
         assert reading.value_rad / URAD == pytest.approx(ANGLES[reading.component], abs=0.02)
         assert reading.line_mm == pytest.approx((500.0, 400.0, -300.0))
-    [finding] = found.findings
+    [finding] = result.findings
     assert finding.code == "OLP856"
     assert "SX, SY, SZ not determined" in finding.message
-    assert [d.name for d in found.diagonals] == ["PPP", "NPP", "PNP", "NNP"]
-    # what is said to change no reading does not
-    for change in found.free:
+    assert [d.name for d in result.diagonals] == ["PPP", "NPP", "PNP", "NNP"]
+    # what is reported to change no reading does not
+    for change in result.free:
         other = model({}, tuple(change.get(name, 0.0) for name in diagonals.SCALES))
         assert [abs(d.elongation()[0]) < 1e-11 for d in body(other)] == [True] * 4
 
 
 def test_three_body_diagonals_mix_scales_and_squareness() -> None:
     machine = model(ANGLES, (30.0, -20.0, 10.0))
-    found = diagonals.fit(body(machine)[:3])
-    assert found.determined == frozenset()
+    result = diagonals.fit(body(machine)[:3])
+    assert result.determined == frozenset()
     known = {"SX": (30e-6, 1e-8), "SY": (-20e-6, 1e-8), "SZ": (10e-6, 1e-8)}
-    told = diagonals.fit(body(machine)[:3], known)
-    assert told.determined == set(diagonals.UNKNOWNS)
-    assert told.value[3:] / URAD == pytest.approx(list(ANGLES.values()), abs=0.1)
+    with_scales = diagonals.fit(body(machine)[:3], known)
+    assert with_scales.determined == set(diagonals.UNKNOWNS)
+    assert with_scales.value[3:] / URAD == pytest.approx(list(ANGLES.values()), abs=0.1)
 
 
 def test_face_diagonals_with_body_diagonals_give_everything() -> None:
     machine = model(ANGLES, (30.0, -20.0, 10.0))
-    found = diagonals.fit(body(machine) + faces(machine))
-    assert found.determined == set(diagonals.UNKNOWNS)
-    assert found.value / URAD == pytest.approx([30, -20, 10, 20.1, -7.5, 12.0], abs=0.05)
-    assert list(found.findings) == []
+    result = diagonals.fit(body(machine) + faces(machine))
+    assert result.determined == set(diagonals.UNKNOWNS)
+    assert result.value / URAD == pytest.approx([30, -20, 10, 20.1, -7.5, 12.0], abs=0.05)
+    assert list(result.findings) == []
 
 
 def test_laser_scale_error_is_not_squareness() -> None:
     machine = model(ANGLES)
-    found = diagonals.fit(body(machine, laser=2e-6))
-    assert found.value[3:] / URAD == pytest.approx(list(ANGLES.values()), abs=0.02)
+    result = diagonals.fit(body(machine, laser=2e-6))
+    assert result.value[3:] / URAD == pytest.approx(list(ANGLES.values()), abs=0.02)
 
 
 def test_a_wrong_sign_of_one_diagonal_is_noticed() -> None:
@@ -272,8 +272,8 @@ def test_diagonal_uncertainty_covers() -> None:
             diagonal(machine, d.start_mm, d.end_mm, noise=1e-3, seed=100 * k + i)
             for i, d in enumerate(body(machine))
         ]
-        found = diagonals.fit(taken)
-        z += [(r.value_rad / URAD - ANGLES[r.component]) / (r.sigma_rad / URAD) for r in found.readings()]
+        result = diagonals.fit(taken)
+        z += [(r.value_rad / URAD - ANGLES[r.component]) / (r.sigma_rad / URAD) for r in result.readings()]
     assert 0.75 < np.std(z) < 1.3
 
 
@@ -289,20 +289,20 @@ def test_wrong_diagonals_are_refused() -> None:
 
 
 def circles(
-    plane: str, ways: tuple[int, ...], seed: int = 0, noise: float = 0.0, servo: float = 0.0
+    plane: str, directions: tuple[int, ...], seed: int = 0, noise: float = 0.0, servo: float = 0.0
 ) -> Circles:
-    """A machine with squareness, scale mismatch and lost motion, whose axes lag; laps run in."""
+    """A machine with squareness, scale mismatch and backlash, whose axes lag; laps run in."""
     machine = model(ANGLES, (30.0, -20.0, 10.0), backlash_mm=(8e-3, 5e-3, 3e-3))
     first, second, _ = PLANES[plane]
     centre, radius, n = BOX.mean(axis=1), 150.0, 720
     random = np.random.default_rng(seed)
     parts = []
-    for run, d in enumerate(ways, 1):
+    for run, d in enumerate(directions, 1):
         t = d * 2.0 * np.pi * (np.arange(n * 5 // 4) + 0.5) / n
-        at = np.tile(centre, (len(t), 1))
-        at[:, first] += radius * np.cos(t)
-        at[:, second] += radius * np.sin(t)
-        moved = at + machine.error(at, np.array(TOOL), plays(machine, at))
+        axis = np.tile(centre, (len(t), 1))
+        axis[:, first] += radius * np.cos(t)
+        axis[:, second] += radius * np.sin(t)
+        moved = axis + machine.error(axis, np.array(TOOL), plays(machine, axis))
         arm = moved[:, [first, second]] - centre[[first, second]]
         # the bar hangs 7 um beside the centre; lags differ by `servo` along the path
         arm += [5e-3, -5e-3]
@@ -310,31 +310,31 @@ def circles(
         value += random.normal(0, 1, len(t)) * noise
         rows = slice(n // 4, None)
         parts.append((t[rows], value[rows], np.full(n, run), np.full(n, d)))
-    t, value, run_of, way = (np.concatenate(c) for c in zip(*parts, strict=True))
-    return Circles(plane, radius, tuple(centre), t, value, run_of, way, TOOL, 50.0, 2e-4, "c.csv")
+    t, value, run_of, direction = (np.concatenate(c) for c in zip(*parts, strict=True))
+    return Circles(plane, radius, tuple(centre), t, value, run_of, direction, TOOL, 50.0, 2e-4, "c.csv")
 
 
 @pytest.mark.parametrize("plane", PLANES)
-def test_both_ways_separate_squareness_and_servo_mismatch(plane: str) -> None:
-    found = ballbar.fit(circles(plane, (1, -1), noise=2e-4, servo=3e-3))
+def test_both_directions_separate_squareness_and_servo_mismatch(plane: str) -> None:
+    result = ballbar.fit(circles(plane, (1, -1), noise=2e-4, servo=3e-3))
     first, second, name = PLANES[plane]
-    reading = found.reading()
+    reading = result.reading()
     assert reading is not None
     assert reading.component == name
     assert reading.value_rad / URAD == pytest.approx(ANGLES[name], abs=0.6)
-    assert found.value[5] == pytest.approx(3e-3, abs=5e-5)
-    scales, lost = (30.0, -20.0, 10.0), (8e-3, 5e-3, 3e-3)
-    assert found.value[3] * 2 / 150.0 / URAD == pytest.approx(scales[first] - scales[second], abs=0.6)
-    assert found.value[6:] == pytest.approx([lost[first], lost[second]], abs=2e-4)
-    assert list(found.findings) == []
+    assert result.value[5] == pytest.approx(3e-3, abs=5e-5)
+    scales, backlash = (30.0, -20.0, 10.0), (8e-3, 5e-3, 3e-3)
+    assert result.value[3] * 2 / 150.0 / URAD == pytest.approx(scales[first] - scales[second], abs=0.6)
+    assert result.value[6:] == pytest.approx([backlash[first], backlash[second]], abs=2e-4)
+    assert list(result.findings) == []
     low = min(first, second)
     half = 150 * math.sqrt(5 / 6)
     assert reading.span_mm[0] == pytest.approx((BOX[low].mean() - half, BOX[low].mean() + half))
-    assert found.hysteresis is not None
-    assert found.hysteresis > 5e-3
+    assert result.hysteresis is not None
+    assert result.hysteresis > 5e-3
 
 
-def test_a_circle_sees_the_mean_lines_over_its_span() -> None:
+def test_a_circle_shows_the_mean_lines_over_its_span() -> None:
     """Straightness of the third order: the reading is the lean of the mean lines over its span."""
     random = np.random.default_rng(3)
     size = random.normal(0, 1e-9, 2)
@@ -342,25 +342,25 @@ def test_a_circle_sees_the_mean_lines_over_its_span() -> None:
     x, y = radius * np.cos(t), radius * np.sin(t)
     value = (size[0] * y**3 * x + size[1] * x**3 * y) / radius
     t, value = np.tile(t, 2), np.tile(value, 2)
-    way = np.repeat([1, -1], 360)
-    found = ballbar.fit(Circles("XY", radius, (0, 0, 0), t, value, np.ones(720, int), way)).reading()
-    assert found is not None
-    (low, high), _ = found.span_mm
+    direction = np.repeat([1, -1], 360)
+    reading = ballbar.fit(Circles("XY", radius, (0, 0, 0), t, value, np.ones(720, int), direction)).reading()
+    assert reading is not None
+    (low, high), _ = reading.span_mm
     q = np.linspace(low, high, 4001)
     slopes = [float(q @ (s * q**3) / (q @ q)) for s in size]
-    assert found.value_rad == pytest.approx(-sum(slopes), rel=2e-3)
+    assert reading.value_rad == pytest.approx(-sum(slopes), rel=2e-3)
 
 
-def test_one_way_gives_no_squareness_and_says_so() -> None:
-    found = ballbar.fit(circles("XY", (1, 1), noise=2e-4, servo=3e-3))
-    assert found.reading() is None
-    assert {"square", "servo"} & found.determined == set()
-    assert {"scale", "lost_1", "lost_2", "radius"} <= found.determined
-    assert found.value[6:] == pytest.approx([8e-3, 5e-3], abs=3e-4)
-    [finding] = found.findings
+def test_one_direction_gives_no_squareness_and_reports_it() -> None:
+    result = ballbar.fit(circles("XY", (1, 1), noise=2e-4, servo=3e-3))
+    assert result.reading() is None
+    assert {"square", "servo"} & result.determined == set()
+    assert {"scale", "lost_1", "lost_2", "radius"} <= result.determined
+    assert result.value[6:] == pytest.approx([8e-3, 5e-3], abs=3e-4)
+    [finding] = result.findings
     assert finding.code == "OLP856" and "one direction only" in finding.message
-    assert ballbar.readings_of([found]) == ()
-    assert "square" in found.as_dict()["not_determined"]
+    assert ballbar.readings_of([result]) == ()
+    assert "square" in result.as_dict()["not_determined"]
 
 
 def test_a_quarter_circle_is_uncertain_or_undetermined() -> None:
@@ -380,11 +380,11 @@ def test_a_quarter_circle_is_uncertain_or_undetermined() -> None:
 def test_circle_fit_is_linear_and_orderless(seed: int, order: list[int]) -> None:
     random = np.random.default_rng(seed)
     t = random.uniform(0, 2 * np.pi, 200)
-    way = random.choice([-1, 1], 200)
+    direction = random.choice([-1, 1], 200)
     one, other = random.normal(0, 1e-3, (2, 200))
 
     def values(value: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        made = Circles("ZX", 100.0, (0, 0, 0), t[rows], value[rows], np.ones(200, int), way[rows])
+        made = Circles("ZX", 100.0, (0, 0, 0), t[rows], value[rows], np.ones(200, int), direction[rows])
         return ballbar.fit(made).value
 
     straight, mixed = np.arange(200), random.permutation(200)

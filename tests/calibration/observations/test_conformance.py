@@ -1,5 +1,5 @@
-"""What every registered instrument must do: its rows are derivatives of its own readings, errors explain the
-readings that they made, a blunder is found, the report names it, its files come back as they were written."""
+"""What every registered instrument must do. Its rows are derivatives of its own readings; errors explain the
+readings that they made; a blunder is detected; the report names it; its files are read back unchanged."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def machine(theta: Array) -> Error:
 
 
 def settled(taken: Observation, theta: Array) -> State:
-    """Its state once its own unknowns stand still under errors theta."""
+    """Its state once its own unknowns have converged under errors theta."""
     screened = taken.screened()
     state = screened.observation.start(screened.noise)
     for _ in range(12):
@@ -62,7 +62,7 @@ def settled(taken: Observation, theta: Array) -> State:
         if step.small:
             return state
         state = state.moved(step, ())
-    raise AssertionError("its own unknowns do not settle")
+    raise AssertionError("its own unknowns do not converge")
 
 
 def standardised(taken: Observation, theta: Array) -> Array:
@@ -72,7 +72,7 @@ def standardised(taken: Observation, theta: Array) -> Array:
 
 @pytest.mark.parametrize("key", KEYS)
 def test_it_is_registered_whole(key: str) -> None:
-    """A list of its tables in a plan, readings for this suite, and a place in the order of the report."""
+    """A list of its tables in a plan, readings for this suite, and a position in the order of the report."""
     (instrument,) = (i for i in INSTRUMENTS if i.key == key)
     assert key in EXAMPLES, f"no readings for {key}; add them to tests/cases/instruments.py"
     assert instrument.words.startswith(f"tables [[{key}]]") and key in MeasurementsFile.model_fields
@@ -82,7 +82,7 @@ def test_it_is_registered_whole(key: str) -> None:
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_a_perfect_machine_leaves_nothing(key: str) -> None:
+def test_a_perfect_machine_leaves_no_residual(key: str) -> None:
     for taken in EXAMPLES[key](machine(NONE)):
         assert np.abs(standardised(taken, NONE)).max() < 1e-3
 
@@ -104,16 +104,16 @@ def test_rows_are_finite_differences_of_what_it_expects_to_read(key: str) -> Non
     for taken in EXAMPLES[key](machine(theta)):
         state = settled(taken, theta)
 
-        def misses(at: Array, state: State = state) -> Array:
-            """Read less expected where the errors are `at`, all own unknowns as they are."""
-            block = state.block(P, at)
-            return np.concatenate([c.y - c.rows @ at[block.columns] for c in block.chunks()])
+        def misses(errors: Array, state: State = state) -> Array:
+            """Read less expected where the errors are `errors`, with the present own unknowns."""
+            block = state.block(P, errors)
+            return np.concatenate([c.y - c.rows @ errors[block.columns] for c in block.chunks()])
 
         block = state.block(P, theta)
         rows = np.concatenate([c.rows for c in block.chunks()]) @ change[block.columns]
-        found = 0.5 * (misses(theta - change) - misses(theta + change))
+        differences = 0.5 * (misses(theta - change) - misses(theta + change))
         assert np.abs(rows).max() > 0.0
-        assert found == pytest.approx(rows, abs=1e-4 * float(np.abs(rows).max()))
+        assert differences == pytest.approx(rows, abs=1e-4 * float(np.abs(rows).max()))
 
 
 @pytest.mark.parametrize("key", KEYS)
@@ -171,25 +171,25 @@ def test_the_report_names_it(key: str) -> None:
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_every_row_of_scattered_readings_is_of_one_place(key: str) -> None:
-    """So that readings of a place are held out together."""
+def test_every_row_of_scattered_readings_is_of_one_point(key: str) -> None:
+    """So that readings of a point are held out together."""
     for taken in EXAMPLES[key](machine(NONE)):
         state = settled(taken, NONE)
         if isinstance(state, ScatteredState):
-            places = np.arange(1, len(state.observation.axis_mm) + 1)
-            spread = state.spread_over_rows(places)
+            points = np.arange(1, len(state.observation.axis_mm) + 1)
+            spread = state.spread_over_rows(points)
             block = state.block(P, NONE)
             rows = np.concatenate([c.rows for c in block.chunks()])
             assert len(spread) == len(rows)
-            # rows of a place depend on nothing but the curves there
+            # rows of a point depend on nothing but the curves there
             still = np.abs(rows[:, P.slices["EXX"]]).max(axis=1) > 0.0
             assert not still[spread == 0].any()
-            for place in (1, len(places) // 2, len(places)):
+            for point in (1, len(points) // 2, len(points)):
                 own = P.design(
-                    state.observation.axis_mm[place - 1 : place], state.observation.tool_mm[place - 1]
+                    state.observation.axis_mm[point - 1 : point], state.observation.tool_mm[point - 1]
                 )
-                rest = rows[spread == place] - rows[spread == place] @ np.linalg.pinv(own[0]) @ own[0]
-                assert np.abs(rest).max() < 1e-9 * np.abs(rows[spread == place]).max() + 1e-12
+                rest = rows[spread == point] - rows[spread == point] @ np.linalg.pinv(own[0]) @ own[0]
+                assert np.abs(rest).max() < 1e-9 * np.abs(rows[spread == point]).max() + 1e-12
 
 
 def filled(taken: Observation, empty: bytes, cells: Array) -> str:
@@ -201,7 +201,7 @@ def filled(taken: Observation, empty: bytes, cells: Array) -> str:
 
 
 @pytest.mark.parametrize("key", [i.key for i in INSTRUMENTS if i.plans])
-def test_its_files_come_back_as_they_were_written(key: str, tmp_path: Path) -> None:
+def test_its_files_are_read_back_unchanged(key: str, tmp_path: Path) -> None:
     theta = theta_of(6)
     for taken in EXAMPLES[key](machine(theta)):
         instrument = planner_of(taken)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases.calibration import FRESH, TOOLS, case, cloud, left
+from cases.calibration import FRESH, TOOLS, case, cloud, residual_of
 from judge import simulated
 
 from olp.calibration.estimator.adjustment import fit
@@ -28,16 +28,16 @@ UM = 1e-3
 SHIFT, TURN = np.array([0.4, -0.7, 0.2]), np.array([150e-6, -90e-6, 210e-6])
 
 
-def told(found: Fit, code: str) -> list[str]:
-    return [f.message for f in findings_of(found, [(0.0, 0.0, -120.0)], None) if f.code == code]
+def messages_of(fitted: Fit, code: str) -> list[str]:
+    return [f.message for f in findings_of(fitted, [(0.0, 0.0, -120.0)], None) if f.code == code]
 
 
 def in_the_frame(machine: simulated.Machine, seed: int, n: int, sigma_um: float) -> Points:
     """Where the tip is in the machine's frame, whose axes as a whole are shifted and turned about zero."""
-    at, tool, _ = simulated.points(machine, seed, n, 0.0)
-    noise = np.random.default_rng(seed).normal(0.0, sigma_um * UM, at.shape)
-    place = at + tool + machine.error(at, tool) + SHIFT + np.cross(TURN, at + tool) + noise
-    return Points(at, tool, place, sigma_um * UM, source="tcp.csv", known_frame=True)
+    axis, tool, _ = simulated.points(machine, seed, n, 0.0)
+    noise = np.random.default_rng(seed).normal(0.0, sigma_um * UM, axis.shape)
+    place = axis + tool + machine.error(axis, tool) + SHIFT + np.cross(TURN, axis + tool) + noise
+    return Points(axis, tool, place, sigma_um * UM, source="tcp.csv", known_frame=True)
 
 
 # -- TCP points in the frame of the machine --------------------------------------------------------------
@@ -49,17 +49,17 @@ def test_points_in_the_frame_of_the_machine_show_all_of_the_error(chain: str, wi
     machine, measurements = case(2, "smooth", chain)
     lines = measurements if with_lines else Measurements("m")
     points = in_the_frame(machine, 2, 120, 5.0)
-    found = fit(lines.also((points,)), chain, datum_mm=(1000.0, 500.0, -200.0))
-    at = np.random.default_rng(2).uniform(found.box_mm[:, 0], found.box_mm[:, 1], (300, 3))
-    model = build(calibration_of(found), chain)
+    fitted = fit(lines.also((points,)), chain, datum_mm=(1000.0, 500.0, -200.0))
+    position = np.random.default_rng(2).uniform(fitted.box_mm[:, 0], fitted.box_mm[:, 1], (300, 3))
+    model = build(calibration_of(fitted), chain)
     for tool in (*TOOLS, *FRESH):
-        true = machine.error(at, np.array(tool)) + SHIFT + np.cross(TURN, at + np.array(tool))
+        true = machine.error(position, np.array(tool)) + SHIFT + np.cross(TURN, position + np.array(tool))
         assert simulated.rms_um(true) > 500.0
-        rest = true - found.error(at, tool)
+        rest = true - fitted.error(position, tool)
         assert simulated.rms_um(rest) < 11.0
-        assert 0.5 < np.sqrt(np.mean((rest / found.sigma(at, tool)) ** 2)) < 1.6
-        assert np.abs(model.error(at, np.array(tool)) - found.error(at, tool)).max() < 0.6 * UM
-    row = summary(found, calibration_of(found), [])["frame"]
+        assert 0.5 < np.sqrt(np.mean((rest / fitted.sigma(position, tool)) ** 2)) < 1.6
+        assert np.abs(model.error(position, np.array(tool)) - fitted.error(position, tool)).max() < 0.6 * UM
+    row = summary(fitted, calibration_of(fitted), [])["frame"]
     assert np.linalg.norm(row["shift_um"]) > 400.0
 
 
@@ -67,13 +67,13 @@ def test_an_unknown_frame_beside_a_known_one_keeps_its_own() -> None:
     machine = simulated.machine(1, "smooth", "FXYZ")
     known, other = in_the_frame(machine, 1, 100, 5.0), cloud(machine, 1, 100, 5.0)
     both = fit(Measurements("m", (known, other)), "FXYZ")
-    at = np.random.default_rng(2).uniform(both.box_mm[:, 0], both.box_mm[:, 1], (200, 3))
-    true = machine.error(at, np.array(FRESH[0])) + SHIFT + np.cross(TURN, at + np.array(FRESH[0]))
-    assert simulated.rms_um(true - both.error(at, FRESH[0])) < 6.0
-    assert not told(both, "OLP808")
+    position = np.random.default_rng(2).uniform(both.box_mm[:, 0], both.box_mm[:, 1], (200, 3))
+    true = machine.error(position, np.array(FRESH[0])) + SHIFT + np.cross(TURN, position + np.array(FRESH[0]))
+    assert simulated.rms_um(true - both.error(position, FRESH[0])) < 6.0
+    assert not messages_of(both, "OLP808")
 
 
-def test_places_far_from_the_frame_are_refused() -> None:
+def test_points_far_from_the_frame_are_refused() -> None:
     points = in_the_frame(simulated.machine(1, "smooth", "FXYZ"), 1, 20, 5.0)
     measured = points.measured_mm.copy()
     measured[7, 1] += 25.0
@@ -86,7 +86,7 @@ def test_places_far_from_the_frame_are_refused() -> None:
 
 def test_a_ball_plate_in_any_pose_is_a_set_of_points() -> None:
     """The machine probes the balls of a plate in six poses: the axes stop where the tip, with the machine's
-    errors, is at the ball. Commanded is where they stop, measured what the certificate says."""
+    errors, is at the ball. Commanded is where they stop, measured is the certificate."""
     machine = simulated.machine(3, "smooth", "FXYZ")
     rng = np.random.default_rng(3)
     balls = np.array([(x, y, 0.0) for x in np.linspace(0, 800, 6) for y in np.linspace(0, 800, 6)])
@@ -104,11 +104,11 @@ def test_a_ball_plate_in_any_pose_is_a_set_of_points() -> None:
             stop = place - vector - machine.error(stop, vector)
         own = own + rng.normal(0.0, 0.5 * UM, own.shape)
         sets.append(Points(stop, vector, own, 0.5 * UM, source=f"pose-{k}.csv"))
-    found = fit(Measurements("m", tuple(sets)), "FXYZ")
-    result = left(machine, found, FRESH[0], 400)
+    fitted = fit(Measurements("m", tuple(sets)), "FXYZ")
+    result = residual_of(machine, fitted, FRESH[0], 400)
     assert result.before_framed > 40.0
     assert result.after_framed < 4.0
-    assert not told(found, "OLP808")
+    assert not messages_of(fitted, "OLP808")
 
 
 # -- one polar station -----------------------------------------------------------------------------------
@@ -118,10 +118,10 @@ def polar_readings(
     machine: simulated.Machine, seed: int, n: int, sigma_mm: float, sigma_rad: float
 ) -> tuple[np.ndarray, ...]:
     """A tracker 3 m in front of the machine: axis positions, tools, distance, azimuth, elevation."""
-    at, tool, distance, azimuth, elevation = simulated.polar(machine, seed, n, (1500.0, -3000.0, -300.0))
+    axis, tool, distance, azimuth, elevation = simulated.polar(machine, seed, n, (1500.0, -3000.0, -300.0))
     rng = np.random.default_rng([seed, 3])
     return (
-        at, tool, distance + rng.normal(0.0, sigma_mm, n), azimuth + rng.normal(0.0, sigma_rad, n),
+        axis, tool, distance + rng.normal(0.0, sigma_mm, n), azimuth + rng.normal(0.0, sigma_rad, n),
         elevation + rng.normal(0.0, sigma_rad, n),
     )  # fmt: skip
 
@@ -136,31 +136,31 @@ def test_a_polar_station_weighs_distance_and_angles_as_they_are() -> None:
         taken = polar_readings(machine, seed, 250, 0.5 * UM, 10e-6)
         points = polar_points(*taken, sigma_mm=np.array(0.5 * UM), sigma_rad=10e-6, source="polar.csv")
         plain = dataclasses.replace(points, covariance_mm2=None)
-        for cloud_, out in ((points, weighed), (plain, alike)):
-            found = fit(Measurements("m", (cloud_,)), "FXYZ")
-            result = left(machine, found, FRESH[1], 400)
-            out.append(result.after_framed)
+        for cloud_, residuals in ((points, weighed), (plain, alike)):
+            fitted = fit(Measurements("m", (cloud_,)), "FXYZ")
+            result = residual_of(machine, fitted, FRESH[1], 400)
+            residuals.append(result.after_framed)
             if cloud_ is points:
                 z.append(result.z)
-                assert not told(found, "OLP808")
-                assert found.chi_square / found.freedom == pytest.approx(1.0, abs=0.2)
+                assert not messages_of(fitted, "OLP808")
+                assert fitted.chi_square / fitted.freedom == pytest.approx(1.0, abs=0.2)
     assert np.median(weighed) < 0.9 * np.median(alike)
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
 def test_a_polar_slip_is_named_and_alike_weights_are_points() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
-    at, tool, distance, azimuth, elevation = polar_readings(machine, 0, 150, 5.0 * UM, 2e-6)
+    axis, tool, distance, azimuth, elevation = polar_readings(machine, 0, 150, 5.0 * UM, 2e-6)
     slipped = distance.copy()
     slipped[30] += 0.2
-    points = polar_points(at, tool, slipped, azimuth, elevation, sigma_mm=np.array(5 * UM), sigma_rad=2e-6)
-    found = fit(Measurements("m", (points,)), "FXYZ")
-    assert [o.row for o in found.outliers] == [31]
+    points = polar_points(axis, tool, slipped, azimuth, elevation, sigma_mm=np.array(5 * UM), sigma_rad=2e-6)
+    fitted = fit(Measurements("m", (points,)), "FXYZ")
+    assert [o.row for o in fitted.outliers] == [31]
     plain = cloud(machine, 0, 60, 5.0)
     same = dataclasses.replace(plain, covariance_mm2=np.tile(np.eye(3) * plain.sigma**2, (60, 1, 1)))
     first, second = (fit(Measurements("m", (p,)), "FXYZ") for p in (plain, same))
-    at = machine.box.mean(axis=1)[None] + np.array([[300.0, 200.0, 100.0]])
-    assert first.error(at, FRESH[0]) == pytest.approx(second.error(at, FRESH[0]), abs=1e-7)
+    axis = machine.box.mean(axis=1)[None] + np.array([[300.0, 200.0, 100.0]])
+    assert first.error(axis, FRESH[0]) == pytest.approx(second.error(axis, FRESH[0]), abs=1e-7)
 
 
 # -- diagonals and ball-bars -----------------------------------------------------------------------------
@@ -201,38 +201,38 @@ def no_square(measurements: Measurements) -> Measurements:
 @pytest.mark.slow
 @pytest.mark.parametrize("chain", ["FXYZ", "YFXZ", "XYZF"])
 def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
-    """Lines whose straightness was read without a square; zero, centre, radius, servo mismatch and lost
-    motion of the instruments are theirs."""
+    """Lines whose straightness was read without a square; zero, centre, radius, servo mismatch and backlash
+    are unknowns of the instruments."""
     machine, measurements = case(0, "smooth", chain)
     bare = no_square(measurements)
-    square = left(machine, fit(measurements, chain), TOOLS[0], 400).after_framed
+    square = residual_of(machine, fit(measurements, chain), TOOLS[0], 400).after_framed
     alone = fit(bare, chain)
-    assert len(told(alone, "OLP806")) == 3
+    assert len(messages_of(alone, "OLP806")) == 3
     for more in (circles_of(machine, 0), diagonals_of(machine, 0)):
-        found = fit(bare.also(more), chain)
-        assert not told(found, "OLP806") and not told(found, "OLP808")
-        result = left(machine, found, TOOLS[0], 400)
+        fitted = fit(bare.also(more), chain)
+        assert not messages_of(fitted, "OLP806") and not messages_of(fitted, "OLP808")
+        result = residual_of(machine, fitted, TOOLS[0], 400)
         assert result.after_framed < max(4.0, 1.5 * square)
         for name in ("C0Y", "B0Z", "A0Z"):
-            row = found.squareness(name)
-            sigma = float(np.sqrt(row @ found.covariance @ row))
+            row = fitted.squareness(name)
+            sigma = float(np.sqrt(row @ fitted.covariance @ row))
             assert sigma < 6e-6
-            assert abs(row @ found.theta - machine.square[name]) < 4.0 * sigma + 1e-6
+            assert abs(row @ fitted.theta - machine.square[name]) < 4.0 * sigma + 1e-6
 
 
-def test_a_ball_bar_in_one_direction_leaves_squareness_unseen() -> None:
+def test_squareness_is_not_observable_with_a_ball_bar_in_one_direction() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     bare = no_square(measurements)
     one_way = fit(bare.also(circles_of(machine, 0, both=False)), "FXYZ")
-    assert {words.split()[0] for words in told(one_way, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
+    assert {words.split()[0] for words in messages_of(one_way, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
 
 
-def test_a_diagonal_read_in_the_wrong_sense_does_not_fit() -> None:
+def test_a_diagonal_with_the_wrong_sign_does_not_fit() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     first, *rest = diagonals_of(machine, 0)
     wrong = dataclasses.replace(first, value=-first.value)
-    found = fit(measurements.also((wrong, *rest)), "FXYZ")
-    assert told(found, "OLP808")
+    fitted = fit(measurements.also((wrong, *rest)), "FXYZ")
+    assert messages_of(fitted, "OLP808")
 
 
 def test_no_uncertainty_is_refused() -> None:
@@ -290,9 +290,9 @@ def test_tables_of_diagonals_and_ball_bars(tmp_path: Path) -> None:
     )
     plan = tmp_path / "measurements.toml"
     plan.write_text(PLAN + '[[diagonals]]\nfile = "d.csv"\n[[ballbars]]\nfile = "c.csv"\n')
-    found = load_measurements([plan])
-    assert found.of(Diagonal)[0].value[1] == -0.005
-    assert found.of(Circles)[0].value[10] == pytest.approx(0.001)
+    measurements = load_measurements([plan])
+    assert measurements.of(Diagonal)[0].value[1] == -0.005
+    assert measurements.of(Circles)[0].value[10] == pytest.approx(0.001)
     names = {Path(name).name for name in files_of_measurements([plan])}
     assert names == {"measurements.toml", "d.csv", "c.csv"}
     (tmp_path / "d.csv").write_text("target_mm,run,direction,value_um\n0,1,1,0\n")

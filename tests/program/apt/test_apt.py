@@ -75,16 +75,16 @@ def test_every_flavour_follows_its_path(bent: Path, zero: Path, flavour: str, se
     data = posts.apt(posts.job(seed, count=10), flavour)
     assert olp.correct(data, zero).data == data
     result = olp.correct(data, bent)
-    found = judged(data, result.data, bent)
-    assert found.before.max_um > 10
-    assert found.max_um <= ALLOWED_UM
-    assert found.vertex_max_um <= 0.1
-    assert result.report["deviation"]["path_max_um"] == pytest.approx(found.max_um, abs=0.05)
+    errors = judged(data, result.data, bent)
+    assert errors.before.max_um > 10
+    assert errors.max_um <= ALLOWED_UM
+    assert errors.vertex_max_um <= 0.1
+    assert result.report["deviation"]["path_max_um"] == pytest.approx(errors.max_um, abs=0.05)
     assert olp.verify(data, result.data, bent).report["deviation"]["holds"]
 
 
 @pytest.mark.parametrize("flavour", posts.FLAVOURS)
-def test_lost_motion_is_taken_up_in_statements(tmp_path: Path, flavour: str) -> None:
+def test_backlash_is_taken_up_in_statements(tmp_path: Path, flavour: str) -> None:
     path = machines.random_machine(tmp_path, 3, replace(RECIPE, backlash_um={"X": 5.0, "Y": 3.0}))
     data = posts.apt(posts.job(2, count=8), flavour)
     result = olp.correct(data, path)
@@ -101,8 +101,8 @@ def test_one_job_posted_twice_moves_the_machine_alike(bent: Path, tmp_path: Path
     machine_path = linuxcnc.interpret(olp.correct(posts.gcode(steps), bent).data, bent)
     for flavour in posts.FLAVOURS:
         own = canon(olp.correct(posts.apt(steps, flavour), bent).data)
-        found = deviation(own, machine_path, model, shift_by_frame=STILL, kinds=JUDGED)
-        assert found.max_um <= 1.0
+        errors = deviation(own, machine_path, model, shift_by_frame=STILL, kinds=JUDGED)
+        assert errors.max_um <= 1.0
 
 
 @pytest.mark.corpus
@@ -122,19 +122,19 @@ def test_real_programs_follow_their_path(corpus: Path, tmp_path: Path) -> None:
             continue  # holes and tilted tools have no reader in the judge
         result = olp.correct(data, path, contour=True)
         nominal, own = (read_apt(d, places, lengths, tool=1).canon() for d in (data, result.data))
-        found = deviation(own, nominal, JudgeModel(path), shift_by_frame=STILL, kinds=JUDGED)
-        assert found.max_um <= ALLOWED_UM, source.name
+        errors = deviation(own, nominal, JudgeModel(path), shift_by_frame=STILL, kinds=JUDGED)
+        assert errors.max_um <= ALLOWED_UM, source.name
         counted += 1
     assert counted >= 3
 
 
-def test_tilted_tools_are_corrected_with_the_lever_along_their_axis(bent: Path) -> None:
+def test_tilted_tools_are_corrected_with_the_tool_vector_along_their_axis(bent: Path) -> None:
     axes = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, -0.6, 0.8]])
     points = np.array([[10.0, 20.0, 5.0], [60.0, -30.0, 2.0], [-40.0, 10.0, 0.0]])
-    said = "".join(
+    statements = "".join(
         f"GOTO/{','.join(f'{v:.4f}' for v in (*p, *a))}\n" for p, a in zip(points, axes, strict=True)
     )
-    data = f"UNITS/MM\nMULTAX/ON\nLOADTL/1\nFEDRAT/500,MMPM\n{said}FINI\n".encode()
+    data = f"UNITS/MM\nMULTAX/ON\nLOADTL/1\nFEDRAT/500,MMPM\n{statements}FINI\n".encode()
     result = olp.correct(data, bent)
     moves = read_apt(result.data, FRAMES, LENGTHS)
     model = JudgeModel(bent)
@@ -154,8 +154,8 @@ def test_a_turned_frame_turns_the_points(tmp_path: Path) -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     places = {"G54": (turn, ORIGIN)}
     nominal, own = (read_apt(d, places, LENGTHS, tool=1).canon() for d in (data, result.data))
-    found = deviation(own, nominal, JudgeModel(path), shift_by_frame=STILL, kinds=JUDGED)
-    assert found.max_um <= ALLOWED_UM
+    errors = deviation(own, nominal, JudgeModel(path), shift_by_frame=STILL, kinds=JUDGED)
+    assert errors.max_um <= ALLOWED_UM
     points = olp.simulate(data, path).points_mm
     ends = np.array([s.end for s in posts.job(1, count=8)])
     away = np.sqrt(((points[:, None] - ends[None]) ** 2).sum(axis=2)).min(axis=0)
@@ -186,17 +186,17 @@ def test_rapid_is_for_the_next_goto_only(zero: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "said",
+    "statement",
     [
         "GOTO/1.5,-2,.25", "goto / 1.5 , -2 , .25", "GOTO/ 1.5 -2 .25", "GOTO/1.5,-2,.25,",
         "GOTO/1.$\n5,-2,.25",
         "GOTO/1.5,$\n-2,.25", "GOTO/1.5,-2,.25 $$ text", "GOTO/15E-1,-0.2D1,2.5E-01", "GOTO/1.5,-2,.25,0,0,1",
     ],
 )  # fmt: skip
-def test_one_point_in_many_ways(zero: Path, tmp_path: Path, said: str) -> None:
-    text = f"UNITS/MM\n{said}\nGOTO/0,0,0\n"
-    found = program(text, zero).toolpath.end_mm[0] - ORIGIN
-    assert found == pytest.approx([1.5, -2.0, 0.25])
+def test_one_point_in_many_ways(zero: Path, tmp_path: Path, statement: str) -> None:
+    text = f"UNITS/MM\n{statement}\nGOTO/0,0,0\n"
+    end_mm = program(text, zero).toolpath.end_mm[0] - ORIGIN
+    assert end_mm == pytest.approx([1.5, -2.0, 0.25])
     moved = olp.correct(text.encode(), machines.shift_machine(tmp_path, recipe=RECIPE)).data
     again = read_apt(moved, FRAMES, LENGTHS).axis[0] - ORIGIN
     assert again == pytest.approx([1.4, -2.1, 0.15])
@@ -205,8 +205,8 @@ def test_one_point_in_many_ways(zero: Path, tmp_path: Path, said: str) -> None:
 
 def test_an_inch_program_is_written_in_inches(tmp_path: Path) -> None:
     path = machines.shift_machine(tmp_path, recipe=RECIPE)
-    out = olp.correct(b"UNITS/INCH\nGOTO/1.0,2.0,3.0\n", path).data
-    assert unstamped(out) == b"UNITS/INCH\nGOTO/0.996063,1.996063,2.996063\n"
+    written = olp.correct(b"UNITS/INCH\nGOTO/1.0,2.0,3.0\n", path).data
+    assert unstamped(written) == b"UNITS/INCH\nGOTO/0.996063,1.996063,2.996063\n"
 
 
 def test_a_distance_along_the_tool_becomes_three_where_it_must(bent: Path, zero: Path) -> None:
@@ -235,8 +235,8 @@ def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
         b"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/10,20,30\nCYCLE/DRILL,FEDTO,40.,MMPM,250.,RAPTO,3.,RTRCTO,25.\n"
         b"GOTO/10,20,0\nGOTO/60,-20,0\nCYCLE/OFF\nRAPID\nGOTO/0,0,50\n"
     )
-    found = program(data, bent)
-    path = found.toolpath
+    nominal = program(data, bent)
+    path = nominal.toolpath
     heights = (path.end_mm - ORIGIN)[:, 2] - 120.0
     assert heights.tolist() == pytest.approx([30, 3, -40, 25, 3, -40, 25, 50])
     assert ((path.flag & Flag.CYCLE) != 0).tolist() == [False, True, True, True, True, True, True, False]
@@ -252,13 +252,13 @@ def test_holes_are_corrected_in_the_middle_of_their_stroke(bent: Path) -> None:
     assert (moves["corrected"], moves["approximated"], moves["passed"]) == (2, 6, 0)
 
 
-def test_strokes_of_holes_take_up_no_lost_motion(tmp_path: Path) -> None:
-    """The error asks for another place at the bottom than above, and yet no axis turns round there."""
+def test_strokes_of_holes_take_up_no_backlash(tmp_path: Path) -> None:
+    """The error shifts the bottom of the hole against its top, and yet no axis reverses there."""
     path = machines.random_machine(tmp_path, 3, replace(RECIPE, backlash_um={"X": 8.0, "Y": 8.0}))
     places = [(40.0, 40.0), (40.0, 120.0), (40.0, 200.0), (160.0, 200.0), (160.0, 40.0)]
-    said = "".join(f"GOTO/{x},{y},0\n" for x, y in places)
+    points = "".join(f"GOTO/{x},{y},0\n" for x, y in places)
     cycle = "CYCLE/DRILL,DEPTH,12,MMPM,200,CLEAR,2,RTRCTO,20\n"
-    data = f"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/-50,-60,20\n{cycle}{said}CYCLE/OFF\nFINI\n".encode()
+    data = f"UNITS/MM\nLOADTL/1\nRAPID\nGOTO/-50,-60,20\n{cycle}{points}CYCLE/OFF\nFINI\n".encode()
     model = JudgeModel(path)
     real = actual(canon(olp.correct(data, path).data), model)
     ends = real.points[real.dense.last][1:] - canon(data).axis[1:]
@@ -276,9 +276,9 @@ def test_holes_stand_where_a_canned_cycle_puts_them(bent: Path) -> None:
     )
     blocks = re.findall(rb"X([-\d.]+) ?Y([-\d.]+)", olp.correct(cycle, bent).data)[1:]
     points = re.findall(rb"GOTO/([-\d.]+),([-\d.]+)", olp.correct(data, bent).data)[1:]
-    said = [np.array([[float(n) for n in row] for row in rows]) for rows in (blocks, points)]
-    assert len(said[0]) == len(said[1]) == 2
-    assert np.abs(said[0] - said[1]).max() <= 2e-4
+    ends = [np.array([[float(n) for n in row] for row in rows]) for rows in (blocks, points)]
+    assert len(ends[0]) == len(ends[1]) == 2
+    assert np.abs(ends[0] - ends[1]).max() <= 2e-4
 
 
 def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:
@@ -300,7 +300,7 @@ def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:
         ("COPY/1,TRANSL,10,0,0,2\n", 1, "COPY"),
         ("FROBNICATE/1\n", 1, "FROBNICATE"),
         ("GOTO/0,0,0\nINSERT/G0 G53 Z0\n", 2, "INSERT"),
-        ("GOTO/1,0,0\nCIRCLE/0,0,0,0,.6,.8,1\nGOTO/0,1,0\n", 2, "no plane"),
+        ("GOTO/1,0,0\nCIRCLE/0,0,0,0,.6,.8,1\nGOTO/0,1,0\n", 2, "not in a plane of two axes"),
         ("GOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,1,0\n", 2, "radius"),
         ("GOTO/1,0,0\nCIRCLE/0,0,0,0,0,1\nGOTO/0,2,0\n", 2, "radius"),
         ("GOTO/1,0,0\nMOVARC/0,0,0,0,0,1,1,ANGLE,270\nGOTO/0,1,0\n", 2, "angle"),
@@ -325,7 +325,7 @@ def test_what_may_move_and_is_not_read_is_refused(zero: Path, text: str, line: i
     refused(text, zero, line, words)
 
 
-def test_text_and_comments_are_carried(zero: Path) -> None:
+def test_text_and_comments_stay_unchanged(zero: Path) -> None:
     text = (
         "PARTNO GOTO/1,2,3 $\nPPRINT  GOTO/9,9,9\nINSERT/Stock Size X350. Y150. Z10.5\n$$ GOTO/8,8,8\n"
         "$$-> CSYS / 1,0,0,0, $\n0,1,0,0, $\n0,0,1,0\nUNITS/MM\nGOTO/1,2,3\nFINI\nGOTO/7,7,7\n"
@@ -338,27 +338,27 @@ def test_cards_keep_their_columns(tmp_path: Path) -> None:
     data = b"UNITS/MM\nGOTO/ 1234.5,  1234.5,      -123.5,  0.000000000,  0.000000000,1.000000000\n"
     data += b"GOTO/0,0,0\n"
     path = machines.shift_machine(tmp_path, recipe=replace(RECIPE, travel=((-3000.0, 3000.0),) * 3))
-    out = unstamped(olp.correct(data, path).data)
-    assert max(len(line) for line in out.splitlines()) <= 80
-    assert read_apt(out, FRAMES, LENGTHS).axis[0] - ORIGIN == pytest.approx([1234.4, 1234.4, -123.6])
+    written = unstamped(olp.correct(data, path).data)
+    assert max(len(line) for line in written.splitlines()) <= 80
+    assert read_apt(written, FRAMES, LENGTHS).axis[0] - ORIGIN == pytest.approx([1234.4, 1234.4, -123.6])
 
 
 @pytest.mark.parametrize("eol", ["\n", "\r\n"])
 def test_cards_keep_their_numbers(tmp_path: Path, bent: Path, eol: str) -> None:
-    said = ["PARTNO CARDS", "UNITS/MM", "FEDRAT/600,MMPM", "GOTO/ -120.5,  -70.5,  3.5", "RAPID"]
-    said += ["GOTO/200.123,150.456,2.5", "CIRCLE/180,150.456,2.5,$", "0,0,1,20.123", "GOTO/180,170.579,2.5"]
-    said += ["GOTO/-120.5,-70.5,3.5", "FINI"]
-    data = "".join(f"{line:<72}{10 * k + 10:08d}{eol}" for k, line in enumerate(said)).encode()
+    cards = ["PARTNO CARDS", "UNITS/MM", "FEDRAT/600,MMPM", "GOTO/ -120.5,  -70.5,  3.5", "RAPID"]
+    cards += ["GOTO/200.123,150.456,2.5", "CIRCLE/180,150.456,2.5,$", "0,0,1,20.123", "GOTO/180,170.579,2.5"]
+    cards += ["GOTO/-120.5,-70.5,3.5", "FINI"]
+    data = "".join(f"{line:<72}{10 * k + 10:08d}{eol}" for k, line in enumerate(cards)).encode()
     zero = machines.zero_machine(tmp_path, RECIPE)
     assert olp.correct(data, zero).data == data
-    out = olp.correct(data, bent).data
-    lines = unstamped(out).split(eol.encode())
+    written = olp.correct(data, bent).data
+    lines = unstamped(written).split(eol.encode())
     assert {len(line) for line in lines} == {80, 0}
     numbers = [line[72:] for line in lines if line[72:].strip()]
-    assert numbers == [f"{10 * k + 10:08d}".encode() for k in range(len(said))]
-    bare = [b"".join(line[:72].rstrip() + b"\n" for line in text.splitlines()) for text in (data, out)]
+    assert numbers == [f"{10 * k + 10:08d}".encode() for k in range(len(cards))]
+    bare = [b"".join(line[:72].rstrip() + b"\n" for line in text.splitlines()) for text in (data, written)]
     assert judged(*bare, bent).max_um <= ALLOWED_UM
-    assert olp.verify(data, out, bent).report["deviation"]["holds"]
+    assert olp.verify(data, written, bent).report["deviation"]["holds"]
 
 
 def test_the_dialect_is_told_by_name_text_and_ending() -> None:
@@ -376,12 +376,12 @@ def test_the_dialect_is_told_by_name_text_and_ending() -> None:
 
 def test_feeds_in_all_their_forms(zero: Path) -> None:
     text = "UNITS/INCH\nSPINDL/600,CLW\n" + "".join(
-        f"FEDRAT/{said}\nGOTO/{n},0,0\n"
-        for n, said in enumerate(("60,MMPM", "MMPM,60", "60,IPM", "60", ".1,MMPR", ".1,IPR"))
+        f"FEDRAT/{feed}\nGOTO/{n},0,0\n"
+        for n, feed in enumerate(("60,MMPM", "MMPM,60", "60,IPM", "60", ".1,MMPR", ".1,IPR"))
     )
-    found = program(text, zero).statements
-    assert found is not None
-    assert found.feed_mm_s.tolist() == pytest.approx([1.0, 1.0, 25.4, 25.4, 1.0, 25.4])
+    statements = program(text, zero).statements
+    assert statements is not None
+    assert statements.feed_mm_s.tolist() == pytest.approx([1.0, 1.0, 25.4, 25.4, 1.0, 25.4])
 
 
 def test_planned_feeds_are_written_into_fedrat(tmp_path: Path) -> None:

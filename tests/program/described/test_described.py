@@ -122,7 +122,7 @@ def ends(text: bytes, setup: Setup) -> np.ndarray:
 
 
 def judged(text: bytes, corrected: bytes, machine: Path, setup: Setup, tools: list[int]) -> float:
-    """How far the tip is from the nominal way-points, by the independent model."""
+    """How far the tip is from the nominal waypoints, by the independent model."""
     model = JudgeModel(machine)
     nominal, command = ends(text, setup), ends(corrected, setup)
     if len(command) > len(nominal):
@@ -139,8 +139,8 @@ def judged(text: bytes, corrected: bytes, machine: Path, setup: Setup, tools: li
 
 
 def test_every_statement_does_what_its_form_says(machine: Path, own: Path) -> None:
-    found = read(PROGRAM, setup_of(machine, load_described(own)), load_described(own))
-    path = found.toolpath
+    own_program = read(PROGRAM, setup_of(machine, load_described(own)), load_described(own))
+    path = own_program.toolpath
     assert path.kind.tolist() == [Kind.RAPID, *[Kind.LINE] * 6, Kind.RAPID]
     assert path.line.tolist() == [3, 4, 5, 8, 9, 11, 13, 14]
     assert path.end_mm[1] == pytest.approx(OFFSET + np.array((80.5, 60.25, 40.125)))
@@ -151,8 +151,8 @@ def test_every_statement_does_what_its_form_says(machine: Path, own: Path) -> No
     assert path.end_mm[6] == pytest.approx(turned + np.array([300.0, 200.0, -250.0]))
     assert np.isnan(path.end_mm[7]).all()
     assert [path.frames[f].tool for f in path.frame] == [1, 1, 1, 1, 1, 2, 2, 2]
-    assert found.statements is not None
-    assert found.statements.feed_mm_s[1:7] == pytest.approx([10 / 60] * 6)
+    assert own_program.statements is not None
+    assert own_program.statements.feed_mm_s[1:7] == pytest.approx([10 / 60] * 6)
 
 
 def test_a_corrected_program_brings_the_tip_there(machine: Path, own: Path) -> None:
@@ -192,9 +192,9 @@ def test_without_error_nothing_is_touched(perfect: Path, own: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "line", "words"), [
-    (b"GO X1 Y2 Z3\nJUMP X1\n", 2, "`JUMP X1` is no statement that the dialect own knows"),
+    (b"GO X1 Y2 Z3\nJUMP X1\n", 2, "`JUMP X1` is not a statement of the dialect own"),
     (b"GO X1 Y2 Z3\nLOOP 5\n", 2, "is not read: write it out"),
-    (b"GO X1 Y2\n", 1, "no statement"),
+    (b"GO X1 Y2\n", 1, "is not a statement"),
     (b"TOOL 9\nGO X1 Y2 Z3\n", 2, "tool 9"),
     (b"FRAME NOWHERE\nGO X1 Y2 Z3\n", 2, "NOWHERE"),
     (b"GO X1.000 Y2.000 Z3.000\nPART Z30.000\n", 2, "leaves out"),
@@ -244,21 +244,21 @@ LINES = st.sampled_from([
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None)
 @given(lines=st.lists(LINES, max_size=14), end=st.sampled_from(["\n", "\r\n", "\r"]))
-def test_lines_that_are_alike_say_what_each_says_alone(
+def test_similar_lines_are_read_as_each_is_alone(
     perfect: Path, own: Path, monkeypatch: pytest.MonkeyPatch, lines: list[str], end: str
 ) -> None:
     dialect = load_described(own)
     text, setup = end.join(lines).encode(), setup_of(perfect, dialect)
-    found: list[object] = []
+    programs: list[object] = []
     for alone in (False, True):
         with monkeypatch.context() as patch:
             if alone:
                 patch.setattr("olp.program.described.reader.kin_of", lambda *_: None)
             try:
-                found.append(read(text, setup, dialect))
+                programs.append(read(text, setup, dialect))
             except ProgramError as error:
-                found.append(str(error))
-    fast, slow = found
+                programs.append(str(error))
+    fast, slow = programs
     if isinstance(fast, str) or isinstance(slow, str):
         assert fast == slow
     else:
@@ -382,14 +382,14 @@ def test_small_programs_in_them_are_corrected(machine: Path, perfect: Path, name
 
 
 @pytest.mark.parametrize(("name", "text", "line", "words"), [
-    ("kawasaki-as", b".PROGRAM a()\nLMOVE p9\n.END\n", 2, "p9 is not in this text"),
+    ("kawasaki-as", b".PROGRAM a()\nLMOVE p9\n.END\n", 2, "p9 is not defined in this text"),
     ("kawasaki-as", b".PROGRAM a()\nFOR i = 1 TO 3\n.END\n", 2, "loop"),
     ("kawasaki-as", b".PROGRAM a()\nLAPPRO p1, 50\n.END\n", 2, "tool axis"),
-    ("kawasaki-as", b".PROGRAM a()\nXMOVE p1\n.END\n", 2, "no statement"),
+    ("kawasaki-as", b".PROGRAM a()\nXMOVE p1\n.END\n", 2, "is not a statement"),
     ("kawasaki-as", b".PROGRAM a()\nPOINT p = SHIFT(q BY 1,2,3)\nLMOVE p\n.END\n", 2, "computed"),
     ("kawasaki-as", b".PROGRAM a()\nLMOVE TRANS(1,2,3)\n.PROGRAM b()\nLMOVE TRANS(1,2,4)\n", 4, "two parts"),
-    ("kawasaki-as", b".TRANS\np 1 2 3\np 1 2 4\n.END\n.PROGRAM a()\nLMOVE p\n.END\n", 6, "again in line 3"),
-    ("val2", b"MOVES part\n", 1, "part is not in this text"),
+    ("kawasaki-as", b".TRANS\np 1 2 3\np 1 2 4\n.END\n.PROGRAM a()\nLMOVE p\n.END\n", 6, "is defined twice, in lines 2 and 3"),
+    ("val2", b"MOVES part\n", 1, "part is not defined in this text"),
     ("val2", b"APPROS part, 50\n", 1, "tool axis"),
     ("karel", b"MOVE NEAR p1 BY 100\n", 1, "computed"),
 ])  # fmt: skip
@@ -403,19 +403,19 @@ def test_what_they_do_not_know_is_refused(
 
 def test_one_position_of_two_moves_that_want_different_numbers_is_refused(machine: Path) -> None:
     text = b".TRANS\np 10.0000 20.0000 30.0000\n.END\n.PROGRAM a()\nLMOVE p\nTOOL 2\nLMOVE p\n.END\n"
-    with pytest.raises(ProgramError, match="that of line 5 too") as caught:
+    with pytest.raises(ProgramError, match="serves line 5 too") as caught:
         olp.correct(text, setup_of(machine, described("kawasaki-as")))
     assert caught.value.line == 7
 
 
 def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
-    source, out = tmp_path / "a.prg", tmp_path / "b.prg"
+    source, target = tmp_path / "a.prg", tmp_path / "b.prg"
     source.write_bytes(PROGRAM)
     run = CliRunner()
     words = ["-m", str(machine), "--dialect", str(own)]
-    assert run.invoke(main, ["correct", str(source), *words, "-o", str(out)]).exit_code == 0
+    assert run.invoke(main, ["correct", str(source), *words, "-o", str(target)]).exit_code == 0
     for verb, more in (
-        ("verify", [str(out)]), ("inspect", []), ("simulate", ["-o", "-"]), ("check", []), ("retime", []),
+        ("verify", [str(target)]), ("inspect", []), ("simulate", ["-o", "-"]), ("check", []), ("retime", []),
         ("view", ["-o", str(tmp_path / "v.html")]),
     ):  # fmt: skip
         done = run.invoke(main, [verb, str(source), *more, *words])
@@ -425,7 +425,7 @@ def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
     assert "any other statement" in matrix
     job = tmp_path / "job.toml"
     job.write_text(f'schema = "olp-job-1"\nprogram = "a.prg"\nmachine = "{machine}"\ndialect = "{own}"\n')
-    assert run.invoke(main, ["correct", "-j", str(job), "-o", "-", "-q"]).stdout_bytes == out.read_bytes()
+    assert run.invoke(main, ["correct", "-j", str(job), "-o", "-", "-q"]).stdout_bytes == target.read_bytes()
     other = tmp_path / "m2.toml"
     other.write_text(machine.read_text().replace('"linuxcnc"', '"kawasaki-as"').replace(
         'calibration = "', f'calibration = "{machine.parent}/'

@@ -136,9 +136,9 @@ def test_points_under_manual_mode_are_left_to_the_person(bent: Path) -> None:
 
 
 def test_thermal_compensation_is_warned_of(bent: Path) -> None:
-    for said in ("TECOMP/ON,0.0000105\n", "TEMPR/PART,23.8\n"):
-        found = olp.correct(PROGRAM.replace("MODE", said + "MODE", 1).encode(), bent).findings
-        assert "OLP412" in {f.code for f in found}
+    for statement in ("TECOMP/ON,0.0000105\n", "TEMPR/PART,23.8\n"):
+        findings = olp.correct(PROGRAM.replace("MODE", statement + "MODE", 1).encode(), bent).findings
+        assert "OLP412" in {f.code for f in findings}
     assert "OLP412" not in {f.code for f in olp.correct(PROGRAM.encode(), bent).findings}
 
 
@@ -150,8 +150,8 @@ def test_a_feature_without_points_leaves_the_position_unknown(zero: Path) -> Non
 
 def test_names_numbers_and_comments_may_be_broken(zero: Path) -> None:
     text = HEAD + "$$ a comment, $\n$$ and its end\nSNSL$\nCT/S(STA$\nR1)\nGOTO/CART,1.$\n5,-2,.2$\n5\n"
-    found = program(text, zero)
-    assert found.toolpath.end_mm[-1] == pytest.approx([1.5, -2.0, 120.25])
+    broken = program(text, zero)
+    assert broken.toolpath.end_mm[-1] == pytest.approx([1.5, -2.0, 120.25])
     refused(HEAD + "$$ a comment $\nGOTO/1,2,3\n", zero, 6, "may belong")
 
 

@@ -231,30 +231,30 @@ def compare(nominal: bytes, place: Path) -> int:
     """Feeds as LinuxCNC reads them, moves matched by line and end; the number of them."""
     job = place.with_name("job.toml")
     program = read(nominal, load_setup(place, job if job.exists() else None), DIALECTS["linuxcnc"])
-    clock, path = timing(program), program.toolpath
+    times, path = timing(program), program.toolpath
     moves = linuxcnc.interpret(nominal, place, find_known=False)
     cutting = np.isin(moves.kind, (linuxcnc.FEED, linuxcnc.ARC, linuxcnc.PROBE))
     theirs: dict[int, list[tuple[np.ndarray, float]]] = {}
-    for line, at, feed in zip(
+    for line, position, feed in zip(
         moves.line[cutting].tolist(), moves.axis[cutting], moves.feed[cutting].tolist(), strict=True
     ):
-        theirs.setdefault(line, []).append((at, feed))
+        theirs.setdefault(line, []).append((position, feed))
     length, count = lengths_mm(path), 0
-    for i in np.flatnonzero(np.isfinite(clock.feed_mm_s)).tolist():
+    for i in np.flatnonzero(np.isfinite(times.feed_mm_s)).tolist():
         near = [
-            feed for at, feed in theirs.get(int(path.line[i]), [])
-            if np.nanmax(np.abs(at - path.end_mm[i]), initial=0.0) <= NEAR_MM
+            feed for position, feed in theirs.get(int(path.line[i]), [])
+            if np.nanmax(np.abs(position - path.end_mm[i]), initial=0.0) <= NEAR_MM
         ]  # fmt: skip
         if not near:
             assert length[i] <= NEAR_MM, int(path.line[i])
             continue
         count += 1
-        want = min(near, key=lambda f: abs(f - 60.0 * clock.feed_mm_s[i]))
+        want = min(near, key=lambda f: abs(f - 60.0 * times.feed_mm_s[i]))
         # LinuxCNC takes the radius at one end of an arc for its length, not the mean of both
         bar = 1e-3 if i in path.arcs.move else 1e-9
-        assert abs(60.0 * clock.feed_mm_s[i] - want) <= bar * want, (int(path.line[i]), want)
+        assert abs(60.0 * times.feed_mm_s[i] - want) <= bar * want, (int(path.line[i]), want)
     pauses = moves.seconds[moves.kind == linuxcnc.DWELL]
-    np.testing.assert_allclose(clock.dwell_s.sum(), pauses.sum(), rtol=1e-12)
+    np.testing.assert_allclose(times.dwell_s.sum(), pauses.sum(), rtol=1e-12)
     return count
 
 
@@ -285,7 +285,7 @@ def test_feeds_are_linuxcncs(tmp_path: Path, seed: int) -> None:
 def test_inverse_times_are_linuxcncs(tmp_path: Path, seed: int) -> None:
     """Every motion block in G93 or in G94, in turns, with an F word of its own and units that change."""
     rng = np.random.default_rng(seed)
-    rows, at = ["G21 G90 G94 G17 G54", "G0 X0 Y0 Z0", "F100"], np.zeros(3)
+    rows, position = ["G21 G90 G94 G17 G54", "G0 X0 Y0 Z0", "F100"], np.zeros(3)
     for _ in range(60):
         inch = rng.random() < 0.4
         unit = 25.4 if inch else 1.0
@@ -296,11 +296,11 @@ def test_inverse_times_are_linuxcncs(tmp_path: Path, seed: int) -> None:
         word = f"F{rng.uniform(0.5, 50):.3f}"
         move = f"G1 X{x:.4f} Y{y:.4f} Z{z:.4f}"
         if rng.random() < 0.4:
-            i, j = ((to - at)[:2] / 2 / unit).tolist()
+            i, j = ((to - position)[:2] / 2 / unit).tolist()
             move = f"G{rng.integers(2, 4)} X{x:.4f} Y{y:.4f} Z{z:.4f} I{i:.4f} J{j:.4f}"
             move = move.replace("-0.0000", "0.0000")
         rows.append(f"{'G20' if inch else 'G21'} {move} {word}")
-        at = np.round(to / unit, 4) * unit
+        position = np.round(to / unit, 4) * unit
     assert compare(("\n".join(rows) + "\nM2\n").encode(), machines.random_machine(tmp_path, seed)) == 60
 
 
@@ -356,8 +356,10 @@ points = st.lists(st.tuples(numbers, numbers, numbers), min_size=2, max_size=8)
 
 
 @given(points, st.floats(0.01, 100).map(lambda v: round(v, 3)))
-def test_inverse_time_is_the_time_of_each_block(at: list[tuple[float, float, float]], f: float) -> None:
-    rows = [f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f} F{f:.3f}" for x, y, z in at]
+def test_inverse_time_is_the_time_of_each_block(
+    waypoints: list[tuple[float, float, float]], f: float
+) -> None:
+    rows = [f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f} F{f:.3f}" for x, y, z in waypoints]
     program = reading("G93\n" + "\n".join(rows))
     length, feed = lengths_mm(program.toolpath), timing(program).feed_mm_s
     assert np.isnan(feed[length == 0]).all()
@@ -365,9 +367,9 @@ def test_inverse_time_is_the_time_of_each_block(at: list[tuple[float, float, flo
 
 
 @given(points, st.floats(0.01, 100).map(lambda v: round(v, 3)))
-def test_inches_and_millimetres_mean_the_same(at: list[tuple[float, float, float]], f: float) -> None:
-    rows = "\n".join(f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in at)
-    metric = "\n".join(f"G1 X{x * 25.4:.7f} Y{y * 25.4:.7f} Z{z * 25.4:.7f}" for x, y, z in at)
+def test_inches_and_millimetres_mean_the_same(waypoints: list[tuple[float, float, float]], f: float) -> None:
+    rows = "\n".join(f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in waypoints)
+    metric = "\n".join(f"G1 X{x * 25.4:.7f} Y{y * 25.4:.7f} Z{z * 25.4:.7f}" for x, y, z in waypoints)
     a = timed(f"G20\nG64 P0.001\nF{f:.3f}\n{rows}")
     b = timed(f"G21\nG64 P0.0254\nF{f * 25.4:.7f}\n{metric}")
     np.testing.assert_allclose(a.feed_mm_s, b.feed_mm_s, rtol=1e-9)

@@ -43,7 +43,7 @@ def halved(text: str, control: str = "linuxcnc", keys: str = "", share: float = 
     return write_feeds(program, lines, seconds / share, seconds)
 
 
-#: text, control, what stands behind F at half the feed
+#: text, control, the number after F at half the feed
 STYLES: dict[str, tuple[str, str, list[bytes]]] = {
     "whole": ("G1 X9 F600", "linuxcnc", [b"300"]),
     "a point at the end": ("G1 X9 F600.", "linuxcnc", [b"300."]),
@@ -118,10 +118,10 @@ def test_a_word_for_several_blocks() -> None:
 def test_words_over_moves_that_are_not_timed_stay(tmp_path: Path) -> None:
     path = machine(tmp_path / "m", tables=TRUE_ZERO)
     text = b"G1 X5 F6000\nG0 Y0 Z0\nG1 X50 F6000\n"
-    found = olp.retime(text, path)
-    assert found.with_feeds().startswith(b"G1 X5 F6000\nG0 Y0 Z0\nG1 X50 F")
-    assert found.report["write_feed"]["kept_lines"] == [1]
-    assert found.report["write_feed"]["changed"] == 1
+    result = olp.retime(text, path)
+    assert result.with_feeds().startswith(b"G1 X5 F6000\nG0 Y0 Z0\nG1 X50 F")
+    assert result.report["write_feed"]["kept_lines"] == [1]
+    assert result.report["write_feed"]["changed"] == 1
 
 
 def retimed(text: str) -> Retiming:
@@ -137,14 +137,14 @@ def test_the_planned_mean_of_a_block_in_every_mode() -> None:
         "G93 G1 X100 F60\nM0\nX0 F60",
         "S1000\nG95 G1 F6 X100\nM0\nX0 F6",
     ):
-        found = retimed(text)
-        written = found.with_feeds()
+        result = retimed(text)
+        written = result.with_feeds()
         assert blanked(written) == blanked(text.encode())
         program = reading(written.decode())
         feed = timed(written.decode()).feed_mm_s
-        mean = lengths_mm(program.toolpath) / found.lines.seconds
+        mean = lengths_mm(program.toolpath) / result.lines.seconds
         np.testing.assert_allclose(feed, mean, rtol=0.01)
-        assert found.report["write_feed"]["duration_s"] > found.duration_s
+        assert result.report["write_feed"]["duration_s"] > result.duration_s
 
 
 @settings(max_examples=10)
@@ -153,14 +153,14 @@ def test_written_programs_move_alike_and_no_faster(moves: list[tuple[float, floa
     text = "G21 G90 G1 F3000\n" + "".join(
         f"X{x:.3f} Y{y:.3f}{'' if f is None else f' F{f:.1f}'}\n" for x, y, f in moves
     )
-    found = retimed(text)
+    result = retimed(text)
     for shared in ("mean", "least"):
-        written = found.with_feeds(shared)
+        written = result.with_feeds(shared)
         assert blanked(written) == blanked(text.encode())
         before, after = reading(text), reading(written.decode())
         np.testing.assert_array_equal(before.toolpath.end_mm, after.toolpath.end_mm)
         assert (timed(written.decode()).feed_mm_s <= timed(text).feed_mm_s).all()
-        assert found.report["write_feed"]["duration_s"] >= found.duration_s * 0.99
+        assert result.report["write_feed"]["duration_s"] >= result.duration_s * 0.99
 
 
 def test_one_long_block_is_written_in_closed_form(tmp_path: Path) -> None:
@@ -170,6 +170,6 @@ def test_one_long_block_is_written_in_closed_form(tmp_path: Path) -> None:
     feed, way = 300.0, 500.0
     axis = setup.machine.axes["X"]
     seconds = way / feed + feed / axis.acceleration_mm_s2 + axis.acceleration_mm_s2 / axis.jerk_mm_s3
-    found = olp.retime(f"G1 X{way} F{60 * feed:.2f}\n".encode(), setup)
-    assert found.duration_s == pytest.approx(seconds, rel=1e-6)
-    assert found.with_feeds() == f"G1 X{way} F{60 * way / seconds:.2f}\n".encode()
+    result = olp.retime(f"G1 X{way} F{60 * feed:.2f}\n".encode(), setup)
+    assert result.duration_s == pytest.approx(seconds, rel=1e-6)
+    assert result.with_feeds() == f"G1 X{way} F{60 * way / seconds:.2f}\n".encode()

@@ -1,4 +1,4 @@
-"""Lists of positions as programs: what is told of their form, and that only numbers change."""
+"""Lists of positions as programs: what is detected of their form, and that only numbers change."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from olp.files.point_profile import PointProfile
 from olp.program.pointlist.dialect import DIALECT, with_layout
 from olp.program.program import Program
 from olp.program.registry import read
-from olp.program.text.delimited import told
+from olp.program.text.delimited import detected_layout
 
 FRAMES = {
     "G54": {"X_mm": 210.0, "Y_mm": 180.0, "Z_mm": -260.0, "set_by": "true"},
@@ -155,7 +155,7 @@ def test_places_are_no_path_unless_the_profile_says_so(machine: Path) -> None:
         olp.correct(LONG, setup_of(machine), split_rapids=True)
 
 
-def test_no_row_takes_up_lost_motion_where_none_may_be_inserted(tmp_path: Path) -> None:
+def test_no_row_takes_up_backlash_where_none_may_be_inserted(tmp_path: Path) -> None:
     recipe = Recipe(work_offsets=FRAMES, backlash_um={"X": 8.0, "Y": 5.0, "Z": 6.0})
     machine = random_machine(tmp_path / "m", 4, recipe)
     places = [(0, 0, 0), (50, 0, 0), (20, 10, 0), (60, -10, 5), (10, 20, 5), (11, 20, 5), (10.5, 20, 6)]
@@ -181,27 +181,27 @@ def test_a_list_without_comments_is_not_marked(machine: Path) -> None:
     assert "OLP626" in {f.code for f in result.findings}
 
 
-def test_what_is_told_is_said(machine: Path) -> None:
-    found = olp.correct(TABLES[1], setup_of(machine)).findings
-    said = " ".join(f.message for f in found if f.code == "OLP331")
-    assert "separated by semicolon" in said
-    assert "decimal mark is a comma" in said
-    assert "in mm" in said
-    assert "stated in G54" in said
+def test_what_is_detected_is_stated(machine: Path) -> None:
+    findings = olp.correct(TABLES[1], setup_of(machine)).findings
+    messages = " ".join(f.message for f in findings if f.code == "OLP331")
+    assert "separated by semicolon" in messages
+    assert "decimal mark is a comma" in messages
+    assert "in mm" in messages
+    assert "stated in G54" in messages
     turning = b"X_mm,Y_mm,Z_mm,A,B,C\n1,2,3,0,0,0\n1,2,4,0,0,90\n"
     assert "OLP332" in {f.code for f in olp.correct(turning, setup_of(machine)).findings}
 
 
 @pytest.mark.parametrize(("text", "error", "words"), [
     (b"1,2,3\n4,5,6\n", ProgramError, "states no unit"),
-    (b"1,2,3,4,5\n", ProgramError, "does not tell which columns"),
-    (b"", ProgramError, "holds no positions"),
+    (b"1,2,3,4,5\n", ProgramError, "does not show which columns"),
+    (b"", ProgramError, "has no positions"),
     (b"X_mm,Y_mm,Z_mm\n1,2\n", ProgramError, ":2: 2 columns"),
     (b"X_mm,Y_mm,Z_mm\n1,2,3\n1,2,z\n", ProgramError, ':3: column 3 is "z"'),
     (b"# frame=G57\nX_mm,Y_mm,Z_mm\n1,2,3\n", ProgramError, "G57"),
     (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,9\n", ProgramError, ":2: tool 9"),
-    (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,T1\n", ProgramError, ':2: "T1" is no tool number'),
-    (b"# olp-corrected 0123456789ab\nX_mm,Y_mm,Z_mm\n1,2,3\n", AlreadyCorrected, "correcting it again"),
+    (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,T1\n", ProgramError, ':2: "T1" is not a tool number'),
+    (b"# olp-corrected 0123456789ab\nX_mm,Y_mm,Z_mm\n1,2,3\n", AlreadyCorrected, "a second one would apply the model twice"),
 ])  # fmt: skip
 def test_what_is_not_said_is_refused(
     machine: Path, tmp_path: Path, text: bytes, error: type[OlpError], words: str
@@ -224,10 +224,10 @@ CELLS = st.one_of(
 ))  # fmt: skip
 def test_any_bytes_are_read_or_refused(perfect: Path, data: bytes) -> None:
     try:
-        found = read(data, setup_of(perfect), DIALECT)
+        program = read(data, setup_of(perfect), DIALECT)
     except ProgramError:
         return
-    assert found.data == data
+    assert program.data == data
     with contextlib.suppress(InputError):
         assert olp.correct(data, setup_of(perfect)).data == data
 
@@ -329,7 +329,7 @@ def test_the_command_line(machine: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.corpus
-def test_lists_of_another_package_are_carried(tmp_path: Path, corpus: Path) -> None:
+def test_lists_of_another_package_stay_unchanged(tmp_path: Path, corpus: Path) -> None:
     """RoboDK's examples: no header, no unit, fifteen decimals, and empty cells."""
     wide = Recipe(
         work_offsets={"G54": {"X_mm": 1000.0, "Y_mm": 500.0, "Z_mm": 0.0, "set_by": "true"}},
@@ -356,6 +356,6 @@ def test_lists_of_another_package_are_carried(tmp_path: Path, corpus: Path) -> N
 def test_a_profile_is_a_dialect(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
     path.write_text(PointProfile(joined="lines", unit="inch").to_toml())
-    found = load_described(path)
-    assert found.layout.unit == "inch"  # type: ignore[attr-defined]
-    assert told(["X,Y,Z"]).unit is None  # type: ignore[union-attr]
+    dialect = load_described(path)
+    assert dialect.layout.unit == "inch"  # type: ignore[attr-defined]
+    assert detected_layout(["X,Y,Z"]).unit is None  # type: ignore[union-attr]

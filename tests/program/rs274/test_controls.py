@@ -118,7 +118,7 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "levels_follow_distance": (
         f"{_SERIES}\nG91\nX2.",
-        {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|"} | dict.fromkeys(_ISO, "give R and the depth anew"),
+        {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|"} | dict.fromkeys(_ISO, "give R and the depth again"),
     ),
     "exact_corners": (
         f"G64\n{_SERIES}",
@@ -135,11 +135,11 @@ TABLES = {"codes", "refusals", "harmless_m", "cycles", "language", "written_endi
 
 @pytest.fixture(scope="module")
 def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Setup]:
-    found = {}
+    by_control = {}
     for control in CONTROLS:
         place = tmp_path_factory.mktemp(control)
-        found[control] = load_setup(machine(place, controller=control, tables=TRUE_ZERO + TOOLS))
-    return found
+        by_control[control] = load_setup(machine(place, controller=control, tables=TRUE_ZERO + TOOLS))
+    return by_control
 
 
 def outcome(text: str, setup: Setup, control: Profile) -> Outcome:

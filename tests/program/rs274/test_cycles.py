@@ -82,7 +82,7 @@ def test_levels_count_from_the_initial_level_in_g91() -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "change", "found"),
+    ("code", "change", "message"),
     [
         (870, {}, "G87"),
         (880, {}, "G88"),
@@ -99,8 +99,8 @@ def test_levels_count_from_the_initial_level_in_g91() -> None:
         (840, {"plane": 18}, "wrong axes"),
     ],
 )
-def test_refusals_name_the_word(code: int, change: dict[str, float], found: str) -> None:
-    with pytest.raises(ProgramError, match=re.escape(found)):
+def test_refusals_name_the_word(code: int, change: dict[str, float], message: str) -> None:
+    with pytest.raises(ProgramError, match=re.escape(message)):
         hole_moves(code, **{**HOLE, **change}, retract_to_r=True)  # type: ignore[arg-type]
 
 
@@ -184,25 +184,25 @@ def _judge(tmp_path: Path, program: str) -> list[tuple[object, ...]]:
 
 def _ours(strokes: tuple[Stroke, ...]) -> list[tuple[object, ...]]:
     names = {"stop": "stop", "reverse": "COUNTERCLOCKWISE", "restore": "CLOCKWISE"}
-    out: list[tuple[object, ...]] = []
+    calls: list[tuple[object, ...]] = []
     for s in strokes:
         if s.kind in ("rapid", "feed"):
-            out.append((s.kind, *(round(v, 4) + 0.0 for v in s.point)))
+            calls.append((s.kind, *(round(v, 4) + 0.0 for v in s.point)))
         else:
-            out.append((s.kind, names[s.spindle] if s.spindle else s.seconds))
-    return out
+            calls.append((s.kind, names[s.spindle] if s.spindle else s.seconds))
+    return calls
 
 
 def _without_standstill(calls: list[tuple[object, ...]]) -> list[tuple[object, ...]]:
-    out: list[tuple[object, ...]] = []
-    at: tuple[object, ...] = ()
+    moving: list[tuple[object, ...]] = []
+    position: tuple[object, ...] = ()
     for call in calls:
         if call[0] in ("rapid", "feed"):
-            if call[1:] == at:
+            if call[1:] == position:
                 continue
-            at = call[1:]
-        out.append(call)
-    return out
+            position = call[1:]
+        moving.append(call)
+    return moving
 
 
 @pytest.mark.oracle
@@ -221,7 +221,7 @@ def test_linuxcnc_makes_the_same_strokes(tmp_path: Path, seed: int) -> None:
         "M3",
     ]
     expected: list[tuple[object, ...]] = [("rapid", *start), ("spindle", "CLOCKWISE")]
-    at = start
+    position = start
     absolute = True
     for _ in range(rng.randint(1, 5)):
         code = rng.choice(sorted(CODES - {740} if plane == 17 else CODES - {740, 840}))
@@ -235,7 +235,7 @@ def test_linuxcnc_makes_the_same_strokes(tmp_path: Path, seed: int) -> None:
             xy, step = word_xy, (0.0, 0.0)
         else:
             r_word, z_word = round(rng.uniform(-9, 9), 2), round(rng.uniform(-9, 0), 2)
-            xy, step = (at[first] + word_xy[0], at[second] + word_xy[1]), word_xy
+            xy, step = (position[first] + word_xy[0], position[second] + word_xy[1]), word_xy
         q, p = round(rng.uniform(0.3, 5), 2), round(rng.uniform(0, 2), 1)
         words = dict(zip((first, second, tool), (*word_xy, z_word), strict=True))
         lines.append(
@@ -247,19 +247,19 @@ def test_linuxcnc_makes_the_same_strokes(tmp_path: Path, seed: int) -> None:
         )
         r, z = levels(r_word, z_word, absolute=absolute, initial_z=start[tool])
         strokes = cycle_moves(
-            code, start=at, xy=xy, step=step, repeats=repeats, r=r, z=z, q=q, p=p, retract_to_r=retract_to_r,
-            initial_z=start[tool], plane=plane, clearance=0.010 if inch else 0.254,
+            code, start=position, xy=xy, step=step, repeats=repeats, r=r, z=z, q=q, p=p,
+            retract_to_r=retract_to_r, initial_z=start[tool], plane=plane, clearance=0.010 if inch else 0.254,
         )  # fmt: skip
         expected += _ours(strokes)
-        at = strokes[-1].point
+        position = strokes[-1].point
     judged = _judge(tmp_path, "\n".join([*lines, "M2"]) + "\n")
     # M2 stops the spindle.
     got = _without_standstill(judged[:-1])
     want = _without_standstill(expected)
     assert len(got) == len(want)
-    for found, wanted in zip(got, want, strict=True):
-        assert found[0] == wanted[0]
-        if found[0] == "spindle":
-            assert found == wanted
+    for call, wanted in zip(got, want, strict=True):
+        assert call[0] == wanted[0]
+        if call[0] == "spindle":
+            assert call == wanted
         else:
-            assert found[1:] == pytest.approx(wanted[1:], abs=1.01e-4)
+            assert call[1:] == pytest.approx(wanted[1:], abs=1.01e-4)

@@ -32,7 +32,7 @@ def test_the_state_takes_every_modal_code_of_a_profile(profile: Profile) -> None
             assert getattr(state, ACTS[act]) == code
 
 
-def test_no_code_stands_in_two_groups_and_the_cycles_are_those_with_strokes() -> None:
+def test_no_code_is_in_two_groups_and_the_cycles_are_those_with_strokes() -> None:
     listed = [code for group in codes.GROUPS.values() for code in group]
     assert len(listed) == len(set(listed))
     assert codes.CYCLES == CODES

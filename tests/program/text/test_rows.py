@@ -20,7 +20,7 @@ XYZ = mapping({"X": "x", "Y": "y", "Z": 3})
 
 
 def reads_csv(source: str) -> bool:
-    """Whether a text splits rows by the csv module, or lines at commas that it was not told of."""
+    """Whether a text splits rows by the csv module, or lines at commas that are not an argument."""
     return any(
         isinstance(node, ast.Attribute) and node.attr in ("reader", "DictReader")
         and isinstance(node.value, ast.Name) and node.value.id == "csv"
@@ -29,8 +29,8 @@ def reads_csv(source: str) -> bool:
 
 
 def test_delimited_text_is_split_in_one_place() -> None:
-    found = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.rglob("*.py") if reads_csv(p.read_text())}
-    assert found == {"program/text/rows.py"}
+    modules = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.rglob("*.py") if reads_csv(p.read_text())}
+    assert modules == {"program/text/rows.py"}
     assert reads_csv("import csv\nrows = list(csv.reader(lines))")
 
 
@@ -54,7 +54,7 @@ def test_remarks_and_blanks() -> None:
 
 
 def test_a_cell_beyond_all_measure_is_refused() -> None:
-    with pytest.raises(InputError, match="no table of comma-separated values"):
+    with pytest.raises(InputError, match="not a table of comma-separated values"):
         CSV.cells("1," + "2" * 200_000)
 
 
@@ -101,5 +101,5 @@ def test_both_ways_of_reading_find_the_same_cells(table: list[list[str]], mark: 
     names = {",": "comma", ";": "semicolon", "\t": "tab"}
     layout = Layout(XYZ, names[mark], header=False)  # type: ignore[arg-type]
     cells = Cells(text.encode(), layout)
-    found = [(line, [cells.text(span) for span in row]) for line, row in cells.rows()]
-    assert found == list(form_of(layout).rows(text))
+    rows = [(line, [cells.text(span) for span in row]) for line, row in cells.rows()]
+    assert rows == list(form_of(layout).rows(text))

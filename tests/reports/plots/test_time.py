@@ -27,25 +27,25 @@ def job(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_the_picture_names_what_it_shows_and_is_the_same_each_time() -> None:
     way, limits = random_route(3)
-    found = plan(way, limits)
-    first, second = (motion_plot(found, way, "part.ngc on mill") for _ in range(2))
+    trajectory = plan(way, limits)
+    first, second = (motion_plot(trajectory, way, "part.ngc on mill") for _ in range(2))
     assert first == second
     text = first.decode()
     for words in ("part.ngc on mill", "speed in mm/s", "acceleration in mm/s2", "jerk in mm/s3", "time in s"):
         assert words in text
     for label in ("speed", "feed", "X", "Y", "Z", "limit of the axis"):
         assert re.search(rf">{label}</text>", text)
-    assert motion_plot(found, way, "part", "png").startswith(b"\x89PNG")
+    assert motion_plot(trajectory, way, "part", "png").startswith(b"\x89PNG")
 
 
 def test_bands_of_a_long_motion_reach_as_far_as_its_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     way, limits = random_route(8)
-    found = plan(way, limits)
-    pieces = np.arange(len(found.motion))
+    trajectory = plan(way, limits)
+    pieces = np.arange(len(trajectory.motion))
     monkeypatch.setattr(plots_time, "_COLUMNS", 40)
     monkeypatch.setattr(plots_time, "_BLOCK", 7)
-    lines = plots_time._lines(found, pieces, 0.0, found.duration_s)
-    bands = plots_time._bands(found, pieces, 0.0, found.duration_s)
+    lines = plots_time._lines(trajectory, pieces, 0.0, trajectory.duration_s)
+    bands = plots_time._bands(trajectory, pieces, 0.0, trajectory.duration_s)
     assert len(bands[0]) == 40 < len(lines[0])
     for thin, wide in zip(lines[1:], bands[1:], strict=True):
         np.testing.assert_array_equal(thin.max(axis=(1, 2)), wide[:, 1].max(axis=1))
@@ -55,16 +55,16 @@ def test_bands_of_a_long_motion_reach_as_far_as_its_lines(monkeypatch: pytest.Mo
 
 def test_a_span_cuts_the_motion() -> None:
     way, _ = random_route(3)
-    found = plan(way, LIMITS)
-    whole = found.duration_s
-    first, last = found.motion.piece_at(np.array([0.3, 0.6]) * whole)
+    trajectory = plan(way, LIMITS)
+    whole = trajectory.duration_s
+    first, last = trajectory.motion.piece_at(np.array([0.3, 0.6]) * whole)
     pieces = np.arange(first, last + 1)
-    time, *_ = plots_time._lines(found, pieces, 0.3 * whole, 0.6 * whole)
+    time, *_ = plots_time._lines(trajectory, pieces, 0.3 * whole, 0.6 * whole)
     assert (time[0], time[-1]) == pytest.approx((0.3 * whole, 0.6 * whole))
-    assert motion_plot(found, way, "", from_s=0.3 * whole, to_s=0.6 * whole)
+    assert motion_plot(trajectory, way, "", from_s=0.3 * whole, to_s=0.6 * whole)
     for span in ((-1.0, 1.0), (whole, whole + 1.0), (0.5, 0.5)):
         with pytest.raises(UsageError, match="no motion to draw"):
-            motion_plot(found, way, "", from_s=span[0], to_s=span[1])
+            motion_plot(trajectory, way, "", from_s=span[0], to_s=span[1])
 
 
 def test_on_the_command_line(job: Path, tmp_path: Path) -> None:

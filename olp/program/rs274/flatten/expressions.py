@@ -1,10 +1,10 @@
 """Expressions of parametric programs: `#1`, `#<name>`, `[ ]`, functions and operators.
 
-There are two kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC evaluates
-it. `**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`, all from left to
-right. A sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. `MACRO_B` is Custom Macro
-B: `* / MOD AND`, then `+ - OR XOR`, then comparisons. FIX and FUP count by magnitude. A variable that was
-never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
+There are two kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC
+evaluates it. `**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`, all from
+left to right. A sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. `MACRO_B` is
+Custom Macro B: `* / MOD AND`, then `+ - OR XOR`, then comparisons. FIX and FUP count by magnitude. A variable
+that was never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
 
 Text is compact and lower case: the caller has removed blanks and comments. Angles are in degrees.
 Every error is a ProgramError without a line, which the caller adds.
@@ -25,7 +25,8 @@ EQUAL_WITHIN = 1e-4
 
 
 class Parameters(Protocol):
-    """Where an expression finds its parameters; raises ProgramError for values that are not known off line."""
+    """Where an expression finds its parameters; raises ProgramError for values that are not known off
+    line."""
 
     def number(self, index: int) -> float | None:
         """Value of #index; None is a vacant variable."""
@@ -270,8 +271,8 @@ def _atan2_degrees(rise: float, run: float) -> float:
 def _atan2_of_positive(rise: float, run: float) -> float:
     if rise < 0:
         raise ProgramError(
-            "ATAN of a negative first argument is in 0..360 or -180..180, which a parameter of the control decides; "
-            "write the angle with ACOS or ASIN"
+            "ATAN of a negative first argument is in 0..360 or in -180..180, as a parameter of the control "
+            "decides, which is not known off line; write the angle with ACOS or ASIN"
         )
     return math.degrees(math.atan2(rise, run))
 

@@ -12,8 +12,8 @@ from olp.program.rs274.flatten.expressions import Arithmetic
 class Language:
     """How the parametric programs of a control are read, and how plain blocks are written for it.
 
-    - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, the right side of an assignment
-      needs no brackets, and variables are numbered as in Macro B: #1 to #33 local, vacant until set.
+    - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, and the right side of an
+      assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are modal motion.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps

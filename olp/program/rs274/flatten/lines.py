@@ -188,7 +188,15 @@ def _word(reader: Reader, places: list[int], language: Language) -> Word:
                 "ROUND inside a word rounds to the least increment, which is not known here; "
                 "assign the rounded value to a variable first"
             )
-    return Word(letter.group(), number, value, pointed, places[start], places[value_start], places[reader.position - 1] + 1)
+    return Word(
+        letter.group(),
+        number,
+        value,
+        pointed,
+        places[start],
+        places[value_start],
+        places[reader.position - 1] + 1,
+    )
 
 
 def _assignment(reader: Reader, places: list[int], language: Language) -> Assignment:
@@ -217,7 +225,9 @@ def _o_word(reader: Reader) -> Flow:
     keyword = _KEYWORD.match(text, reader.position)
     if keyword is None:
         if reader.position < len(text) or not label.isdigit():
-            raise ProgramError(f"O-word without a known keyword at {text[reader.position : reader.position + 12]!r}")
+            raise ProgramError(
+                f"O-word without a known keyword at {text[reader.position : reader.position + 12]!r}"
+            )
         return Flow("program", label)
     reader.position = keyword.end()
     values: list[Expression] = []

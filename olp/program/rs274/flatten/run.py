@@ -59,7 +59,8 @@ class Walk:
                 visits += 1
                 if visits > self.limit:
                     raise ProgramError(
-                        f"the run visits more than {self.limit} blocks; end the loop that has no end, or raise the limit"
+                        f"the run visits more than {self.limit} blocks; "
+                        "correct an endless loop, or raise the limit"
                     )
                 line = frame.unit.line(index)
                 frame.next_index += 1
@@ -117,7 +118,8 @@ class Walk:
         return False
 
     def _program(self, line: Line, frame: Frame) -> bool:
-        """A header such as O1234 is written at the start; a later one means that the program before has no end."""
+        """A header such as O1234 is written at the start; a later one means that the program before has no
+        end."""
         if len(self._frames) > 1:
             raise ProgramError(f"subprogram {frame.label} runs into the next program; M99 is missing")
         if self._headers:
@@ -276,13 +278,18 @@ class Walk:
         return frame
 
     def _calls(self, line: Line, frame: Frame, index: int) -> bool | None:
-        """Carry out M98, M97, M99 and G65; None where the line has none of them, else whether the run ends."""
+        """Carry out M98, M97, M99 and G65; None where the line has none of them, else whether the run
+        ends."""
         codes = {(w.letter, w.number) for w in line.words if w.letter in "mg" and w.value is None}
         saves = self.language.saved_modes and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
         if saves and (len(self._frames) > 1 or ("m", 73.0) in saves):
-            raise ProgramError("M70, M72 and M73 act on a level of subprograms, which plain blocks do not have")
+            raise ProgramError(
+                "M70, M72 and M73 act on a level of subprograms, which plain blocks do not have"
+            )
         if self.language.profile_cycles and codes & _PROFILE_CYCLES:
-            raise ProgramError("G70 to G72 take their profile from a subprogram, which plain blocks do not have")
+            raise ProgramError(
+                "G70 to G72 take their profile from a subprogram, which plain blocks do not have"
+            )
         if ("g", 66.0) in codes or ("g", 66.1) in codes:
             raise ProgramError("G66 calls a macro after every move, which is not unrolled; call it with G65")
         if ("g", 65.0) in codes:
@@ -351,7 +358,9 @@ class Walk:
         target = self._word(line, "p")
         caller = self._leave()
         if target is not None:
-            caller.next_index = caller.unit.block_number(whole(target, "the block number P"), caller.next_index - 1)
+            caller.next_index = caller.unit.block_number(
+                whole(target, "the block number P"), caller.next_index - 1
+            )
         return False
 
     def _macro(self, line: Line, frame: Frame) -> None:

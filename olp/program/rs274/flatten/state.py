@@ -1,7 +1,7 @@
 """The state as the unroller follows it, in program coordinates and program units.
 
-It has no tables of offsets and tools: after a change of these the position is not known. This is an error only
-where the program needs the position.
+It has no tables of offsets and tools: after a change of these the position is not known. This is an error
+only where the program needs the position.
 """
 
 from __future__ import annotations
@@ -213,7 +213,10 @@ class ProgramState(State):
                 raise ProgramError(f"M{value:g} in the block of a canned cycle; put it into its own block")
         codes = self._modes(words)
         if self.inverse_time or self.compensated or self.odd_frame:
-            raise ProgramError("a canned cycle is in inverse time, cutter compensation or a turned frame, which is not read; end these modes first")
+            raise ProgramError(
+                "a canned cycle is in inverse time, cutter compensation or a turned frame, "
+                "which is not read; end these modes first"
+            )
         chosen = codes & CYCLES
         code = next(iter(chosen)) if chosen else self.motion
         if code is None:

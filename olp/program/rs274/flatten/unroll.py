@@ -53,10 +53,10 @@ def flatten(
 
     `subprograms` gives the text of a program that the file does not have, by its number or lower-case name.
     `block_delete`: blocks with `/` are left out (switch on); else they count as executed. `expand_cycles`
-    writes canned cycles as G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of
-    G73 and G83, needed where a parameter of the control sets it. `limit` is the largest number of blocks that
-    the run may visit. Raises ProgramError with the line in the source, or with the line in the subprogram and
-    its name as the file.
+    writes canned cycles as G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance
+    of G73 and G83, needed where a parameter of the control sets it. `limit` is the largest number of blocks
+    that the run may visit. Raises ProgramError with the line in the source, or with the line in the
+    subprogram and its name as the file.
     """
     writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
     main = Unit(data, profile.language, file)
@@ -104,7 +104,9 @@ class _Flattener:
         eol = next((line_end for _, line_end in self._blocks if line_end), b"\n")
         whole_text = b"".join(raw + (line_end or eol) for raw, line_end in self._blocks)
         last = self._blocks[-1] if self._blocks else (b"", b"")
-        return whole_text[: -len(eol)] if self._blocks and not last[1] and not main.ends_with_eol else whole_text
+        return (
+            whole_text[: -len(eol)] if self._blocks and not last[1] and not main.ends_with_eol else whole_text
+        )
 
     def block(self, line: Line, frame: Frame, without: frozenset[int]) -> bool:
         """Write one executed line, its words at indices `without` left out; True where the program ends."""
@@ -175,7 +177,7 @@ class _Flattener:
         if line.plain and not cut and line.flow is None:
             self._blocks.append((line.raw, line.eol))
             return
-        # A flow statement has no word of its own: only comments and assignments are in the line.
+        # A flow statement has no words: only comments and assignments are in the line.
         if line.flow is not None and line.flow.keyword != "program":
             if line.comments:
                 self._blocks.append((b" ".join(line.comments), line.eol))
@@ -225,7 +227,9 @@ class _Flattener:
                 lines.append("M5")
             else:
                 if spindle not in (3, 4):
-                    raise ProgramError("the cycle reverses the spindle, whose direction M3 or M4 has not set; give M3 or M4 before")
+                    raise ProgramError(
+                        "the cycle reverses the spindle, whose direction is not set; give M3 or M4 before"
+                    )
                 lines.append(f"M{spindle if stroke.spindle == 'restore' else 7 - spindle}")
         if not lines:
             return

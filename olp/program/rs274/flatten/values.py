@@ -74,7 +74,9 @@ class Variables:
             return known()
         table = self.globals if name.startswith("_") else self.names
         if name not in table:
-            raise ProgramError(f"#<{name}> is not set before in the program and not known off line; assign it in the program")
+            raise ProgramError(
+                f"#<{name}> is not set before in the program and not known off line; assign it in the program"
+            )
         return table[name]
 
     def exists(self, name: str) -> bool:
@@ -114,7 +116,9 @@ class Variables:
         elif 1 <= target <= _NGC_FREE or target == _DEBUG_SWITCH:
             self.common[target] = value
         else:
-            raise ProgramError(f"#{target} belongs to the control, and no plain block has the effect of setting it")
+            raise ProgramError(
+                f"#{target} belongs to the control, and no plain block has the effect of setting it"
+            )
 
     def _assign_macro_b(self, index: int, value: float | None) -> None:
         if 1 <= index <= _MACRO_B_LOCAL:
@@ -122,9 +126,11 @@ class Variables:
         elif 100 <= index < _MACRO_B_COMMON:
             self.common[index] = value
         elif index == 3000:
-            raise ProgramError("the program stops here with an alarm of its own (#3000)")
+            raise ProgramError("the program stops here with its own alarm (#3000)")
         elif index not in (3003, 3004):
-            raise ProgramError(f"#{index} belongs to the control, and no plain block has the effect of setting it")
+            raise ProgramError(
+                f"#{index} belongs to the control, and no plain block has the effect of setting it"
+            )
 
 
 def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, float | None]]:
@@ -139,8 +145,8 @@ def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, flo
         value = word.number if word.value is None else word.value(variables)
         if word.value is None and not word.pointed and value != 0 and letter not in _COUNT_ARGUMENTS:
             raise ProgramError(
-                f"the argument {letter.upper()} has no decimal point, so the control scales it by its least increment; "
-                "write the point"
+                f"the argument {letter.upper()} has no decimal point, so the control scales it by its least "
+                "increment; write the point"
             )
         index = _ARGUMENTS[letter]
         if letter in "ijk":

@@ -28,7 +28,7 @@ class _Table:
 def value(text: str, arithmetic: Arithmetic = NGC) -> float | None:
     reader = Reader(text.replace(" ", "").lower(), arithmetic)
     result = reader.value()(_Table())
-    assert reader.at == len(reader.text)
+    assert reader.position == len(reader.text)
     return result
 
 
@@ -91,7 +91,7 @@ def test_macro_b_values(text: str, expected: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "message"),
     [
         ("[1/0]", "division by zero"),
         ("[1 MOD 0]", "MOD by zero"),
@@ -102,7 +102,7 @@ def test_macro_b_values(text: str, expected: float) -> None:
         ("[0**-1]", "no finite real value"),
         ("[9**9**9**9]", "no finite real value"),
         ("ATAN[1]", "two arguments"),
-        ("#[7.3]", "whole number"),
+        ("#[7.3]", "is 7.3; expected an integer"),
         ("[1+", "expected a number"),
         ("[1", "expected ']'"),
         ("#<a", "closing '>'"),
@@ -111,10 +111,10 @@ def test_macro_b_values(text: str, expected: float) -> None:
         ("", "expected a number"),
     ],
 )
-def test_refusals_say_what_was_found(text: str, found: str) -> None:
+def test_refusals_say_what_was_found(text: str, message: str) -> None:
     with pytest.raises(ProgramError) as caught:
         value(text)
-    assert found in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_angle_that_depends_on_a_parameter_of_the_control_is_refused() -> None:

@@ -48,12 +48,12 @@ def assert_same(source: bytes, *, expand_cycles: bool = False) -> bytes:
 
 def _samples() -> list[Path]:
     """Installed programs, each content once."""
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     for folder in SAMPLES:
         for path in sorted(folder.rglob("*.ngc")):
             if path.is_file() and path.stat().st_size <= LARGEST_SAMPLE:
-                found.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), path)
-    return list(found.values())
+                paths.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), path)
+    return list(paths.values())
 
 
 @pytest.mark.parametrize("expand_cycles", [False, True])

@@ -50,8 +50,8 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
         return Stylus(ZERO, ZERO, 0.0)
     if number is None:
         raise ConfigError(
-            "no stylus is known, and angular errors act through its vector; give job_defaults.tool in the machine "
-            "file, --tool, or columns SX, SY, SZ (gauge point to tip)"
+            "no stylus is known, and angular errors act through its vector; give job_defaults.tool in the "
+            "machine file, --tool, or columns SX, SY, SZ (gauge point to tip)"
         )
     if isinstance(number, str) and number.isdigit():
         number = int(number)
