@@ -1,14 +1,14 @@
 """Every exception that `olp` raises.
 
-OlpError
-├── UsageError             the call itself is wrong                        exit 2
-├── InputError             a file is unreadable, invalid or refused        exit 3
-│   ├── ConfigError        machine, calibration or job file
-│   ├── ProgramError       a program, with its line
-│   │   └── AlreadyCorrected
-│   └── OutsideBox         a command leaves the calibrated volume
-└── CannotCompute          good input, no answer                           exit 4
-    └── NotInvertible
+    OlpError
+    ├── UsageError             the call itself is wrong                        exit 2
+    ├── InputError             a file is unreadable, invalid or refused        exit 3
+    │   ├── ConfigError        machine, calibration or job file
+    │   ├── ProgramError       a program, with its line
+    │   │   └── AlreadyCorrected
+    │   └── OutsideBox         a command leaves the calibrated volume
+    └── CannotCompute          good input, no answer                           exit 4
+        └── NotInvertible
 
 Each holds its data and builds its message in `__str__`, as
 `file:line: what is wrong; what was expected; what to do`.

@@ -37,7 +37,7 @@ class ErrorModel(Protocol):
     def contributions(
         self, axis_mm: Array, tool_mm: Array, play: Array | None = None
     ) -> Iterator[tuple[str, Array]]:
-        """(name, (n, 3) mm) by source, e.g. "EXX", "ECX", "C0Y", "cyclic EXX", "lost motion X"; only non-zero
+        """(name, (n, 3) mm) by source, e.g. "EXX", "ECX", "C0Y", "cyclic EXX", "backlash X"; only non-zero
         sources; their sum is the error to first order."""
         ...
 

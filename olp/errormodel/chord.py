@@ -45,10 +45,10 @@ def bins(length_mm: Array) -> npt.NDArray[np.int64]:
 class Variation:
     """Bounds of one function f over its whole range, in units u of f.
 
-    peak = max|f| (u); slope = max|f'|; curvature = max|f''| away from kinks.
+    `peak` = max|f| (u); `slope` = max|f'|; `curvature` = max|f''| away from kinks.
 
-    smooth (bins,) bounds the departure of the smooth part at the upper edge of a bin. kinks (bins,) times the
-    length d bounds that of the kinks. change (bins,) times d bounds |f(q + d) - f(q)|.
+    `smooth` (bins,) bounds the departure of the smooth part at the upper edge of a bin. `kinks` (bins,) times
+    the length d bounds that of the kinks. `change` (bins,) times d bounds |f(q + d) - f(q)|.
     """
 
     peak: float

@@ -86,7 +86,7 @@ class AxisComponents:
             if self.backlash_mm != 0.0:
                 directional[self.axis] = _plus(directional[self.axis], play * (-0.5 * self.backlash_mm))
             if any(value is not None for value in directional):
-                contributions.append((f"lost motion {axis}", _six(directional)))
+                contributions.append((f"backlash {axis}", _six(directional)))
         return contributions
 
     def backlash_at(self, q: Array) -> Column | None:

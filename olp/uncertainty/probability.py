@@ -25,8 +25,8 @@ def within(covariance: Array, offset: Array, radius: float) -> Array:
     (n, 3, 3); offset (n, 3).
 
     Along every direction w of the unit sphere x = rho A w (A A.T the covariance), which is in the ball for
-    rho in an interval; of rho the distribution is known (chi with 3 degrees of freedom), so one integral
-    over directions remains.
+    rho in an interval. The distribution of rho is chi with 3 degrees of freedom, so one integral over
+    directions remains.
     """
     size = np.sqrt((offset**2).sum(axis=1))
     reach = _SIGMAS * np.sqrt(np.trace(covariance, axis1=1, axis2=2))

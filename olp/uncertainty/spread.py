@@ -50,9 +50,9 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Waypoints of a path: (n,) nominal `move`, (n, 3) nominal `axis_mm`, `before_mm` and `after_mm`, the
-    deviations of the tip that the model predicts for the nominal and the corrected program, and `play`
-    (n, 3), None where no axis has backlash."""
+    """Waypoints of a path: (n,) nominal `move` and (n, 3) nominal `axis_mm`. The others are (n, 3) too.
+    `before_mm` and `after_mm` are the deviations of the tip that the model predicts for the nominal and the
+    corrected program. `play` is None where no axis has backlash."""
 
     move: Index
     axis_mm: Array

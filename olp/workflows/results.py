@@ -78,9 +78,10 @@ def correct_results(
 ) -> ResultCorrection:
     """Correct the points that a measuring machine reported: true = reported + error at the touch.
 
-    `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset of the points
-    ("machine": axis positions), `tool` the number of the stylus. Where a file names several, each is a
-    mapping from the file's names to those of machine and job. `tip_radius_mm` replaces that of the stylus. `decimals` is the least number of decimals written. Only the numbers of points change.
+    `results` is a table of points or DMIS output, a path or its bytes. `frame` names the work offset of the
+    points ("machine": axis positions), `tool` the number of the stylus. Where a file names several, each is a
+    mapping from the file's names to those of machine and job. `tip_radius_mm` replaces that of the stylus.
+    `decimals` is the least number of decimals written. Only the numbers of points change.
     Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
     """
     session, source = opened(results, machine, job)

@@ -16,7 +16,7 @@ from olp.calibration.observations.pods import Pods
 from olp.calibration.observations.points import Points
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
-#: tools of the judgement: the one measured with, and one that no line has seen
+#: tools of the judgement: the one measured with, and one with which no line was measured
 TOOLS = (simulated.TOOL, (200.0, -60.0, -400.0))
 
 

@@ -14,11 +14,11 @@ from olp.clearance.distance import Swept
 
 @dataclass(frozen=True)
 class Scene:
-    """A random bumpy surface with loose triangles, and cylinders or cones on straight ways among them."""
+    """A random bumpy surface with loose triangles, and cylinders or cones on straight paths among them."""
 
     triangle: np.ndarray
     start: np.ndarray
-    way: np.ndarray
+    travel: np.ndarray
     level: np.ndarray
     radius: np.ndarray
     shape: str
@@ -40,15 +40,15 @@ class Scene:
         mesh.endModel()
         level = np.sort(rng.uniform(0.0, 60.0, (count, 2)), axis=1) + np.array([0.0, 1.0])
         start = rng.uniform((-80.0, -80.0, 0.0), (80.0, 80.0, 60.0), (count, 3))
-        way = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-2.0, 1.5, (count, 1))
-        return Scene(triangle, start, way, level, rng.uniform(0.1, 12.0, count), shape, mesh)
+        travel = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-2.0, 1.5, (count, 1))
+        return Scene(triangle, start, travel, level, rng.uniform(0.1, 12.0, count), shape, mesh)
 
     def swept(self) -> Swept:
         top = self.radius if self.shape == "cylinder" else np.zeros(len(self.radius))
-        return Swept(self.start, self.way, self.level, np.stack([self.radius, top], axis=1))
+        return Swept(self.start, self.travel, self.level, np.stack([self.radius, top], axis=1))
 
     def least(self, k: int, within_mm: float) -> tuple[float, float]:
-        """Bounds of the least distance on way k, no farther apart than that."""
+        """Bounds of the least distance on path k, no farther apart than that."""
         import coal
 
         long = float(self.level[k, 1] - self.level[k, 0])
@@ -56,10 +56,10 @@ class Scene:
         request = coal.DistanceRequest()
         request.gjk_tolerance, request.gjk_max_iterations = 1e-10, 1000
         middle = self.start[k] + [0.0, 0.0, float(self.level[k].mean())]
-        length = float(np.linalg.norm(self.way[k]))
+        length = float(np.linalg.norm(self.travel[k]))
 
         def at(t: float) -> float:
-            place = coal.Transform3s(np.eye(3), middle + t * self.way[k])
+            place = coal.Transform3s(np.eye(3), middle + t * self.travel[k])
             result = coal.DistanceResult()
             return max(float(coal.distance(form, place, self.mesh, coal.Transform3s(), request, result)), 0.0)
 

@@ -74,7 +74,7 @@ def spoilt(calibration: Calibration, chain: str, rng: np.random.Generator) -> tu
             a, b = rng.choice(list("ABC"), 2, replace=False)
             a, b = sorted((f"E{a}{letter}", f"E{b}{letter}"))
             columns[a], columns[b] = columns[b], columns[a]
-            done.arranged.append(f"{a} and {b} in each other's place")
+            done.arranged.append(f"{a} and {b} exchanged")
         elif curve.axis == letter and kind < 0.25:
             columns = {name: values[::-1] for name, values in columns.items()}
             done.arranged.append(f"positions of {letter} counted from the other end")

@@ -22,8 +22,8 @@ Readings = tuple[Observation, ...]
 
 BOX = ((0.0, 1000.0), (0.0, 800.0), (-500.0, 0.0))
 DATUM = (500.0, 400.0, -250.0)
-LEVER = (0.0, 0.0, -100.0)
-TOOLS = np.array([LEVER, (80.0, 0.0, -150.0), (0.0, 90.0, -60.0)])
+TOOL = (0.0, 0.0, -100.0)
+TOOLS = np.array([TOOL, (80.0, 0.0, -150.0), (0.0, 90.0, -60.0)])
 N = 60
 
 
@@ -40,7 +40,7 @@ def lines(error: Error) -> Readings:
     run, side = np.repeat([1, 2, 3], 22), np.tile(np.repeat([1, -1], 11), 3)
     axis_mm = np.tile(np.array(DATUM), (len(q), 1))
     axis_mm[:, 0] = q
-    tool, higher = np.array(LEVER), np.add(LEVER, (0.0, 0.0, 1000.0))
+    tool, higher = np.array(TOOL), np.add(TOOL, (0.0, 0.0, 1000.0))
     plain = error(axis_mm, tool)
     values = {
         "EXX": plain[:, 0] + 0.02,
@@ -49,7 +49,7 @@ def lines(error: Error) -> Readings:
     }
     return tuple(
         Line(
-            name, q, value, run, side, DATUM, LEVER, sigma=1e-7 if name[1] in "ABC" else 1e-4,
+            name, q, value, run, side, DATUM, TOOL, sigma=1e-7 if name[1] in "ABC" else 1e-4,
             source=f"{name.lower()}.csv",
         )
         for name, value in values.items()
@@ -128,10 +128,8 @@ def diagonals(error: Error) -> Readings:
     d = np.tile(np.concatenate([there, there[::-1]]), 2)
     unit = (end - start) / far
     run, side = np.repeat([1, 2], 42), np.tile(np.repeat([1, -1], 21), 2)
-    value = error(start + d[:, None] * unit, np.array(LEVER)) @ unit + 0.05 + 0.002 * side
-    return (
-        Diagonal(tuple(start), tuple(end), d, value, run, side, LEVER, sigma=1e-4, source="diagonal.csv"),
-    )
+    value = error(start + d[:, None] * unit, np.array(TOOL)) @ unit + 0.05 + 0.002 * side
+    return (Diagonal(tuple(start), tuple(end), d, value, run, side, TOOL, sigma=1e-4, source="diagonal.csv"),)
 
 
 def ballbars(error: Error) -> Readings:
@@ -141,13 +139,13 @@ def ballbars(error: Error) -> Readings:
     for plane, (first, second, _) in PLANES.items():
         radial = np.zeros((len(angle), 3))
         radial[:, first], radial[:, second] = np.cos(angle), np.sin(angle)
-        value = np.einsum("ni,ni->n", error(np.array(DATUM) + 150.0 * radial, np.array(LEVER)), radial)
+        value = np.einsum("ni,ni->n", error(np.array(DATUM) + 150.0 * radial, np.array(TOOL)), radial)
         value += 0.02 + 0.003 * radial[:, first] - 0.004 * radial[:, second]
         value += 0.001 * direction * np.sin(2.0 * angle)
         run = np.ones(len(angle), int)
         measurements.append(
             Circles(
-                plane, 150.0, DATUM, angle, value, run, direction, LEVER, sigma=1e-4,
+                plane, 150.0, DATUM, angle, value, run, direction, TOOL, sigma=1e-4,
                 source=f"circle-{plane}.csv",
             )
         )  # fmt: skip
@@ -161,9 +159,9 @@ def squareness(error: Error) -> Readings:
         q = np.linspace(*BOX[moving], 101)
         axis_mm = np.tile(np.array(DATUM), (len(q), 1))
         axis_mm[:, moving] = q
-        slopes.append(np.polyfit(q - q.mean(), error(axis_mm, np.array(LEVER))[:, along], 1)[0])
+        slopes.append(np.polyfit(q - q.mean(), error(axis_mm, np.array(TOOL))[:, along], 1)[0])
     value = -float(sum(slopes))
-    return (SquarenessReading("C0Y", value, DATUM, (BOX[0], BOX[1]), LEVER, 1e-7, "plan.toml"),)
+    return (SquarenessReading("C0Y", value, DATUM, (BOX[0], BOX[1]), TOOL, 1e-7, "plan.toml"),)
 
 
 #: By the key of the instrument's tables in a plan.

@@ -68,7 +68,7 @@ def test_a_tool_length_set_on_the_raw_machine(tmp_path: Path) -> None:
     assert words(text, "X") == [pytest.approx(0.015, abs=1e-9)]
 
 
-# -- levers, squareness, temperature --------------------------------------------------------------------
+# -- lever arms, squareness, temperature ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

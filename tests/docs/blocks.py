@@ -25,7 +25,7 @@ _FENCE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 #: First line of a block that is a file to be written.
-_PATH = re.compile(r"# ([\w./-]+\.\w+)\n")
+_PATH = re.compile(r"[#;] ([\w./-]+\.\w+)\n")
 #: End of a command that is meant to fail.
 _EXITS = re.compile(r"\s+# exits with (\d)$")
 

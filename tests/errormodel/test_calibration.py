@@ -89,7 +89,7 @@ def test_values_are_frozen_copies() -> None:
         curve.columns["EXX"][0] = 1.0
 
 
-def test_a_cyclic_angle_has_its_lever() -> None:
+def test_a_cyclic_angle_has_its_lever_arm() -> None:
     term = Cyclic("EAY", 8.0, 2e-5, 0.3)
     model = build(Calibration("m", BOX, cyclic=(term,)), "FXYZ")
     y = np.array([1.0, 3.0, 5.5])

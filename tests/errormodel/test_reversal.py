@@ -135,7 +135,7 @@ def test_direction_columns_give_both_directions_and_the_mean(chain: str) -> None
     parts = dict(model.contributions(points, np.array([0.0, 0.0, -100.0]), np.ones((3, 3))))
     # The lever arm of the difference in pitch belongs to the backlash too.
     expected = [-2e-3, -1.5e-3 + 1e-5 * 100.0, -3e-3]
-    np.testing.assert_allclose(parts["lost motion X"][:, 0], expected, atol=1e-15)
+    np.testing.assert_allclose(parts["backlash X"][:, 0], expected, atol=1e-15)
 
 
 def test_backlash_is_unknown_where_the_position_is() -> None:

@@ -1,5 +1,5 @@
-"""The indirect thermal model: laws of its parts, its files, and a warm machine that it has not seen
-before."""
+"""The indirect thermal model: laws of its parts, its files, and a warm machine on days
+that are not in its logs."""
 
 from __future__ import annotations
 
@@ -87,7 +87,8 @@ def test_the_chord_bound_holds() -> None:
 
 def test_temperatures_that_were_not_identified_are_refused_or_held() -> None:
     warm = Calibration("m", BOX, structure=STRUCTURE.at({"beam": 31.0, "column": 20.0}))
-    with pytest.raises(ConfigError, match=r"beam: the structure is at 31.00 degC.* from 15.00 to 30.00 degC"):
+    refused = r"beam: the structure is at 31\.00 degC; expected 15\.00 to 30\.00 degC"
+    with pytest.raises(ConfigError, match=refused):
         build(warm, "FXYZ")
     points, tool = np.array([[500.0, 0, 0]]), np.zeros(3)
     edge = build(Calibration("m", BOX, structure=STRUCTURE.at({"beam": 30.0, "column": 20.0})), "FXYZ")

@@ -215,7 +215,7 @@ CALIBRATION = {
     "backlash and direction": (
         "Y_um = 4.0",
         "X_um = 4.0",
-        ["backlash of axis X", "direction column", "one of the two"],
+        ["axis X has a backlash", "direction column", "one of the two"],
     ),
     "component unknown": ('"EXX"', '"EXW"', ["cyclic[0].component", '"EXW"', '"EXX"']),
     "period zero": ("period_mm = 10.0", "period_mm = 0.0", ["cyclic[0].period_mm", "above 0", "mm"]),

@@ -45,7 +45,7 @@ def elastic_line(
         condition(size - 1, size - 1, (1.0,))
         node = at_mm / h + 2.0
         low = int(np.floor(node))
-        # between two nodes the load is shared out by the lever
+        # between two nodes the load is shared by distance
         for k, share in ((low, 1.0 - (node - low)), (low + 1, node - low)):
             if 2 < k < size - 3:
                 right[k] += share * load_n * h**3 / stiffness_n_mm2

@@ -2,10 +2,10 @@
 badly.
 
 Bodies (room, base, beam top, beam bottom, column) exchange heat by lumped capacities, integrated in steps of
-5 s by an explicit rule. The drives heat the beam from above, the room swings over the day. From the
-temperatures of the bodies, not of the sensors: the scale of X grows, the beam bends by the difference of its
-top and bottom (bow alpha dT L^2 / 8 h, slope with it), the column leans and grows. A sensor lags its body by
-minutes and has noise and an offset of its own.
+5 s by an explicit rule. The drives heat the beam from above, the room swings over the day. The temperatures
+of the bodies, not of the sensors, act. The scale of X grows, the column leans and grows. The beam bends by
+the difference of its top and bottom (bow alpha dT L^2 / 8 h, slope with it). A sensor lags its body by
+minutes and has noise and an individual offset.
 """
 
 from __future__ import annotations

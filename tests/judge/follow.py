@@ -1,9 +1,10 @@
 """Whether a motion follows a polyline: passes every waypoint in order, near enough, and never turns back.
 
-The waypoints are found by brute force over all chords of the sampled motion: a waypoint can be passed on a
-chord if one on which the waypoint before can be passed comes no later, and all places between are near the
-segment that joins the two. That is the free space in which the distance of two curves after Frechet is
-decided (H. Alt, M. Godau, 1995), so a spike that is left out, a loop, or a step back are seen.
+The waypoints are sought by brute force over all chords of the sampled motion. A waypoint can be passed on a
+chord if two conditions hold. A chord on which the waypoint before can be passed comes no later, and all
+positions between are near the segment that joins the two. That is the free space in which the Frechet
+distance of two curves is decided (H. Alt, M. Godau, 1995). So a spike that is left out, a loop, and a step
+back are detected.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ class Places:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """The segments `first` to `last` (m,) on which each sample can be, and by the most lenient of them its
-    distance as a share of what is allowed (`used`), its feed mm/s (`feed`), and its velocity along it
-    (`forward`), (m,); `lines_ok` (m,): its line is that of one of them, or of the next, which begins where a
+    """The segments `first` to `last` (m,) on which each sample can be. By the most lenient of them: its
+    distance as a share of what is allowed (`used`), its feed in mm/s (`feed`), and its velocity along it
+    (`forward`), (m,). `lines_ok` (m,): its line is that of one of them, or of the next, which begins where a
     corner is cut."""
 
     first: np.ndarray
@@ -76,10 +77,10 @@ def places(pieces: Pieces, tolerance_mm: float) -> Places:
 
 def _apart(point: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
     """(m,) distances of points from segments; any of them may be one for all."""
-    way = end - begin
-    square = np.maximum((way * way).sum(axis=-1), 1e-300)
-    share = np.clip(((point - begin) * way).sum(axis=-1) / square, 0.0, 1.0)
-    off = point - begin - share[..., None] * way
+    chord = end - begin
+    square = np.maximum((chord * chord).sum(axis=-1), 1e-300)
+    share = np.clip(((point - begin) * chord).sum(axis=-1) / square, 0.0, 1.0)
+    off = point - begin - share[..., None] * chord
     return np.asarray(np.sqrt((off * off).sum(axis=-1)))
 
 
@@ -134,9 +135,9 @@ def follow(route, pieces: Pieces, path: Places) -> Followed:
     velocity = pieces.at(path.piece, path.u, 1)
     line = pieces.line[path.piece]
     bound = allowed(tolerance)
-    way = np.diff(point, axis=0)
-    length = np.sqrt((way * way).sum(axis=1))
-    unit = way / np.maximum(length, 1e-300)[:, None]
+    step = np.diff(point, axis=0)
+    length = np.sqrt((step * step).sum(axis=1))
+    unit = step / np.maximum(length, 1e-300)[:, None]
     used, away = np.full(count, np.inf), np.full(count, np.inf)
     for rows, k in _pairs(low, high):
         d = _apart(path.position_mm[rows], point[k], point[k + 1])
@@ -145,7 +146,7 @@ def follow(route, pieces: Pieces, path: Places) -> Followed:
     feed, forward = np.zeros(count), np.full(count, -np.inf)
     # rounding spreads a corner over its neighbours; a straight segment has one direction
     beside = np.where(pieces.bent[path.piece], 2, 0)
-    for rows, k in _pairs(np.maximum(low - beside, 0), np.minimum(high + beside, len(way) - 1)):
+    for rows, k in _pairs(np.maximum(low - beside, 0), np.minimum(high + beside, len(step) - 1)):
         forward[rows] = np.maximum(forward[rows], (velocity[rows] * unit[k]).sum(axis=1))
     for rows, k in _pairs(low, high):
         d = _apart(path.position_mm[rows], point[k], point[k + 1])

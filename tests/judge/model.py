@@ -294,7 +294,7 @@ class JudgeModel:
                 target, column = (shift, "XYZ") if name[1] in "XYZ" else (own, "ABC")
                 target[:, column.index(name[1])] += value
             angle += own
-            line = self._line_lever(curve, q)
+            line = self._line_arm(curve, q)
             if self.first_order:
                 tool_vector -= np.cross(own, line)
             else:
@@ -308,7 +308,7 @@ class JudgeModel:
                 target, column = (shift, "XYZ") if name[1] in "XYZ" else (own, "ABC")
                 target[:, column.index(name[1])] += value
             angle += own
-            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_lever(load, q))
+            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_arm(load, q))
         for name, period, amplitude, phase in self.cyclic:
             if name[2] == AXES[axis]:
                 value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
@@ -316,15 +316,15 @@ class JudgeModel:
         shift[:, axis] -= 0.5 * self.backlash_mm[axis] * play
         return shift, angle, tool_vector
 
-    def _line_lever(self, curve: _CurveFile | _LoadFile, q: np.ndarray) -> np.ndarray:
-        """(n, 3) lever at which the curve was measured: tool vector + axes toward the tool (+ own axis)."""
+    def _line_arm(self, curve: _CurveFile | _LoadFile, q: np.ndarray) -> np.ndarray:
+        """(n, 3) lever arm of the measured line: tool vector + axes toward the tool (+ own axis)."""
         position = np.tile(curve.line_mm, (len(q), 1))
         position[:, curve.axis] = 0.0 if curve.on_table else q - self.datum[curve.axis]
         tool = np.zeros(3) if self.first_order else curve.tool_mm
         return np.asarray(position * self._reach(curve.axis) + tool)
 
     def _reach(self, axis: int) -> np.ndarray:
-        """(3,) 1 for the axes in the lever of this one."""
+        """(3,) 1 for the axes in the lever arm of this one."""
         place = self.chain.index(AXES[axis])
         reach = np.array([float(self.chain.index(other) > place) for other in AXES])
         reach[axis] = float(place < self.chain.index("F"))
@@ -425,7 +425,7 @@ class JudgeModel:
         if "gauge_to_tip_mm" in entry:
             return np.array(entry["gauge_to_tip_mm"], float)
         if entry.get("Z_mm", 0.0) < 0:
-            raise ValueError(f"tool {tool}: a touch-off value gives no lever")
+            raise ValueError(f"tool {tool}: a touch-off value gives no tool vector")
         return -self.length_mm(tool)
 
     def length_mm(self, tool: int | None) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Compares the path a machine really takes with the nominal one, matched in order.
 
 The corrected moves are grouped to the nominal moves: every nominal end point is reached, in sequence, by
-the end of some corrected move (dynamic programming over the two sequences, so path passes that overlap in
-space are never mixed up). Each dense point of a group is then measured to its own nominal line or arc.
+the end of some corrected move. Dynamic programming over the two sequences never confuses path passes that
+overlap in space. Each dense point of a group is then measured to its own nominal line or arc.
 """
 
 from __future__ import annotations

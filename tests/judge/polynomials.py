@@ -1,8 +1,8 @@
 """What pieces of motion do, from their coefficients alone: written without the project's own evaluation.
 
-Path and drive of a piece are composed into one polynomial of time for each axis, and what it can reach is
-read off its control points in Bernstein form, which bound it; where they do not decide, the piece is halved.
-So a limit is kept everywhere, between all samples, or a time is known at which it is not. Times of joints are
+Path and drive of a piece are composed into one polynomial of time for each axis. Its control points in
+Bernstein form bound what it can reach; where they do not decide, the piece is halved. So a limit is kept
+everywhere, between all samples, or a time is known at which it is not. Times of joints are
 floats, so the last digits of both ends do not count to a piece.
 """
 
@@ -21,7 +21,8 @@ _DEPTH = 40
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
     """Of n pieces: `axis` (n, d + 1, 3) coefficients of positions by time in s after the piece's start,
-    lowest first, of degree `plain` where the piece is not `bent` (n,); `start_s`, `lasts_s`, `line` (n,)."""
+    lowest first. The degree is `plain` where the piece is not `bent` (n,). `start_s`, `lasts_s` and `line`
+    are (n,)."""
 
     axis: np.ndarray
     start_s: np.ndarray

@@ -115,9 +115,9 @@ class _Writer:
 
     def _straight(self) -> None:
         """Parts of one line, with feeds of their own."""
-        way = self.step(self.scale)
+        step = self.step(self.scale)
         for _ in range(int(self.rng.integers(2, 5))):
-            self.to(self.position + way * self.rng.uniform(0.05, 1.0))
+            self.to(self.position + step * self.rng.uniform(0.05, 1.0))
 
     def _back(self) -> None:
         here = self.position

@@ -165,9 +165,11 @@ def take(
     tool: Any = TOOL, runs: int = 5, slope: float | None = None, square: str | None = None,
     reference: str = "functional-point", drift: float = 1.0,
 ) -> Taken:  # fmt: skip
-    """Read a component in both directions along a line through `line_mm`: laser 0.5 um + 0.5 um/m (noise that
-    grows with the distance for straightness, a scale of the line for positioning), angles 1 urad, drift over
-    some um or urad."""
+    """Read a component in both directions along a line through `line_mm`.
+
+    Laser 0.5 um + 0.5 um/m: noise that grows with the distance for straightness, a scale of the line for
+    positioning. Angles 1 urad, drift over some um or urad.
+    """
     d, axis = "XYZABC".index(component[1]), AXES.index(component[2])
     one = np.concatenate([targets, targets[::-1]])
     side = np.concatenate([np.ones(len(targets)), -np.ones(len(targets))])

@@ -126,7 +126,7 @@ def test_sources_add_up_to_the_error(tmp_path: Path) -> None:
     assert (np.linalg.norm(scene.samples.uncorrected, axis=1) <= total * (1 + 1e-3) + 1e-6).all()
     sizes = [float(part.max()) for _, part in scene.sources]
     assert sizes == sorted(sizes, reverse=True)
-    assert {"EXX", "cyclic EXX", "lost motion X"} <= {name for name, _ in scene.sources}
+    assert {"EXX", "cyclic EXX", "backlash X"} <= {name for name, _ in scene.sources}
 
 
 def test_between_way_points_the_tip_is_beside_the_path(tmp_path: Path) -> None:

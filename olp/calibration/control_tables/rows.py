@@ -65,8 +65,8 @@ def component_rows(
     """Rows of a component as its curve states it, on its own line, with the backlash of its axis; None
     where the calibration does not hold it.
 
-    Positions are the curve's own where straight lines between them are good enough, more where they are not,
-    and many where cyclic terms have to be followed; `most` limits their number, and `even` asks for equal
+    Positions are the curve's own where straight lines between them are good enough, and more where they are
+    not, or where cyclic terms have to be followed. `most` limits their number, and `even` asks for equal
     steps. Values at the curve's own positions are exact. Cyclic terms are left out where their period would
     get too few rows.
     """

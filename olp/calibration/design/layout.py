@@ -109,8 +109,9 @@ def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: fl
 def lines(
     machine: str, box_mm: Array, tool: Vector, periods_mm: Sequence[Sequence[float]], seed: int
 ) -> Planned:
-    """A full set along the middle of the box: positioning, angles (no roll of Z, which a level cannot read),
-    straightness pairs that share a square, and straightness of Z with the reflector at a second offset."""
+    """A full set along the middle of the box: positioning, angles, straightness pairs that share a square,
+    and straightness of Z with the reflector at a second offset. Roll of Z is left out, as a level cannot read
+    it."""
     middle = np.round(box_mm.mean(axis=1), 1)
     place = (float(middle[0]), float(middle[1]), float(middle[2]))
     targets = [_targets(box_mm[k], periods_mm[k], seed + k) for k in range(3)]

@@ -158,10 +158,10 @@ class Checkpoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Factors:
-    """The joint estimate: `marginals` by name, `theta` and `covariance` of factors (in the order of `names`),
-    frame and scale with all decisions applied; `inflation` of the stated uncertainty, residuals (n, 3) and
-    the standard uncertainty (n, 3) that was used, in mm. `evidence` is the logarithm of the probability of
-    the points with what is decided, up to a constant."""
+    """The joint estimate: `marginals` by name, and `theta` and `covariance` of factors (in the order of
+    `names`), frame and scale with all decisions applied. `inflation` is that of the stated uncertainty;
+    residuals (n, 3) and the standard uncertainty (n, 3) that was used are in mm. `evidence` is the logarithm
+    of the probability of the points with what is decided, up to a constant."""
 
     names: tuple[str, ...]
     marginals: Mapping[str, Marginal]

@@ -30,13 +30,13 @@ Change = Mapping[tuple[str, str, float], tuple[Entry, Array]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
-    """`calibration` and `uncertainty` after the run. rms lengths at the points in the frame that fits best,
-    in mm: `before_mm` of the residual with the old calibration, `after_mm` with the new one, `noise_mm` of
-    the stated noise, `expected_mm` as expected from noise and the old covariance.
+    """`calibration` and `uncertainty` after the run. Lengths in mm are rms values at the points, in the
+    frame that fits best. `before_mm` is that of the residual with the old calibration, `after_mm` with the
+    new one. `noise_mm` is that of the stated noise, `expected_mm` that from noise and the old covariance.
 
-    `chi_square` over `freedom` says how the run fits the old covariance; where it is above 1 the new
-    covariance is larger by it. `changes` is the largest change of each number by kind and name, in mm or rad,
-    and in old standard deviations. `outliers` are rows left out, with their standard deviations.
+    `chi_square` / `freedom` is the reduced chi-square of the run with the old covariance; where it is above 1
+    the new covariance is larger by it. `changes` is the largest change of each number by kind and name, in mm
+    or rad, and in old standard deviations. `outliers` are rows left out, with their standard deviations.
     """
 
     calibration: Calibration

@@ -58,9 +58,9 @@ class Fit:
         return float((ratio ** (1.0 / 3.0) - (1.0 - part)) / np.sqrt(part))
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-        """(n, 3, size) dependence of the error on theta, in the frame of the machine where some points were
-        measured in it, else in the gauge of the datum: on lines through it X has no mean slope, nor has Y
-        towards Z."""
+        """(n, 3, size) dependence of the error on theta. It is in the frame of the machine where some points
+        were measured in it, else in the gauge of the datum. On lines through the datum X then has no mean
+        slope, nor has Y towards Z."""
         position = np.atleast_2d(np.asarray(axis_mm, float))
         table = self.parameters.design(position, np.asarray(tool_mm, float), play)
         if self.parameters.framed:
@@ -100,8 +100,8 @@ class Fit:
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def between_targets(self, name: str, q: Array) -> Array:
-        """(n,) variance of a component at q (n,), as the position of a step between two targets is unknown: a
-        step of height J lies before q with probability u, so it is J^2 u (1 - u)."""
+        """(n,) variance of a component at q (n,), as the position of a step between two targets is unknown.
+        A step of height J lies before q with probability u, so it is J^2 u (1 - u)."""
         space = self.parameters.spaces[name]
         raw = space.gauge @ self.theta[self.parameters.slices[name]]
         total = np.zeros(len(q))

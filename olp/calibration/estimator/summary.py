@@ -67,7 +67,7 @@ def scale_unobservable(fit: Fit) -> float | None:
 
 def scales_open(fit: Fit) -> tuple[Array, Array]:
     """(k, 3) changes of the scales of X, Y, Z that are not observable, and (3 - k, 3) the combinations of
-    them that are, each with a largest part of 1; from the prior and posterior covariance."""
+    them that are. Each has a largest part of 1. They follow from the prior and posterior covariance."""
     prior = np.linalg.inv(fit.prior.precision()[0])
     rows = np.zeros((3, fit.parameters.size))
     for axis, letter in enumerate(AXES):

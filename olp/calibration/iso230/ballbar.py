@@ -41,7 +41,7 @@ _TOO_MUCH = 5.0
 @dataclass(frozen=True, slots=True, eq=False)
 class CircleFit:
     """(8,) `value` and `sigma` of UNKNOWNS, all in mm at the circle: scale R (S_1 - S_2) / 2, square R g / 2,
-    servo v (T_1 - T_2) / 2, backlash b; `determined` names those that are determined. `residual` (n,) in mm
+    servo v (T_1 - T_2) / 2, backlash b. `determined` names those that are determined. `residual` (n,) in mm
     of all readings, also those beside the fit (`used` False). G by direction and H in mm."""
 
     circles: Circles

@@ -31,9 +31,9 @@ _TOO_MUCH = 5.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Postures:
-    """Rows of one test: axis positions (n, 3) with the tool point on the one point, the name of the tool of
-    each row, its nominal vector in the frame of the head (n, 3), the turn of the head (n, 3, 3), and `sigma`
-    of one coordinate of a reading in mm (0: not stated). Raises ConfigError."""
+    """Rows of one test: axis positions (n, 3) with the tool point on the one point, and the name of the tool
+    of each row. `vector_mm` (n, 3) is its nominal vector in the frame of the head, `turn` (n, 3, 3) the turn
+    of the head. `sigma` is that of one coordinate of a reading in mm (0: not stated). Raises ConfigError."""
 
     axis_mm: Array
     tool: tuple[str, ...]

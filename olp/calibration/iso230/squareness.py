@@ -169,9 +169,9 @@ def from_frame(
     sigma_mm: float = 0.0,
     tool_mm: Vector = ZERO,
 ) -> SquarenessReading:
-    """Squareness from a parallelogram that the machine drew, drilled or printed: the diagonal that grows in
-    both axes, the other one, and one side (any of the four), measured elsewhere; `sigma_mm` is the standard
-    uncertainty of each length.
+    """Squareness from a parallelogram that the machine drew, drilled or printed. Measured elsewhere are the
+    diagonal that grows in both axes, the other one, and one side (any of the four). `sigma_mm` is the
+    standard uncertainty of each length.
 
     The cotangent of its corner: (pp^2 - np^2) / (4 side other), where the other side follows from the
     parallelogram law, so a scale common to all three cancels. Raises ConfigError.

@@ -85,9 +85,9 @@ class Diagonal(Observation):
         return statistics(self.distance_mm, self.value, self.direction, f"diagonal {self.name}", self.source)
 
     def elongation(self) -> tuple[float, float]:
-        """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty:
-        from the scatter of the readings (`sigma` where that is more) or, where that is larger, from the
-        deviations of the target means from the line."""
+        """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty.
+        That follows from the scatter of the readings (or `sigma`), or from the deviations of the target means
+        from the line: the larger one counts."""
         x = self.distance_mm - self.distance_mm.mean()
         spread = float(x @ x)
         if spread == 0.0:

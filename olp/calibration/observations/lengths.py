@@ -39,7 +39,7 @@ class Lengths(Scattered):
     """Lengths that a tracking interferometer read from one station of unknown position and dead length.
 
     `axis_mm` (n, 3) are the commanded axis positions, `tool_mm` (n, 3) or (3,) the vectors from the gauge
-    point to the reflector, `length_mm` (n,) the readings, `sigma_mm` (n,) or one number their standard
+    point to the reflector, `length_mm` (n,) the readings. `sigma_mm`, (n,) or one number, is their standard
     uncertainty, `sigma_scale` that of their common scale (mm/mm). Raises ConfigError.
     """
 

@@ -21,8 +21,8 @@ LEAST_RAD = 1e-8
 class SquarenessReading(Observation):
     """The squareness of two axes from any instrument, in the sign convention of this package.
 
-    `component` is C0Y, B0Z or A0Z; `value_rad` the lean of the mean line of the later axis against that of
-    the earlier one, as at the axis positions `line_mm` with tool vector `tool_mm`, over the lengths
+    `component` is C0Y, B0Z or A0Z; `value_rad` is the lean of the mean line of the later axis against that
+    of the earlier one. It holds at the axis positions `line_mm` with tool vector `tool_mm`, over the lengths
     `span_mm` (low, high) of the earlier and of the later axis. `sigma_rad` is its standard uncertainty.
     """
 

@@ -71,8 +71,8 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
 
     `blend_mm` is the path tolerance where G64 states none; `block_delete` as in the reading. Raises
     ProgramError with its line for a feed move without a feed, and for a feed or a dwell that cannot be read
-    correctly. Raises UsageError for a tolerance that is not above zero, and where the program was read without
-    words.
+    correctly. Raises UsageError for a tolerance that is not above zero, and where the program was read
+    without words.
     """
     if not blend_mm > 0:
         raise UsageError(f"the path tolerance of G64 is {blend_mm:g} mm; expected a length above zero")

@@ -27,7 +27,11 @@ from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.build import build
 from olp.findings.catalogue import Finding
 
-SMOOTH, ROUGH = range(4), range(2)
+#: Seeds of smooth machines.
+SMOOTH = range(4)
+#: Seeds of rough machines.
+ROUGH = range(2)
+#: mm per um.
 UM = 1e-3
 
 

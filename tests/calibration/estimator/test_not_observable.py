@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from calibration.observations.test_instruments import (
     CENTRE,
-    LEVER,
+    TOOL_MM,
     circles_of,
     diagonals_of,
     messages_of,
@@ -143,7 +143,7 @@ def test_four_diagonals_leave_the_differences_of_scales_open(chain: str) -> None
         parts = []
         for d in lines:
             axis = np.array(d.start_mm) + d.distance_mm[:, None] * d.unit
-            parts.append(m.error(axis, np.array(LEVER)) @ d.unit)
+            parts.append(m.error(axis, np.array(TOOL_MM)) @ d.unit)
         return np.concatenate(parts)
 
     table, names = nullspace.columns(chain, reading)
@@ -179,7 +179,7 @@ def test_a_ball_bar_in_one_direction_does_not_determine_squareness(chain: str) -
             axis = np.array(CENTRE) + circle.radius_mm * outward
             one = nullspace.blank(chain)
             one.square[square] = 1e-6
-            column = (one.error(axis, np.array(LEVER)) * outward).sum(axis=1)
+            column = (one.error(axis, np.array(TOOL_MM)) * outward).sum(axis=1)
             own = [np.ones(len(axis)), outward[:, i], outward[:, j]]
             own.append(circle.direction * np.sin(2.0 * circle.angle_rad))
             seen += 1 - len(nullspace.open_changes(column[:, None], np.stack(own, axis=1)))

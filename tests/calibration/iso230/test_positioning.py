@@ -14,6 +14,7 @@ from olp.calibration.iso230.positioning import evaluate, findings_of, reference_
 from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError
 
+#: mm per um.
 UM = 1e-3
 
 

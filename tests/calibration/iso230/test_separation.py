@@ -13,6 +13,7 @@ from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Axis, Machine
 
+#: mm per um.
 UM = 1e-3
 
 
@@ -258,7 +259,7 @@ def test_a_drift_that_swings_within_a_run_makes_no_reversal_along_the_axis() -> 
 
 
 def test_a_recording_of_many_targets_needs_no_large_system() -> None:
-    """20,000 targets each way: as one dense system this would be 6 GB."""
+    """20,000 targets in each direction: as one dense system this would be 6 GB."""
     random = np.random.default_rng(1)
     x = np.arange(20_000) * 0.1
     one = add(line(x, np.full(20_000, -2.0), np.full(20_000, 2.0), runs=2), random.normal(0, 1e-3, 80_000))

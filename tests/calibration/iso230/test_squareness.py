@@ -25,6 +25,7 @@ from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
 from olp.errormodel.reversal import plays
 
+#: rad per urad.
 URAD = 1e-6
 BOX = np.array([[0.0, 1000.0], [0.0, 800.0], [-600.0, 0.0]])
 TOOL = (0.0, 0.0, -120.0)
@@ -189,7 +190,8 @@ def diagonal(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-LOW, HIGH = BOX[:, 0], BOX[:, 1]
+LOW = BOX[:, 0]
+HIGH = BOX[:, 1]
 
 
 def body(machine, **options: float) -> list[Diagonal]:  # type: ignore[no-untyped-def]

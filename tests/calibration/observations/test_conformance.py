@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases.instruments import BOX, DATUM, EXAMPLES, LEVER, Error
+from cases.instruments import BOX, DATUM, EXAMPLES, TOOL, Error
 
 from olp.calibration.estimator.basis import CurveSpace, Spline
 from olp.calibration.estimator.normal import residuals_of
@@ -33,7 +33,7 @@ def _parameters() -> Parameters:
         axis = AXES.index(name[2])
         kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
         spaces[name] = CurveSpace.of(Spline(*BOX[axis], 5), (), DATUM[axis], kind)  # type: ignore[arg-type]
-        places[name] = Place(DATUM, LEVER)
+        places[name] = Place(DATUM, TOOL)
     return Parameters(CHAIN, DATUM, spaces, places)
 
 

@@ -24,8 +24,12 @@ from olp.core.errors import ConfigError
 from olp.errormodel.build import build
 from olp.files.measurements.reader import files_of_measurements, load_measurements
 
+#: mm per um.
 UM = 1e-3
-SHIFT, TURN = np.array([0.4, -0.7, 0.2]), np.array([150e-6, -90e-6, 210e-6])
+#: Shift of the axes as a whole, mm.
+SHIFT = np.array([0.4, -0.7, 0.2])
+#: Turn of the axes as a whole, rad.
+TURN = np.array([150e-6, -90e-6, 210e-6])
 
 
 def messages_of(fitted: Fit, code: str) -> list[str]:
@@ -165,7 +169,7 @@ def test_a_polar_slip_is_named_and_alike_weights_are_points() -> None:
 
 # -- diagonals and ball-bars -----------------------------------------------------------------------------
 
-LEVER = (0.0, 0.0, -120.0)
+TOOL_MM = (0.0, 0.0, -120.0)
 CENTRE = (1500.0, 1000.0, -500.0)
 
 
@@ -178,7 +182,7 @@ def diagonals_of(machine: simulated.Machine, seed: int, count: int = 4) -> tuple
         ((x0, y0, -500.0), (x1, y1, -500.0)), ((x0, y1, -500.0), (x1, y0, -500.0)),
     ]  # fmt: skip
     return tuple(
-        Diagonal(a, b, *simulated.diagonal(machine, seed, a, b, LEVER), LEVER, source=f"diagonal-{k}.csv")
+        Diagonal(a, b, *simulated.diagonal(machine, seed, a, b, TOOL_MM), TOOL_MM, source=f"diagonal-{k}.csv")
         for k, (a, b) in enumerate(ends[:count])
     )
 
@@ -186,8 +190,8 @@ def diagonals_of(machine: simulated.Machine, seed: int, count: int = 4) -> tuple
 def circles_of(machine: simulated.Machine, seed: int, *, both: bool = True) -> tuple[Circles, ...]:
     return tuple(
         Circles(
-            plane, 400.0, CENTRE, *simulated.circles(machine, seed, plane, CENTRE, 400.0, LEVER, both=both),
-            LEVER, sigma=0.2 * UM, source=f"circle-{plane}.csv",
+            plane, 400.0, CENTRE, *simulated.circles(machine, seed, plane, CENTRE, 400.0, TOOL_MM, both=both),
+            TOOL_MM, sigma=0.2 * UM, source=f"circle-{plane}.csv",
         )
         for plane in ("XY", "YZ", "ZX")
     )  # fmt: skip

@@ -253,7 +253,7 @@ def test_similar_lines_are_read_as_each_is_alone(
     for alone in (False, True):
         with monkeypatch.context() as patch:
             if alone:
-                patch.setattr("olp.program.described.reader.kin_of", lambda *_: None)
+                patch.setattr("olp.program.described.reader.same_form_of", lambda *_: None)
             try:
                 programs.append(read(text, setup, dialect))
             except ProgramError as error:
@@ -388,7 +388,10 @@ def test_small_programs_in_them_are_corrected(machine: Path, perfect: Path, name
     ("kawasaki-as", b".PROGRAM a()\nXMOVE p1\n.END\n", 2, "is not a statement"),
     ("kawasaki-as", b".PROGRAM a()\nPOINT p = SHIFT(q BY 1,2,3)\nLMOVE p\n.END\n", 2, "computed"),
     ("kawasaki-as", b".PROGRAM a()\nLMOVE TRANS(1,2,3)\n.PROGRAM b()\nLMOVE TRANS(1,2,4)\n", 4, "two parts"),
-    ("kawasaki-as", b".TRANS\np 1 2 3\np 1 2 4\n.END\n.PROGRAM a()\nLMOVE p\n.END\n", 6, "is defined twice, in lines 2 and 3"),
+    (
+        "kawasaki-as", b".TRANS\np 1 2 3\np 1 2 4\n.END\n.PROGRAM a()\nLMOVE p\n.END\n", 6,
+        "is defined twice, in lines 2 and 3",
+    ),
     ("val2", b"MOVES part\n", 1, "part is not defined in this text"),
     ("val2", b"APPROS part, 50\n", 1, "tool axis"),
     ("karel", b"MOVE NEAR p1 BY 100\n", 1, "computed"),

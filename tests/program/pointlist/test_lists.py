@@ -201,7 +201,10 @@ def test_what_is_detected_is_stated(machine: Path) -> None:
     (b"# frame=G57\nX_mm,Y_mm,Z_mm\n1,2,3\n", ProgramError, "G57"),
     (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,9\n", ProgramError, ":2: tool 9"),
     (b"X_mm,Y_mm,Z_mm,tool\n1,2,3,T1\n", ProgramError, ':2: "T1" is not a tool number'),
-    (b"# olp-corrected 0123456789ab\nX_mm,Y_mm,Z_mm\n1,2,3\n", AlreadyCorrected, "a second one would apply the model twice"),
+    (
+        b"# olp-corrected 0123456789ab\nX_mm,Y_mm,Z_mm\n1,2,3\n", AlreadyCorrected,
+        "would apply the model twice",
+    ),
 ])  # fmt: skip
 def test_what_is_not_said_is_refused(
     machine: Path, tmp_path: Path, text: bytes, error: type[OlpError], words: str
