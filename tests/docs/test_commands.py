@@ -12,7 +12,7 @@ from docs.blocks import README, ROOT, blocks, papers, problems, run
 NEVER_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist")
 PAPERS = papers()
 #: What no shell of Windows understands.
-_OF_BASH = re.compile(r"\||<|>(?! \d)|\$|\bprintf\b|\bcat\b|\bexport\b|&&|/bin/|\\$", re.MULTILINE)
+_OF_BASH = re.compile(r"\||<|>(?! \d)|\$|\bprintf\b|\bcat\b|^export\b|&&|/bin/|\\$", re.MULTILINE)
 
 
 @pytest.fixture
