@@ -32,6 +32,7 @@ from olp.cli.options import (
     force_option,
     json_option,
     output_option,
+    part_tolerance_option,
     quiet_option,
     renamed_option,
     report_option,
@@ -83,9 +84,7 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
     help="Leave points farther from the path out of all figures.",
 )  # fmt: skip
 @renamed_option("--tolerance-um", "--part-tolerance-um")
-@click.option(
-    "--part-tolerance-um", type=Length(), help="Exit with 1 where the measured path is farther off."
-)
+@part_tolerance_option("Exit with 1 where the measured path is farther off. Default: the job's.")
 @click.option("--add-errors", is_flag=True, help="Add the machine's errors to the axis positions of a log.")
 @output_option("OUT.csv", "Deviation of every point.")
 @click.option(

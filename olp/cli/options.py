@@ -23,7 +23,7 @@ def renamed_option(old: str, new: str, *, flag: bool = False) -> Callable[[F], F
 
     return click.option(
         old, f"renamed_{old.strip('-').replace('-', '_')}", is_flag=flag, hidden=True, expose_value=False,
-        callback=refuse,
+        callback=refuse, help=f"Now {new}.",
     )  # fmt: skip
 
 
@@ -162,14 +162,18 @@ def unroll_options(function: F) -> F:
     return function
 
 
+def part_tolerance_option(says: str) -> Callable[[F], F]:
+    """--part-tolerance-um; its help says what is judged by it."""
+    return click.option("--part-tolerance-um", type=Length(), help=says)
+
+
 def confidence_options(function: F) -> F:
     """Options of every verb that shows uncertainties."""
     for option in (
         renamed_option("--within-um", "--part-tolerance-um"),
-        click.option(
-            "--part-tolerance-um",
-            type=Length(),
-            help="Part tolerance: give the probability that the tip is within it. Default: --tolerance-um.",
+        part_tolerance_option(
+            "The tolerance of the part: the probability that the tip stays within is stated. Default: the "
+            "job's, else --tolerance-um."
         ),
         click.option(
             "--only-sure-components",

@@ -31,7 +31,7 @@ class Repeated:
 def repeated(command_mm: Array, attained_mm: Array) -> Repeated:
     """Figures of each pose or station from commands (m, 3) and attained positions (n, m, 3) of n cycles.
 
-    ISO 9283, 7.2: AP_P = |mean - command| and RP_l = l + 3 S_l, l_j = |attained_j - mean|, S_l with n - 1;
+    ISO 9283, 7.2: AP_P = |mean - command| and RP_l = l + 3 S_l, l_j = |attained_j - mean|, S_l with n - 1.
     8.2 and 8.3 define the same for stations of a path in its normal planes. Cycles that did not reach a
     station (NaN) are left out there.
     """

@@ -38,8 +38,8 @@ _STEPS = 256
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairing:
     """Per measured point (m,): `segment` of the path, `foot_mm` (m, 3) on it, `distance_mm`, arc length
-    `s_mm`; `beyond` marks points before the start or behind the end of the path, `doubtful` those that a pass
-    in another direction fits equally well."""
+    `s_mm`. `beyond` marks points before the start or behind the end of the path. `doubtful` marks those that
+    a pass in another direction fits equally well."""
 
     segment: Index
     foot_mm: Array
@@ -109,7 +109,7 @@ def _means(points: Array, edges: Index) -> Array:
 def coarse(
     path: Path, points_mm: Array, count: int = COARSE, far: float = np.inf
 ) -> tuple[Array, Array, Array, float]:
-    """Thinned points (L, 3), the index and the arc length of each (L,), and the cost of their match; `far` is
+    """Thinned points (L, 3), the index and the arc length of each (L,), and the cost of their match. `far` is
     the share of the size of the path beyond which a point is not on it."""
     few, index = thinned(points_mm, count)
     s = np.linspace(0.0, path.length_mm, count)

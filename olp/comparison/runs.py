@@ -196,8 +196,8 @@ def absorbed(path: Path, run: Run, rigid: Rigid) -> tuple[float, float]:
 
 
 def absorbed_of_field(path: Path, run: Run, error_mm: Array) -> tuple[float, float]:
-    """What a fit would absorb of a known field of errors (m, 3) at the feet of a run: rms across the path in
-    um of the field, and of its residual after the best fit."""
+    """What a fit would absorb of a known field of errors (m, 3) at the feet of a run. Gives the rms across
+    the path in um of the field, and of its residual after the best fit."""
     feet, along = run.pairing.foot_mm[run.counted], path.axes(run.pairing.segment[run.counted])[0]
     field = error_mm[run.counted]
     rigid, _ = fit_path(feet + field, feet, along)

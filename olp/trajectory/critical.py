@@ -321,8 +321,9 @@ def _driven(path: SmoothPath, profile: Profile) -> tuple[Array, Array, Index]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
-    """The phases (p,) of constant jerk of a profile: `start_s` (p + 1,); arc length, speed, acceleration and
-    jerk at the start of each and how long it `lasts`; `first` (m + 1,) of each span, and their number."""
+    """The phases (p,) of constant jerk of a profile, from `start_s` (p + 1,) on. Arc length, speed,
+    acceleration and jerk are those at the start of each, which `lasts` so long. `first` (m + 1,) is the first
+    phase of each span, and their number."""
 
     start_s: Array
     arc_mm: Array

@@ -20,9 +20,11 @@ class AxisLimits:
 class Route:
     """A polyline of commanded axis positions.
 
-    `point_mm` (n, 3); `feed_mm_s` (n - 1,) largest speed along each segment, inf for rapids; `line` (n - 1,)
-    the line of the program that each segment comes from; `tolerance_mm` (n,) how far from each waypoint the
-    path may pass, 0 for a stop on it (as at both ends); `dwell_s` (n,) time at rest there.
+    - `point_mm` (n, 3): the waypoints.
+    - `feed_mm_s` (n - 1,): largest speed along each segment, inf for rapids.
+    - `line` (n - 1,): the line of the program that each segment comes from.
+    - `tolerance_mm` (n,): how far from each waypoint the path may pass, 0 for a stop on it (as at both ends).
+    - `dwell_s` (n,): time at rest there.
     """
 
     point_mm: Array

@@ -154,7 +154,7 @@ def test_a_fine_sweep_beside_an_aliased_line_is_used(tmp_path: Path) -> None:
 def test_ballbar(tmp_path: Path) -> None:
     target = tmp_path / "s.toml"
     text = good("ballbar", CHECKS / "ballbar-xy.csv", "-o", target, "--plot", tmp_path / "c.svg")
-    assert re.search(r"lost motion X\s+um\s+5\.9|lost motion X.*6\.0", text)
+    assert re.search(r"backlash X\s+um\s+5\.9|backlash X.*6\.0", text)
     [table] = tomllib.loads(target.read_text("utf-8"))["squareness"]
     assert table["value_urad"] == pytest.approx(lean_of_plane(0, 1), abs=6.0)
     assert (tmp_path / "c-XY.svg").is_file()

@@ -26,14 +26,12 @@ def options_in(source: str) -> set[str]:
 
 
 SHARED_OPTIONS = options_in(SHARED.read_text("utf-8")) | {"--date"}
-#: `compare` judges what was measured by a tolerance that has no default.
-OWN = {"compare.py": {"--tolerance-um"}}
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
 def test_a_shared_option_is_defined_once(path: Path) -> None:
     defined = set() if path == SHARED else options_in(path.read_text("utf-8")) & SHARED_OPTIONS
-    assert defined <= OWN.get(path.name, set())
+    assert defined == set()
 
 
 def test_a_second_definition_is_seen() -> None:
