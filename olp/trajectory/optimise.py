@@ -249,8 +249,8 @@ def _tightened(rows_at: _Rows, rows: Rows, spline: Spline, start: Array) -> Arra
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """The pieces of a window, cut at breaks of the path and knots of the speed. Each goes from `low` to `high`
-    (n,) in cell `cell` and piece `piece` of the path. It keeps `share` (n,) of the limits."""
+    """The pieces of a window, cut at breaks of the path and knots of the speed. Each goes from `low` to
+    `high` (n,) in cell `cell` and piece `piece` of the path. It keeps `share` (n,) of the limits."""
 
     path: SmoothPath
     limits: AxisLimits
