@@ -30,15 +30,7 @@ def head(
         "measured_before": [_described(points) for points in before],
     }
     if loaded is not None:
-        machine, calibration = loaded.setup.machine, loaded.calibration
-        report["machine"] = {
-            "name": machine.name, "chain": machine.chain, "controller": machine.controller,
-        }  # fmt: skip
-        report["calibration"] = {
-            "measured": calibration.measured, "valid_until": calibration.valid_until,
-            "model": calibration.model, "temperature_degC": calibration.temperature_degC,
-            "sha256": loaded.digest,
-        }  # fmt: skip
+        report |= loaded.heads()
     return report
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import inspect
 import os
 import shutil
@@ -224,3 +225,26 @@ def test_a_session_loads_a_calibration_once_and_of_each_box_a_model() -> None:
     assert session.loaded("hold") is session.loaded("hold")
     assert session.loaded("hold").model is not session.loaded("refuse").model
     assert session.loaded("hold").digest == session.loaded("refuse").digest
+
+
+@pytest.mark.slow
+def test_reports_name_machine_and_calibration_alike(tmp_path: Path) -> None:
+    """The digest is SHA-256 of the calibration file, the files that it names in order, and the chain."""
+    folder = Path(shutil.copytree(FOLDER, tmp_path / "plate"))
+    machine, program = folder / "machine.toml", folder / "plate.ngc"
+    files = ["calibration.toml", "x.csv", "y.csv", "z.csv"]
+    digest = hashlib.sha256(b"".join((folder / name).read_bytes() for name in files) + b"'FXYZ'").hexdigest()
+    measured = tmp_path / "measured.csv"
+    measured.write_bytes(olp.simulate(program, machine).to_csv())
+    corrected = olp.correct(program, machine)
+    reports = [
+        corrected.report,
+        olp.verify(program, corrected.data, machine).report,
+        olp.compare(program, [measured], machine).report,
+    ]
+    for report in reports:
+        assert report["machine"] == {"name": "gantry-1600", "chain": "FXYZ", "controller": "linuxcnc"}
+        assert report["calibration"]["sha256"] == digest
+        assert report["calibration"] == corrected.report["calibration"]
+    (folder / "x.csv").write_bytes((folder / "x.csv").read_bytes() + b"\n")
+    assert olp.correct(program, machine).report["calibration"]["sha256"] != digest
