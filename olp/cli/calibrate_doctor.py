@@ -6,9 +6,9 @@ import click
 
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_report, refuse_early
 from olp.cli.options import (
-    Length,
     fail_on_option,
     force_option,
+    instrument_options,
     json_option,
     machine_option,
     output_option,
@@ -22,11 +22,7 @@ from olp.core.errors import UsageError
 @click.argument("points", metavar="POINTS.csv")
 @machine_option(required=True)
 @output_option("NEW.toml", "Write the calibration with the decided mistakes corrected.")
-@click.option("--sigma-um", type=Length(), help="Standard uncertainty of a coordinate, if the file has none.")
-@click.option(
-    "--tool", type=(float, float, float), metavar="X Y Z",
-    help="Vector from the gauge point to the reflector in mm, if the file has none.",
-)  # fmt: skip
+@instrument_options
 @json_option()
 @fail_on_option
 @quiet_option("No table; only the exit code.")
@@ -37,7 +33,7 @@ def command(
     machine: str,
     output: str | None,
     sigma_um: float | None,
-    tool: tuple[float, float, float] | None,
+    reflector: tuple[float, float, float] | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -61,7 +57,7 @@ def command(
     from olp.files.write import write_files
     from olp.workflows.calibrate_doctor import diagnose_calibration
 
-    diagnosis = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=tool)
+    diagnosis = diagnose_calibration(calibration, points, machine, sigma_um=sigma_um, tool_mm=reflector)
     if output is not None:
         files = diagnosis.files(output)
         write_files(files, force=force, inputs=inputs)

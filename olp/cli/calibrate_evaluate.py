@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import click
 
-from olp.cli.common import STREAM, files_of, refuse_early, report_ending
+from olp.cli.common import STREAM, files_of, refuse_early
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
 from olp.cli.options import day_option, machine_option, plot_option, report_option
 
@@ -44,8 +44,6 @@ def command(
 
     kind = plot_kind(plot)
     inputs = (*files_of_measurements(data), *files_of(machine))
-    for name in files_of(report_file):
-        report_ending(name)
     refuse_early(files_of(report_file), inputs, force=force)
     evaluated = evaluate_lines(data, machine, zone=cast(Any, zone))
     result = evaluated.as_dict()

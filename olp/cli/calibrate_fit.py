@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put, refuse_early, report_ending
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put, refuse_early
 from olp.cli.options import (
     day_option,
     fail_on_option,
@@ -66,8 +66,6 @@ def command(
     from olp.files.measurements.reader import files_of_measurements
 
     inputs = (*files_of_measurements(data), *files_of(machine))
-    for name in files_of(report_file):
-        report_ending(name)
     refuse_early(files_of(output, report_file), inputs, force=force)
 
     from olp.files.write import write_files

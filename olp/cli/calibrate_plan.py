@@ -16,6 +16,8 @@ from olp.cli.options import (
     machine_option,
     output_option,
     quiet_option,
+    reflector_option,
+    sigma_option,
 )
 from olp.core.errors import UsageError
 
@@ -34,13 +36,10 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
     "--box", type=(float, float, float, float, float, float), metavar="X X Y Y Z Z",
     help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
 )  # fmt: skip
-@click.option(
-    "--reflector", "reflectors", type=(float, float, float), multiple=True, metavar="X Y Z",
-    help="Vector from the gauge point to a reflector in mm; three that are not on one line suffice.",
-)  # fmt: skip
-@click.option(
-    "--sigma-um", type=Length(), help="Standard uncertainty of a tracker's coordinate.  [default: 8]"
+@reflector_option(
+    "Vector from the gauge point to a reflector in mm; three that are not on one line suffice.", several=True
 )
+@sigma_option("Standard uncertainty of a tracker's coordinate.  [default: 8]")
 @click.option("--period-x", type=Length(), multiple=True, help="Period of the screw or scale of X in mm.")
 @click.option("--period-y", type=Length(), multiple=True, help="The same of Y.")
 @click.option("--period-z", type=Length(), multiple=True, help="The same of Z.")
@@ -58,7 +57,7 @@ def command(
     instrument: str | None,
     points: int | None,
     box: tuple[float, float, float, float, float, float] | None,
-    reflectors: tuple[tuple[float, float, float], ...],
+    reflector: tuple[tuple[float, float, float], ...],
     sigma_um: float | None,
     period_x: tuple[float, ...],
     period_y: tuple[float, ...],
@@ -90,7 +89,7 @@ def command(
         uncertainty_um=uncertainty_um,
         instrument=next((name for name in INSTRUMENTS if name == instrument), None),
         box_mm=None if box is None else (box[0:2], box[2:4], box[4:6]),
-        tools=reflectors,
+        tools=reflector,
         sigma_um=sigma_um,
         periods_mm=(period_x, period_y, period_z),
         dwell_s=dwell_s,

@@ -8,10 +8,10 @@ import click
 
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_report, refuse_early
 from olp.cli.options import (
-    Length,
     day_option,
     fail_on_option,
     force_option,
+    instrument_options,
     json_option,
     output_option,
     quiet_option,
@@ -28,11 +28,7 @@ from olp.core.errors import UsageError
 @click.option(
     "--program", metavar="NOMINAL", help="MEASURED are tip positions along a corrected run of this program."
 )
-@click.option("--sigma-um", type=Length(), help="Standard uncertainty of a coordinate, if the file has none.")
-@click.option(
-    "--tool", type=(float, float, float), metavar="X Y Z",
-    help="Vector from the gauge point to the reflector in mm, if the file has none.",
-)  # fmt: skip
+@instrument_options
 @day_option("Day of the run: the new calibration's date of measuring. Default: the old one's.")
 @json_option()
 @fail_on_option
@@ -46,7 +42,7 @@ def command(
     output: str,
     program: str | None,
     sigma_um: float | None,
-    tool: tuple[float, float, float] | None,
+    reflector: tuple[float, float, float] | None,
     date: datetime.date | None,
     as_json: bool,
     fail_on: str,
@@ -77,7 +73,7 @@ def command(
     from olp.workflows.calibrate_refine import refine_calibration
 
     refined = refine_calibration(
-        calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=tool,
+        calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=reflector,
         date=date,
     )  # fmt: skip
     files = refined.files(output)

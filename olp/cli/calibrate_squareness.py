@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from olp.cli.common import put
-from olp.cli.options import json_option
+from olp.cli.options import json_option, renamed_option
 from olp.core.errors import UsageError
 from olp.core.units import RAD_PER_URAD
 
@@ -19,15 +19,16 @@ from olp.core.units import RAD_PER_URAD
     help="Convention of VALUES, as listed.",
 )  # fmt: skip
 @click.option(
-    "--frame", "frames", multiple=True, metavar="NAME=PP,NP,SIDE",
+    "--drawn-frame", "frames", multiple=True, metavar="NAME=PP,NP,SIDE",
     help="Diagonal that grows in both axes, the other one, and a side of a drawn frame, in mm.",
 )  # fmt: skip
+@renamed_option("--frame", "--drawn-frame")
 @json_option("Print the result as JSON.")
 def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], as_json: bool) -> None:
     """Squareness in the sign conventions of controls and instruments.
 
-    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from. With --frame, they come from a
-    frame that the machine drew or printed. Without either, the conventions are listed."""
+    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from. With --drawn-frame, they come
+    from a frame that the machine drew or printed. Without either, the conventions are listed."""
     from olp.calibration.iso230.conventions import CONVENTIONS, angle_words, from_iso, to_iso
     from olp.calibration.iso230.squareness import from_frame
     from olp.cli.outline import outline

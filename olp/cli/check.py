@@ -25,8 +25,10 @@ from olp.cli.options import (
     date_option,
     fail_on_option,
     force_option,
+    json_option,
     output_option,
     outside_box_option,
+    quiet_option,
     setup_options,
     tolerance_option,
 )
@@ -41,9 +43,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @click.command("check")
 @click.argument("program", required=False)
 @setup_options
-@click.option(
-    "--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is a corrected one."
-)
+@click.option("--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is a corrected one.")
 @click.option(
     "--select", multiple=True, callback=_codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
 )
@@ -57,6 +57,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     show_default=True,
     help="SARIF 2.1.0 and JUnit XML are for pipelines.",
 )
+@json_option("The same as --format json.")
 @output_option("OUT", "Default: stdout.", default=STREAM)
 @date_option()
 @tolerance_option
@@ -64,6 +65,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @confidence_options
 @click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
 @contour_option
+@quiet_option("No report and no progress; only the exit code.")
 @force_option("the output file")
 def command(
     program: str | None,
@@ -74,6 +76,8 @@ def command(
     fail_on: str,
     output: str,
     clearances: str | None,
+    as_json: bool,
+    quiet: bool,
     force: bool,
     **words: Any,
 ) -> None:
@@ -81,6 +85,9 @@ def command(
 
     A nominal PROGRAM is corrected first, and the result is checked. A corrected PROGRAM is checked unchanged,
     and against NOMINAL where that is given."""
+    if as_json and form not in ("text", "json"):
+        raise UsageError(f"--json and --format {form} exclude each other; leave one of them out")
+    form = "json" if as_json else form
     call = given(program, machine, job)
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")
@@ -98,14 +105,15 @@ def command(
 
     options = options_of(check.CheckOptions, words)
     other = None if nominal is None else source(call.session.sources, nominal)
-    with progress(form != "text") as show, naming(call.stream):
+    with progress(quiet or form != "text") as show, naming(call.stream):
         result = check.run(call.session, call.source, options, nominal=other, progress=show)
     parts = {output: FORMATS[form](result.report, fail_on).encode()}
     if clearances is not None and result.clearances is not None:
         parts[clearances] = to_csv(result.clearances.rows())
     write_files({Path(name): parts[name] for name in files_of(*parts)}, force=force, inputs=inputs)
-    if STREAM in parts:
+    if STREAM in parts and not (quiet and form == "text" and output == STREAM):
         put(parts[STREAM])
-    for name in files_of(*parts):
-        diagnostic(f"wrote {name}")
+    if not quiet:
+        for name in files_of(*parts):
+            diagnostic(f"wrote {name}")
     exit_for(result.findings, fail_on)

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 STREAM = "-"
 #: Exit code of a run with findings at or above --fail-on.
 FINDINGS_EXIT = 1
-REPORT_ENDINGS = (".html", ".json", ".md")
 PLOT_ENDINGS = (".svg", ".png")
 
 #: Key under which a call keeps the value of --dialect.
@@ -133,14 +132,6 @@ def plot_ending(name: str) -> None:
     """Raise UsageError for a picture whose ending names no format."""
     if Path(name).suffix.lower() not in PLOT_ENDINGS:
         raise UsageError(f"the plot {name!r} ends in no known format; expected .svg or .png")
-
-
-def report_ending(name: str) -> str:
-    """The form of a report by the ending of its file. Raises UsageError."""
-    ending = Path(name).suffix.lower()
-    if ending not in REPORT_ENDINGS:
-        raise UsageError(f"is not a form of report; expected {', '.join(REPORT_ENDINGS)}", file=name)
-    return ending
 
 
 def diagnostic(message: str) -> None:

@@ -21,7 +21,6 @@ from olp.cli.common import (
     refuse_early,
     refuse_stream,
     refuse_twice,
-    report_ending,
     source,
 )
 from olp.cli.options import (
@@ -159,8 +158,6 @@ def _refuse(outputs: _Outputs, inputs: Iterable[str], *, poses: bool) -> None:
     refuse_twice(targets)
     if outputs.part_frame and not poses:
         raise UsageError("--part-frame takes points of a part, one row per point; add --poses")
-    for name in files_of(outputs.report_file):
-        report_ending(name)
     if outputs.output and poses:
         raise UsageError("-o writes deviations along a path, and --poses has none; use --report")
 

@@ -22,7 +22,6 @@ from olp.cli.common import (
     put,
     refuse_early,
     refuse_twice,
-    report_ending,
 )
 from olp.cli.layouts import with_layout_of
 from olp.cli.options import (
@@ -59,12 +58,8 @@ LAST_DIGITS_UM = 10.0
 @unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @report_option()
-@click.option(
-    "--review", "review_file", metavar="review.html", help="Also write the page of olp view."
-)
-@click.option(
-    "--profile", metavar="NAME|FILE", help="Layout of the columns of a list of positions."
-)
+@click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")
+@click.option("--profile", metavar="NAME|FILE", help="Layout of the columns of a list of positions.")
 @click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
 @click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a list.")
 @renamed_option("--results", "the verb olp results", flag=True)
@@ -127,11 +122,7 @@ def _refuse(outputs: _Outputs, inputs: Iterable[str]) -> None:
     if outputs.review_file == STREAM:
         raise UsageError("--review writes a file and cannot be -; name a file, or use olp view -o -")
     if outputs.as_json and (outputs.output == STREAM or outputs.show_diff):
-        raise UsageError(
-            "JSON on stdout excludes -o - and --diff; write the report to a file with --report"
-        )
-    for name in files_of(outputs.report_file):
-        report_ending(name)
+        raise UsageError("JSON on stdout excludes -o - and --diff; write the report to a file with --report")
     targets = files_of(outputs.output, outputs.report_file, outputs.review_file)
     refuse_early(targets, inputs, force=outputs.force)
     refuse_twice(targets)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from olp.cli.common import DIALECT
+from olp.cli.common import DIALECT, STREAM
+from olp.core.errors import UsageError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def renamed_option(old: str, new: str, *, flag: bool = False) -> Callable[[F], F]:
+def renamed_option(old: str, new: str, *, flag: bool = False, values: int = 1) -> Callable[[F], F]:
     """An option that has another name now: using it is an error that says which."""
 
     def refuse(context: click.Context, _: click.Parameter, value: object) -> None:
@@ -22,8 +24,8 @@ def renamed_option(old: str, new: str, *, flag: bool = False) -> Callable[[F], F
             raise click.UsageError(f"{old} is now {new}.", context)
 
     return click.option(
-        old, f"renamed_{old.strip('-').replace('-', '_')}", is_flag=flag, hidden=True, expose_value=False,
-        callback=refuse, help=f"Now {new}.",
+        old, f"renamed_{old.strip('-').replace('-', '_')}", is_flag=flag, nargs=values, hidden=True,
+        expose_value=False, callback=refuse, help=f"Now {new}.",
     )  # fmt: skip
 
 
@@ -107,11 +109,39 @@ def plot_option(help: str) -> Callable[[F], F]:
     return click.option("--plot", metavar="FILE", help=help)
 
 
-def report_option(
-    metavar: str = "FILE", help: str = "Also write the report: .html, .json or .md."
-) -> Callable[[F], F]:
-    """--report."""
-    return click.option("--report", "report_file", metavar=metavar, help=help)
+def reflector_option(help: str, *, several: bool = False) -> Callable[[F], F]:
+    """--reflector."""
+    return click.option(
+        "--reflector", multiple=several, type=(float, float, float), metavar="X Y Z", help=help
+    )
+
+
+def sigma_option(help: str) -> Callable[[F], F]:
+    """--sigma-um."""
+    return click.option("--sigma-um", type=Length(), help=help)
+
+
+def instrument_options(function: F) -> F:
+    """--sigma-um and --reflector, for points of a tracker in a file that may not state them."""
+    function = reflector_option("Vector from the gauge point to the reflector in mm, if the file has none.")(
+        function
+    )
+    function = renamed_option("--tool", "--reflector", values=3)(function)
+    return sigma_option("Standard uncertainty of a coordinate, if the file has none.")(function)
+
+
+def report_option(endings: Sequence[str] = (".html", ".json", ".md")) -> Callable[[F], F]:
+    """--report; the ending of the file's name decides its form."""
+
+    def check(_: click.Context, __: click.Parameter, name: str | None) -> str | None:
+        if name not in (None, STREAM) and Path(name).suffix.lower() not in endings:
+            raise UsageError(f"is not a form of this report; expected {', '.join(endings)}", file=name)
+        return name
+
+    return click.option(
+        "--report", "report_file", metavar="FILE", callback=check,
+        help=f"Also write the report: {' or '.join(', '.join(endings).rsplit(', ', 1))}.",
+    )  # fmt: skip
 
 
 def outside_box_option(refused: str, held: str) -> Callable[[F], F]:

@@ -91,7 +91,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
 @flatten_option
-@report_option("report.json", "Also write the report as JSON.")
+@report_option((".json",))
 @json_option()
 @fail_on_option
 @quiet_option("No report and no progress.")

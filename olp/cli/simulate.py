@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from olp.cli.common import STREAM, diagnostic, files_of, given, put, refuse_early
-from olp.cli.options import Length, contour_option, force_option, output_option, setup_options
+from olp.cli.options import Length, contour_option, force_option, output_option, quiet_option, setup_options
 
 
 @click.command("simulate")
@@ -16,6 +16,7 @@ from olp.cli.options import Length, contour_option, force_option, output_option,
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
 @contour_option
+@quiet_option("No messages.")
 @force_option("the output file")
 def command(
     program: str | None,
@@ -24,6 +25,7 @@ def command(
     output: str,
     step_mm: float,
     contour: bool,
+    quiet: bool,
     force: bool,
 ) -> None:
     """Write the path that the machine would take with its errors, as CSV.
@@ -43,4 +45,5 @@ def command(
         put(data)
         return
     write_bytes(output, data, force=force, inputs=call.inputs)
-    diagnostic(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")
+    if not quiet:
+        diagnostic(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, exit_for, given, options_of, put, source
-from olp.cli.options import confidence_options, proof_options, setup_options
+from olp.cli.options import confidence_options, proof_options, quiet_option, setup_options
 from olp.core.errors import UsageError
 
 
@@ -17,9 +17,10 @@ from olp.core.errors import UsageError
 @setup_options
 @proof_options
 @confidence_options
+@quiet_option("No report; only the exit code.")
 def command(
     nominal: str, corrected: str, machine: str | None, job: str | None, as_json: bool, fail_on: str,
-    **words: Any,
+    quiet: bool, **words: Any,
 ) -> None:  # fmt: skip
     """Prove a corrected program from the nominal and the corrected text alone.
 
@@ -35,5 +36,8 @@ def command(
 
     options = options_of(verify.VerifyOptions, words)
     result = verify.run(call.session, call.source, source(call.session.sources, corrected), options)
-    put(report.to_json(result.report) if as_json else report.to_text(result.report))
+    if as_json:
+        put(report.to_json(result.report))
+    elif not quiet:
+        put(report.to_text(result.report))
     exit_for(result.findings, fail_on)

@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 @click.command("view")
 @click.argument("program", required=False)
 @setup_options
-@click.option(
-    "--corrected", metavar="FILE", help="The corrected program. Default: correct PROGRAM."
-)
+@click.option("--corrected", metavar="FILE", help="The corrected program. Default: correct PROGRAM.")
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
 )
@@ -41,17 +39,13 @@ if TYPE_CHECKING:
 @click.option(
     "--live", is_flag=True, help="Serve the page on this computer until Ctrl-C, and keep it up to date."
 )
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: a free one."
-)
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: a free one.")
 @tolerance_option
 @outside_box_option("refuse the program", "take the error at the box's face")
 @contour_option
 @unroll_options
 @confidence_options
-@click.option(
-    "--no-time", is_flag=True, help="Do not plan the motion; times come from the programmed feed."
-)
+@click.option("--no-time", is_flag=True, help="Do not plan the motion; times come from the programmed feed.")
 @click.option(
     "--step-mm",
     type=Length(),

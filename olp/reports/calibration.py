@@ -342,9 +342,7 @@ def fit_plots(summary: FitSummary) -> dict[str, bytes]:
     """The plots of a fit as SVG; those of lines where there are any."""
     curves = calibration_curves(summary.calibration)
     plots = {"curves": curves[curves.index(b"<svg") :]}
-    results = sorted(
-        summary.fit.of(LineState), key=lambda r: _place_in_order(r.state.observation)
-    )
+    results = sorted(summary.fit.of(LineState), key=lambda r: _place_in_order(r.state.observation))
     if results:
         plots["fitted"] = plots_calibration.fitted(fitted_lines(summary.fit))
         plots["residuals"] = plots_calibration.residuals([(r.state.observation, r.residual) for r in results])

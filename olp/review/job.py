@@ -269,8 +269,11 @@ def _scene(
         tolerance_um=options.tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
         uncertainty=_uncertainty(
-            loaded, nominal, samples,
-            loaded.part_tolerance_um(options.part_tolerance_um) or options.tolerance_um, options.date,
+            loaded,
+            nominal,
+            samples,
+            loaded.part_tolerance_um(options.part_tolerance_um) or options.tolerance_um,
+            options.date,
         ),
     )
 

@@ -79,9 +79,7 @@ def fit_calibration(
         measurements = load_measurements(sources, None if described is None else described.chain)
     chain = described.chain if described is not None else measurements.chain
     if chain is None:
-        raise ConfigError(
-            "no chain is stated; give the machine file (-m), or the key chain of the plan"
-        )
+        raise ConfigError("no chain is stated; give the machine file (-m), or the key chain of the plan")
     if described is not None and described.name != measurements.machine:
         raise ConfigError(
             f'the measurements are of machine "{measurements.machine}", and the machine file is of '

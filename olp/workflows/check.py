@@ -261,9 +261,7 @@ def _confidence(run: Run) -> list[Finding]:
     ]
 
 
-def _clearances(
-    case: _Case, codes: list[str], sources: Sources, tell: Progress
-) -> Clearances | None:
+def _clearances(case: _Case, codes: list[str], sources: Sources, tell: Progress) -> Clearances | None:
     """Clearances; None where the job has no meshes, or `codes` has none of clearances."""
     setup = case.loaded.setup
     if not setup.job.meshes or not any(RULES[code].topic == "clearance" for code in codes):
@@ -294,9 +292,7 @@ def _stamps(case: _Case) -> list[Finding]:
     first = find_stamp(case.data)
     if first is not None and find_stamp(case.data[first.end() :]) is not None:
         findings.append(
-            finding(
-                "OLP311", "the program has two stamps of a correction", [_line(case.data, first.start())]
-            )
+            finding("OLP311", "the program has two stamps of a correction", [_line(case.data, first.start())])
         )
     if case.run is not None and not case.corrected_here and find_stamp(case.run.nominal.data) is not None:
         findings.append(finding("OLP311", "the program given as nominal has the stamp of a correction"))

@@ -33,9 +33,7 @@ _POINTS = 120_000
 _STEP_MM = 0.5
 
 
-def comparison(
-    result: Comparison, session: Session | None, name: str, date: datetime.date | None
-) -> bytes:
+def comparison(result: Comparison, session: Session | None, name: str, date: datetime.date | None) -> bytes:
     """The report of a comparison in the form that `name` ends in."""
     from olp.reports import document_comparison as report_document
     from olp.reports.plots import path as plots_path

@@ -79,9 +79,7 @@ def run(
         tell("read", 0.0)
         with source.errors("<program>"):
             programs.append(_read(source, loaded, options))
-    done = verify_programs(
-        (programs[0], nominal.name), (programs[1], corrected.name), loaded, options
-    )
+    done = verify_programs((programs[0], nominal.name), (programs[1], corrected.name), loaded, options)
     return Verification(done.report, done.findings, done.confidence)
 
 

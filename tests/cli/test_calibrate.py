@@ -251,7 +251,7 @@ def test_squareness_in_all_conventions() -> None:
     rows = {row["name"]: row for row in report["conventions"]}
     assert rows["iso"]["C0Y_urad"] == -12 and rows["iso"]["B0Z_urad"] == 5
     assert rows["obtuse"]["B0Z_urad"] == -5
-    framed = json.loads(good("squareness", "--frame", "C0Y=140.4,142.8,99.8", "--json"))
+    framed = json.loads(good("squareness", "--drawn-frame", "C0Y=140.4,142.8,99.8", "--json"))
     assert framed["conventions"][3]["C0Y_urad"] == pytest.approx(-16950.7368, abs=1e-3)
     assert call("squareness", "C0Y").exit_code == 2
 

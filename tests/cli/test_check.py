@@ -70,6 +70,27 @@ def test_json_is_the_report_of_the_library(tmp_path: Path) -> None:
     assert (report["schema"], report["rules"]) == ("olp-check-1", list(GATE_CODES))
 
 
+def test_json_is_one_of_the_forms_and_excludes_the_others(tmp_path: Path) -> None:
+    short = checked(tmp_path / "a", SEVERAL, "--json")
+    assert short.exit_code == 1
+    named = checked(tmp_path / "a", SEVERAL, "--format", "json")
+    assert json.loads(short.stdout) == json.loads(named.stdout)
+    refused = checked(tmp_path / "c", SEVERAL, "--json", "--format", "sarif")
+    assert refused.exit_code == 2
+    assert "exclude each other" in refused.stderr
+
+
+def test_quiet_is_the_exit_code_alone(tmp_path: Path) -> None:
+    quiet = checked(tmp_path / "a", SEVERAL, "-q")
+    assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (1, "", "")
+    program, machine, job = written(tmp_path / "b", Call())
+    proved = run("verify", program, program, "-m", machine, "-j", job, "-q", "--tolerance-um", "1000")
+    assert (proved.stdout, proved.stderr) == ("", "")
+    assert run("verify", program, program, "-m", machine, "-j", job).stdout
+    simulated = run("simulate", program, "-m", machine, "-j", job, "-o", tmp_path / "m.csv", "-q")
+    assert (simulated.exit_code, simulated.stdout, simulated.stderr) == (0, "", "")
+
+
 def sarif(text: str) -> dict[str, Any]:
     """A log as SARIF's object model reads it."""
     model = pytest.importorskip("sarif_pydantic")

@@ -6,8 +6,10 @@ import ast
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import olp
+from olp.cli import main
 
 FOLDER = Path(olp.__file__).parent / "cli"
 SHARED = FOLDER / "options.py"
@@ -37,3 +39,28 @@ def test_a_shared_option_is_defined_once(path: Path) -> None:
 def test_a_second_definition_is_seen() -> None:
     assert options_in('@click.option("-f", "--force", is_flag=True)\ndef f(): ...') & SHARED_OPTIONS
     assert len(SHARED_OPTIONS) > 15
+
+
+RENAMED = {
+    ("correct", "--within-um", "5"): "--part-tolerance-um",
+    ("check", "--within-um", "5"): "--part-tolerance-um",
+    ("compare", "--tolerance-um", "5"): "--part-tolerance-um",
+    ("correct", "--results"): "olp results",
+    ("calibrate doctor", "--tool", "0", "0", "-50"): "--reflector",
+    ("calibrate refine", "--tool", "0", "0", "-50"): "--reflector",
+    ("calibrate squareness", "--frame", "C0Y=140.4,142.8,99.8"): "--drawn-frame",
+}
+
+
+@pytest.mark.parametrize("words", RENAMED, ids=" ".join)
+def test_a_renamed_option_names_the_new_one(words: tuple[str, ...]) -> None:
+    result = CliRunner().invoke(main, [*words[0].split(), *words[1:]])
+    assert result.exit_code == 2
+    assert f"{words[1]} is now {RENAMED[words]}." in result.output.replace("the verb ", "")
+
+
+@pytest.mark.parametrize("verb", ("correct", "retime", "results", "compare", "calibrate fit"))
+def test_a_report_of_an_unknown_form_is_refused_before_anything_is_read(verb: str) -> None:
+    result = CliRunner().invoke(main, [*verb.split(), "absent.ngc", "--report", "report.pdf"])
+    assert result.exit_code == 2
+    assert "report.pdf: is not a form of this report; expected " in str(result.exception) + result.output

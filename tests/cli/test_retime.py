@@ -210,7 +210,7 @@ def test_a_reader_that_goes_is_no_error(job: Path, tmp_path: Path) -> None:
 
 def test_nothing_is_overwritten_without_force(job: Path, tmp_path: Path) -> None:
     part = program(tmp_path)
-    names = {option: tmp_path / f"x{option}" for option in ("-o", "--lines", "--slow", "--report")}
+    names = {option: tmp_path / f"x{option}.json" for option in ("-o", "--lines", "--slow", "--report")}
     for option, name in names.items():
         name.write_text("mine")
         refused = run("retime", part, "-j", job, option, name)

@@ -142,7 +142,7 @@ def _kind(value: Mapping[str, Any]) -> str:
         return f'"{value["const"]}"'
     if "anyOf" in value:
         return " or ".join(dict.fromkeys(_kind(v) for v in value["anyOf"]))
-    kinds = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false",
+    kinds = {"string": "text", "number": "number", "integer": "integer", "boolean": "true or false",
              "array": "list", "object": "table"}  # fmt: skip
     return kinds.get(str(value.get("type", "")), "")
 

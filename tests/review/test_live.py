@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -141,7 +142,9 @@ def test_ctrl_c_ends_it(tmp_path: Path) -> None:
     machine = zero_machine(tmp_path / "m")
     (tmp_path / "part.ngc").write_text(TEXT)
     words = ["view", str(tmp_path / "part.ngc"), "-m", str(machine), "--live", "--no-time"]
-    with subprocess.Popen([sys.executable, "-m", "olp", *words], stderr=subprocess.PIPE, text=True) as done:
+    command = [sys.executable, "-m", "olp", *words]
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell's background job ignores it
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard) as done:
         assert done.stderr is not None
         line = done.stderr.readline()
         assert line.startswith("serving http://127.0.0.1:")

@@ -81,6 +81,3 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
         (b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves an axis that is not read")
     ),
 }  # fmt: skip
-
-#: majors of assignments that run and input statements make; their value is text or logic, never motion
-FREE = (b"TEXT", b"DISPLAY", b"PSTHRU")
