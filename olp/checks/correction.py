@@ -14,6 +14,7 @@ from olp.compensation.hole_plan import HolePlan
 from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
@@ -136,28 +137,28 @@ def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
                 lines_of(path, above),
             )
         )
-    if not proof.after.judged.any():
+    if not proof.judged.any():
         findings.append(finding("OLP107", "no move of this program could be judged"))
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
     untouched[uncorrected] = True
     if untouched.any():
         lines = lines_of(path, untouched)
         findings.append(finding("OLP102", f"{int(untouched.sum())} moves were written unchanged", lines))
-    unknown = proof.after.side > proof.tolerance_mm
+    unknown = proof.judged & (proof.after.side > proof.tolerance_mm)
     if unknown.any():
         findings.append(
             finding(
                 "OLP103",
-                f"at {int(unknown.sum())} waypoints the side of an axis' backlash is unknown; the tip may be "
-                f"off by up to {proof.after.side.max() * 1e3:.1f} um there",
+                f"in {int(unknown.sum())} moves the side of an axis' backlash is unknown; up to "
+                f"{proof.after.side[unknown].max() * UM_PER_MM:.1f} um of the deviation comes from that",
                 lines_of(path, unknown),
             )
         )
     if proof.lean.any():
         lines = lines_of(path, proof.lean)
-        findings.append(
-            finding("OLP306", f"{len(lines)} feed moves start where a move ended uncorrected", lines)
-        )
+        most = proof.size_mm()[proof.lean].max() * UM_PER_MM
+        what = f"{len(lines)} feed moves start where a move ended uncorrected; they are off by up to "
+        findings.append(finding("OLP306", f"{what}{most:.2f} um", lines))
     return findings
 
 

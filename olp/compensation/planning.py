@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.compensation.approach import with_approaches
 from olp.compensation.arcs import subdivide_arcs
 from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
@@ -52,6 +53,7 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
         path, target, command, raw, uncorrected, shift, [cuts_line, cuts_arc], model, reversal is not None
     )
     if reversal is not None:
+        rows = with_approaches(path, model, rows, reversal.axes, limits)
         rows = carry_play(path, model, rows, reversal, insert=limits.insert)
     if limits.refuse_outside:
         _check_box(path, model, rows)

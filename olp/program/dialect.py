@@ -65,7 +65,8 @@ class Dialect:
     texts say at the start of a line, `shared_sign` what texts of other dialects say too. With
     `payload_comments` the payload may change inside a program. `path_tolerance`: programs state how far the
     control may leave the path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions
-    count at the end of the ram, whatever stylus or tool is active.
+    count at the end of the ram, whatever stylus or tool is active. `points`: programs state points, and all
+    of them count, however the machine goes there.
     """
 
     name: str
@@ -79,6 +80,7 @@ class Dialect:
     payload_comments: bool = False
     path_tolerance: bool = False
     axes_at_ram: bool = False
+    points: bool = False
     inch_decimals: int = 5
     free_digits: int = 1
     comment: tuple[bytes, bytes] = (b"(", b")")

@@ -8,7 +8,6 @@ the program belong to which nominal move.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_distance, arc_points, segment_distance
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import play_states
+from olp.errormodel.reversal import play_interval, play_states
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 
 #: enough for deviations, which are small, and half the memory
@@ -25,8 +24,8 @@ Single = npt.NDArray[np.float32]
 
 #: nominal moves at a time, so that memory is small
 _BLOCK = 1 << 15
-#: moves that are left as they are, and so not judged
-_AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: positions over the box at which an unknown axis is tried
+_PROBES = 9
 #: samples of an arc move at the least
 _ARC_STEPS = 8
 
@@ -34,27 +33,13 @@ _ARC_STEPS = 8
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
     """Deviation per nominal move, in mm: `waypoint` at its end, `path` the largest along it and at its end,
-    `bend` the part of it that comes from chords. NaN where the position is unknown. `judged` (n,): the move
-    counts. `side` (n,): how far the tip may be off because the side of the backlash is not known yet."""
+    `bend` the part of it that comes from chords. NaN where the position is unknown. `side` (n,) is how much
+    more it may be because the side of the backlash is not known yet."""
 
     waypoint: Single
     path: Single
     bend: Single
-    judged: Mask
     side: Array
-
-    def summary(self, cutting: Mask) -> dict[str, dict[str, float]]:
-        """Largest and rms in um, at waypoints of all judged moves and along those that are `cutting`."""
-        waypoints = self.waypoint[self.judged & np.isfinite(self.waypoint)]
-        along = self.path[self.judged & cutting & np.isfinite(self.path)]
-        return {"waypoints": _figures(waypoints), "between": _figures(along)}
-
-
-def _figures(values: Single) -> dict[str, float]:
-    if not len(values):
-        return {"max_um": 0.0, "rms_um": 0.0}
-    rms = float(np.sqrt(np.mean(np.square(values, dtype=np.float64))))
-    return {"max_um": float(values.max()) * 1e3, "rms_um": rms * 1e3}
 
 
 def cutting_moves(path: Toolpath) -> Mask:
@@ -66,54 +51,73 @@ def cutting_moves(path: Toolpath) -> Mask:
 
 
 def measure(
-    nominal: Toolpath,
-    target_mm: Array,
-    path: Toolpath,
-    groups: Index,
-    model: ErrorModel,
-    bend_mm: float,
-    exempt: Mask | None = None,
+    nominal: Toolpath, target_mm: Array, path: Toolpath, groups: Index, model: ErrorModel, bend_mm: float
 ) -> Deviation:
     """Compare the actual path of `path` with the nominal one.
 
     `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
-    the last move of `path` that belongs to each nominal move. `exempt` moves are left uncorrected and not
-    judged.
+    the last move of `path` that belongs to each nominal move.
     """
     count = len(nominal)
     waypoint = np.full(count, np.nan, np.float32)
     worst = np.full(count, np.nan, np.float32)
     bend = np.zeros(count, np.float32)
-    judged = (nominal.flag & (_AWAY | np.uint8(Flag.CYCLE))) == 0
-    if exempt is not None:
-        judged &= ~exempt
-    side = _unknown_side(path, groups, model)
-    judged &= ~(side > bend_mm)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     for a in range(0, count, _BLOCK):
         b = min(a + _BLOCK, count)
         tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
-    return Deviation(waypoint, worst, bend, judged, side)
+    _from_unknown(nominal, target_mm, path, groups, model, worst)
+    return Deviation(waypoint, worst, bend, _unknown_side(path, groups, model))
+
+
+def _from_unknown(
+    nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, worst: Single
+) -> None:
+    """Where a feed move starts at a position of which an axis is unknown, how far the tip may be off there in
+    the others: the largest over the box of the unknown axis."""
+    start = nominal.starts_mm()
+    first = np.concatenate(([0], groups[:-1] + 1)) if len(groups) else groups
+    some = np.isnan(start).any(axis=1) & np.isfinite(start).any(axis=1)
+    some &= (nominal.kind != Kind.RAPID) & np.isfinite(target).all(axis=1)
+    command = path.starts_mm()
+    for i in np.flatnonzero(some).tolist():
+        known, at = np.isfinite(start[i]), int(first[i])
+        if at >= len(path) or not np.isfinite(command[at][known]).all():
+            continue
+        ranges = [
+            command[at][axis : axis + 1] if known[axis] else np.linspace(*model.box_mm[axis], _PROBES)
+            for axis in range(3)
+        ]
+        point = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
+        tip = point + model.error(point, path.tool_mm(at, at + 1))
+        meant = start[i] + target[i] - nominal.end_mm[i]
+        away = float(np.sqrt((((tip - meant)[:, known]) ** 2).sum(axis=1)).max())
+        worst[i] = max(away, float(np.nan_to_num(worst[i])))
 
 
 def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
-    """(n,) mm: the unknown play at the start or at the end of each group of moves, whichever is more. It
+    """(n,) mm: what the unknown play changes at most at the start or at the end of each group of moves. It
     shrinks with the range that an axis has moved, and is 0 once that range is the backlash."""
     width = model.backlash_at(path.end_mm) if len(groups) else None
     if width is None:
         return np.zeros(len(groups))
+    low, high = play_interval(path.end_mm, width)
+    half = (high - low) / 2
+    half[np.isnan(path.end_mm)] = 0.0
+    rows = np.flatnonzero((half > 0.0).any(axis=1) & (np.nan_to_num(width) > 0.0).any(axis=1))
     unknown = np.zeros(len(path))
-    for axis in np.flatnonzero((np.nan_to_num(width) > 0).any(axis=0)).tolist():
-        command, backlash = path.end_mm[:, axis], np.nan_to_num(width[:, axis])
-        resets = np.flatnonzero(np.isnan(command))
-        edges = [0, *(resets + 1).tolist(), len(command)]
-        for a, b in pairwise(edges):
-            if b > a:
-                part = command[a:b]
-                reach = np.maximum.accumulate(part) - np.minimum.accumulate(part)
-                half = np.maximum(backlash[a:b] - np.nan_to_num(reach), 0.0) / 2
-                unknown[a:b] = np.hypot(unknown[a:b], half)
-    return np.maximum(unknown[groups], np.concatenate((unknown[:1], unknown[groups[:-1]])))
+    if rows.size:
+        tool = path.tool_mm()
+        tool = tool if tool.ndim == 1 else tool[rows]
+        for axis in range(3):
+            ahead = np.zeros((len(rows), 3))
+            ahead[:, axis] = half[rows, axis]
+            change = model.error(path.end_mm[rows], tool, ahead) - model.error(path.end_mm[rows], tool, -ahead)
+            unknown[rows] += np.nan_to_num(np.linalg.norm(change, axis=1)) / 2
+    largest = np.maximum(unknown, np.concatenate((unknown[:1], unknown[:-1])))
+    first = np.concatenate(([0], groups[:-1] + 1))
+    result = np.maximum(largest[groups], largest[np.minimum(first, len(path) - 1)])
+    return np.asarray(result, float)
 
 
 class Tracer:
@@ -191,10 +195,12 @@ class Tracer:
             self._arc_steps(arc, known, steps, start, tool)
         reached, inner = self._samples(start, end, arc, steps, known, tool)
         # ends of parts inside a nominal move lie along it, too
+        ends = self.groups[a:b] - first
         last_part = np.zeros(last - first, bool)
-        last_part[self.groups[a:b] - first] = True
+        last_part[ends[ends >= 0]] = True
         cuts = np.flatnonzero(~last_part)
-        away = reached[last_part] - self.target[a:b]
+        # a hole with fewer pecks than the nominal one has strokes that end with the move before them
+        away = reached[np.maximum(ends, 0)] - self.target[a:b]
         waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
         worst[:] = waypoint
         if len(inner.part) or len(cuts):

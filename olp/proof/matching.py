@@ -1,80 +1,289 @@
-"""Which moves of a corrected program belong to which move of the nominal one, from the two paths alone."""
+"""Which moves of a corrected program belong to which move of the nominal one, from the two programs alone.
+
+A correction keeps all moves in their order. It splits some, puts steps that take up backlash before others,
+and may change the number of pecks of a hole. So the two sequences are aligned: every nominal move ends with
+one move of the corrected program, and those between two such ends lie along the later move. Where the tip is
+near the waypoints this is plain; elsewhere the alignment with the least squares of distances is taken.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
-from olp.core.toolpath import Flag, Kind
+from olp.core.geometry import PLANES, segment_distance
+from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.program.program import Program
 
-#: mm; a waypoint counts as reached within this where nothing comes nearer; corrections are far smaller
-GATE_MM = 0.05
-#: moves that are compared at once
+#: mm; beyond this all distances count the same, so one wrong coordinate does not shift the others.
+_FAR_MM = 1.0
+#: mm2; cost of a nominal move that would end with a move of another kind.
+_OTHER_KIND_MM2 = 4.0
+#: Share of waypoints that may be far off before the programs count as different jobs.
+_MOST_FAR = 0.5
+#: Units that are compared at once where both sequences agree.
 _BLOCK = 4096
-#: kinds of moves along arcs
-_ARCS = (Kind.ARC_CW, Kind.ARC_CCW)
+#: Nominal units that are aligned at once.
+_WINDOW = 12
+#: How many of them are kept: the last ones depend on what comes behind them.
+_KEPT = 6
+#: rad; angles of an arc count from this much before its start.
+_WHOLE = 1e-3
+#: Inserted moves that a window allows at first; more where the alignment needs them.
+_SPARE = 64
+#: Kind of a whole hole.
+_HOLE = 255
+#: Moves that are as the control makes them: their ends may be anywhere.
+_FREE = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 
 
 def match(program: Program, target_mm: Array, corrected: Program, model: ErrorModel, near_mm: float) -> Index:
     """(n,) index of the last move of `corrected` for each move of `program`, whose waypoints are
-    `target_mm`.
+    `target_mm` (n, 3).
 
-    Waypoints are sought in order: the next move that comes within `near_mm`, else the nearest of those within
-    the gate. Raises ProgramError where one is not reached: then the two programs are not the same job.
+    Within `near_mm` of its waypoint a move counts as found. Raises ProgramError where the two programs are
+    not the same job: fewer moves, or most waypoints farther off than 1 mm.
     """
-    nominal, path = program.toolpath, corrected.toolpath
-    count, extra = len(nominal), len(path) - len(nominal)
-    if extra < 0:
+    holes = len(program.holes) == len(corrected.holes)
+    mine, theirs = _units(program, holes), _units(corrected, holes)
+    if len(theirs) < len(mine):
         raise ProgramError(
-            f"the corrected program has {len(path)} moves, fewer than the {count} of the nominal one, so it "
-            "is not a correction of it; give the two programs of one job"
+            f"the corrected program has {len(theirs)} moves and holes, fewer than the {len(mine)} of the "
+            "nominal one, so it is not a correction of it; give the two programs of one job"
         )
-    if extra == 0:
-        return np.arange(count)
+    if not len(mine):
+        return np.zeros(0, np.int64)
+    path = corrected.toolpath
     play = plays(model, path.end_mm)
-    actual = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
-    free = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE)
-    loose = ((nominal.flag & free) != 0) | ~np.isfinite(target_mm).all(axis=1)
-    # the step that takes up backlash before a whole circle ends where the circle ends, but is no part of it
-    curved = np.isin(nominal.kind, _ARCS)
-    straight = ~np.isin(path.kind, _ARCS)
-    groups = np.zeros(count, np.int64)
-    i = j = 0
-    while i < count:
-        span = min(_BLOCK, count - i, len(path) - j)
-        away = np.abs(actual[j : j + span] - target_mm[i : i + span]).max(axis=1, initial=0.0)
-        near = ((away < near_mm) & ~(curved[i : i + span] & straight[j : j + span])) | loose[i : i + span]
-        run = span if near.all() else int(np.argmin(near))
-        groups[i : i + run] = np.arange(j, j + run)
-        i, j = i + run, j + run
-        if i == count or (run == span and span):
-            continue
-        ahead = np.abs(actual[j : j + extra + 1] - target_mm[i]).max(axis=1, initial=0.0)
-        if curved[i]:
-            ahead[straight[j : j + extra + 1]] = np.inf
-        skip = (
-            int(np.argmax(ahead < near_mm))
-            if (ahead < near_mm).any()
-            else int(np.argmin(ahead))
-            if len(ahead)
-            else -1
+    tip = path.end_mm + model.error(path.end_mm, path.tool_mm(), play)
+    aligned = _Alignment(program.toolpath, target_mm, mine, path, tip, theirs, near_mm)
+    ends = aligned.ends()
+    _refuse_others(program.toolpath, target_mm, mine, tip[theirs.last[ends]])
+    return _groups(target_mm, mine, tip, theirs, ends)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Units:
+    """Moves, whole holes as one: (u,) `first` and `last` move and `kind`."""
+
+    first: Index
+    last: Index
+    kind: Index
+
+    def __len__(self) -> int:
+        return len(self.last)
+
+
+def _units(program: Program, holes: bool) -> _Units:
+    path = program.toolpath
+    starts = np.ones(len(path), bool)
+    kind = path.kind.astype(np.int64)
+    if holes:
+        for hole in program.holes:
+            starts[hole.first + 1 : hole.last] = False
+            kind[hole.first : hole.last] = _HOLE
+    first = np.flatnonzero(starts)
+    last = np.append(first[1:], len(path)) - 1 if len(path) else first
+    return _Units(first, last, kind[first])
+
+
+class _Alignment:
+    """The alignment of two sequences of units."""
+
+    def __init__(
+        self, nominal: Toolpath, target: Array, mine: _Units, path: Toolpath, tip: Array, theirs: _Units,
+        near_mm: float,
+    ) -> None:  # fmt: skip
+        self.mine, self.theirs, self.near = mine, theirs, near_mm
+        self.target, self.tip = target[mine.last], tip[theirs.last]
+        self.begin = np.empty_like(self.target)
+        self.begin[1:], self.begin[0] = self.target[:-1], np.array(nominal.start_mm)
+        free = (nominal.flag[mine.last] & _FREE) != 0
+        self.loose = free | ~np.isfinite(self.target).all(axis=1)
+        self.lost = ~np.isfinite(self.tip).all(axis=1)
+        self.arc = np.full(len(mine), -1, np.int64)
+        index = np.full(len(nominal), -1, np.int64)
+        index[nominal.arcs.move] = np.arange(len(nominal.arcs))
+        self.arc = index[mine.last]
+        self.arcs = nominal.arcs
+
+    def ends(self) -> Index:
+        """(u,) the unit of the corrected program at which each nominal unit ends."""
+        count, total = len(self.mine), len(self.theirs)
+        if count == total:
+            return np.arange(count)
+        ends = np.zeros(count, np.int64)
+        i = j = 0
+        while i < count:
+            run = self._run(i, j)
+            ends[i : i + run] = np.arange(j, j + run)
+            i, j = i + run, j + run
+            if i == count:
+                break
+            skipped = self._plain_split(i, j)
+            some = self._window(i, j) if skipped is None else np.array([j + skipped])
+            ends[i : i + len(some)] = some
+            i, j = i + len(some), int(some[-1]) + 1
+        # what comes behind the last move, such as the second half of a whole circle, belongs to it
+        ends[-1] = total - 1
+        return ends
+
+    def _room(self, i: int, j: int) -> int:
+        """How many moves may be inserted before unit i when unit j is the next."""
+        return (len(self.theirs) - j) - (len(self.mine) - i)
+
+    def _near(self, i: Index, j: Index) -> Mask:
+        """Whether nominal units end at units of the corrected program, beyond doubt."""
+        away = np.abs(self.tip[j] - self.target[i]).max(axis=1, initial=0.0)
+        unknown = self.loose[i] & (self.lost[j] | ~np.isfinite(self.target[i]).all(axis=1))
+        good: Mask = ((away < self.near) | unknown) & (self.mine.kind[i] == self.theirs.kind[j])
+        return good
+
+    def _run(self, i: int, j: int) -> int:
+        """How many units from here agree one by one."""
+        done = 0
+        while i + done < len(self.mine):
+            span = min(_BLOCK, len(self.mine) - i - done, len(self.theirs) - j - done)
+            step = np.arange(span)
+            near = self._near(i + done + step, j + done + step)
+            if not near.all():
+                return done + int(np.argmin(near))
+            done += span
+            if not span:
+                break
+        return done
+
+    def _plain_split(self, i: int, j: int) -> int | None:
+        """The number of moves inserted before the end of unit i where they all lie along it, None where that
+        is not plain."""
+        ahead = np.arange(j, j + min(self._room(i, j), _SPARE) + 1)
+        end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead))
+        if not end.size or not end[0]:
+            return None
+        count = int(end[0])
+        along = self._along(i, ahead[:count])
+        return count if (along < self.near).all() else None
+
+    def _along(self, i: int, j: Index) -> Array:
+        """(m,) distances of the ends of units j from the nominal unit i as a line or an arc, in mm."""
+        point = self.tip[j]
+        arc = int(self.arc[i])
+        if arc < 0:
+            begin, end = self.begin[i : i + 1], self.target[i : i + 1]
+            if not np.isfinite(begin).all():
+                begin = end
+            away = segment_distance(point, np.repeat(begin, len(j), 0), np.repeat(end, len(j), 0))
+        else:
+            away = self._from_arc(i, arc, point)
+        return np.asarray(np.nan_to_num(away, nan=_FAR_MM), float)
+
+    def _from_arc(self, i: int, arc: int, point: Array) -> Array:
+        """(m,) distances of points from the nominal arc of unit i: across it, and beyond its ends."""
+        first, second, third = PLANES[int(self.arcs.plane[arc])]
+        centre, sweep = self.arcs.centre_mm[arc], float(self.arcs.sweep_rad[arc])
+        begin, end = self.begin[i], self.target[i]
+        radius = float(np.hypot(*(end - centre)[[first, second]]))
+        arm = point - centre
+        across = np.hypot(arm[:, first], arm[:, second]) - radius
+        start = float(np.arctan2(begin[second] - centre[second], begin[first] - centre[first]))
+        angle = np.sign(sweep) * (np.arctan2(arm[:, second], arm[:, first]) - start)
+        # a little before the start is at the start
+        angle = np.mod(angle + 0.5 * _WHOLE, 2 * np.pi) - 0.5 * _WHOLE
+        beyond = np.maximum(angle - abs(sweep), 0.0) * radius
+        low, high = min(begin[third], end[third]), max(begin[third], end[third])
+        level = np.maximum(np.maximum(low - point[:, third], point[:, third] - high), 0.0)
+        return np.asarray(np.sqrt(across**2 + beyond**2 + level**2), float)
+
+    def _window(self, i: int, j: int) -> Index:
+        """The ends of the next units, by the least squares of all distances."""
+        rows = min(_WINDOW, len(self.mine) - i)
+        spare = _SPARE
+        while True:
+            width = rows + min(self._room(i, j), spare)
+            ends = self._aligned(i, j, rows, width)
+            if ends[-1] - j < width - 1 or width == rows + self._room(i, j):
+                return ends if i + rows == len(self.mine) else ends[:_KEPT]
+            spare *= 4
+
+    def _aligned(self, i: int, j: int, rows: int, width: int) -> Index:
+        """Dynamic programming over `rows` nominal units and `width` units of the corrected program."""
+        columns = np.arange(j, j + width)
+        best = np.full(width + 1, np.inf)
+        best[0] = 0.0
+        back = np.zeros((rows, width), np.int64)
+        for r in range(rows):
+            end, inner = self._costs(i + r, columns)
+            total = np.concatenate(([0.0], np.cumsum(inner)))
+            # best[c]: the units before end before column c
+            gain = best - total
+            least = np.minimum.accumulate(gain)
+            lower = gain < np.concatenate(([np.inf], least[:-1]))
+            back[r] = np.maximum.accumulate(np.where(lower, np.arange(width + 1), 0))[:width]
+            best = np.full(width + 1, np.inf)
+            best[1:] = least[:width] + total[:width] + end
+        column = width - 1 if i + rows == len(self.mine) and j + width == len(self.theirs) else -1
+        if column < 0:
+            column = int(np.argmin(best[1:]))
+        ends = np.zeros(rows, np.int64)
+        for r in range(rows - 1, -1, -1):
+            ends[r] = j + column
+            column = int(back[r, column]) - 1
+        return ends
+
+    def _costs(self, i: int, j: Index) -> tuple[Array, Array]:
+        """mm2: what it costs that unit i ends at each of units j, and that each of them is a part of it."""
+        away = np.minimum(((self.tip[j] - self.target[i]) ** 2).sum(axis=1), _FAR_MM**2)
+        if self.loose[i]:
+            known = np.isfinite(self.target[i]).all()
+            away = np.where(self.lost[j] == ~known, 0.0, _FAR_MM**2)
+        end = np.nan_to_num(away, nan=_FAR_MM**2) + np.where(
+            self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2
         )
-        if skip < 0 or ahead[skip] > GATE_MM:
-            raise ProgramError(
-                f"no move of the corrected program comes within {GATE_MM:g} mm of the end of line "
-                f"{int(nominal.line[i])} of the nominal one; it is not a correction of this program for this "
-                "machine",
-                line=int(path.line[min(j, len(path) - 1)]),
-            )
-        groups[i] = j + skip
-        extra -= skip
-        i, j = i + 1, j + skip + 1
-    last = len(path) - 1
-    if count and groups[-1] < last and np.abs(actual[last] - target_mm[-1]).max() < near_mm:
-        # a whole circle at the end comes to its last point twice
-        groups[-1] = last
+        # a part of a feed move is a feed move, and a part of a rapid a rapid
+        other = (self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID)
+        part = np.minimum(self._along(i, j), _FAR_MM) ** 2 + np.where(other, _OTHER_KIND_MM2, 0.0)
+        return np.asarray(end, float), part
+
+
+def _refuse_others(nominal: Toolpath, target: Array, mine: _Units, tip: Array) -> None:
+    """Raise ProgramError where most waypoints are far off: this is another job."""
+    counted = ((nominal.flag[mine.last] & _FREE) == 0) & np.isfinite(target[mine.last]).all(axis=1)
+    with np.errstate(invalid="ignore"):
+        far: Mask = counted & ~(np.abs(tip - target[mine.last]).max(axis=1) < _FAR_MM)
+    if counted.any() and far.sum() > _MOST_FAR * counted.sum():
+        first = int(mine.last[np.argmax(far)])
+        raise ProgramError(
+            f"{int(far.sum())} of {int(counted.sum())} waypoints are farther than {_FAR_MM:g} mm from those of "
+            f"the nominal program, the first at its line {int(nominal.line[first])}; it is not a correction "
+            "of this program for this machine"
+        )
+
+
+def _groups(target: Array, mine: _Units, tip: Array, theirs: _Units, ends: Index) -> Index:
+    """(n,) the last move of the corrected program for each nominal move, from those of the units."""
+    groups = np.zeros(len(target), np.int64)
+    groups[mine.last] = theirs.last[ends]
+    for u in np.flatnonzero(mine.last > mine.first).tolist():
+        # of a hole: the strokes one by one; one peck more belongs to the last stroke
+        first, last = int(mine.first[u]), int(mine.last[u])
+        begin, end = int(theirs.first[ends[u]]), int(theirs.last[ends[u]])
+        count = last - first
+        begin += _first_stroke(target[first : last + 1], tip[begin : end + 1])
+        groups[first:last] = np.minimum(begin + np.arange(count), end)
     return groups
+
+
+def _first_stroke(target: Array, tip: Array) -> int:
+    """With how many moves the corrected hole begins before the first of the nominal one: a rapid to the hole
+    that the nominal program does not need."""
+    extra = len(tip) - len(target)
+    if extra <= 0:
+        return 0
+    few = min(2, len(target))
+    away = [np.abs(tip[k : k + few] - target[:few]).sum() for k in range(extra + 1)]
+    return int(np.argmin(away))

@@ -135,7 +135,7 @@ def corrected(
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
     proof = prove(
         done.nominal, second, loaded.model, tolerance_mm=done.limits.tolerance_mm, digit_mm=done.digit_mm,
-        uncorrected=done.uncorrected, parts=done.parts,
+        uncorrected=done.uncorrected,
     )  # fmt: skip
     _prove_without_deleted(done, loaded, options.contour)
     assessment = confidence_of(loaded, done.nominal, second, proof, done.uncorrected, options, tell)

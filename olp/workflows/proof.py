@@ -25,7 +25,7 @@ from olp.core.toolpath import Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
-from olp.proof.proof import ROUNDING_SHARE, Proof, prove
+from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, prove
 from olp.uncertainty.spread import Confidence
 from olp.workflows.confidence import Assessment, assess
 from olp.workflows.session import Loaded
@@ -147,10 +147,7 @@ def report_of(
 ) -> dict[str, Any]:
     """The parts of the report ("olp-report-1") that a proof alone gives."""
     data, name = source
-    size = proof.size_mm()
-    bend = float(
-        np.where(proof.after.judged & proof.cutting & ~proof.lean, proof.after.bend, 0.0).max(initial=0.0)
-    )
+    bend = float(np.where(proof.counts == Counts.FEED, proof.after.bend, 0.0).max(initial=0.0))
     return {
         "schema": "olp-report-1",
         "program": {
@@ -163,9 +160,9 @@ def report_of(
         **loaded.heads(),
         "tolerance_um": tolerance_um,
         "deviation": {
-            "before": proof.before.summary(proof.cutting),
-            "after": proof.after.summary(proof.cutting & ~proof.lean),
-            "path_max_um": float(size.max(initial=0.0)) * 1e3,
+            "before": proof.summary("before"),
+            "after": proof.summary("after"),
+            "path_max_um": proof.largest_mm * UM_PER_MM,
             "allowed_um": proof.allowed_mm * 1e3,
             "holds": proof.holds,
         },

@@ -32,6 +32,7 @@ DIALECT = StatementDialect(
     ),
     shared_sign=POINTS_BY_SLASH,
     axes_at_ram=True,
+    points=True,
     comment=(b"$$ ", b""),
     first=(b"FILNAM|DMISMN|DMISMD",),
 )

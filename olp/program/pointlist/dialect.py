@@ -11,6 +11,7 @@ DIALECT = PointList(
     name="list",
     title="list of positions (CSV, TXT)",
     path_mode="not stated",
+    points=True,
     reader=read_list,
     endings=("csv", "tsv"),
     comment=(b"# ", b""),

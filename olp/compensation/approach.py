@@ -1,0 +1,92 @@
+"""The side of the backlash at the start of a cut, taken up in the rapid before it.
+
+At the start of a program and after a tool change nothing is known of the side on which an axis rests in its
+backlash. Where the first feed would begin so, the rapid before it goes past its end by the backlash and comes
+back: after that the side is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.plan import Limits, Plan
+from olp.core.arrays import Array, Index, Mask
+from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.reversal import play_interval
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+
+#: Digits beyond the backlash by which a rapid goes past its end: rounding may take one at either end.
+_DIGITS = 2.0
+#: mm; the same where the last digit is not known.
+_LEAST_MM = 1e-3
+#: Moves that take no further block.
+_FIXED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE | Flag.DELETED)
+
+
+def with_approaches(path: Toolpath, model: ErrorModel, rows: Plan, axes: Mask, limits: Limits) -> Plan:
+    """The plan with a row before the end of each rapid after which a cut would begin with an unknown side of
+    an axis of `axes` (3,)."""
+    width = model.backlash_at(rows.command_mm)
+    if width is None or not limits.insert or not len(rows):
+        return rows
+    width = np.where(axes, np.maximum(np.nan_to_num(width), 0.0), 0.0)
+    low, high = play_interval(rows.command_mm, width)
+    unknown = (high - low > 1e-9) & (width > 0.0) & np.isfinite(rows.command_mm)
+    where = _rapids(path, rows, unknown)
+    if not where.size:
+        return rows
+    past = np.maximum(_DIGITS * limits.digit_mm, _LEAST_MM)
+    side = _sides(path, rows, where)
+    step = np.where(unknown[where], side * (width[where] + past), 0.0)
+    beyond = rows.command_mm[where] - step
+    box = model.box_mm
+    step = np.where((beyond < box[:, 0]) | (beyond > box[:, 1]), -step, step)
+
+    def insert(column: npt.NDArray[_Scalar], new: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
+        return np.insert(column, where, new, axis=0)
+
+    share = np.nextafter(rows.reach[where], 0.0)
+    return replace(
+        rows,
+        move=insert(rows.move, rows.move[where]),
+        target_mm=insert(rows.target_mm, rows.target_mm[where] - step),
+        command_mm=insert(rows.command_mm, rows.command_mm[where] - step),
+        raw=insert(rows.raw, rows.raw[where]),
+        reach=insert(rows.reach, share),
+        take_up=insert(rows.take_up, np.zeros(len(where), bool)),
+    )
+
+
+def _rapids(path: Toolpath, rows: Plan, unknown: Mask) -> Index:
+    """The last rows of rapids after which a cut begins while the side of an axis is unknown."""
+    kind, flag = path.kind[rows.move], path.flag[rows.move]
+    cutting = (kind != Kind.RAPID) & ~rows.raw.any(axis=1)
+    starts = np.flatnonzero(cutting[1:] & unknown[:-1].any(axis=1)) + 1
+    found = []
+    for start in starts.tolist():
+        k = start - 1
+        while k > 0 and kind[k] == Kind.RAPID and flag[k] & np.uint8(Flag.CYCLE):
+            k -= 1
+        good = kind[k] == Kind.RAPID and not flag[k] & _FIXED and not rows.raw[k].any()
+        deleted = k and bool(flag[k - 1] & np.uint8(Flag.DELETED))
+        if good and not deleted and np.isfinite(rows.command_mm[k]).all() and unknown[k].any():
+            found.append(k)
+    return np.unique(np.array(found, np.int64))
+
+
+def _sides(path: Toolpath, rows: Plan, where: Index) -> Array:
+    """(m, 3) the direction of the next motion of each axis after the rows, 1 where there is none."""
+    side = np.ones((len(where), 3))
+    for i, k in enumerate(where.tolist()):
+        for axis in range(3):
+            ahead = path.end_mm[rows.move[k] + 1 :, axis] - path.end_mm[rows.move[k], axis]
+            moved = np.flatnonzero(np.nan_to_num(ahead[:1000]) != 0.0)
+            if moved.size:
+                side[i, axis] = np.sign(ahead[moved[0]])
+    return side

@@ -1,0 +1,88 @@
+"""How far the strokes of canned cycles are from the axis and the bottom of their holes.
+
+A corrected hole may have a peck more or less than the nominal one, so strokes are not compared one by one: a
+feed stroke anywhere in the hole counts by its distance from the axis of the hole, and the deepest one by its
+depth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Array, Index
+from olp.core.geometry import PLANES, segment_distance
+from olp.core.toolpath import Kind, Toolpath
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.reversal import plays
+from olp.errormodel.sampling import steps_needed
+from olp.program.program import Hole, Program
+
+Single = npt.NDArray[np.float32]
+#: Most steps of a stroke: an error that bends more often than that along a hole is no error of an axis.
+_MOST_STEPS = 1 << 8
+
+
+def strokes_mm(
+    nominal: Program, target_mm: Array, path: Toolpath, holes: tuple[Hole, ...], model: ErrorModel,
+    bend_mm: float,
+) -> tuple[Index, Single]:  # fmt: skip
+    """(h,) the nominal move that reaches the bottom of each hole, and (h,) mm, the largest deviation of the
+    feed strokes of `holes` of `path` from the nominal hole; NaN where a position is unknown."""
+    count = len(nominal.holes)
+    worst = np.full(count, np.nan, np.float32)
+    move = np.zeros(count, np.int64)
+    if not count or len(holes) != count:
+        return move[:0], worst[:0]
+    top, bottom = np.zeros((count, 3)), np.zeros((count, 3))
+    for k, hole in enumerate(nominal.holes):
+        move[k], top[k], bottom[k] = _axis(nominal.toolpath, target_mm, hole)
+    which = np.repeat(np.arange(count), [h.last - h.first for h in holes])
+    rows = np.concatenate([np.arange(h.first, h.last) for h in holes])
+    feed = path.kind[rows] != Kind.RAPID
+    which, rows = which[feed], rows[feed]
+    if not rows.size:
+        return move, worst
+    tip, of = _tips(path, rows, model, bend_mm)
+    hole_of = which[of]
+    away = segment_distance(tip, top[hole_of], bottom[hole_of])
+    np.fmax.at(worst, hole_of, away.astype(np.float32))
+    along = bottom - top
+    size = np.maximum(np.sqrt((along * along).sum(axis=1)), 1e-12)
+    depth = ((tip - top[hole_of]) * along[hole_of]).sum(axis=1) / size[hole_of]
+    deepest = np.full(count, -np.inf)
+    np.fmax.at(deepest, hole_of, depth)
+    off = np.where(np.isfinite(deepest), np.abs(deepest - size), np.nan).astype(np.float32)
+    return move, np.hypot(worst, np.where(np.isfinite(off), off, 0.0)).astype(np.float32)
+
+
+def _axis(path: Toolpath, target: Array, hole: Hole) -> tuple[int, Array, Array]:
+    """The move that reaches the bottom, and the ends of the hole's axis where its strokes are, targets."""
+    axis = PLANES[hole.plane][2]
+    some = np.arange(hole.first, hole.last)
+    depth = path.end_mm[some, axis]
+    at_bottom = some[np.abs(depth - hole.z_mm) < 1e-9]
+    move = int(at_bottom[0]) if at_bottom.size else int(some[-1])
+    bottom = target[move].copy()
+    top = bottom.copy()
+    side = 1.0 if hole.r_mm >= hole.z_mm else -1.0
+    levels = np.append(target[some, axis], bottom[axis] + hole.r_mm - hole.z_mm)
+    top[axis] = side * np.nanmax(side * levels)
+    return move, top, bottom
+
+
+def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tuple[Array, Index]:
+    """(m, 3) where the tip is along moves `rows`, their starts too, and (m,) which of `rows` each is on."""
+    start, end = path.starts_mm()[rows], path.end_mm[rows]
+    tool = path.tool_mm()
+    tool = tool if tool.ndim == 1 else tool[rows]
+    steps = steps_needed(model, np.nan_to_num(end - start), tool, bend_mm, at_most=_MOST_STEPS)
+    of = np.repeat(np.arange(len(rows)), steps + 1)
+    first = np.cumsum(steps + 1) - steps - 1
+    share = (np.arange(len(of)) - first[of]) / steps[of]
+    point = start[of] + share[:, None] * (end - start)[of]
+    play = plays(model, path.end_mm)
+    if play is not None:
+        # along a stroke the axis of the hole is on the side of its motion, as at its end
+        play = play[rows][of]
+    return point + model.error(point, tool if tool.ndim == 1 else tool[of], play), of
