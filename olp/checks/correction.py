@@ -10,7 +10,6 @@ import numpy.typing as npt
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import remark_findings
-from olp.compensation.hole_plan import HolePlan
 from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -18,7 +17,8 @@ from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
-from olp.proof.proof import Proof
+from olp.proof.judgement import Judgements
+from olp.proof.proof import Counts, Proof
 
 #: moves that are sampled for a table
 _SAMPLED = 4096
@@ -154,6 +154,11 @@ def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
                 lines_of(path, unknown),
             )
         )
+    holes = (proof.counts == Counts.HOLE) & (size > proof.tolerance_mm)
+    if holes.any():
+        most_um = size[holes].max() * UM_PER_MM
+        what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke"
+        findings.append(finding("OLP105", what, lines_of(path, holes)))
     if proof.lean.any():
         lines = lines_of(path, proof.lean)
         most = proof.size_mm()[proof.lean].max() * UM_PER_MM
@@ -162,38 +167,18 @@ def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
     return findings
 
 
-def hole_findings(holes: HolePlan, tolerance_mm: float) -> list[Finding]:
-    """Cycles whose stroke cannot follow the error."""
-    leaning = [
-        h.line for h, lean in zip(holes.holes, holes.lean_mm.tolist(), strict=True) if lean > tolerance_mm
-    ]
-    if not leaning:
+def part_findings(table: Judgements, part_tolerance_um: float | None) -> list[Finding]:
+    """Is the corrected path within the part tolerance, uncertainty left aside?"""
+    if part_tolerance_um is None:
         return []
-    return [
-        finding(
-            "OLP105",
-            f"{len(leaning)} holes lean by up to {holes.lean_mm.max() * 1e3:.2f} um between R and bottom",
-            leaning,
-        )
-    ]
-
-
-def stroke_findings(program: Program, model: ErrorModel, tolerance_mm: float) -> list[Finding]:
-    """Holes whose stroke is made by the control and cannot follow the error."""
-    statements = program.statements
-    if statements is None or not len(statements.strokes):
+    above = table.judged & (np.nan_to_num(table.corrected) * UM_PER_MM > part_tolerance_um)
+    if not above.any():
         return []
-    path = program.toolpath
-    top, bottom = statements.strokes[:, 0], statements.strokes[:, 1]
-    tool = path.tool_mm()
-    tool_vectors = tool if tool.ndim == 1 else tool[top]
-    change = model.error(path.end_mm[bottom], tool_vectors) - model.error(path.end_mm[top], tool_vectors)
-    lean = np.nan_to_num(np.sqrt((change * change).sum(axis=1))) / 2
-    wide = lean > tolerance_mm
-    if not wide.any():
-        return []
-    what = f"{int(wide.sum())} holes lean by up to {lean.max() * 1e3:.2f} um at clearance and bottom"
-    return [finding("OLP105", what, path.line[top[wide]].tolist())]
+    what = (
+        f"{int(above.sum())} moves are above the part tolerance: "
+        f"{table.largest_mm() * UM_PER_MM:.2f} um, {part_tolerance_um:g} um allowed"
+    )
+    return [finding("OLP108", what, sorted(set(table.line[above].tolist())))]
 
 
 def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:

@@ -85,7 +85,9 @@ def _from_unknown(
         if at >= len(path) or not np.isfinite(command[at][known]).all():
             continue
         ranges = [
-            command[at][axis : axis + 1] if known[axis] else np.linspace(*model.box_mm[axis], _PROBES)
+            command[at][axis : axis + 1]
+            if known[axis]
+            else np.linspace(model.box_mm[axis, 0], model.box_mm[axis, 1], _PROBES)
             for axis in range(3)
         ]
         point = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -112,7 +114,9 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
         for axis in range(3):
             ahead = np.zeros((len(rows), 3))
             ahead[:, axis] = half[rows, axis]
-            change = model.error(path.end_mm[rows], tool, ahead) - model.error(path.end_mm[rows], tool, -ahead)
+            change = model.error(path.end_mm[rows], tool, ahead) - model.error(
+                path.end_mm[rows], tool, -ahead
+            )
             unknown[rows] += np.nan_to_num(np.linalg.norm(change, axis=1)) / 2
     largest = np.maximum(unknown, np.concatenate((unknown[:1], unknown[:-1])))
     first = np.concatenate(([0], groups[:-1] + 1))

@@ -104,8 +104,9 @@ class _Alignment:
         self.begin = np.empty_like(self.target)
         self.begin[1:], self.begin[0] = self.target[:-1], np.array(nominal.start_mm)
         free = (nominal.flag[mine.last] & _FREE) != 0
-        self.loose = free | ~np.isfinite(self.target).all(axis=1)
-        self.lost = ~np.isfinite(self.tip).all(axis=1)
+        self.unknown = np.asarray(~np.isfinite(self.target).all(axis=1), bool)
+        self.loose = np.asarray(free | self.unknown, bool)
+        self.lost = np.asarray(~np.isfinite(self.tip).all(axis=1), bool)
         self.arc = np.full(len(mine), -1, np.int64)
         index = np.full(len(nominal), -1, np.int64)
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
@@ -140,9 +141,9 @@ class _Alignment:
     def _near(self, i: Index, j: Index) -> Mask:
         """Whether nominal units end at units of the corrected program, beyond doubt."""
         away = np.abs(self.tip[j] - self.target[i]).max(axis=1, initial=0.0)
-        unknown = self.loose[i] & (self.lost[j] | ~np.isfinite(self.target[i]).all(axis=1))
-        good: Mask = ((away < self.near) | unknown) & (self.mine.kind[i] == self.theirs.kind[j])
-        return good
+        unknown = self.loose[i] & (self.lost[j] | self.unknown[i])
+        good = np.asarray((away < self.near) | unknown, bool)
+        return np.asarray(good & (self.mine.kind[i] == self.theirs.kind[j]), bool)
 
     def _run(self, i: int, j: int) -> int:
         """How many units from here agree one by one."""
@@ -239,8 +240,7 @@ class _Alignment:
         """mm2: what it costs that unit i ends at each of units j, and that each of them is a part of it."""
         away = np.minimum(((self.tip[j] - self.target[i]) ** 2).sum(axis=1), _FAR_MM**2)
         if self.loose[i]:
-            known = np.isfinite(self.target[i]).all()
-            away = np.where(self.lost[j] == ~known, 0.0, _FAR_MM**2)
+            away = np.where(self.lost[j] == self.unknown[i], 0.0, _FAR_MM**2)
         end = np.nan_to_num(away, nan=_FAR_MM**2) + np.where(
             self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2
         )
@@ -254,13 +254,14 @@ def _refuse_others(nominal: Toolpath, target: Array, mine: _Units, tip: Array) -
     """Raise ProgramError where most waypoints are far off: this is another job."""
     counted = ((nominal.flag[mine.last] & _FREE) == 0) & np.isfinite(target[mine.last]).all(axis=1)
     with np.errstate(invalid="ignore"):
-        far: Mask = counted & ~(np.abs(tip - target[mine.last]).max(axis=1) < _FAR_MM)
+        near = np.asarray(np.abs(tip - target[mine.last]).max(axis=1) < _FAR_MM, bool)
+    far = np.asarray(counted & ~near, bool)
     if counted.any() and far.sum() > _MOST_FAR * counted.sum():
         first = int(mine.last[np.argmax(far)])
         raise ProgramError(
-            f"{int(far.sum())} of {int(counted.sum())} waypoints are farther than {_FAR_MM:g} mm from those of "
-            f"the nominal program, the first at its line {int(nominal.line[first])}; it is not a correction "
-            "of this program for this machine"
+            f"{int(far.sum())} of {int(counted.sum())} waypoints are farther than {_FAR_MM:g} mm from those "
+            f"of the nominal program, the first at its line {int(nominal.line[first])}; it is not a "
+            "correction of this program for this machine"
         )
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from olp.compensation.plan import targets, zero_shifts
 from olp.core.arrays import Array, Index, Mask
+from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
@@ -146,6 +147,23 @@ def prove(
     )
 
 
+def corrections_mm(nominal: Program, corrected: Program, proof: Proof) -> Array:
+    """(n, 3) how far each waypoint was moved, 0 where that is not known; of canned cycles the position and
+    the bottom of each hole, as a corrected depth may need other pecks."""
+    correction = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
+    correction[(proof.nominal.flag & np.uint8(Flag.CYCLE | Flag.CONTROL)) != 0] = 0.0
+    for mine, other in zip(nominal.holes, corrected.holes, strict=False):
+        moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
+        correction[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
+    return np.asarray(correction, float)
+
+
+def largest_correction_mm(nominal: Program, corrected: Program, proof: Proof) -> float:
+    """The largest distance of the commands from the nominal path."""
+    away = corrections_mm(nominal, corrected, proof)
+    return float(np.sqrt(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
+
+
 def _counts(program: Program, target: Array, exempt: Mask) -> npt.NDArray[np.uint8]:
     """(n,) how each nominal move counts."""
     path = program.toolpath
@@ -161,9 +179,7 @@ def _counts(program: Program, target: Array, exempt: Mask) -> npt.NDArray[np.uin
     return counts
 
 
-def _sizes(
-    deviation: Deviation, counts: npt.NDArray[np.uint8], bottom: Index, stroke: Single
-) -> Single:
+def _sizes(deviation: Deviation, counts: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
     """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom."""
     side = deviation.side.astype(np.float32)
     size = np.full(len(counts), np.nan, np.float32)

@@ -34,14 +34,9 @@ _PART = {
 
 def correction(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:
     """The document of a report of `correct` ("olp-report-1")."""
-    program, deviation = report["program"], report["deviation"]
+    program = report["program"]
     name = program.get("name") or "program"
-    largest, allowed = deviation["path_max_um"], deviation["allowed_um"]
-    sentence = (
-        f"{'Within tolerance' if deviation['holds'] else 'Above tolerance'}: the corrected path is at most "
-        f"{number(largest)} um from the nominal one; {number(allowed)} um are allowed "
-        f"(tolerance {report['tolerance_um']:g} um, and rounding)."
-    )
+    verdict = report["verdict"]
     sections = [
         Section("Result", list(_correction_result(report))),
         Section("Machine tool and numerical controller", [Pairs(machine_rows(report))]),
@@ -55,7 +50,7 @@ def correction(report: Report, plots: Plots, version: str, date: datetime.date |
     ]
     return Document(
         "Numerical compensation of a program", subtitle_of(name, report, date),
-        (deviation["holds"], sentence), sections, footer_of(version),
+        (verdict["ok"], " ".join(verdict["sentences"])), sections, footer_of(version),
     )  # fmt: skip
 
 

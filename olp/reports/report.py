@@ -172,18 +172,8 @@ def _degrees(value: object) -> str:
 
 
 def _verdict(report: Report) -> Iterator[str]:
-    tolerance, deviation = report.get("tolerance_um"), _part(report, "deviation")
-    largest = deviation.get("path_max_um")
-    if tolerance is None or largest is None:
-        return
-    allowed = deviation.get("allowed_um")
-    limit = "" if allowed is None else f"; with rounding to the last digit {number(allowed)} um are allowed"
-    verdict = "Within tolerance" if deviation.get("holds") else "ABOVE TOLERANCE"
-    yield from textwrap.wrap(
-        f"{verdict}: the corrected path is at most {number(largest)} um from the nominal one. "
-        f"The tolerance is {tolerance:g} um{limit}.",
-        WIDTH,
-    )
+    for sentence in _part(report, "verdict").get("sentences") or ():
+        yield from textwrap.wrap(sentence, WIDTH)
 
 
 def _deviation(report: Report) -> Iterator[str]:

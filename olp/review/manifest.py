@@ -346,10 +346,5 @@ def _callouts(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict[s
 
 
 def _verdict(scene: Scene) -> dict[str, Any] | None:
-    deviation = scene.report.get("deviation")
-    if not deviation:
-        return None
-    good = bool(deviation["holds"])
-    most, allowed = float(deviation["path_max_um"]), float(deviation["allowed_um"])
-    word = "within tolerance" if good else "above tolerance"
-    return {"ok": good, "text": f"{word}: at most {most:.2f} µm, {allowed:.2f} µm allowed"}
+    verdict = scene.report.get("verdict")
+    return verdict and {"ok": verdict["ok"], "text": " ".join(verdict["sentences"])}

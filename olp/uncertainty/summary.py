@@ -38,10 +38,8 @@ def summary(
     growth: float,
     expansion: Expansion | None,
     parts: Sequence[Component],
-    *,
-    asked: bool,
 ) -> dict[str, Any]:
-    """The part of the report; `asked`: the user stated the tolerance."""
+    """The part of the report."""
     points = confidence.points
     band = confidence.band_mm * UM_PER_MM
     variance = (confidence.sigma_mm**2).sum(axis=1)
@@ -73,7 +71,7 @@ def summary(
         },
         "within": {
             "tolerance_um": confidence.within_mm * UM_PER_MM,
-            "asked": asked,
+            "asked": True,
             "before": _probabilities(confidence.within_before, confidence.program_before),
             "after": _probabilities(confidence.within_after, confidence.program_after),
             "draws": confidence.draws,
@@ -90,8 +88,6 @@ def findings(
     expansion: Expansion | None,
     parts: Sequence[Component],
     left_out: frozenset[str],
-    *,
-    asked: bool,
 ) -> list[Finding]:
     """Findings about waypoints and components whose gain is not probable, and about the uncertainty."""
     results = []
@@ -110,7 +106,7 @@ def findings(
             f"rms deviation {before:.2f} um uncorrected, {after:.2f} um corrected"
         )
         results.append(_finding("OLP432", what))
-    if asked and confidence.program_after < GOOD:
+    if confidence.program_after < GOOD:
         poor = confidence.lines[confidence.line_after < GOOD]
         what = (
             f"all waypoints are within {confidence.within_mm * UM_PER_MM:g} um with a probability of "

@@ -16,19 +16,16 @@ from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp
-from olp.core.arrays import Array
 from olp.core.errors import UsageError
-from olp.core.geometry import PLANES
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
-from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.meshes import read_mesh
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import GATE_CODES, RULES, Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.proof.proof import Proof
+from olp.proof.proof import Proof, corrections_mm
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
@@ -235,7 +232,7 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     if speeds.mm_s is not None:
         findings += motion.demand_findings(path, speeds.mm_s, machine)
     if run is not None and proof is not None and before is not None:
-        correction = _corrections(run.nominal, case.written, proof)
+        correction = corrections_mm(run.nominal, case.written, proof)
         findings += state.sanity_findings(proof.nominal, correction, sanity)
         findings += motion.low_findings(proof, loaded.model)
         if speeds.mm_s is not None and before.mm_s is not None:
@@ -273,17 +270,6 @@ def _clearances(case: _Case, codes: list[str], sources: Sources, tell: Progress)
     ]
     path = case.written.toolpath if case.proof is None else case.proof.written
     return clearances(path, case.loaded.model, setup, solids)
-
-
-def _corrections(nominal: Program, written: Program, proof: Proof) -> Array:
-    """(n, 3) how far each waypoint was moved, 0 where that is not known; of canned cycles the position and
-    the bottom of each hole, as a corrected depth may need other pecks."""
-    correction = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
-    correction[(proof.nominal.flag & np.uint8(Flag.CYCLE)) != 0] = 0.0
-    for mine, other in zip(nominal.holes, written.holes, strict=False):
-        moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
-        correction[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
-    return np.asarray(correction, float)
 
 
 def _stamps(case: _Case) -> list[Finding]:

@@ -29,11 +29,9 @@ def assess(
     part_tolerance_um: float,
     date: datetime.date | None,
     tell: Progress,
-    *,
-    asked: bool,
 ) -> Assessment | None:
     """Bands and probabilities of a proved program, its part of the report, and its findings; None where the
-    calibration states no uncertainty. `asked`: the call gives the tolerance `part_tolerance_um`."""
+    calibration states no uncertainty."""
     uncertainty = loaded.uncertainty
     if uncertainty is None:
         return None
@@ -43,10 +41,8 @@ def assess(
     parts = [
         c for c in components(loaded.calibration, uncertainty.scaled(growth)) if c.name not in loaded.skip
     ]
-    report = summary(result, nominal.toolpath, uncertainty, growth, expansion, parts, asked=asked)
-    return result, report, findings(
-        result, growth, expansion, parts, loaded.left_out, asked=asked
-    )  # fmt: skip
+    report = summary(result, nominal.toolpath, uncertainty, growth, expansion, parts)
+    return result, report, findings(result, growth, expansion, parts, loaded.left_out)
 
 
 def unknowns_of(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -12,34 +10,30 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks import correction as checks
-from olp.compensation.hole_plan import HolePlan
-from olp.compensation.plan import Limits, Plan
+from olp.compensation.plan import Limits
 from olp.compensation.planning import plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.tally import Tally
 from olp.compensation.writing import write
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Index
 from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
-from olp.core.toolpath import Flag, Toolpath
+from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_UM
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.proof.proof import Proof, prove
+from olp.proof.proof import prove
 from olp.uncertainty.spread import Confidence
 from olp.workflows.flatten import unrolled
 from olp.workflows.proof import (
+    Pair,
     ProofOptions,
     Run,
-    calibration_findings,
-    confidence_of,
-    findings_of_model,
     last_digit_mm,
-    position_findings,
-    report_of,
+    proved,
 )
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -133,19 +127,11 @@ def corrected(
     tell("prove", 0.7)
     reading = Options(contour=options.contour)
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
-    proof = prove(
-        done.nominal, second, loaded.model, tolerance_mm=done.limits.tolerance_mm, digit_mm=done.digit_mm,
-        uncorrected=done.uncorrected,
-    )  # fmt: skip
     _prove_without_deleted(done, loaded, options.contour)
-    assessment = confidence_of(loaded, done.nominal, second, proof, done.uncorrected, options, tell)
-    findings = _findings(done, proof, loaded, options, outside, assessment[2] if assessment else ())
-    report = report_of(done.nominal, (data, program.name), loaded, proof, findings, options.tolerance_um)
-    report |= _written_report(done)
-    if assessment:
-        report["uncertainty"] = assessment[1]
-    confidence = assessment[0] if assessment else None
-    return Run(done.text, done.nominal, second, proof, done.uncorrected, report, findings, confidence)
+    pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
+    held = outside if options.outside_box == "hold" else None
+    run = proved(pair, loaded, options, outside=held, tell=tell)
+    return replace(run, report=run.report | _written_report(done))
 
 
 def _refuse_stamped(data: bytes) -> None:
@@ -170,8 +156,6 @@ class _Rewritten:
     uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
-    holes: HolePlan
-    largest_mm: float
 
 
 def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progress) -> _Rewritten:
@@ -199,29 +183,7 @@ def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progr
     )  # fmt: skip
     nominal = replace(program, words=None, slot=program.slot[:0])
     text = written.text if written.changed else data
-    largest = _largest_correction(nominal.toolpath, _ends(rows, len(nominal.toolpath)))
-    return _Rewritten(
-        nominal, text, limits, digit, rows.uncorrected, written.parts, written.tally, written.holes, largest
-    )
-
-
-def _findings(
-    done: _Rewritten, proof: Proof, loaded: Loaded, options: CorrectOptions, outside: str,
-    uncertain: Iterable[Finding],
-) -> tuple[Finding, ...]:  # fmt: skip
-    tolerance_mm = done.limits.tolerance_mm
-    return (
-        *calibration_findings(loaded, options.date),
-        *checks.proof_findings(proof, done.uncorrected),
-        *checks.between_findings(done.nominal, proof, loaded.model),
-        *checks.hole_findings(done.holes, tolerance_mm),
-        *checks.stroke_findings(done.nominal, loaded.model, tolerance_mm),
-        *position_findings(proof, loaded, outside if options.outside_box == "hold" else None),
-        *checks.path_mode_findings(done.nominal, done.largest_mm),
-        *checks.program_findings(done.nominal, loaded.setup, contour=options.contour),
-        *uncertain,
-        *findings_of_model(done.nominal.toolpath, loaded, tolerance_mm),
-    )
+    return _Rewritten(nominal, text, limits, digit, rows.uncorrected, written.parts, written.tally)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:
@@ -234,10 +196,6 @@ def _written_report(done: _Rewritten) -> dict[str, Any]:
             "inserted_words": tally.inserted_words,
             "changed_words": tally.changed_words,
         },
-        "corrected": {
-            "sha256": hashlib.sha256(done.text).hexdigest(), "lines": done.text.count(b"\n"),
-        },
-        "largest_correction_um": done.largest_mm * 1e3,
     }  # fmt: skip
 
 
@@ -266,20 +224,3 @@ def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool) -> N
             "both switch positions; remove the `/`, or give every axis in the first block after it",
             line=line,
         )
-
-
-def _ends(rows: Plan, count: int) -> Array:
-    """(n, 3) command at the end of each move."""
-    if len(rows) == count:
-        return rows.command_mm
-    last = np.append(rows.move[1:] != rows.move[:-1], True)
-    return np.asarray(rows.command_mm[last], float)
-
-
-def _largest_correction(path: Toolpath, command_mm: Array) -> float:
-    """The largest distance of the commands from the nominal path, in mm."""
-    largest = 0.0
-    for a in range(0, len(path), 1 << 16):
-        away = np.nan_to_num(command_mm[a : a + (1 << 16)] - path.end_mm[a : a + (1 << 16)])
-        largest = max(largest, float(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
-    return float(largest**0.5)

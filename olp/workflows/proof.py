@@ -25,9 +25,10 @@ from olp.core.toolpath import Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
-from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, prove
+from olp.proof.judgement import Judgements, verdict
+from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, largest_correction_mm, prove
 from olp.uncertainty.spread import Confidence
-from olp.workflows.confidence import Assessment, assess
+from olp.workflows.confidence import assess
 from olp.workflows.session import Loaded
 
 _PROVES = (
@@ -58,18 +59,33 @@ class ProofOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A correction, or a verification of one: the corrected text and both programs as read, the proof, the
-    report ("olp-report-1"), the findings, and bands and probabilities where the calibration states
-    uncertainties."""
+    """A correction, or a verification of one: the corrected text and both programs as read, the proof and its
+    table of judgements, the report ("olp-report-1"), the findings, and bands and probabilities where a part
+    tolerance is stated and the calibration states uncertainties."""
 
     text: bytes
     nominal: Program
     corrected: Program
     proof: Proof
+    table: Judgements
     uncorrected: Index
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     confidence: Confidence | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """A nominal program and its correction as read, with the bytes and the names of both, and the moves of
+    the nominal one that are left uncorrected."""
+
+    nominal: Program
+    data: bytes
+    name: str
+    corrected: Program
+    text: bytes
+    other: str
+    uncorrected: Index
 
 
 def verify_programs(
@@ -78,43 +94,57 @@ def verify_programs(
     """Prove a corrected program from any source; programs come with their names. Raises ProgramError where
     the second is not a correction of the first."""
     (first, name), (second, other) = nominal, corrected
-    limits = Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
     with naming(name or "<nominal>"):
-        rows = plan(first.toolpath, loaded.model, limits)
-    digit = last_digit_mm(second, loaded.setup)
+        rows = plan(
+            first.toolpath, loaded.model, Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
+        )
+    pair = Pair(first, first.data, name, second, second.data, other, rows.uncorrected)
     try:
-        proof = prove(
-            first, second, loaded.model, tolerance_mm=limits.tolerance_mm, digit_mm=digit,
-            uncorrected=rows.uncorrected,
-        )  # fmt: skip
+        return proved(pair, loaded, options)
     except OlpError as error:
         raise error.in_file(other or "<corrected>") from None
-    assessment = confidence_of(loaded, first, second, proof, rows.uncorrected, options, silent)
+
+
+def proved(
+    pair: Pair, loaded: Loaded, options: ProofOptions, *, outside: str | None = None, tell: Progress = silent
+) -> Run:
+    """The proof of a pair of programs with all that is said of it; `correct` and `verify` are the same here.
+    `outside` is the code of findings outside the calibrated box, None where nothing is outside. Raises
+    ProgramError where the second is not a correction of the first."""
+    tolerance_mm = options.tolerance_um * MM_PER_UM
+    first = pair.nominal
+    proof = prove(
+        first, pair.corrected, loaded.model, tolerance_mm=tolerance_mm,
+        digit_mm=last_digit_mm(pair.corrected, loaded.setup), uncorrected=pair.uncorrected,
+    )  # fmt: skip
+    table = Judgements.of(proof)
+    part_um = loaded.part_tolerance_um(options.part_tolerance_um)
+    assessment = None
+    if part_um is not None:
+        assessment = assess(
+            loaded, first, pair.corrected, proof.groups, pair.uncorrected, part_um, options.date, tell
+        )
+    largest_mm = largest_correction_mm(first, pair.corrected, proof)
     findings = (
         *calibration_findings(loaded, options.date),
-        *checks.proof_findings(proof, rows.uncorrected),
+        *checks.proof_findings(proof, pair.uncorrected),
+        *checks.part_findings(table, part_um),
         *checks.between_findings(first, proof, loaded.model),
+        *position_findings(proof, loaded, outside),
+        *checks.path_mode_findings(first, largest_mm),
         *checks.program_findings(first, loaded.setup, contour=options.contour),
         *(assessment[2] if assessment else ()),
-        *findings_of_model(first.toolpath, loaded, limits.tolerance_mm),
+        *findings_of_model(first.toolpath, loaded, tolerance_mm),
     )
-    report = report_of(first, (first.data, name), loaded, proof, findings, options.tolerance_um)
+    report = report_of(first, (pair.data, pair.name), loaded, proof, findings, options.tolerance_um)
+    report["corrected"] = {"sha256": hashlib.sha256(pair.text).hexdigest(), "lines": pair.text.count(b"\n")}
+    report["largest_correction_um"] = largest_mm * UM_PER_MM
     if assessment:
         report["uncertainty"] = assessment[1]
+    report["judgement"] = table.report()
+    report["verdict"] = verdict(table, part_um, report.get("uncertainty"), findings)
     confidence = assessment[0] if assessment else None
-    return Run(second.data, first, second, proof, rows.uncorrected, report, findings, confidence)
-
-
-def confidence_of(
-    loaded: Loaded, nominal: Program, corrected: Program, proof: Proof, uncorrected: Index,
-    options: ProofOptions, tell: Progress,
-) -> Assessment | None:  # fmt: skip
-    """Bands and probabilities of a proof; None where the calibration states no uncertainty."""
-    part_um = loaded.part_tolerance_um(options.part_tolerance_um)
-    return assess(
-        loaded, nominal, corrected, proof.groups, uncorrected, part_um or options.tolerance_um, options.date,
-        tell, asked=part_um is not None,
-    )  # fmt: skip
+    return Run(pair.text, first, pair.corrected, proof, table, pair.uncorrected, report, findings, confidence)
 
 
 def position_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:

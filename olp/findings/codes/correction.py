@@ -73,6 +73,16 @@ RULES = (
         "A program of nothing but G53 moves.",
     ),
     _rule(
+        "OLP108",
+        "above the part tolerance",
+        Severity.ERROR,
+        "The corrected path, as the model predicts it, is farther from the nominal path than the tolerance "
+        "of the part allows. The uncertainty of the calibration comes on top of that.",
+        "Look at the listed blocks. A smaller --tolerance-um follows the path more closely. Else state the "
+        "tolerance that the part really has.",
+        "`--part-tolerance-um 1` for a program with a hole whose stroke is off by 3 um.",
+    ),
+    _rule(
         "OLP401",
         "calibration expired",
         Severity.WARNING,
