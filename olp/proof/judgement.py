@@ -153,6 +153,35 @@ def verdict(
     return {"ok": bool(ok), "numerical": numerical, "part": part, "errors": errors, "sentences": sentences}
 
 
+def measured(largest_um: float | None, tolerance_um: float | None) -> dict[str, Any]:
+    """The verdict on measured runs: `ok` is None where no part tolerance is stated. `largest_um` is the
+    largest distance of a point of a cutting move from the path, None where no point counts."""
+    result = {"largest_um": largest_um, "tolerance_um": tolerance_um}
+    if largest_um is None:
+        ok = None if tolerance_um is None else False
+        words = "Not verified: no measured point of a cutting move counts."
+    elif tolerance_um is None:
+        ok = None
+        words = (
+            f"The measured path is at most {_um(largest_um)} um from the nominal one; no part tolerance is "
+            "stated."
+        )
+    else:
+        ok = largest_um <= tolerance_um
+        words = (
+            f"{'Within the' if ok else 'ABOVE the'} part tolerance of {tolerance_um:g} um: the measured path "
+            f"is at most {_um(largest_um)} um from the nominal one."
+        )
+    return {"ok": ok, "measured": result, "sentences": [words]}
+
+
+def with_measured(predicted: dict[str, Any], runs: dict[str, Any]) -> dict[str, Any]:
+    """One verdict of a prediction and of what was measured: the measured runs decide, unless the prediction
+    fails already."""
+    ok = runs["ok"] if predicted["ok"] else False
+    return predicted | runs | {"ok": ok, "sentences": [*predicted["sentences"], *runs["sentences"]]}
+
+
 #: Findings that say what the verdict says already.
 _OWN = {"OLP101", "OLP108"}
 

@@ -111,18 +111,8 @@ def _frame(report: Report) -> Iterator[str]:
 
 
 def _verdict(report: Report) -> Iterator[str]:
-    if "holds" not in report:
-        return
-    size = figure(report.get("after"), ("across_um", "max"))
-    if size is None:
-        yield "NOT VERIFIED TO BE WITHIN TOLERANCE: no measured point of a cutting move counts."
-        return
-    verdict = "Within tolerance" if report["holds"] else "ABOVE TOLERANCE"
-    yield from textwrap.wrap(
-        f"{verdict}: the measured path is at most {number(size)} um from the nominal one; "
-        f"{report['tolerance_um']:g} um are allowed.",
-        WIDTH,
-    )
+    for sentence in (report.get("verdict") or {}).get("sentences") or ():
+        yield from textwrap.wrap(sentence, WIDTH)
 
 
 def _before_after(report: Report) -> Iterator[str]:

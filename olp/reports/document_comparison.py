@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from olp.reports.compare import absorbed_by_fit, change, figure, table_rows
+from olp.reports.compare import absorbed_by_fit, change, table_rows
 from olp.reports.document import Block, Document, Grid, Pairs, Paragraph, Section
 from olp.reports.document_parts import (
     MOST_POSES,
@@ -30,14 +30,8 @@ def comparison(report: Report, plots: Plots, version: str, date: datetime.date |
     wrong = any(f["code"] == "OLP601" for f in report["findings"])
     if wrong:
         verdict = (False, "Measured and nominal path do not match: no figures are given.")
-    elif "holds" in report:
-        size = figure(report["after"], ("across_um", "max"))
-        words = "Within tolerance" if report["holds"] else "Above tolerance"
-        sentence = (
-            f"{words}: the measured path is at most {number(size)} um from the nominal one; "
-            f"{report['tolerance_um']:g} um are allowed."
-        )
-        verdict = (report["holds"], sentence)
+    elif (report.get("verdict") or {}).get("ok") is not None:
+        verdict = (report["verdict"]["ok"], " ".join(report["verdict"]["sentences"]))
     sections = [
         Section("Result", list(_comparison_result(report))),
         Section("Machine tool and numerical controller", [Pairs(machine_rows(report))]),

@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from olp.compensation.plan import targets, zero_shifts
 from olp.core.arrays import Array, Index
 from olp.core.errors import naming
 from olp.core.machine import Setup
@@ -22,7 +21,8 @@ from olp.files.sources import Source, Sources
 from olp.files.write import write_bytes
 from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.proof.matching import match as match_moves
+from olp.proof import judgement
+from olp.proof.judgement import Judgements
 from olp.review.listing import aligned
 from olp.review.manifest import manifest_of
 from olp.review.measured import Matched, Matcher
@@ -38,7 +38,7 @@ from olp.workflows.confidence import unknowns_of
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.correct import corrected as correct_program
 from olp.workflows.flatten import unrolled
-from olp.workflows.proof import ProofOptions, last_digit_mm, verify_programs
+from olp.workflows.proof import ProofOptions, Run, verify_programs
 from olp.workflows.retime import RetimeOptions, Retiming
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -152,7 +152,7 @@ def run(
     else:
         if correction is None:
             with program.errors():
-                correction = _corrected(session, data, loaded, options, tell)
+                correction = Correction.of(_corrected(session, data, loaded, options, tell))
         other = correction.data
     tell("read", 0.0)
     reading = Options(contour=options.contour)
@@ -162,19 +162,30 @@ def run(
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
         second = read(other, loaded.setup, loaded.dialect, reading)
         if correction is not None:
-            report = correction.report
+            proved = _Proved(correction.report, correction.table, correction.groups)
         else:
-            report = verify_programs((nominal, name), (second, corrected_name), loaded, options).report
-        texts = _Texts(program, data, corrected_name, other, nominal, second, report)
+            run = verify_programs((nominal, name), (second, corrected_name), loaded, options)
+            proved = _Proved(run.report, run.table, run.proof.groups)
+        texts = _Texts(program, data, corrected_name, other, nominal, second, proved)
         shown = _shown(session, texts, loaded, options, progress)
     tell("pack", 0.0)
     return Review(_scene(session, texts, shown, loaded, options, measured))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Proved:
+    """What the correction or its verification says: the report, the table of judgements, and the last
+    corrected move of each nominal one."""
+
+    report: dict[str, Any]
+    table: Judgements
+    groups: Index
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Texts:
     """The nominal program as shown, unrolled where the call asks for it, and the corrected one, as bytes and
-    as read; `report` is that of the correction or of its verification."""
+    as read, and the proof."""
 
     source: Source
     data: bytes
@@ -182,15 +193,13 @@ class _Texts:
     corrected: bytes
     nominal: Program
     second: Program
-    report: dict[str, Any]
+    proved: _Proved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """The nominal moves of the corrected ones, points along both paths, and the motion where it is
-    planned."""
+    """Points along both paths, and the motion where it is planned."""
 
-    groups: Index
     samples: Samples
     plan: Retiming | None
 
@@ -204,26 +213,22 @@ def _unrolled(session: Session, program: Source, loaded: Loaded, options: ViewOp
     )  # fmt: skip
 
 
-def _corrected(
-    session: Session, data: bytes, loaded: Loaded, options: ViewOptions, tell: Progress
-) -> Correction:
+def _corrected(session: Session, data: bytes, loaded: Loaded, options: ViewOptions, tell: Progress) -> Run:
     correcting = CorrectOptions(**options.proof(), outside_box=options.outside_box)
-    done = correct_program(session.sources, session.sources.source(data), loaded, correcting, tell)
-    return Correction(done.text, done.report, done.findings, done.confidence)
+    return correct_program(session.sources, session.sources.source(data), loaded, correcting, tell)
 
 
 def _shown(
     session: Session, texts: _Texts, loaded: Loaded, options: ViewOptions, progress: Progress | None
 ) -> _Shown:
-    groups = _groups(texts.nominal, texts.second, loaded, options.tolerance_um)
     (progress or silent)("sample", 0.0)
-    samples = sample(texts.nominal, texts.second, groups, loaded.model, options.step_mm)
+    samples = sample(texts.nominal, texts.second, texts.proved.groups, loaded.model, options.step_mm)
     plan = None
     if options.time:
         other = session.sources.source(texts.corrected)
         timing = RetimeOptions(contour=options.contour)
         plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
-    return _Shown(groups, samples, plan)
+    return _Shown(samples, plan)
 
 
 def _scene(
@@ -237,7 +242,8 @@ def _scene(
         samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
     frame = Frame.of(nominal.toolpath)
     position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
-    report = texts.report
+    report = texts.proved.report
+    part_um = loaded.part_tolerance_um(options.part_tolerance_um)
     runs: list[Matched] = []
     digests: list[str] = []
     if measured:
@@ -247,7 +253,12 @@ def _scene(
             runs.append(matcher.match(points))
             digests.append(points.sha256)
         more = [finding.as_dict() for run in runs for finding in run.findings]
-        report = report | {"findings": [*report["findings"], *more]}
+        sizes = [run.largest_um for run in runs if run.largest_um is not None]
+        judged = judgement.measured(max(sizes, default=None), part_um)
+        report = report | {
+            "findings": [*report["findings"], *more],
+            "verdict": judgement.with_measured(report["verdict"], judged),
+        }
     bodies = tuple(_bodies(session, setup, nominal, samples, frame, position))
     return Scene(
         name=texts.source.short or "program",
@@ -262,37 +273,37 @@ def _scene(
         motion=None if plan is None else table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
-        listing=aligned(nominal, texts.second, shown.groups),
+        listing=aligned(nominal, texts.second, texts.proved.groups),
         bodies=bodies,
         measured=tuple(runs),
         report=report,
+        table=texts.proved.table,
         tolerance_um=options.tolerance_um,
         tool_radius_mm=_radius(setup, nominal),
-        uncertainty=_uncertainty(
-            loaded,
-            nominal,
-            samples,
-            loaded.part_tolerance_um(options.part_tolerance_um) or options.tolerance_um,
-            options.date,
-        ),
+        uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),
     )
 
 
 def _uncertainty(
-    loaded: Loaded, nominal: Program, samples: Samples, part_tolerance_um: float, date: datetime.date | None
-) -> TipUncertainty | None:
-    """Bands and probabilities of samples, as `olp.workflows.confidence` gives them for waypoints."""
+    loaded: Loaded, nominal: Program, samples: Samples, part_tolerance_um: float | None,
+    date: datetime.date | None,
+) -> TipUncertainty | None:  # fmt: skip
+    """Bands of samples and, where a part tolerance is stated, probabilities, as `olp.workflows.confidence`
+    gives them for waypoints."""
     if loaded.uncertainty is None:
         return None
     unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)
     points = Points(samples.move, samples.axis_mm, samples.uncorrected, samples.result, samples.play)
     covariance = covariances(unknowns, nominal.toolpath, points)
+    band = bands(covariance).astype(np.float32)
+    if part_tolerance_um is None:
+        return TipUncertainty(None, band, {})
     radius = part_tolerance_um * MM_PER_UM
     beyond = {
         name: np.asarray(1.0 - within(covariance, deviation, radius), np.float32)
         for name, deviation in (("uncorrected", points.before_mm), ("result", points.after_mm))
     }
-    return TipUncertainty(radius, bands(covariance).astype(np.float32), beyond)
+    return TipUncertainty(radius, band, beyond)
 
 
 def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples, Array]:
@@ -314,13 +325,6 @@ def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sou
     for mesh in loaded.setup.job.meshes:
         combined.update(sources.digest(mesh.file))
     return combined.hexdigest()[:12]
-
-
-def _groups(nominal: Program, second: Program, loaded: Loaded, tolerance_um: float) -> Index:
-    path = nominal.toolpath
-    target = targets(path, zero_shifts(path.frames, loaded.model))
-    near = tolerance_um * MM_PER_UM + last_digit_mm(second, loaded.setup)
-    return match_moves(nominal, target, second, loaded.model, near)
 
 
 def _bodies(

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Index
 from olp.program.program import Program
 
 Small = npt.NDArray[np.int32]
-Single = npt.NDArray[np.float32]
 
 #: Most characters of a line; a longer one is cut, as browsers are slow with it.
 LONGEST = 2000
@@ -83,13 +82,6 @@ def aligned(nominal: Program, corrected: Program, groups: Index) -> Listing:
     count, other = nominal.lines, corrected.lines
     rows = _pairs(first, second, mine, theirs, count, other)
     return Listing(first, second, *rows)
-
-
-def largest(rows: Index, values: Array, count: int) -> Single:
-    """(count,) the largest of the values of each row, NaN where it has none."""
-    peaks = np.full(count, np.nan, np.float32)
-    np.fmax.at(peaks, rows, values.astype(np.float32))
-    return peaks
 
 
 def _anchors(nominal: Program, corrected: Program, groups: Index) -> tuple[Index, Index]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,6 @@ from olp.core.arrays import Array
 from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
-from olp.proof.deviation import cutting_moves
-from olp.review.listing import largest
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 from olp.review.scene import Scene
@@ -36,6 +34,8 @@ _PARTS = (
     ("along", "along the path", "diverging"),
     ("normal", "across the path", "sequential"),
 )
+#: State of a line of the listing without a move.
+NOT_JUDGED = 3
 #: Fewest steps of an error source over its range: colours show no more.
 _SOURCE_LEVELS = 200
 #: Finest step of an error source in um.
@@ -60,7 +60,6 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays.raw("rapid", _rapid(scene), "u1")
     arrays.quantised("t", scene.time_s, TIME_S)
     arrays.quantised("s", scene.samples.arc_mm, ARC_MM)
-    deviations = list(_deviations(scene))
     manifest = {
         "schema": "olp-review-1",
         "title": f"{scene.name} on {scene.machine.name}",
@@ -84,14 +83,14 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "metrics": _metrics(scene, arrays),
         "sources": [f"source:{name}" for name, _ in scene.sources],
         "motion": _motion(scene, arrays),
-        "listing": _listing(scene, arrays, row, deviations),
+        "listing": _listing(scene, arrays),
         "meshes": list(_meshes(scene, arrays, origin)),
         "nodes": [{"path": list(path), "axis": axis} for path, axis in nodes(scene.machine)],
         "axes": "Q",
         "axes_origin_mm": axes_origin.tolist(),
-        "statistics": list(_statistics(scene, deviations)),
+        "statistics": list(_statistics(scene)),
         "findings": _findings(scene),
-        "callouts": list(_callouts(scene, deviations)),
+        "callouts": list(_callouts(scene)),
         "verdict": _verdict(scene),
         "frame": scene.frame.label,
         "tool_radius_mm": scene.tool_radius_mm,
@@ -124,8 +123,11 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
         base = arrays.quantised(f"P_{name}", measured.base_mm - origin, POSITION_MM)
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
+        kind = arrays.raw(f"kind_{name}", np.where(measured.counted, 0, 1).astype(np.uint8), "u1")
         label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
-        layers.append(_layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0))
+        layers.append(
+            _layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0) | {"kind": kind}
+        )
     return layers
 
 
@@ -177,8 +179,10 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
     array = arrays.quantised("band", band, step)
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
-        "by_layer": dict.fromkeys(uncertainty.beyond, array), "limit": scene.tolerance_um,
+        "by_layer": dict.fromkeys(("uncorrected", "result"), array), "limit": scene.tolerance_um,
     }  # fmt: skip
+    if uncertainty.within_mm is None:
+        return
     by_layer = {
         layer: arrays.quantised(f"beyond:{layer}", 100.0 * value, _PERCENT)
         for layer, value in uncertainty.beyond.items()
@@ -222,24 +226,29 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
     }
 
 
-def _listing(
-    scene: Scene, arrays: Arrays, row: npt.NDArray[np.int64], deviations: Sequence[_Deviation]
-) -> dict[str, Any]:
+def _listing(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     listing = scene.listing
-    rows = len(listing.row_nominal)
     arrays.text("text_nominal", listing.nominal)
     lines = listing.row_corrected > 0
     like = np.full(int(listing.row_corrected.max(initial=0)), -1, np.int64)
     like[listing.row_corrected[lines] - 1] = listing.row_nominal[lines].astype(np.int64) - 1
     arrays.patch("text_corrected", listing.corrected, "text_nominal", listing.nominal, _resembled(like))
-    before, after = (value for _, value, _ in deviations[:2])
+    table = scene.table.by_line()
+    row = listing.row_of(table["line"])
+    columns = {}
+    for name, key in (("error_um", "uncorrected_um"), ("result_um", "corrected_um")):
+        values = np.full(len(listing.row_nominal), np.nan, np.float32)
+        values[row] = table[key]
+        columns[name] = arrays.raw(name, _rounded(values), "f4")
+    state = np.full(len(listing.row_nominal), NOT_JUDGED, np.uint8)
+    state[row] = table["state"]
     return {
         "nominal": "text_nominal",
         "corrected": "text_corrected",
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
-        "error_um": arrays.raw("error_um", _rounded(largest(row, before, rows)), "f4"),
-        "result_um": arrays.raw("result_um", _rounded(largest(row, after, rows)), "f4"),
+        **columns,
+        "state": arrays.raw("line_state", state, "u1"),
     }
 
 
@@ -271,46 +280,22 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
         }
 
 
-def _size(delta: Array) -> Array:
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", delta, delta)), float)
-
-
-_Deviation = tuple[str, Array, npt.NDArray[np.bool_]]
-
-
-def _deviations(scene: Scene) -> Iterator[_Deviation]:
-    """(layer, (n,) um, (n,) whether the sample is on a cutting move) of the deviations of the tip."""
-    samples = scene.samples
-    feed = cutting_moves(scene.nominal.toolpath)[samples.move]
-    yield "uncorrected", _size(samples.uncorrected) * UM_PER_MM, feed
-    yield "result", _size(samples.result) * UM_PER_MM, feed
-    for name, measured in zip(_measured(scene), scene.measured, strict=True):
-        yield name, _size(measured.delta_mm) * UM_PER_MM, feed[measured.index]
-
-
-def _statistics(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict[str, Any]]:
-    for layer, value, feed in deviations:
-        cut = value[feed]
-        if not len(cut):
-            continue
-        mean = float(cut.mean())
-        figures = {
-            "largest": float(cut.max()),
-            "95 % below": float(np.percentile(cut, 95)),
-            "mean": mean,
-            "rms": float(np.sqrt(np.mean(cut * cut))),
-            "std. deviation": float(cut.std()),
-        }
-        for label, number in figures.items():
-            yield {"label": label, "value": number, "unit": "um", "layer": layer}
-        within = 100.0 * float((cut <= scene.tolerance_um).mean())
-        yield {"label": "within tolerance", "value": within, "unit": "%", "layer": layer}
-    deviation = scene.report.get("deviation") or {}
+def _statistics(scene: Scene) -> Iterator[dict[str, Any]]:
+    """The figures of the report, of each layer and of the job."""
+    deviation, table = scene.report["deviation"], scene.table
+    largest = {
+        "uncorrected": np.nan_to_num(table.uncorrected[table.judged]).max(initial=0.0) * UM_PER_MM,
+        "result": table.largest_mm() * UM_PER_MM,
+    }
     for side, layer in (("before", "uncorrected"), ("after", "result")):
-        for where, label in (("waypoints", "proof, at waypoints"), ("between", "proof, between them")):
-            proved = (deviation.get(side) or {}).get(where)
-            if proved:
-                yield {"label": label, "value": float(proved["max_um"]), "unit": "um", "layer": layer}
+        yield {"label": "largest", "value": float(largest[layer]), "unit": "um", "layer": layer}
+        rms, waypoints = deviation[side]["between"]["rms_um"], deviation[side]["waypoints"]["max_um"]
+        yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
+        yield {"label": "at waypoints", "value": float(waypoints), "unit": "um", "layer": layer}
+    for name, run in zip(_measured(scene), scene.measured, strict=True):
+        for label, value in (("largest", run.largest_um), ("rms", run.rms_um)):
+            if value is not None:
+                yield {"label": label, "value": value, "unit": "um", "layer": name}
     moves = scene.nominal.toolpath
     length_m = float(scene.samples.arc_mm[-1]) * 1e-3
     yield {"label": "path length", "value": length_m, "unit": "m", "layer": None}
@@ -333,18 +318,24 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
     ]
 
 
-def _callouts(scene: Scene, deviations: Sequence[_Deviation]) -> Iterator[dict[str, Any]]:
-    """The worst point, uncorrected and corrected, on cutting moves."""
-    lines = scene.nominal.toolpath.line[scene.samples.move]
-    for layer, value, feed in deviations:
-        if layer not in ("uncorrected", "result") or not feed.any():
+def _callouts(scene: Scene) -> Iterator[dict[str, Any]]:
+    """The worst line, uncorrected and corrected, of the moves that count."""
+    table = scene.table
+    for layer, words, values in (
+        ("uncorrected", "uncorrected", table.uncorrected), ("result", "corrected", table.corrected),
+    ):  # fmt: skip
+        size = np.where(table.judged, np.nan_to_num(values), -1.0)
+        if not len(size) or size.max() < 0.0:
             continue
-        worst = int(np.where(feed, value, -1.0).argmax())
-        which = "uncorrected" if layer == "uncorrected" else "corrected"
-        text = f"largest, {which}: {value[worst]:.2f} µm, line {int(lines[worst])}"
-        yield {"sample": worst, "text": text, "layer": layer}
+        move = int(size.argmax())
+        own = np.flatnonzero(scene.samples.move == move)
+        if not own.size:
+            continue
+        away = np.linalg.norm(getattr(scene.samples, layer)[own], axis=1)
+        text = f"largest, {words}: {size[move] * UM_PER_MM:.2f} µm, line {int(table.line[move])}"
+        yield {"sample": int(own[away.argmax()]), "text": text, "layer": layer}
 
 
-def _verdict(scene: Scene) -> dict[str, Any] | None:
-    verdict = scene.report.get("verdict")
-    return verdict and {"ok": verdict["ok"], "text": " ".join(verdict["sentences"])}
+def _verdict(scene: Scene) -> dict[str, Any]:
+    verdict = scene.report["verdict"]
+    return {"ok": verdict["ok"], "text": " ".join(verdict["sentences"])}

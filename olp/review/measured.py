@@ -11,7 +11,7 @@ from olp.comparison import runs
 from olp.comparison.figures import Run
 from olp.comparison.nominal import Nominal, nominal_of
 from olp.compensation.plan import zero_shifts
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ConfigError, InputError
 from olp.core.machine import Setup
 from olp.core.toolpath import Toolpath
@@ -28,13 +28,18 @@ REACH_MM = 1.0
 class Matched:
     """Of n measured points in the order of the path: (n, 3) `base_mm`, the nearest point of the path,
     `delta_mm` from there, and (n,) the `index` of the sample next to it. `findings` are those of
-    `olp compare` on how the run was placed."""
+    `olp compare` on how the run was placed. (n,) `counted` are points of cutting moves: figures are of these,
+    `largest_um` of all (None where none counts), `by_line_um` of each line."""
 
     label: str
     base_mm: Array
     delta_mm: Array
     index: Index
     findings: tuple[Finding, ...]
+    counted: Mask
+    largest_um: float | None
+    rms_um: float | None
+    by_line_um: dict[int, float]
 
 
 class Matcher:
@@ -71,7 +76,11 @@ class Matcher:
         base = foot + self._home - self._shift[self._path.frame[move]] - self._origin
         index = np.maximum.accumulate(self._nearest(run.pairing.s_mm[rows], move))
         findings = tuple(runs.findings(nominal, placed))
-        return Matched(run.name, base, run.points_mm[rows] - foot, index, findings)
+        across = run.figures(nominal)["across_um"] or {}
+        return Matched(
+            run.name, base, run.points_mm[rows] - foot, index, findings, run.counted[rows], across.get("max"),
+            across.get("rms"), run.largest_by_line(nominal),
+        )  # fmt: skip
 
     def _nearest(self, s_mm: Array, move: Index) -> Index:
         """(n,) the sample next to each arc length, but not the last one of the move before."""

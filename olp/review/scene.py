@@ -13,6 +13,7 @@ from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
 from olp.program.program import Program
+from olp.proof.judgement import Judgements
 from olp.review.listing import Listing
 from olp.review.measured import Matched
 from olp.review.meshes import Body
@@ -50,10 +51,11 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipUncertainty:
-    """Uncertainty of samples: (n,) `band_mm`, expanded uncertainty (k = 2) in the worst direction, and by
-    layer the probability (n,) that the tip is farther than `within_mm` from its nominal point."""
+    """Uncertainty of samples: (n,) `band_mm`, expanded uncertainty (k = 2) in the worst direction. Where a
+    part tolerance `within_mm` is stated also, by layer, the probability (n,) that the tip is farther than
+    that from its nominal point."""
 
-    within_mm: float
+    within_mm: float | None
     band_mm: Single
     beyond: Mapping[str, Single]
 
@@ -62,7 +64,8 @@ class TipUncertainty:
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
     where there is one, else at the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
-    correction or verification ("olp-report-1"); `uncertainty` is None where the calibration states none."""
+    correction or verification ("olp-report-1"), `table` its judgements;
+    `uncertainty` is None where the calibration states none."""
 
     name: str
     corrected_name: str
@@ -80,6 +83,7 @@ class Scene:
     bodies: tuple[Body, ...]
     measured: tuple[Matched, ...]
     report: Mapping[str, Any]
+    table: Judgements
     tolerance_um: float
     tool_radius_mm: float
     uncertainty: TipUncertainty | None = None

@@ -13,6 +13,7 @@ from olp.comparison.path import Path
 from olp.core.units import UM_PER_MM
 from olp.files.points import Points
 from olp.findings.catalogue import Finding
+from olp.proof import judgement
 from olp.workflows.session import Loaded
 
 #: Number of lines with the largest deviations in a report.
@@ -97,16 +98,17 @@ def _iso_9283(path: Path, members: Sequence[figures.Run]) -> dict[str, Any]:
 
 
 def verdict(report: dict[str, Any], tolerance_um: float | None) -> list[Finding]:
-    """The finding where the measured path is not within tolerance; sets `holds` where there is one."""
+    """The finding where the measured path is not within tolerance; sets `verdict`, and `holds` where a
+    tolerance is stated."""
     size = (report["after"].get("across_um") or {}).get("max")
+    report["verdict"] = judgement.measured(size, tolerance_um)
     if tolerance_um is None:
         return []
+    report["holds"] = report["verdict"]["ok"]
     if size is None:
-        report["holds"] = False
         message = f"no measured point of a cutting move counts, so {tolerance_um:g} um cannot be verified"
         return [Finding("OLP609", message)]
-    report["holds"] = size <= tolerance_um
-    if report["holds"]:
+    if report["verdict"]["ok"]:
         return []
     lines = tuple(row["line"] for row in report["after"]["worst"] if row["max_um"] > tolerance_um)
     message = f"{size:.2f} um off the nominal path, {tolerance_um:g} um allowed"

@@ -25,6 +25,7 @@ from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.proof.judgement import Judgements
 from olp.proof.proof import prove
 from olp.uncertainty.spread import Confidence
 from olp.workflows.flatten import unrolled
@@ -52,12 +53,20 @@ class CorrectOptions(ProofOptions):
 @dataclass(frozen=True, slots=True, eq=False)
 class Correction:
     """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
-    `confidence` has bands and probabilities by waypoint where the calibration states uncertainties."""
+    `confidence` has bands and probabilities by waypoint where a part tolerance is stated and the calibration
+    states uncertainties. `table` has the judgement of every nominal move, and (n,) `groups` the last move of
+    the corrected program that belongs to each."""
 
     data: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    table: Judgements
+    groups: Index
     confidence: Confidence | None = None
+
+    @staticmethod
+    def of(run: Run) -> Correction:
+        return Correction(run.text, run.report, run.findings, run.table, run.proof.groups, run.confidence)
 
 
 def correct(
@@ -106,7 +115,7 @@ def run(
     with program.errors():
         loaded = session.loaded(options.outside_box, only_sure=options.only_sure_components)
         done = corrected(session.sources, program, loaded, options, progress or silent)
-    return Correction(done.text, done.report, done.findings, done.confidence)
+    return Correction.of(done)
 
 
 def corrected(

@@ -12,6 +12,7 @@ from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
 from olp.workflows.proof import ProofOptions, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
@@ -26,10 +27,11 @@ class VerifyOptions(ProofOptions):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verification:
-    """The proof of a corrected program from two texts alone; `confidence` as in Correction."""
+    """The proof of a corrected program from two texts alone; `table` and `confidence` as in Correction."""
 
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    table: Judgements
     confidence: Confidence | None = None
 
 
@@ -80,7 +82,7 @@ def run(
         with source.errors("<program>"):
             programs.append(_read(source, loaded, options))
     done = verify_programs((programs[0], nominal.name), (programs[1], corrected.name), loaded, options)
-    return Verification(done.report, done.findings, done.confidence)
+    return Verification(done.report, done.findings, done.table, done.confidence)
 
 
 def _read(source: Source, loaded: Loaded, options: VerifyOptions) -> Program:

@@ -32,7 +32,7 @@
             get(spec.base ?? manifest.base),
             spec.delta ? get(spec.delta) : null,
             index,
-            own || index ? null : this.kind,
+            spec.kind ? get(spec.kind) : own || index ? null : this.kind,
           ),
         );
       }
@@ -237,7 +237,7 @@
       return AXES[this.state.theme][i % 3];
     }
 
-    // Layer whose errors the verdict judges: the last state that is shown.
+    // Layer whose largest values are listed: the last state that is shown.
     judged(metric) {
       const names = this.metrics.layers(metric).filter(n => this.layers.get(n).visible);
       return JUDGED.map(p => names.find(n => n.startsWith(p))).find(Boolean) ?? names[0] ?? null;

@@ -14,6 +14,7 @@
       this.texts = [get(listing.nominal), get(listing.corrected)];
       this.numbers = [get(listing.row_nominal), get(listing.row_corrected)];
       this.errors = [get(listing.error_um), get(listing.result_um)];
+      this.state = get(listing.state); // of each row: 0 within, 1 above, 2 shown and not judged, 3 no move
       this.n = this.numbers[0].length;
       this.box = document.getElementById("listing");
       this.inner = document.getElementById("listing-inner");
@@ -108,8 +109,8 @@
             this.show_change(d, nominal, corrected);
           }
           e.textContent = this.error(k);
-          const worst = this.errors[1] ?? this.errors[0];
-          e.classList.toggle("over", Boolean(worst) && worst[k] > this.app.scale.tolerance);
+          e.classList.toggle("over", this.state?.[k] === 1);
+          e.classList.toggle("aside", this.state?.[k] === 2);
           row.classList.toggle("inserted", !this.number(k, 0));
         }
         row.classList.toggle("selected", k === this.selected);

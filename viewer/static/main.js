@@ -47,7 +47,7 @@
     let largest = 0;
     const metric = app.plot_metric();
     for (const name of app.metrics.layers(metric))
-      if (app.layers.get(name).visible) largest = Math.max(largest, app.metrics.summary(metric, name, 1)?.largest ?? 0);
+      if (app.layers.get(name).visible) largest = Math.max(largest, app.metrics.summary(metric, name)?.largest ?? 0);
     if (!(largest > 0)) return 1;
     const wanted = (SHARE * size) / (1e-3 * largest),
       unit = 10 ** Math.floor(Math.log10(wanted));

@@ -70,16 +70,15 @@
       }
     }
 
-    // Largest |value|, mean, rms, standard deviation and share within the tolerance of a layer.
-    summary(metric, name, tolerance) {
+    // Largest |value|, mean and rms of the points of a layer.
+    summary(metric, name) {
       const values = this.values(metric, name);
       if (!values) return null;
       let count = 0,
         sum = 0,
         squares = 0,
         low = Infinity,
-        high = -Infinity,
-        inside = 0;
+        high = -Infinity;
       for (let i = 0; i < values.length; i++) {
         const v = values[i];
         if (Number.isNaN(v)) continue;
@@ -88,19 +87,15 @@
         squares += v * v;
         if (v < low) low = v;
         if (v > high) high = v;
-        if (Math.abs(v) <= tolerance) inside++;
       }
       if (!count) return null;
-      const mean = sum / count;
       return {
         count,
         low,
         high,
         largest: Math.max(Math.abs(low), Math.abs(high)),
-        mean,
+        mean: sum / count,
         rms: Math.sqrt(squares / count),
-        sigma: Math.sqrt(Math.max(0, squares / count - mean * mean)),
-        inside: inside / count,
       };
     }
   }

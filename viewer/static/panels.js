@@ -7,7 +7,6 @@
     element.append(...children);
     return element;
   };
-  const OWN = new Set(["largest", "mean", "rms", "std. deviation", "within tolerance"]); // the page computes these for any metric
   const ROLES = {workpiece: "Workpiece", fixture: "Fixture", machine: "Machine", tool: "Tool"};
 
   class Panels {
@@ -27,10 +26,7 @@
       this.layers();
       this.findings();
       this.verdict();
-      OLP.on("metric", () => {
-        this.statistics();
-        this.verdict();
-      });
+      OLP.on("metric", () => this.statistics());
       OLP.on("layers", () => {
         this.tick();
         this.statistics();
@@ -85,33 +81,36 @@
       }
     }
 
+    // Of the deviation the figures of the proof and of the comparison, of other metrics those of the points shown.
     statistics() {
       const {app} = this,
         metric = app.metrics.find(app.state.metric) ?? app.plot_metric(),
-        names = app.metrics.layers(metric).filter(n => app.layers.get(n).visible);
-      const parts = names.map(n => app.metrics.summary(metric, n, app.scale.tolerance)),
-        number = OLP.colour.number,
-        unit = OLP.colour.unit_label(metric?.unit);
-      const rows = [
-        ["largest", p => number(p.largest)],
-        ["mean", p => number(p.mean)],
-        ["rms", p => number(p.rms)],
-        ["σ", p => number(p.sigma)],
-      ];
-      if (metric?.unit === "um")
-        rows.push(["in tolerance", p => `${number(100 * p.inside, p.inside < 1 && p.inside > 0.999 ? 4 : 3)} %`]);
+        names = app.metrics.layers(metric).filter(n => app.layers.get(n).visible),
+        unit = OLP.colour.unit_label(metric?.unit),
+        proved = metric === app.plot_metric(),
+        what = proved ? "moves that count" : "points shown";
       const table = make(
         "table",
         {},
-        make("caption", {textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, feed moves` : ""}),
+        make("caption", {textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, ${what}` : ""}),
         make("tr", {}, make("th"), ...names.map(n => make("th", {}, this.key(app.layers.get(n))))),
       );
-      for (const [label, show] of rows)
+      if (proved) this.packed_rows(table, names);
+      else this.shown_rows(table, metric, names);
+      $("statistics").replaceChildren(table, ...this.facts());
+    }
+
+    shown_rows(table, metric, names) {
+      const parts = names.map(n => this.app.metrics.summary(metric, n)),
+        {number} = OLP.colour;
+      for (const [label, show] of [
+        ["largest", p => number(p.largest)],
+        ["mean", p => number(p.mean)],
+        ["rms", p => number(p.rms)],
+      ])
         table.append(
           make("tr", {}, make("th", {textContent: label}), ...parts.map(p => make("td", {textContent: p ? show(p) : "–"}))),
         );
-      if (metric === app.plot_metric()) this.packed_rows(table, names);
-      $("statistics").replaceChildren(table, ...this.facts());
     }
 
     key(layer) {
@@ -120,12 +119,12 @@
       return mark;
     }
 
-    // The file's own figures of layers that this page does not compute: one row per label.
+    // The file's own figures of layers: one row per label.
     packed_rows(table, names) {
       const rows = new Map(),
         {number} = OLP.colour;
       for (const s of this.app.manifest.statistics ?? [])
-        if (s.layer && !OWN.has(s.label)) rows.set(s.label, {...rows.get(s.label), [s.layer]: s});
+        if (s.layer) rows.set(s.label, {...rows.get(s.label), [s.layer]: s});
       for (const [label, by] of rows) {
         if (!names.some(n => by[n])) continue;
         table.append(
@@ -180,31 +179,16 @@
       }
     }
 
+    // The verdict of the file; this page computes none.
     verdict() {
-      const {app} = this,
-        box = $("verdict"),
-        metric = app.plot_metric(),
-        tolerance = app.scale?.tolerance;
-      let {verdict} = app.manifest;
-      if (!verdict && tolerance && metric) {
-        const largest = name => app.metrics.summary(metric, name, tolerance)?.largest,
-          before = largest("uncorrected"),
-          after = largest("result") ?? largest("measured"),
-          number = OLP.colour.number;
-        if (before !== undefined || after !== undefined)
-          verdict = {
-            ok: (after ?? before) <= tolerance,
-            text: `${[before, after]
-              .filter(v => v !== undefined)
-              .map(v => number(v))
-              .join(" → ")} µm of ±${number(tolerance)} µm`,
-          };
-      }
+      const box = $("verdict"),
+        {verdict} = this.app.manifest;
       box.hidden = !verdict;
       if (!verdict) return;
-      box.className = verdict.ok ? "pass" : "fail";
-      box.replaceChildren(make("b", {textContent: verdict.ok ? "PASS" : "FAIL"}), make("span", {textContent: verdict.text}));
-      box.title = "Largest predicted deviation, uncorrected → corrected, against the tolerance";
+      const [name, word] = verdict.ok === null ? ["open", "NOT JUDGED"] : verdict.ok ? ["pass", "PASS"] : ["fail", "FAIL"];
+      box.className = name;
+      box.replaceChildren(make("b", {textContent: word}), make("span", {textContent: verdict.text}));
+      box.title = verdict.text;
     }
 
     readout() {

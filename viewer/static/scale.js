@@ -79,7 +79,7 @@
       if (!this.metric) return;
       const parts = this.app.metrics
         .layers(this.metric)
-        .map(name => this.app.metrics.summary(this.metric, name, this.tolerance))
+        .map(name => this.app.metrics.summary(this.metric, name))
         .filter(Boolean);
       const top = OLP.colour.round_up(Math.max(1e-6, ...parts.map(p => p.largest)));
       [this.min, this.max] = [this.kind === "diverging" ? -top : 0, top];
