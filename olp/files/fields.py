@@ -90,7 +90,8 @@ def _iso_names(value: object) -> frozenset[str]:
     if unknown:
         raise refusal(
             f"names {', '.join(unknown)}; expected ISO 230-1 names: E, direction X Y Z A B C, axis X Y Z "
-            "(EXX, EYX, EAX ...), or C0Y, B0Z, A0Z"
+            "(EXX, EYX, EAX ...), or C0Y, B0Z, A0Z. Backlash has no name here: if the control takes it up, "
+            "leave the axis out of [backlash]"
         )
     return frozenset(value)
 

@@ -53,7 +53,8 @@ class Block:
 
     @property
     def set_up(self) -> bool:
-        return "set-up" in self.mark
+        """Whether the block makes an environment: it then runs in a copy of the checkout, apart."""
+        return ".venv/bin/pip" in self.body
 
 
 def blocks(path: Path, name: str) -> list[Block]:
