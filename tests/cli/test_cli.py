@@ -236,6 +236,32 @@ def test_init_writes_a_set_that_loads_and_never_replaces_it(tmp_path: Path) -> N
     assert run("init", folder / "machine.toml").exit_code == 2
     assert run("init", tmp_path / "bad", "--travel", "X", "5", "5").exit_code == 2
     assert not (tmp_path / "bad").exists()
+    assert run("init", tmp_path / "bad", "--controller", "mach3").exit_code == 2
+    assert not (tmp_path / "bad").exists()
+
+
+def test_a_cut_below_the_zero_of_a_new_machine_is_corrected(tmp_path: Path) -> None:
+    assert run("init", tmp_path / "mill").exit_code == 0
+    program = tmp_path / "part.nc"
+    program.write_text("G21 G90 G54 G94\nG0 X0 Y0 Z5\nG1 Z-3 F200\nX20\nM2\n")
+    result = run("correct", program, "-m", tmp_path / "mill" / "machine.toml", "--fail-on", "never")
+    assert result.exit_code == 0, result.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        (["inspect", "{}/calibration.toml"], "a machine file (olp-machine-1)"),
+        (["inspect", "-m", "{}/calibration.toml"], "a machine file (olp-machine-1)"),
+        (["inspect", "-m", "{}/machine.toml", "-j", "{}/calibration.toml"], "a job file (olp-job-1)"),
+    ],
+)
+def test_a_file_of_another_kind_is_one_line(tmp_path: Path, call: list[str], expected: str) -> None:
+    assert run("init", tmp_path / "mill").exit_code == 0
+    result = run(*(word.replace("{}", str(tmp_path / "mill")) for word in call))
+    assert result.exit_code == 3
+    assert f"this is a calibration (olp-calibration-1); expected {expected}" in result.stderr
+    assert result.stderr.count("\n") == 1
 
 
 INI = """[TRAJ]
