@@ -320,3 +320,32 @@ def test_inspect_wants_one_machine() -> None:
     assert run("inspect").exit_code == 2
     assert run("inspect", MACHINE, "--tool", "1").exit_code == 2
     assert run("inspect", MACHINE.with_name("none.toml")).exit_code == 3
+
+
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        ("--frob", "No such option"),
+        ("correct --frob", "No such option"),
+        ("correct --tolerance-um 5um", "'5um' is not a number; expected a number, such as 5"),
+        ("correct --tolerance-um -1", "is not in the range"),
+        ("inspect --at 1 2 z", "'z' is not a number; expected a number, such as 5"),
+        ("inspect --tool 1.5", "'1.5' is not an integer; expected an integer, such as 5"),
+        ("init x --travel X 0 2m", "'2m' is not a number"),
+        ("calibrate frob", "there is no verb 'frob'"),
+        ("inspect", "no machine file is given"),
+    ],
+)
+def test_a_wrong_call_is_headed_as_every_error(call: str, expected: str) -> None:
+    result = run(*call.split())
+    assert result.exit_code == 2
+    last = result.stderr.splitlines()[-1]
+    assert last.startswith("olp: error: ")
+    assert expected in last
+
+
+@pytest.mark.parametrize("call", [(), ("calibrate",)])
+def test_a_group_without_a_verb_shows_its_help(call: tuple[str, ...]) -> None:
+    result = run(*call)
+    assert "Verbs:" in result.output
+    assert "olp: error" not in result.output
