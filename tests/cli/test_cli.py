@@ -349,3 +349,11 @@ def test_a_group_without_a_verb_shows_its_help(call: tuple[str, ...]) -> None:
     result = run(*call)
     assert "Verbs:" in result.output
     assert "olp: error" not in result.output
+
+
+def test_a_dialect_in_capitals_is_recognised(tmp_path: Path) -> None:
+    assert run("init", tmp_path / "mill").exit_code == 0
+    (tmp_path / "a.nc").write_text("G0 X1\nM2\n")
+    result = run("inspect", tmp_path / "a.nc", "-m", tmp_path / "mill" / "machine.toml", "--dialect", "GRBL")
+    assert result.exit_code == 2
+    assert "there is no dialect 'GRBL'; did you mean grbl?" in result.stderr
