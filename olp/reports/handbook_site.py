@@ -132,8 +132,10 @@ _STYLE = """:root { color-scheme: light dark; --line: color-mix(in srgb, current
 body { margin: 0; display: grid; grid-template-columns: 17rem minmax(0, 52rem); gap: 2rem;
   font: 1rem/1.55 system-ui, sans-serif; }
 nav { padding: 1rem; border-right: 1px solid var(--line); font-size: 0.9rem; position: sticky; top: 0;
-  height: 100vh; overflow-y: auto; box-sizing: border-box; }
+  height: 100vh; box-sizing: border-box; display: flex; flex-direction: column; }
+nav details { flex: 1; min-height: 0; overflow-y: auto; }
 nav summary { display: none; }
+nav #hits { flex: none; max-height: 50vh; overflow-y: auto; padding-left: 1.75rem; }
 nav h2 { font-size: 0.8rem; margin: 1rem 0 0.25rem; text-transform: uppercase; }
 nav ul, nav ol { margin: 0; padding-left: 1rem; }
 nav [aria-current] { font-weight: 600; }
@@ -146,7 +148,7 @@ table { border-collapse: collapse; display: block; overflow-x: auto; }
 th, td { border: 1px solid var(--line); padding: 0.25rem 0.6rem; text-align: left; vertical-align: top; }
 @media (max-width: 50rem) {
   body { display: block; }
-  nav { position: static; height: auto; border: 0; border-bottom: 1px solid var(--line); }
+  nav { position: static; display: block; height: auto; border: 0; border-bottom: 1px solid var(--line); }
   nav summary { display: list-item; cursor: pointer; padding: 0.5rem 0; }
 }
 @media print { nav { display: none; } body { display: block; } }
@@ -159,7 +161,8 @@ const narrow = matchMedia("(max-width: 50rem)");
 const fold = () => { pages.open = !narrow.matches; };
 fold();
 narrow.addEventListener("change", fold);
-if (pages.open) document.querySelector("nav [aria-current]")?.scrollIntoView({ block: "center" });
+const current = document.querySelector("nav [aria-current]");
+if (current) pages.scrollTop = current.offsetTop - pages.offsetTop - pages.clientHeight / 2;
 const empty = new Set(EMPTY);
 const stems = text => (text.toLowerCase().match(/[\p{L}\p{N}_.+-]*[\p{L}\p{N}_]/gu) || [])
   .filter(word => !empty.has(word) && !/^\d{1,2}$/.test(word))
