@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -186,7 +187,7 @@ def _diff(nominal: bytes, result: Correction, machine: Machine, on_stderr: bool)
         nominal,
         result.data,
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
-        increments_mm=machine.least_increment_mm if profile and profile.increments_without_point else None,
+        bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,
         colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
     )
