@@ -107,7 +107,8 @@ def _measured(report: Report, plots: Plots) -> Iterator[Block]:
         [
             row["name"], sides[name], str(row.get("counted", row["points"])),
             *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
-            *(number((row.get(side) or {}).get(key)) for side in ("normal_um", "binormal_um") for key in ("mean", "rms")),
+            *(number((row.get("normal_um") or {}).get(key)) for key in ("mean", "rms")),
+            *(number((row.get("binormal_um") or {}).get(key)) for key in ("mean", "rms")),
         ]
         for name in sides
         for row in (report.get(name) or {}).get("runs") or ()

@@ -32,11 +32,11 @@ from olp.errormodel.sources.base import (
 
 
 class OnLine(Table):
-    """Where the other axes stood, and the tool vector."""
+    """The positions of the other axes, and the tool vector."""
 
     line_mm: Position = Field(
         default_factory=Position,
-        description="where the other axes stood, such as { Y = 0.0, Z = 0.0 } in mm; the datum if left out",
+        description="positions of the other axes, such as { Y = 0.0, Z = 0.0 } in mm; the datum if left out",
     )
     tool_mm: Triple = Field(default=(0.0, 0.0, 0.0), description="the tool vector then, [X, Y, Z] in mm")
 

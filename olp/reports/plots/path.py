@@ -34,7 +34,7 @@ Runs = Mapping[str, Sequence[Run]]
 
 
 def picture(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
-    """The path in plan view, coloured by its distance from the nominal one; `sides` are the labels of groups."""
+    """The path in plan view, coloured by its distance from the nominal one; `sides` labels the groups."""
 
     def draw(figure: Figure) -> None:
         from matplotlib.collections import LineCollection
@@ -89,9 +89,7 @@ def _sampled(run: Run) -> tuple[Array, Array]:
     return run.pairing.foot_mm[rows][:, :2], run.deviation.across[rows] * UM_PER_MM
 
 
-def along(
-    path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]
-) -> bytes:
+def along(path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
     """Distance from the nominal path along it; bands from least to most where points are many."""
 
     def draw(figure: Figure) -> None:
