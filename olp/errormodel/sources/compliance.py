@@ -57,7 +57,8 @@ class ComplianceTable(OnLine):
 class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]]):
     """Tables [[compliance]], each with a CSV file."""
 
-    key = field = "compliance"
+    key = "compliance"
+    field = "compliance"
     schema: Schema = (
         list[ComplianceTable],
         Field(default=[], description="tables [[compliance]], errors per kg of payload"),

@@ -186,7 +186,8 @@ def _cells(entry: Entry) -> int:
 class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
     """Tables [[curves]], each with a CSV file."""
 
-    key = field = "curves"
+    key = "curves"
+    field = "curves"
     numbers = (Mean(), Half())
     schema: Schema = (list[CurveTable], Field(default=[], description="tables [[curves]]"))
 

@@ -263,7 +263,8 @@ class ThermalFile(Table):
 class ThermalStructure(ErrorSource[str | None, Structure | None]):
     """An olp-thermal-1 file, which the key `structure` of the table [thermal] names."""
 
-    key = field = "structure"
+    key = "structure"
+    field = "structure"
     covered = False
 
     def example(self, by: float) -> Example:
