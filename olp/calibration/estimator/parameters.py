@@ -52,8 +52,8 @@ class Parameters:
 
     `measuring_lines` holds that of each displacement curve. `slices` holds the part of theta by name:
     "EXX", "half EXX", "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were
-    measured in the machine's frame, and theta has a part "frame" of nine numbers: the shift of the axes in
-    that frame (mm), their turn about the datum, and the turn of the tool vectors (rad times LEVER_ARM_MM).
+    measured in the machine's frame. Theta then has a part "frame" of nine numbers: shift (mm) and turn of the
+    axes in that frame, and turn of the tool vectors. Turns are in rad times LEVER_ARM_MM.
     """
 
     chain: str

@@ -142,8 +142,8 @@ class Structure:
             low, high = ranges[name]
             raise ConfigError(
                 f"sensor {name}: the structure is at {value:.2f} degC; expected {low:.2f} to {high:.2f} "
-                "degC, the range that was identified; log the drift there too, or take the end of the range "
-                "with --outside-box hold of olp correct, check, view or results"
+                "degC, the range that was identified. Log the drift there too, or take the end of the range "
+                "with --outside-box hold (of olp correct, check, view and results)"
             )
         return {
             s.name: float(np.clip(stated[s.name], *s.range_degC)) - s.reference_degC for s in self.sensors
