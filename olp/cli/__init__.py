@@ -32,7 +32,7 @@ VERBS = {
     "calibrate": "Make a calibration from measurements; read and write the tables of controls.",
     "schema": "Print the JSON Schema of a file that people write.",
     "explain": "Explain the code of a finding or a term, or list all codes.",
-    "help": "Show the papers on a topic, or answer a question.",
+    "help": "Show the documentation on a topic, or answer a question.",
 }
 
 #: Exit code of an interrupted run, as shells report it.

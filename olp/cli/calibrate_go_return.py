@@ -23,7 +23,7 @@ from olp.core.errors import UsageError
 @click.option("--count", type=Count(min=1), default=10, show_default=True, help="Number of targets.")
 @click.option("--over-mm", type=Length(), default=2.0, show_default=True, help="Overtravel past each target.")
 @click.option("--feed", type=Length(), default=1000.0, show_default=True, help="Feed in mm/min.")
-@click.option("--runs", type=Count(min=1), default=5, show_default=True, help="Runs, both ways.")
+@click.option("--runs", type=Count(min=1), default=5, show_default=True, help="Runs in each direction.")
 @ending_options
 def command(
     data: tuple[str, ...],

@@ -90,8 +90,13 @@ def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> No
 
 def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """The statements of a support matrix, by kind of support; the JSON holds the reasons too."""
+    from olp.program.dialect import Support
+
     kinds = dict.fromkeys(row["support"] for row in matrix)
-    return {kind: " ".join(row["statement"] for row in matrix if row["support"] == kind) for kind in kinds}
+    return {
+        Support(kind).title: " ".join(row["statement"] for row in matrix if row["support"] == kind)
+        for kind in kinds
+    }
 
 
 def _calibration(session: Session) -> Calibration:

@@ -138,7 +138,8 @@ def _names(option: str, given: tuple[str, ...]) -> str | dict[str, str] | None:
     pairs = [item.partition("=") for item in given]
     wrong = next((item for item, (name, _, value) in zip(given, pairs, strict=True) if not value), None)
     if wrong is not None:
-        raise UsageError(f"{option} {wrong} is one of several; expected {option} NAME_IN_FILE=NAME for each")
+        why = "has nothing after =" if "=" in wrong else "is one of several"
+        raise UsageError(f"{option} {wrong} {why}; expected {option} NAME_IN_FILE=NAME for each")
     return {name: value for name, _, value in pairs} or None
 
 

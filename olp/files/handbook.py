@@ -53,9 +53,9 @@ class Page:
 @functools.cache
 def pages() -> dict[str, Page]:
     """All pages by name, in reading order: the index first, then as it links them, then what it links not."""
-    found = {name: Page(name, text) for name, text in _texts(resources.files("olp") / "docs", "")}
-    order = [INDEX, *_LINK.findall(found[INDEX].text), *sorted(found)]
-    return {name: found[name] for name in dict.fromkeys(order) if name in found}
+    pages_by_name = {name: Page(name, text) for name, text in _texts(resources.files("olp") / "docs", "")}
+    order = [INDEX, *_LINK.findall(pages_by_name[INDEX].text), *sorted(pages_by_name)]
+    return {name: pages_by_name[name] for name in dict.fromkeys(order) if name in pages_by_name}
 
 
 @functools.cache

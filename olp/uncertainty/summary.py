@@ -41,7 +41,7 @@ def summary(
     *,
     asked: bool,
 ) -> dict[str, Any]:
-    """The part of the report; `asked`: the user stated the tolerance."""
+    """The part of the report; `asked`: the call or the job states the part tolerance."""
     points = confidence.points
     band = confidence.band_mm * UM_PER_MM
     variance = (confidence.sigma_mm**2).sum(axis=1)
@@ -129,7 +129,8 @@ def findings(
         results.append(_finding("OLP434", what))
     doubtful = [part.name for part in parts if not part.probable and part.name not in left_out]
     if doubtful:
-        results.append(_finding("OLP435", f"{', '.join(doubtful)}: smaller than 2 sigma"))
+        what = f"{', '.join(doubtful)}: smaller than their expanded uncertainty (k = {COVERAGE:g})"
+        results.append(_finding("OLP435", what))
     if left_out:
         results.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
     if growth >= AGED:

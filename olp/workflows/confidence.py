@@ -33,7 +33,7 @@ def assess(
     asked: bool,
 ) -> Assessment | None:
     """Bands and probabilities of a proved program, its part of the report, and its findings; None where the
-    calibration states no uncertainty. `asked`: the call gives the tolerance `part_tolerance_um`."""
+    calibration states no uncertainty. `asked`: the call or the job gives `part_tolerance_um`."""
     uncertainty = loaded.uncertainty
     if uncertainty is None:
         return None

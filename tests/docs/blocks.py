@@ -59,9 +59,9 @@ class Block:
 
 def blocks(path: Path, name: str) -> list[Block]:
     text = path.read_text("utf-8")
-    found, start = [], 0
+    parts, start = [], 0
     while match := _FENCE.search(text, start):
-        found.append(
+        parts.append(
             Block(
                 name,
                 match["kind"],
@@ -72,7 +72,7 @@ def blocks(path: Path, name: str) -> list[Block]:
             )
         )
         start = match.end("body") + len("```\n")
-    return found
+    return parts
 
 
 def papers() -> dict[str, list[Block]]:
@@ -100,14 +100,14 @@ def run(body: str, folder: Path, *, timeout_s: float = 300.0) -> tuple[int, str]
     return done.returncode, done.stdout
 
 
-def problems(found: list[Block], folder: Path) -> Iterator[str]:
+def problems(parts: list[Block], folder: Path) -> Iterator[str]:
     """Run all blocks of a page in a folder, one after the other; what goes wrong."""
-    for block in found:
+    for block in parts:
         if block.file is not None:
             target = folder / block.file
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(block.body, "utf-8")
-    for block in found:
+    for block in parts:
         if block.kind == "sh" and not block.set_up:
             yield from _shell(block, folder)
         elif block.kind == "python":

@@ -46,13 +46,13 @@ def anchor(title: str) -> str:
 
 @pytest.mark.parametrize("path", [*PAGES, *modules()], ids=name_of)
 def test_no_sentence_is_too_long(path: Path) -> None:
-    found = of_paper(path) if path.suffix == ".md" else of_module(path)
-    assert [f"line {s.line}: {s.text}" for s in found if s.words > LONGEST] == []
+    sentences = of_paper(path) if path.suffix == ".md" else of_module(path)
+    assert [f"line {s.line}: {s.text}" for s in sentences if s.words > LONGEST] == []
 
 
-def mean(found: Iterator[Sentence]) -> float:
+def mean(sentences: Iterator[Sentence]) -> float:
     """Words of a sentence in the mean, of those that are sentences and not cells or titles."""
-    return statistics.fmean([s.words for s in found if s.words > 3] or [0])
+    return statistics.fmean([s.words for s in sentences if s.words > 3] or [0])
 
 
 @pytest.mark.parametrize("path", PAGES, ids=name_of)
@@ -67,12 +67,12 @@ def test_messages_are_short_in_the_mean() -> None:
 @pytest.mark.parametrize("path", sorted({*PAGES, *modules()} - HISTORY), ids=name_of)
 def test_words_are_those_of_the_field(path: Path) -> None:
     lines = path.read_text("utf-8").splitlines()
-    found = [
+    banned = [
         f"line {number}: {match[0]!r}, say: {instead(match[0])}"
         for number, line in enumerate(lines, 1)
         for match in PATTERN.finditer(line)
     ]
-    assert found == []
+    assert banned == []
 
 
 def test_the_readme_is_a_page_for_a_stranger() -> None:
@@ -179,15 +179,15 @@ def test_figures_are_those_of_today(job: str) -> None:
 #: What a new user asks, and what the answer has to say.
 QUESTIONS = {
     "my Grbl router is out of square": "C0Y",
-    "which sign does a level have": "sign",
-    "what does OLP306 mean": "OLP306",
+    "which sign does a level have": "olp help background/conventions",
+    "what does OLP306 mean": "What to do:",
     "how do I add my control": "DIALECT",
     "what does the proof not prove": "calibration",
-    "what is backlash": "backlash",
+    "what is backlash": "olp help background/model",
     "how certain is the correction": "uncertainty",
     "my program has loops and subprograms": "--flatten",
-    "which exit codes are there": "exit",
-    "can it read Heidenhain programs": "Heidenhain",
+    "which exit codes are there": "exit code 0",
+    "can it read Heidenhain programs": "olp help background/limits",
     "how do I stop a bad program before it runs": "olp check",
     "how do I correct CMM results": "olp results",
     "out of square": "five minutes to a corrected program",

@@ -66,7 +66,8 @@ class Tilt(Numbers):
 class Squareness(ErrorSource[SquarenessTable, Angles]):
     """The table [squareness]."""
 
-    key = field = "squareness"
+    key = "squareness"
+    field = "squareness"
     numbers = (Tilt(),)
     schema: Schema = (
         SquarenessTable,

@@ -53,7 +53,7 @@ RULES = (
         Severity.WARNING,
         "A canned cycle moves straight along the tool axis, so it can be exact at one depth only. The rest "
         "of this stroke deviates from the nominal path by more than the tolerance.",
-        "Write the cycles out as plain moves with --expand-cycles.",
+        "Write the cycles out as plain moves with olp correct --expand-cycles.",
         "`G81 Z-80 R2` where the column leans by 3 um over 80 mm.",
     ),
     _rule(

@@ -32,8 +32,9 @@ from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Profile, increment
 from olp.program.rs274.state import NAN, Capture, PathMode, State
 
-#: ten times M6 and M61
+#: M6, as ten times its number.
 TOOL_CHANGE = 60
+#: M61, as ten times its number.
 SET_TOOL = 610
 
 #: RS-274's order of execution within a block; other codes come last.
