@@ -103,7 +103,7 @@ def sanity_findings(path: Toolpath, correction_mm: Array, sanity: Sanity) -> lis
         return []
     what = (
         f"{int(wild.sum())} waypoints are moved by up to {np.nanmax(size) * 1e3:.0f} um; "
-        f"the sanity limit is {sanity.largest_correction_mm * 1e3:g} um"
+        f"largest_correction_um of [check] is {sanity.largest_correction_mm * 1e3:g}"
     )
     return [finding("OLP409", what, lines_of(path, wild))]
 

@@ -5,7 +5,10 @@ Every error of `olp` becomes one `olp: error: ...` on stderr and an exit code he
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
+from typing import IO, Any
 
 import click
 
@@ -29,7 +32,7 @@ VERBS = {
     "calibrate": "Make a calibration from measurements; read and write the tables of controls.",
     "schema": "Print the JSON Schema of a file that people write.",
     "explain": "Explain the code of a finding or a term, or list all codes.",
-    "help": "Show the papers on a topic, or answer a question.",
+    "help": "Show the documentation on a topic, or answer a question.",
 }
 
 #: Exit code of an interrupted run, as shells report it.
@@ -41,12 +44,37 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
+class _WrongCall(click.UsageError):
+    """A call that click refuses: its usage, then what is wrong, headed as the errors of `olp` are."""
+
+    def show(self, file: IO[Any] | None = None) -> None:
+        if self.ctx is not None:
+            diagnostic(f"{self.ctx.get_usage()}\nTry '{self.ctx.command_path} --help' for help.\n")
+        diagnostic(f"olp: error: {self.message}")
+
+
+@contextlib.contextmanager
+def _wrong_calls() -> Iterator[None]:
+    try:
+        yield
+    except click.UsageError as error:
+        # A group without a verb shows its help, which click raises as an error of its own.
+        if type(error).show is not click.UsageError.show:
+            raise
+        raise _WrongCall(error.format_message(), error.ctx) from None
+
+
 class _Verbs(LateGroup):
     """The verbs; an error of `olp` ends in one line and an exit code."""
 
+    def make_context(self, *words: Any, **settings: Any) -> click.Context:
+        with _wrong_calls():
+            return super().make_context(*words, **settings)
+
     def invoke(self, ctx: click.Context) -> object:
         try:
-            return super().invoke(ctx)
+            with _wrong_calls():
+                return super().invoke(ctx)
         except OlpError as error:
             for line in str(error).split("\n"):
                 diagnostic(f"olp: error: {line}")

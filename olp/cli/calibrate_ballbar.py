@@ -7,14 +7,14 @@ from typing import Any, cast
 import click
 
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
-from olp.cli.options import output_option, plot_option
+from olp.cli.options import Range, output_option, plot_option
 
 
 @click.command("ballbar")
 @click.argument("files", nargs=-1, required=True)
 @output_option("OUT.toml", "Write [[squareness]] for a plan of measurements.")
 @click.option(
-    "--skip-deg", type=click.FloatRange(0.0, 30.0), default=2.5, show_default=True,
+    "--skip-deg", type=Range(0.0, 30.0), default=2.5, show_default=True,
     help="Leave out readings this near to the reversal of an axis.",
 )  # fmt: skip
 @plot_option("Draw every circle, as FILE-<plane>.svg or .png.")

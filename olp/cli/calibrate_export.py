@@ -8,7 +8,7 @@ import click
 
 from olp.cli.calibrate_import import table_options
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, machine_given, put, refuse_early
-from olp.cli.options import fail_on_option, json_option, output_option, setup_options
+from olp.cli.options import Count, fail_on_option, json_option, output_option, setup_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @output_option("FILE", "The table; further files go beside it.")
 @click.option("--compare", is_flag=True, help="Write nothing; show the residual error of every format.")
 @click.option("--program", metavar="PROGRAM", help="Also show the residual error along this program.")
-@click.option("--most-rows", type=click.IntRange(min=2), help="Rows that the control takes in one table.")
+@click.option("--most-rows", type=Count(min=2), help="Rows that the control takes in one table.")
 @json_option()
 @fail_on_option
 @table_options

@@ -11,6 +11,7 @@ import click
 
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put, refuse_early
 from olp.cli.options import (
+    NUMBER,
     day_option,
     fail_on_option,
     force_option,
@@ -29,7 +30,7 @@ from olp.core.errors import UsageError
 @output_option("calibration.toml", "Where to write; curves go beside it.")
 @machine_option("The machine file: chain, travel, tools.")
 @click.option(
-    "--datum", type=(float, float, float), metavar="X Y Z",
+    "--datum", type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z",
     help="Axis position where the curves are zero. Default: the position in the box nearest to zero.",
 )  # fmt: skip
 @day_option("The last day of the calibration's validity.", "--valid-until")

@@ -21,5 +21,5 @@ def command(as_json: bool) -> None:
         return
     for key, form in FORMATS.items():
         put(f"{key} ({form.ending})  {form.title}\n")
-        put(f"  holds: {form.holds}\n  sense: {form.sense or 'to be stated with --sense'}\n")
+        put(f"  holds: {form.holds}\n  sign convention: {form.sense or 'to be stated with --sense'}\n")
         put(f"  known from: {form.status}\n")

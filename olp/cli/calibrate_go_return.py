@@ -9,7 +9,7 @@ import numpy as np
 
 from olp.cli.common import files_of
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
-from olp.cli.options import Length, machine_option, output_option, plot_option
+from olp.cli.options import Count, Length, machine_option, output_option, plot_option
 from olp.core.errors import UsageError
 
 
@@ -20,10 +20,10 @@ from olp.core.errors import UsageError
 @plot_option("Draw the reversal along each axis, as FILE-reversal.svg or .png.")
 @click.option("--program", metavar="OUT.ngc", help="Write the program of the test instead (-m, --axis).")
 @click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="The axis of the program.")
-@click.option("--count", type=click.IntRange(min=1), default=10, show_default=True, help="Number of targets.")
+@click.option("--count", type=Count(min=1), default=10, show_default=True, help="Number of targets.")
 @click.option("--over-mm", type=Length(), default=2.0, show_default=True, help="Overtravel past each target.")
 @click.option("--feed", type=Length(), default=1000.0, show_default=True, help="Feed in mm/min.")
-@click.option("--runs", type=click.IntRange(min=1), default=5, show_default=True, help="Runs, both ways.")
+@click.option("--runs", type=Count(min=1), default=5, show_default=True, help="Runs in each direction.")
 @ending_options
 def command(
     data: tuple[str, ...],

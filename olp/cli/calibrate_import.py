@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.common import diagnostic, files_of, refuse_early
-from olp.cli.options import day_option, force_option, machine_option, output_option
+from olp.cli.options import Count, day_option, force_option, machine_option, output_option
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def table_options(function: Any) -> Any:
             "--axis-name", "names", multiple=True, metavar="X=NAME", callback=axis_names,
             help="What the control calls an axis, such as X=AX1.",
         ),
-        click.option("--comp-type", type=click.IntRange(min=0), help="LinuxCNC's COMP_FILE_TYPE."),
+        click.option("--comp-type", type=Count(min=0), help="LinuxCNC's COMP_FILE_TYPE."),
         click.option(
             "--sense", type=click.Choice(["error", "correction"]),
             help="error: the control subtracts the values (actual minus commanded); correction: adds them.",

@@ -8,6 +8,8 @@ import click
 
 from olp.cli.common import diagnostic, exit_for, files_of, put_report, refuse_early
 from olp.cli.options import (
+    NUMBER,
+    Count,
     Length,
     day_option,
     fail_on_option,
@@ -31,9 +33,9 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
     help="Residual error that a correction may leave: rms length over the box, best-fit frame.",
 )  # fmt: skip
 @click.option("--instrument", type=click.Choice(METHODS), help="Default: the quickest that reaches it.")
-@click.option("--points", type=click.IntRange(min=8), help="Number of points. Default: the fewest.")
+@click.option("--points", type=Count(min=8), help="Number of points. Default: the fewest.")
 @click.option(
-    "--box", type=(float, float, float, float, float, float), metavar="X X Y Y Z Z",
+    "--box", type=(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER), metavar="X X Y Y Z Z",
     help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
 )  # fmt: skip
 @reflector_option(

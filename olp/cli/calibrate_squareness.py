@@ -27,8 +27,8 @@ from olp.core.units import RAD_PER_URAD
 def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], as_json: bool) -> None:
     """Squareness in the sign conventions of controls and instruments.
 
-    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from. With --drawn-frame, they come
-    from a frame that the machine drew or printed. Without either, the conventions are listed."""
+    VALUES such as C0Y=12.5 B0Z=-3 are in urad, in the convention of --from. --drawn-frame computes the
+    squareness from the lengths of a drawn frame. Without either, the conventions are listed."""
     from olp.calibration.iso230.conventions import CONVENTIONS, angle_words, from_iso, to_iso
     from olp.calibration.iso230.squareness import from_frame
     from olp.cli.outline import outline

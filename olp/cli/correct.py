@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +64,10 @@ LAST_DIGITS_UM = 10.0
 @click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
 @click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a list.")
 @renamed_option("--results", "the verb olp results", flag=True)
+@renamed_option("--frame", "an option of olp results")
+@renamed_option("--tool", "an option of olp results")
+@renamed_option("--tip-radius-mm", "an option of olp results")
+@renamed_option("--decimals", "an option of olp results")
 @click.option("--diff", "show_diff", is_flag=True, help="Print the changes, line by line.")
 @quiet_option("No report and no progress; only the exit code.")
 @force_option()
@@ -186,7 +191,7 @@ def _diff(nominal: bytes, result: Correction, machine: Machine, on_stderr: bool)
         nominal,
         result.data,
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
-        increments_mm=machine.least_increment_mm if profile and profile.increments_without_point else None,
+        bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,
         colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
     )

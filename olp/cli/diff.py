@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from olp.core.units import AXES
@@ -52,7 +52,8 @@ _UNITS = re.compile(r"\s*UNITS?\s*/\s*(INCH|MM)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 _UNKNOWN = (math.nan, math.nan, math.nan)
 
-Increments = tuple[float, float, float]
+#: mm per unit of a number without a point, by letter and unit in mm.
+BareMm = Callable[[str, float], float]
 Position = tuple[float, float, float]
 Pair = tuple[int | None, int | None]
 
@@ -71,8 +72,8 @@ class Line:
 class _Reader:
     """Reads lines with the few modal states that lengths need."""
 
-    def __init__(self, increments_mm: Increments | None) -> None:
-        self._increments_mm = increments_mm
+    def __init__(self, bare_mm: BareMm | None = None) -> None:
+        self._bare_mm = bare_mm
         self._unit_um = 1000.0
         self._incremental = False
         self._position = _UNKNOWN
@@ -113,8 +114,8 @@ class _Reader:
             value = float(number)
         except ValueError:
             return math.nan
-        if self._increments_mm is not None and "." not in number:
-            return value * self._increments_mm[_AXIS_OF[letter]] * 1000.0
+        if self._bare_mm is not None and "." not in number:
+            return value * self._bare_mm(letter, self._unit_um / 1000.0) * 1000.0
         return value * self._unit_um
 
 
@@ -203,18 +204,18 @@ def render(
     corrected_data: bytes,
     *,
     near_um: float = 1000.0,
-    increments_mm: Increments | None = None,
+    bare_mm: BareMm | None = None,
     statements: bool = False,
     colour: bool = False,
 ) -> str:
     """The changed lines as text: line in the nominal program, nominal, corrected, change of lengths in um.
 
     The change of an axis is corrected command minus nominal command. No correction is larger than `near_um`.
-    `increments_mm` are the least increments of a control that counts them in numbers without a point.
+    `bare_mm` is what the control takes numbers without a point for; without it they are as with one.
     `statements`: the texts are APT or DMIS.
     """
     nominal, corrected = (
-        (_StatementReader() if statements else _Reader(increments_mm)).read(data)
+        (_StatementReader() if statements else _Reader(bare_mm)).read(data)
         for data in (nominal_data, corrected_data)
     )
     rows: list[tuple[str, str, str, str]] = []

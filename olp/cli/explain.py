@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import textwrap
+from collections.abc import Mapping
 
 import click
 
@@ -21,14 +23,11 @@ from olp.findings.rule import Rule
 def command(code: str | None, as_json: bool) -> None:
     """Explain the code of a finding or a term of the glossary, or list all codes."""
     if code is not None and code.upper() not in RULES:
-        from olp.workflows.help import meaning
+        from olp.workflows.help import meanings
 
-        term = meaning(code)
-        if term is not None:
-            name, text = term
-            lines = textwrap.fill(text, 96, initial_indent="  ", subsequent_indent="  ")
-            as_text = f"{name}\n{lines}\n"
-            put(json.dumps({"term": name, "meaning": text}, indent=2) + "\n" if as_json else as_text)
+        terms = meanings(code)
+        if terms:
+            put(_as_json(terms) if as_json else "\n".join(map(_as_text, terms, terms.values())))
             return
     rules = list(RULES.values()) if code is None else [_rule(code)]
     if as_json:
@@ -41,15 +40,34 @@ def command(code: str | None, as_json: bool) -> None:
         put(of_rule(rules[0]))
 
 
+def _as_text(term: str, meaning: str) -> str:
+    return f"{term}\n{textwrap.fill(meaning, 96, initial_indent='  ', subsequent_indent='  ')}\n"
+
+
+def _as_json(terms: Mapping[str, str]) -> str:
+    rows = [{"term": term, "meaning": meaning} for term, meaning in terms.items()]
+    return json.dumps(rows[0] if len(rows) == 1 else rows, indent=2) + "\n"
+
+
 def _rule(code: str) -> Rule:
-    rule = RULES.get(code.upper())
+    """The finding of a code, also of its number alone. Raises UsageError where there is none."""
+    asked = f"OLP{code}" if code.isdigit() else code.upper()
+    rule = RULES.get(asked)
+    if rule is None and re.fullmatch(r"OLP\d{3,}", asked):
+        raise UsageError(f"there is no finding {asked}; olp explain lists the codes")
     if rule is None:
-        longer = [other for other in RULES if other.startswith(code.upper())]
-        near = longer or difflib.get_close_matches(code.upper(), RULES, 1)
+        longer = [other for other in RULES if other.startswith(asked)]
         lists = "olp explain lists the codes, olp help glossary the terms"
-        hint = f"did you mean {near[0]}?" if near else lists
+        hint = f"did you mean {longer[0]}?" if longer else _near_term(code) or lists
         raise UsageError(f"{code!r} is neither the code of a finding nor a term of the glossary; {hint}")
     return rule
+
+
+def _near_term(word: str) -> str:
+    from olp.files.handbook import glossary
+
+    near = difflib.get_close_matches(word.lower(), glossary(), 1)
+    return f"did you mean {near[0]}?" if near else ""
 
 
 def _severity(rule: Rule) -> str:

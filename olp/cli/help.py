@@ -16,7 +16,7 @@ from olp.core.errors import UsageError
 @click.option("--html", "folder", metavar="DIR", help="Write all pages, linked and with a search, into DIR.")
 @force_option("pages that exist")
 def command(topic: tuple[str, ...], folder: str | None, force: bool) -> None:
-    """Show the papers on a topic, or answer a question.
+    """Show the documentation on a topic, or answer a question.
 
     TOPIC is the name of a page, a verb, or words of a question: olp help out of square. Without it all pages
     are listed.

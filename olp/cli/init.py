@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from olp.cli.common import diagnostic
-from olp.cli.options import force_option
+from olp.cli.options import NUMBER, force_option
 from olp.core.errors import OlpError, UsageError
 
 #: Travel of a small machine in mm, to be replaced by that of the real one.
@@ -23,7 +23,7 @@ Travel = tuple[tuple[str, float, float], ...]
 @click.option("--controller", help="Dialect of the control, such as linuxcnc, fanuc, haas or grbl.")
 @click.option(
     "--travel",
-    type=(click.Choice("XYZ"), float, float),
+    type=(click.Choice("XYZ"), NUMBER, NUMBER),
     multiple=True,
     metavar="AXIS MIN MAX",
     help="Travel of an axis in mm, such as --travel X 0 2000; once per axis.",

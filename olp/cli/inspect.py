@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from olp.cli.common import diagnostic, files_of, machine_given, plot_ending, put, refuse_early, source
-from olp.cli.options import force_option, json_option, plot_option, setup_options
+from olp.cli.options import NUMBER, Integer, force_option, json_option, plot_option, setup_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 @click.argument("file", metavar="PROGRAM|machine.toml", required=False)
 @setup_options
 @click.option(
-    "--at", type=(float, float, float), metavar="X Y Z", help="Show the error at an axis position in mm."
+    "--at", type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z", help="Show the error at an axis position in mm."
 )
-@click.option("--tool", type=int, help="Tool number for --at. Default: the tool at the start.")
+@click.option("--tool", type=Integer(), help="Tool number for --at. Default: the tool at the start.")
 @plot_option("Draw the curves of the calibration, as .svg or .png.")
 @json_option("Print as JSON.")
 @force_option("the plot")
@@ -90,8 +90,13 @@ def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> No
 
 def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """The statements of a support matrix, by kind of support; the JSON holds the reasons too."""
+    from olp.program.dialect import Support
+
     kinds = dict.fromkeys(row["support"] for row in matrix)
-    return {kind: " ".join(row["statement"] for row in matrix if row["support"] == kind) for kind in kinds}
+    return {
+        Support(kind).title: " ".join(row["statement"] for row in matrix if row["support"] == kind)
+        for kind in kinds
+    }
 
 
 def _calibration(session: Session) -> Calibration:

@@ -29,7 +29,44 @@ def renamed_option(old: str, new: str, *, flag: bool = False, values: int = 1) -
     )  # fmt: skip
 
 
-class Length(click.FloatRange):
+def _readable(value: Any, read: type[int] | type[float], what: str) -> Any:
+    """The value, if it is such a number. Raises click.BadParameter in plain words."""
+    try:
+        read(value)
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not {what}; expected {what}, such as 5") from None
+    return value
+
+
+class Number(click.types.FloatParamType):
+    """Any number."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        return float(super().convert(_readable(value, float, "a number"), param, ctx))
+
+
+class Range(click.FloatRange):
+    """A number within limits."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        return float(super().convert(_readable(value, float, "a number"), param, ctx))
+
+
+class Integer(click.types.IntParamType):
+    """Any integer."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        return int(super().convert(_readable(value, int, "an integer"), param, ctx))
+
+
+class Count(click.IntRange):
+    """An integer within limits."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        return int(super().convert(_readable(value, int, "an integer"), param, ctx))
+
+
+class Length(Range):
     """A finite number above zero."""
 
     def __init__(self) -> None:
@@ -40,6 +77,9 @@ class Length(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number.", param, ctx)
         return number
+
+
+NUMBER = Number()
 
 
 def machine_option(help: str = "The machine file.", *, required: bool = False) -> Callable[[F], F]:
@@ -112,7 +152,7 @@ def plot_option(help: str) -> Callable[[F], F]:
 def reflector_option(help: str, *, several: bool = False) -> Callable[[F], F]:
     """--reflector."""
     return click.option(
-        "--reflector", multiple=several, type=(float, float, float), metavar="X Y Z", help=help
+        "--reflector", multiple=several, type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z", help=help
     )
 
 

@@ -10,6 +10,9 @@ from olp.reports.report import findings_text, pairs, printable, table
 
 Summary = Mapping[str, Any]
 
+#: Titles of keys whose words are not those of the shop floor.
+_TITLES = {"lost_motion_um": "backlash um"}
+
 
 def outline(values: Summary) -> str:
     """A summary whose keys end in their units, as text; what is empty is left out."""
@@ -73,7 +76,7 @@ def _table(names: Sequence[str], rows: Sequence[Summary]) -> Iterator[str]:
 
 
 def _title(key: object) -> str:
-    return printable(str(key).replace("_", " "))
+    return _TITLES.get(str(key)) or printable(str(key).replace("_", " "))
 
 
 def _text(value: object) -> str:

@@ -23,6 +23,8 @@ from olp.cli.common import (
 )
 from olp.cli.layouts import layout_of
 from olp.cli.options import (
+    Count,
+    Range,
     date_option,
     fail_on_option,
     force_option,
@@ -72,8 +74,8 @@ class _Asked:
     help="Work offset that the results are stated in, or machine; may be repeated.",
 )  # fmt: skip
 @click.option("--tool", "tools", multiple=True, metavar="[NAME=]N", help="Stylus; may be repeated.")
-@click.option("--tip-radius-mm", type=click.FloatRange(min=0.0), help="Radius of the tip, 0 for centres.")
-@click.option("--decimals", type=click.IntRange(0, 12), help="Fewest decimals of corrected results.")
+@click.option("--tip-radius-mm", type=Range(min=0.0), help="Radius of the tip, 0 for centres.")
+@click.option("--decimals", type=Count(0, 12), help="Fewest decimals of corrected results.")
 @outside_box_option("refuse the results", "take the error at the box's face")
 @date_option()
 @report_option()
@@ -136,7 +138,8 @@ def _names(option: str, given: tuple[str, ...]) -> str | dict[str, str] | None:
     pairs = [item.partition("=") for item in given]
     wrong = next((item for item, (name, _, value) in zip(given, pairs, strict=True) if not value), None)
     if wrong is not None:
-        raise UsageError(f"{option} {wrong} is one of several; expected {option} NAME_IN_FILE=NAME for each")
+        why = "has nothing after =" if "=" in wrong else "is one of several"
+        raise UsageError(f"{option} {wrong} {why}; expected {option} NAME_IN_FILE=NAME for each")
     return {name: value for name, _, value in pairs} or None
 
 

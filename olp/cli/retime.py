@@ -25,6 +25,8 @@ from olp.cli.common import (
     source,
 )
 from olp.cli.options import (
+    NUMBER,
+    Count,
     Length,
     contour_option,
     fail_on_option,
@@ -62,7 +64,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 )
 @click.option("--cycle-ms", type=Length(), default=1.0, show_default=True, help="Time between samples.")
 @click.option(
-    "--stretch", type=click.IntRange(min=1),
+    "--stretch", type=Count(min=1),
     help="Stretch of the motion for OUT and --plot. Default: one file per stretch.",
 )  # fmt: skip
 @click.option("--blend-mm", type=Length(), help="Path tolerance where the program names none.")
@@ -78,7 +80,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.option("--slow", metavar="FILE.csv", help="Write where the motion is below half of the feed.")
 @plot_option("Draw the motion and its limits over time, as .svg or .png.")
 @click.option(
-    "--plot-span", type=(float, float), metavar="FROM TO", help="Seconds of the motion that --plot draws."
+    "--plot-span", type=(NUMBER, NUMBER), metavar="FROM TO", help="Seconds of the motion that --plot draws."
 )
 @click.option("--write-feed", metavar="FILE", help="Write the program with the planned feeds in its F words.")
 @click.option(

@@ -10,6 +10,7 @@ import click
 
 from olp.cli.common import STREAM, diagnostic, files_of, given, options_of, put, refuse_early, source
 from olp.cli.options import (
+    Count,
     Length,
     confidence_options,
     contour_option,
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 @click.option(
     "--live", is_flag=True, help="Serve the page on this computer until Ctrl-C, and keep it up to date."
 )
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of --live. Default: a free one.")
+@click.option("--port", type=Count(0, 65535), default=0, help="Port of --live. Default: a free one.")
 @tolerance_option
 @outside_box_option("refuse the program", "take the error at the box's face")
 @contour_option

@@ -77,35 +77,35 @@ class Run:
         s = np.unique(self.pairing.s_mm[self.good])
         if len(s) < 2:
             return 0.0
-        places, _, cutting = _cutting_places(path)
-        inside = self._near(places, s)
+        arc_mm, _, cutting = _stations(path)
+        inside = self._near(arc_mm, s)
         return float(inside[cutting].mean()) if cutting.any() else 0.0
 
-    def _near(self, places: Array, s: Array) -> Mask:
-        """Which arc lengths `places` lie in no gap between sorted arc lengths `s`."""
+    def _near(self, arc_mm: Array, s: Array) -> Mask:
+        """Which arc lengths `arc_mm` lie in no gap between sorted arc lengths `s`."""
         gap = np.diff(s)
         wide = _GAP * float(np.quantile(gap, 0.9))
-        after = np.clip(np.searchsorted(s, places), 1, len(s) - 1)
-        inside = (gap[after - 1] <= wide) & (places >= s[0] - wide) & (places <= s[-1] + wide)
+        after = np.clip(np.searchsorted(s, arc_mm), 1, len(s) - 1)
+        inside = (gap[after - 1] <= wide) & (arc_mm >= s[0] - wide) & (arc_mm <= s[-1] + wide)
         return np.asarray(inside, bool)
 
-    def at(self, path: Path, places_mm: Array) -> Array:
+    def at(self, path: Path, arc_mm: Array) -> Array:
         """(k, 3) attained positions at arc lengths (k,), in the normal planes there; NaN in gaps."""
         order = np.argsort(self.pairing.s_mm[self.good], kind="stable")
         s = self.pairing.s_mm[self.good][order]
         away = (self.points_mm - self.pairing.foot_mm)[self.good][order]
-        attained = np.full((len(places_mm), 3), np.nan)
+        attained = np.full((len(arc_mm), 3), np.nan)
         if len(s) < 2:
             return attained
         s, first, count = np.unique(s, return_index=True, return_counts=True)
         away = np.add.reduceat(away, first, axis=0) / count[:, None]
         if len(s) < 2:
             return attained
-        place, segment = path.at(places_mm)
+        place, segment = path.at(arc_mm)
         along = path.axes(segment)[0]
-        between = np.column_stack([np.interp(places_mm, s, away[:, i]) for i in range(3)])
+        between = np.column_stack([np.interp(arc_mm, s, away[:, i]) for i in range(3)])
         between -= np.einsum("ij,ij->i", between, along)[:, None] * along
-        near = self._near(places_mm, s)
+        near = self._near(arc_mm, s)
         attained[near] = (place + between)[near]
         return attained
 
@@ -141,14 +141,14 @@ def _off_the_ends(path: Path, points: Array, pairing: Pairing, reach: float, ord
     return beyond
 
 
-def _cutting_places(path: Path) -> tuple[Array, Index, Mask]:
+def _stations(path: Path) -> tuple[Array, Index, Mask]:
     """Arc lengths of equidistant stations along the path, their segments, and which are on cutting moves."""
-    places = (np.arange(STATIONS, dtype=float) + 0.5) * (path.length_mm / STATIONS)
-    segment = path.at(places)[1]
-    return places, segment, path.cutting[segment]
+    arc_mm = (np.arange(STATIONS, dtype=float) + 0.5) * (path.length_mm / STATIONS)
+    segment = path.at(arc_mm)[1]
+    return arc_mm, segment, path.cutting[segment]
 
 
 def stations(path: Path) -> Array:
     """Arc lengths (k,) of equidistant stations along the path, on its cutting moves only."""
-    places, _, cutting = _cutting_places(path)
-    return places[cutting]
+    arc_mm, _, cutting = _stations(path)
+    return arc_mm[cutting]

@@ -37,7 +37,7 @@ def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Arr
 
 
 def arms(point: Array, centre: Array, plane: Plane) -> tuple[Array, Array]:
-    """How far points (n, 3) are from centres along the first and second axis of their planes, (n,) each."""
+    """(n,) coordinates of points (n, 3) along the first and the second axis of their planes, from centres."""
     rows = np.arange(len(point))
     first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
     return point[rows, first] - centre[rows, first], point[rows, second] - centre[rows, second]

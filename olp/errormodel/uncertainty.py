@@ -22,8 +22,8 @@ from olp.errormodel.sources.registry import NUMBERS
 
 #: What a report says of uncertainties from sigma columns.
 SIGMA_COLUMNS = (
-    "sigma columns: components are taken as independent of each other, and so is each "
-    f"{CELLS}th of a curve of the next, so a touch-off elsewhere cancels nothing of it"
+    f"sigma columns: components are taken as independent of each other, and so are the {CELLS} parts of a "
+    "curve; a touch-off in another part cancels nothing"
 )
 #: 1/K; steel, and most glass scales are near it. For expansion that is not stated.
 EXPANSION_PER_K = 11.5e-6

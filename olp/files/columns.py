@@ -14,7 +14,8 @@ import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import InputError
-from olp.files.problems import Problem, config_error, nearest
+from olp.files.fields import nearest
+from olp.files.problems import Problem, config_error
 from olp.program.text import rows
 from olp.program.text.rows import CSV, Form, place_of
 

@@ -72,7 +72,9 @@ class DialectFile(Table):
         default="", description="the mark at the end of a line that continues on the next"
     )
     terminator: str = Field(default="", description="the mark at the end of a statement")
-    label: Text | None = Field(default=None, description="what may stand before a statement, as a form")
+    label: Text | None = Field(
+        default=None, description="the form of what may come before a statement, such as a line number"
+    )
     ignore_case: bool = Field(default=True, description="whether upper and lower case are the same")
     path_mode: Text = Field(
         default="not stated", description="how the control moves from block to block, for reports"

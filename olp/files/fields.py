@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import datetime
+import difflib
 import json
 import math
 import re
+from collections.abc import Iterable
 from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
@@ -18,6 +20,8 @@ from olp.program.registry import DESCRIBED, DIALECTS
 CONTROLLERS = tuple(DIALECTS)
 #: Dialects that are described by files which come with `olp`.
 SHIPPED = DESCRIBED
+#: What `controller` of a machine file may be.
+CONTROLLER_NAMES = (*CONTROLLERS, *SHIPPED)
 #: ISO 230-1 names of the 21 errors.
 ISO_NAMES = COMPONENTS + SQUARENESS
 #: The one sign convention of calibration files.
@@ -41,6 +45,21 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that a misspelt one most likely means."""
+    folded = {candidate.casefold(): candidate for candidate in known}
+    similar = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
+    without_unit = [candidate for candidate in folded if candidate.startswith(name.casefold() + "_")]
+    return next((folded[candidate] for candidate in (*without_unit, *similar)), None)
+
+
+def unknown_dialect(value: object, more: str = "") -> str:
+    """What is wrong with a name that no dialect has, and the one that it most likely means."""
+    near = nearest(value, CONTROLLER_NAMES) if isinstance(value, str) else None
+    hint = f"did you mean {near}?" if near else f"expected one of {', '.join(CONTROLLER_NAMES)}{more}"
+    return f"= {shown(value)} is not a dialect that olp knows; {hint}"
+
+
 def _chain(value: object) -> object:
     if not isinstance(value, str) or value not in CHAINS:
         raise refusal(
@@ -51,21 +70,15 @@ def _chain(value: object) -> object:
 
 
 def _controller(value: object) -> object:
-    if value not in (*CONTROLLERS, *SHIPPED):
-        raise refusal(
-            f"= {shown(value)} is not a dialect that olp knows; expected one of "
-            f"{', '.join((*CONTROLLERS, *SHIPPED))}"
-        )
+    if value not in CONTROLLER_NAMES:
+        raise refusal(unknown_dialect(value))
     return value
 
 
 def _dialect(value: object) -> object:
     described = isinstance(value, str) and value.endswith(".toml")
-    if not described and value not in (*CONTROLLERS, *SHIPPED):
-        raise refusal(
-            f"= {shown(value)} is not a dialect that olp knows; expected one of "
-            f"{', '.join((*CONTROLLERS, *SHIPPED))}, or the path of a file that describes one (.toml)"
-        )
+    if not described and value not in CONTROLLER_NAMES:
+        raise refusal(unknown_dialect(value, ", or the path of a file that describes one (.toml)"))
     return value
 
 
@@ -90,7 +103,8 @@ def _iso_names(value: object) -> frozenset[str]:
     if unknown:
         raise refusal(
             f"names {', '.join(unknown)}; expected ISO 230-1 names: E, direction X Y Z A B C, axis X Y Z "
-            "(EXX, EYX, EAX ...), or C0Y, B0Z, A0Z"
+            "(EXX, EYX, EAX ...), or C0Y, B0Z, A0Z. Backlash has no name here: if the control takes it up, "
+            "leave the axis out of [backlash]"
         )
     return frozenset(value)
 
@@ -145,11 +159,11 @@ ToolNumber = Annotated[
 OffsetName = Annotated[str, Field(min_length=1), AfterValidator(_offset_name)]
 Chain = Annotated[str, BeforeValidator(_chain), Field(json_schema_extra={"enum": sorted(CHAINS)})]
 Controller = Annotated[
-    str, BeforeValidator(_controller), Field(json_schema_extra={"enum": [*CONTROLLERS, *SHIPPED]})
+    str, BeforeValidator(_controller), Field(json_schema_extra={"enum": [*CONTROLLER_NAMES]})
 ]
 ProgramDialect = Annotated[
     str,
     BeforeValidator(_dialect),
-    Field(json_schema_extra={"anyOf": [{"enum": [*CONTROLLERS, *SHIPPED]}, {"pattern": r"\.toml$"}]}),
+    Field(json_schema_extra={"anyOf": [{"enum": [*CONTROLLER_NAMES]}, {"pattern": r"\.toml$"}]}),
 ]
 Sign = Annotated[str, BeforeValidator(_sign), Field(json_schema_extra={"const": SIGN})]

@@ -14,6 +14,8 @@ INDEX = "index"
 GLOSSARY = "background/glossary"
 
 _LINK = re.compile(r"\]\(([\w/.-]+)\.md(?:#[\w-]+)?\)")
+_PICTURE = re.compile(r"!\[[^\]]*\]\([\w./-]*viewer/pictures/([\w.-]+)\)")
+_COMMENT = re.compile(r"^<!--.*?-->[ \t]*\n", re.DOTALL | re.MULTILINE)
 _FENCE = "```"
 
 
@@ -51,9 +53,9 @@ class Page:
 @functools.cache
 def pages() -> dict[str, Page]:
     """All pages by name, in reading order: the index first, then as it links them, then what it links not."""
-    found = {name: Page(name, text) for name, text in _texts(resources.files("olp") / "docs", "")}
-    order = [INDEX, *_LINK.findall(found[INDEX].text), *sorted(found)]
-    return {name: found[name] for name in dict.fromkeys(order) if name in found}
+    pages_by_name = {name: Page(name, text) for name, text in _texts(resources.files("olp") / "docs", "")}
+    order = [INDEX, *_LINK.findall(pages_by_name[INDEX].text), *sorted(pages_by_name)]
+    return {name: pages_by_name[name] for name in dict.fromkeys(order) if name in pages_by_name}
 
 
 @functools.cache
@@ -64,12 +66,21 @@ def glossary() -> dict[str, str]:
     return {term.strip().strip("`*"): meaning.strip() for term, meaning in rows[2:]}
 
 
+def pictures() -> dict[str, bytes]:
+    """The pictures of all pages by file name: from the installed package, or from the checkout."""
+    folder = resources.files("olp") / "_pictures"
+    if not folder.is_dir():
+        folder = resources.files("olp") / ".." / "viewer" / "pictures"
+    names = sorted({name for page in pages().values() for name in _PICTURE.findall(page.text)})
+    return {name: (folder / name).read_bytes() for name in names}
+
+
 def _texts(folder: Traversable, prefix: str) -> Iterator[tuple[str, str]]:
     for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
         if entry.is_dir():
             yield from _texts(entry, f"{prefix}{entry.name}/")
         elif entry.name.endswith(".md"):
-            yield prefix + entry.name.removesuffix(".md"), entry.read_text("utf-8")
+            yield prefix + entry.name.removesuffix(".md"), _COMMENT.sub("", entry.read_text("utf-8"))
 
 
 def _sections(page: Page) -> Iterator[Section]:

@@ -10,7 +10,8 @@ from pydantic import Field
 
 from olp.core.errors import UsageError
 from olp.core.schema import NotNegative, Positive, Table, Text
-from olp.files.problems import nearest, validate
+from olp.files.fields import nearest
+from olp.files.problems import validate
 from olp.files.toml_text import read_toml, toml_lines
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.delimited import ROLES, Layout, detected_layout, mapping

@@ -74,8 +74,8 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         raise InputError("holds no points; expected one row per point", file=file)
     if layout is None:
         raise InputError(
-            "does not show which columns hold X, Y and Z; give their names or numbers with --column X=.. "
-            "--column Y=.. --column Z=.., or give a profile with --profile",
+            "does not show which columns hold X, Y and Z; name them in the header, or give olp compare "
+            "--column X=.. --column Y=.. --column Z=.., or a profile with --profile",
             file=file,
         )
     stated = stated_frame(list(itertools.islice(io.StringIO(text), LOOK)), file)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -10,7 +9,7 @@ from pydantic import ValidationError
 
 from olp.core.errors import ConfigError
 from olp.core.schema import Table, is_table
-from olp.files.fields import shown
+from olp.files.fields import nearest, shown
 from olp.files.toml_text import Path, dotted, line_of
 
 #: A line, where it is known, and a message.
@@ -19,6 +18,18 @@ T = TypeVar("T", bound=Table)
 
 #: At most this many problems are listed; further ones are counted.
 MOST_PROBLEMS = 40
+
+#: Format to the kind of file, and where such a file is given.
+KINDS = {
+    "olp-machine-1": ("a machine file", ", as -m and olp inspect take it"),
+    "olp-job-1": ("a job file", ", as -j takes it"),
+    "olp-calibration-1": ("a calibration", ", which the machine file names"),
+    "olp-measurements-1": ("a file of measurements", ", as olp calibrate fit takes it"),
+    "olp-thermal-1": ("a thermal model", ", which the calibration names"),
+    "olp-dialect-1": ("the description of a dialect", ", as --dialect takes it"),
+    "olp-points-1": ("the layout of a list of positions", ", as --profile takes it"),
+    "olp-line-profile-1": ("the layout of an instrument's file", ""),
+}
 
 _WANTED = {
     "float_type": "a number",
@@ -39,7 +50,9 @@ _WANTED = {
 
 
 def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, int], file: str) -> T:
-    """The typed file. Raises one ConfigError that lists every problem in the order of lines."""
+    """The typed file. Raises one ConfigError that lists every problem in the order of lines; of a file of
+    another kind that is the only one."""
+    _refuse_other_kind(model, values, lines, file)
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -48,6 +61,20 @@ def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, 
     meant = {_meant(model, item["loc"]) for item in items if item["type"] == "extra_forbidden"}
     kept = [item for item in items if item["type"] != "missing" or item["loc"] not in meant]
     raise config_error([_problem(model, item, lines) for item in kept], file)
+
+
+def _refuse_other_kind(
+    model: type[Table], values: Mapping[str, object], lines: Mapping[Path, int], file: str
+) -> None:
+    """Raises ConfigError where a file says that it is of another kind than the one expected."""
+    stated = values.get("schema")
+    field = model.model_fields.get("schema_")
+    expected = next((name for name in get_args(field.annotation) if name in KINDS), None) if field else None
+    if expected is None or stated == expected or not isinstance(stated, str) or stated not in KINDS:
+        return
+    wanted, where = KINDS[expected]
+    sentence = f"this is {KINDS[stated][0]} ({stated}); expected {wanted} ({expected}){where}"
+    raise config_error([(line_of(("schema",), lines), sentence)], file)
 
 
 def config_error(problems: Iterable[Problem], file: str | None) -> ConfigError:
@@ -77,12 +104,15 @@ def _problem(model: type[Table], error: dict[str, Any], lines: Mapping[Path, int
         return line, f"{key} {error['ctx']['sentence']}"
     value = shown(error["input"])
     wanted = _wanted(kind, error.get("ctx", {}))
+    if kind == "literal_error" and wanted in description:
+        return line, f"{key} = {value}; expected {description}"
     return line, f"{key} = {value}; expected {wanted}: {description}"
 
 
 def _wanted(kind: str, context: Mapping[str, Any]) -> str:
     if kind == "literal_error":
-        return "one of " + str(context["expected"]).replace("'", '"')
+        names = str(context["expected"]).replace("'", '"')
+        return f"one of {names}" if " or " in names else names
     if kind == "greater_than":
         return f"a number above {context['gt']:g}"
     if kind == "greater_than_equal":
@@ -149,11 +179,3 @@ def _meant(model: type[Table], path: Path) -> Path:
     """The path that an unknown key most likely means; the path itself where nothing is near."""
     owner, _ = _field(model, path)
     return (*path[:-1], nearest(str(path[-1]), _keys(owner)) or path[-1])
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that a misspelt one most likely means."""
-    folded = {candidate.casefold(): candidate for candidate in known}
-    similar = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
-    without_unit = [candidate for candidate in folded if candidate.startswith(name.casefold() + "_")]
-    return next((folded[candidate] for candidate in (*without_unit, *similar)), None)

@@ -65,7 +65,7 @@ class WorkOffsetTable(Table):
     )
     set_by: Literal["touch", "true"] = Field(
         default="touch",
-        description='"touch" (touched off on the uncorrected machine) or "true" (located by other means)',
+        description='"touch" (touched off on the uncompensated machine) or "true" (located by other means)',
     )
     touched_at_mm: Position = Field(
         default_factory=Position,
@@ -107,7 +107,7 @@ class ToolTable(Table):
     )
     set_by: Literal["touch", "true"] = Field(
         default="true",
-        description='"touch" (length set on the uncorrected machine) or "true" (measured by other means)',
+        description='"touch" (length set on the uncompensated machine) or "true" (measured by other means)',
     )
     touched_at_mm: Position | None = Field(
         default=None,

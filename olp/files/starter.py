@@ -11,6 +11,7 @@ import numpy as np
 from olp.core.errors import UsageError
 from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
 from olp.core.units import AXES
+from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
 from olp.files.linuxcnc import Imported, from_linuxcnc
 from olp.files.toml_text import comment, toml_key, toml_lines, toml_value
 from olp.files.write import PathLike, write_files
@@ -69,10 +70,10 @@ def _work_offset(offset: WorkOffset) -> Iterator[str]:
     rotation = zip(("A_deg", "B_deg", "C_deg"), offset.rotation_deg, strict=True)
     yield from toml_lines({f"{axis}_mm": value for axis, value in zip(AXES, offset.offset_mm, strict=True)})
     yield from toml_lines({key: value for key, value in rotation if value})
+    other = '"true" if located by other means' if offset.set_by == "touch" else '"touch" if touched off'
+    yield from (f"{line}  # {other}" for line in toml_lines({"set_by": offset.set_by}))
     touched = {axis: v for axis, v in zip(AXES, offset.touched_at_mm, strict=True) if v is not None}
-    yield from toml_lines(
-        {"set_by": offset.set_by, "touched_at_mm": touched or None, "touch_tool": offset.touch_tool}
-    )
+    yield from toml_lines({"touched_at_mm": touched or None, "touch_tool": offset.touch_tool})
 
 
 def _tool(tool: Tool) -> Iterator[str]:
@@ -85,7 +86,10 @@ def _tool(tool: Tool) -> Iterator[str]:
 
 
 def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = "linuxcnc") -> Machine:
-    """A machine with plausible limits, one work offset at the middle of X and Y, and one tool."""
+    """A machine with plausible limits, one work offset at the middle of the travel, and one tool. Raises
+    UsageError for a chain, a travel or a control that no machine has."""
+    if controller not in CONTROLLER_NAMES:
+        raise UsageError(f"controller {unknown_dialect(controller)}")
     if chain not in CHAINS:
         raise UsageError(f'"{chain}" is not a chain; expected an order of F, X, Y, Z from workpiece to tool')
     for axis in AXES:
@@ -102,15 +106,14 @@ def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = 
         )
         for axis in AXES
     }
-    x, y = ((axes[a].travel_mm[0] + axes[a].travel_mm[1]) / 2 for a in "XY")
-    z = axes["Z"].travel_mm[0]
+    x, y, z = (sum(axes[axis].travel_mm) / 2 for axis in AXES)
     return Machine(
         name=name,
         chain=chain,
         controller=controller,
         axes=axes,
         calibration="calibration.toml",
-        work_offsets={"G54": WorkOffset("G54", offset_mm=(x, y, z), set_by="true")},
+        work_offsets={"G54": WorkOffset("G54", offset_mm=(x, y, z))},
         tools={1: Tool(1, length_mm=(0.0, 0.0, 100.0), radius_mm=5.0)},
         default_tool=1,
     )
@@ -118,7 +121,10 @@ def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = 
 
 def starter_set(machine: Machine, measured: datetime.date = PLACEHOLDER_DATE) -> dict[str, str]:
     """Texts by file name: machine, calibration with one curve file per axis (all errors zero), and job."""
-    notes = [f"Machine {machine.name}. Replace travel, limits, offsets and tools by those of your machine."]
+    notes = [
+        f"Machine {machine.name}. Replace travel, limits, offsets and tools by those of your machine.",
+        "G54 is the middle of the travel: put the offsets there that your control shows.",
+    ]
     files = {
         "machine.toml": machine_toml(machine, notes),
         "calibration.toml": _calibration_toml(machine, measured),
@@ -146,7 +152,10 @@ def _calibration_toml(machine: Machine, measured: datetime.date) -> str:
         *toml_lines({"schema": "olp-calibration-1", "machine": machine.name, "measured": measured}),
         *toml_lines({"valid_until": measured, "temperature_degC": 20.0, "sign": "actual-minus-commanded"}),
         *toml_lines({"model": "rigid-body", "datum_mm": ZERO}),
-        *comment("Calibrated axis positions [min, max] of X, Y, Z; nothing outside is corrected."),
+        *comment(
+            "Calibrated axis positions [min, max] of X, Y, Z. A program that leaves the box is refused, or "
+            "with --outside-box hold corrected by the error at its face."
+        ),
         *toml_lines({"box_mm": box, "active_during_measurement": []}),
     ]
     for axis in AXES:

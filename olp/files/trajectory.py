@@ -1,5 +1,5 @@
 """Trajectories as files: CSV, NPZ, Parquet, ROS JointTrajectory as JSON, PVT points, and tables of lines and
-slow sections.
+slow stretches.
 
 Every file is written in parts, so that a long one never has to be in memory.
 """
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from olp.core.errors import ConfigError, UsageError
 from olp.core.units import AXES
 from olp.trajectory.plan import Trajectory
-from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
+from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 
 COLUMNS = (
     "t_s",
@@ -217,7 +217,7 @@ def lines_csv(use: LineUse) -> Iterator[bytes]:
         yield "".join(texts).encode()
 
 
-def slow_csv(parts: Sequence[SlowPlaces]) -> Iterator[bytes]:
+def slow_csv(parts: Sequence[SlowStretches]) -> Iterator[bytes]:
     """One row per section below half the feed. Times count from the start of its stretch."""
     yield (",".join(SLOW_COLUMNS) + "\n").encode()
     for stretch, slow in enumerate(parts, 1):

@@ -33,6 +33,11 @@ class Support(Enum):
     UNCHANGED = "carried"  #: has no effect on the path
     REFUSED = "refused"  #: may move the machine, and is not read
 
+    @property
+    def title(self) -> str:
+        """The word for people; values are those of reports."""
+        return "unchanged" if self is Support.UNCHANGED else self.value
+
 
 @dataclass(frozen=True, slots=True)
 class Row:

@@ -6,6 +6,7 @@ that file and its name in `DESCRIBED`. Only this module looks names up.
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping
 from importlib import import_module
@@ -87,7 +88,9 @@ def named(name: str) -> Dialect:
     """The registered dialect of this name. Raises UsageError where there is none."""
     dialect = find(name)
     if dialect is None:
-        raise UsageError(f"there is no dialect {name!r}; expected one of {', '.join(DIALECTS)}")
+        near = difflib.get_close_matches(name.casefold(), DIALECTS, 1)
+        hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(DIALECTS)}"
+        raise UsageError(f"there is no dialect {name!r}; {hint}")
     return dialect
 
 

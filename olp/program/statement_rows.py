@@ -16,6 +16,7 @@ from olp.program.path_columns import PathColumns
 from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
 from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
 _NONE = (-1, -1, -1)
 #: columns of cards and of old terminals: a text within one of these widths is kept within it

@@ -1,4 +1,4 @@
-"""The report of a comparison for people: uncorrected and corrected, frame, ISO 9283 figures, worst lines."""
+"""The report of a comparison for people: measured runs, frame, ISO 9283 figures, worst lines."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from olp.reports.report import (
-    CORRECTED,
-    SIDES,
-    UNCORRECTED,
+    MEASURED_BOTH,
     WIDTH,
     Report,
     findings_text,
+    measured_sides,
     number,
     pairs,
     printable,
@@ -75,7 +74,7 @@ def absorbed_by_fit(frame: Report) -> str:
 
 
 def table_rows(report: Report) -> list[tuple[str, Any, Any]]:
-    """Title, figure without and with correction in um, where there are any."""
+    """Title, figure of the runs without correction (None where there are none) and of the others in um."""
     rows = [
         (title, figure(report.get("before"), keys), figure(report.get("after"), keys))
         for title, keys in (*ACROSS, *ISO)
@@ -84,6 +83,7 @@ def table_rows(report: Report) -> list[tuple[str, Any, Any]]:
 
 
 def _heads(report: Report) -> Iterator[str]:
+    sides = measured_sides(report)
     nominal, machine, path = (report.get(key) or {} for key in ("nominal", "machine", "path"))
 
     def files(rows: Any) -> str:
@@ -92,8 +92,8 @@ def _heads(report: Report) -> Iterator[str]:
     length = f", {path['cutting_mm'] / 1e3:.3f} m cutting, {path['compared_in']}" if path else ""
     yield from pairs([
         ("Nominal", f"{printable(nominal.get('name', ''))}{length}"),
-        ("Measured", files(report.get("measured"))),
-        ("Uncorrected", files(report.get("measured_before"))),
+        (sides["after"].capitalize(), files(report.get("measured"))),
+        (MEASURED_BOTH["before"].capitalize(), files(report.get("measured_before"))),
         ("Machine", ", ".join(str(v) for v in machine.values())),
     ])  # fmt: skip
 
@@ -122,21 +122,22 @@ def _before_after(report: Report) -> Iterator[str]:
     if report.get("before"):
         yield "Uncorrected and corrected, in um"
         cells = [[title, number(a), number(b), change(a, b)] for title, a, b in rows]
-        yield from table(["", UNCORRECTED, CORRECTED, ""], cells)
+        yield from table(["", *MEASURED_BOTH.values(), ""], cells)
     else:
         yield "Measured, in um"
         yield from table(["", ""], [[title, number(b)] for title, _, b in rows])
 
 
 def _runs(report: Report) -> Iterator[str]:
+    sides = measured_sides(report)
     rows = [
         [
-            printable(row["name"]), SIDES[name], str(row.get("counted", row["points"])),
+            printable(row["name"]), sides[name], str(row.get("counted", row["points"])),
             *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
             *(number((row.get(f"{side}_um") or {}).get("mean")) for side in ("normal", "binormal")),
             *(number((row.get(f"{side}_um") or {}).get("rms")) for side in ("normal", "binormal")),
         ]
-        for name in ("before", "after")
+        for name in sides
         for row in (report.get(name) or {}).get("runs") or ()
     ]  # fmt: skip
     if rows:
@@ -146,11 +147,11 @@ def _runs(report: Report) -> Iterator[str]:
 
 
 def _poses(report: Report) -> Iterator[str]:
-    for name in ("before", "after"):
+    for name, side in measured_sides(report).items():
         poses = (report.get(name) or {}).get("poses") or ()
         if not poses:
             continue
-        yield f"Poses, {SIDES[name]}, in um" if report.get("before") else "Poses, in um"
+        yield f"Poses, {side}, in um"
         rows = [
             [printable(str(p["name"])), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
             for p in poses[:_MAX_ROWS]

@@ -21,7 +21,7 @@ from olp.reports.document_parts import (
     subtitle_of,
     test_sections,
 )
-from olp.reports.report import CORRECTED, SIDES, UNCORRECTED, Report, number
+from olp.reports.report import MEASURED_BOTH, Report, measured_sides, number
 
 
 def comparison(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:
@@ -59,7 +59,7 @@ def _comparison_result(report: Report) -> Iterator[Block]:
         yield Paragraph("No figures.")
     elif report.get("before"):
         cells = [[title, number(a), number(b), change(a, b)] for title, a, b in rows]
-        yield Grid(["in um", UNCORRECTED, CORRECTED, ""], cells)
+        yield Grid(["in um", *MEASURED_BOTH.values(), ""], cells)
     else:
         yield Grid(["in um", "measured"], [[title, number(b)] for title, _, b in rows])
 
@@ -96,14 +96,15 @@ def _iso(figures: Report) -> Iterator[str]:
 
 
 def _measured(report: Report, plots: Plots) -> Iterator[Block]:
-    sides = ("normal_um", "binormal_um")
+    sides = measured_sides(report)
     rows = [
         [
-            row["name"], SIDES[name], str(row.get("counted", row["points"])),
+            row["name"], sides[name], str(row.get("counted", row["points"])),
             *(number((row.get("across_um") or {}).get(key)) for key in ("max", "rms")),
-            *(number((row.get(side) or {}).get(key)) for side in sides for key in ("mean", "rms")),
+            *(number((row.get("normal_um") or {}).get(key)) for key in ("mean", "rms")),
+            *(number((row.get("binormal_um") or {}).get(key)) for key in ("mean", "rms")),
         ]
-        for name in ("before", "after")
+        for name in sides
         for row in (report.get(name) or {}).get("runs") or ()
     ]  # fmt: skip
     if rows:
@@ -112,22 +113,22 @@ def _measured(report: Report, plots: Plots) -> Iterator[Block]:
             rows,
             2,
         )
-    for name in ("before", "after"):
+    for name, side in sides.items():
         iso = (report.get(name) or {}).get("iso_9283") or {}
         if iso:
             cycles = f"{iso['cycles']} cycle{'s' if iso['cycles'] > 1 else ''}"
-            yield Paragraph(f"ISO 9283, {SIDES[name]}, {cycles}: {'; '.join(_iso(iso))}.")
+            yield Paragraph(f"ISO 9283, {side}, {cycles}: {'; '.join(_iso(iso))}.")
     yield from path_plot_blocks(plots)
     worst = report.get("worst") or (report.get("after") or {}).get("worst") or ()
     if worst:
-        yield Paragraph("Lines with the largest deviation, corrected, in um:")
+        yield Paragraph(f"Lines with the largest deviation, {sides['after']}, in um:")
         yield Grid(["line", "largest", "block"], [
             [str(w["line"]), number(w["max_um"]), w.get("text", "")] for w in worst
         ], code=2)  # fmt: skip
-    for name in ("before", "after"):
+    for name, side in sides.items():
         poses: Sequence[Mapping[str, Any]] = (report.get(name) or {}).get("poses") or ()
         if poses:
-            yield Paragraph(f"Poses, {SIDES[name]}, in um:")
+            yield Paragraph(f"Poses, {side}, in um:")
             yield Grid(["pose", "AP", "RP", "X", "Y", "Z"], [
                 [str(p["name"]), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
                 for p in poses[:MOST_POSES]

@@ -80,7 +80,7 @@ def _applied(report: Report) -> Iterator[Block]:
     ])  # fmt: skip
     sources = report.get("sources") or ()
     if sources:
-        yield Paragraph("Errors of the uncorrected machine on this program, by source, largest first:")
+        yield Paragraph("Errors of the uncompensated machine on this program, by source, largest first:")
         cells = [[s["name"], number(s["max_um"]), number(s["rms_um"])] for s in sources[:MOST_SOURCES]]
         half = (len(cells) + 1) // 2
         beside = [*cells[half:], ["", "", ""]]

@@ -22,14 +22,23 @@ MAX_LINES = 8
 MAX_SOURCES = 24
 #: Most rows of the table of worst blocks.
 MAX_WORST = 10
-#: The predicted or measured path of the tip with the nominal program.
+#: The predicted path of the tip with the nominal program.
 UNCORRECTED = "uncorrected"
-#: The predicted or measured path of the tip with the corrected program.
+#: The predicted path of the tip with the corrected program.
 CORRECTED = "corrected"
 #: What the keys of reports mean, in words.
 SIDES = {"before": UNCORRECTED, "after": CORRECTED}
+#: What they mean in a comparison of runs without correction with runs of the corrected program.
+MEASURED_BOTH = {name: f"measured, {side}" for name, side in SIDES.items()}
+#: What the only key means in a comparison of one set of runs; its program may be uncorrected too.
+MEASURED_ALONE = {"after": "measured"}
 
 Report = Mapping[str, Any]
+
+
+def measured_sides(groups: Mapping[str, Any]) -> Mapping[str, str]:
+    """The meaning of the keys of measured runs, by the groups of runs "before" and "after" that there are."""
+    return MEASURED_BOTH if groups.get("before") else MEASURED_ALONE
 
 
 def to_json(report: Report) -> bytes:

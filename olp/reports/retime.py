@@ -151,9 +151,9 @@ def _slow(report: Report) -> Iterator[str]:
     slow = report["below_half_feed"]
     if not slow["places"]:
         return
-    sections = _count(slow["places"], "section", "sections")
+    stretches = _count(slow["places"], "slow stretch", "slow stretches")
     yield (
-        f"{sections} below half of the feed, {slow['seconds']:.2f} s in all, "
+        f"{stretches} below half of the feed, {slow['seconds']:.2f} s in all, "
         f"{slow['lost_s']:.2f} s lost there"
     )
     rows = [

@@ -71,7 +71,7 @@ class _Reader:
         self.units: list[float] = []
         self.approaches: list[float] = []
         self.names: list[str] = []
-        self.carried: list[Unchanged] = []
+        self.unchanged: list[Unchanged] = []
         self.stated: list[Stated] = []
 
     def statement(self, statement: Statement) -> None:
@@ -88,7 +88,7 @@ class _Reader:
             self._point(statement, major.decode(), rest, offset)
         elif kind == b"TA":
             name = f"TA({(label or b'').decode('latin-1')})"
-            self.carried.append(Unchanged(statement.line, name, _EVALUATED))
+            self.unchanged.append(Unchanged(statement.line, name, _EVALUATED))
         elif kind in (b"D", b"DA"):
             self.frame = (label or b"").decode("latin-1")
         elif kind is None:
@@ -135,7 +135,7 @@ class _Reader:
         kind, _, tail = rest.partition(b",")
         if kind.strip().upper() != b"POINT":
             what = kind.strip().upper().decode("latin-1")
-            self.carried.append(Unchanged(statement.line, f"{name}, a {what},", _COMPOSED))
+            self.unchanged.append(Unchanged(statement.line, f"{name}, a {what},", _COMPOSED))
             return
         self._point(statement, name, tail, offset + len(kind) + 1)
 
@@ -212,7 +212,7 @@ def read_dmis(data: bytes) -> Reported:
                 )
             reader.statement(statement)
     if not reader.lines:
-        why = f" ({reader.carried[0].name} {reader.carried[0].reason})" if reader.carried else ""
+        why = f" ({reader.unchanged[0].name} {reader.unchanged[0].reason})" if reader.unchanged else ""
         raise InputError(f"holds no points (FA(..)=FEAT/POINT or PTDATA){why}")
     span = np.array(reader.spans, np.int64)
     unit = np.array(reader.units)
@@ -236,7 +236,7 @@ def read_dmis(data: bytes) -> Reported:
         names=tuple(reader.names),
         comment=(b"$$ ", b""),
         point="surface",
-        carried=tuple(reader.carried),
+        unchanged=tuple(reader.unchanged),
         stated=tuple(reader.stated),
         assumed=("DMIS output: points lie on the surface, their directions point out of it",),
     )

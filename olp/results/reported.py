@@ -35,7 +35,7 @@ class Reported:
     (n,) mm per unit. `tool` (n,) indexes `tools`, labels or numbers of styli (None: the one of the job).
     `stylus_mm` (n, 3) is gauge point to tip where a row states it. `approach_mm` (n,) is the distance of the
     approach before a touch, NaN where not known. `axes_at_ram`: axis positions count at the end of the ram.
-    `comment` are the marks of a comment, None where the form has none. `carried` are statements that stay
+    `comment` are the marks of a comment, None where the form has none. `unchanged` are statements that stay
     unchanged. `assumed` says in words what was detected from the file.
     """
 
@@ -60,7 +60,7 @@ class Reported:
     point: str | None = None
     axes_at_ram: bool = False
     tip_radius_mm: float | None = None
-    carried: tuple[Unchanged, ...] = ()
+    unchanged: tuple[Unchanged, ...] = ()
     stated: tuple[Stated, ...] = ()
     assumed: tuple[str, ...] = field(default=())
 

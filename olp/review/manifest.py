@@ -19,7 +19,7 @@ from olp.review.scene import Scene
 #: Name, label, colour and width in pixels of layers; the colours differ also for red-green colour blindness.
 LAYERS = (
     ("nominal", "nominal path", "#4477aa", 1.5),
-    ("uncorrected", "uncorrected machine", "#ee7733", 2.0),
+    ("uncorrected", "uncompensated machine", "#ee7733", 2.0),
     ("corrected", "command, corrected", "#009988", 2.0),
     ("result", "corrected, predicted", "#33bbee", 2.0),
 )

@@ -21,6 +21,7 @@ _LEAST = 0.4
 _OF_PATH = 60.0
 #: least number of cells of a ramp that changes the speed by more than the share _LEVEL
 _OF_RAMP = 6
+#: share of the speed by which a ramp changes it at least
 _LEVEL = 0.02
 #: share of the smaller cell beside a knot by which the knot may move
 _MOVE = 0.3

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
-from olp.trajectory.usage import LIMITS, LineUse, SlowPlaces
+from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 
-#: lines and slow places that a report lists
+#: lines and slow stretches that a report lists
 MOST = 10
 #: mm; a step between lines differs by less than this between nominal and corrected program
 _NEAR_MM = 0.1
@@ -23,8 +23,10 @@ _NEAR_SHARE = 1e-3
 _RUN = 512
 
 
-def summary(trajectories: Sequence[Trajectory], use: LineUse, slow: Sequence[SlowPlaces]) -> dict[str, Any]:
-    """The answers on trajectories driven one after the other, their lines and their slow places."""
+def summary(
+    trajectories: Sequence[Trajectory], use: LineUse, slow: Sequence[SlowStretches]
+) -> dict[str, Any]:
+    """The answers on trajectories driven one after the other, their lines and their slow stretches."""
     whole = max(sum(t.duration_s for t in trajectories), 1e-300)
     solvers: dict[str, float] = {}
     for leg in (leg for t in trajectories for leg in t.legs):
@@ -73,12 +75,12 @@ def _lines(use: LineUse, lost_s: Array, which: Index) -> list[dict[str, Any]]:
     ]
 
 
-def _slow(parts: Sequence[SlowPlaces]) -> dict[str, Any]:
+def _slow(parts: Sequence[SlowStretches]) -> dict[str, Any]:
     worst = []
-    for stretch, slow in enumerate(parts, 1):
+    for number, slow in enumerate(parts, 1):
         worst += [
             {
-                "stretch": stretch,
+                "stretch": number,
                 "t_s": float(slow.start_s[i]),
                 "line": int(slow.line[i]),
                 "position_mm": slow.position_mm[i].tolist(),
@@ -90,7 +92,7 @@ def _slow(parts: Sequence[SlowPlaces]) -> dict[str, Any]:
             }
             for i in np.argsort(-slow.lost_s, kind="stable")[:MOST].tolist()
         ]
-    worst.sort(key=lambda place: -float(place["lost_s"]))
+    worst.sort(key=lambda row: -float(row["lost_s"]))
     return {
         "places": sum(map(len, parts)),
         "seconds": float(sum(slow.seconds.sum() for slow in parts)),

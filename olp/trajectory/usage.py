@@ -79,25 +79,25 @@ class LineUse:
             none, wide = np.zeros(0), np.zeros((0, len(LIMITS)))
             return LineUse(none.astype(np.int64), none, none, none, none, none, none, none, wide, wide)
         columns = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(LineUse)}
-        line, place = np.unique(columns["line"], return_inverse=True)
+        line, row = np.unique(columns["line"], return_inverse=True)
         table: dict[str, Array] = {}
         nominal = _over(columns["feed_length_mm"], columns["feed_mm_s"])
         for name, values in columns.items():
             if name in ("fastest_mm_s", "most"):
                 table[name] = np.zeros((len(line), *values.shape[1:]))
-                np.maximum.at(table[name], place, values)
+                np.maximum.at(table[name], row, values)
             else:
                 table[name] = np.zeros((len(line), *values.shape[1:]))
-                np.add.at(table[name], place, values)
-        table["feed_mm_s"] = _feed(table["feed_length_mm"], _sums(place, nominal, len(line)))
+                np.add.at(table[name], row, values)
+        table["feed_mm_s"] = _feed(table["feed_length_mm"], _sums(row, nominal, len(line)))
         return LineUse(line.astype(np.int64), **{k: v for k, v in table.items() if k != "line"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SlowPlaces:
-    """(k,) places in order where the speed is below half the feed.
+class SlowStretches:
+    """(k,) stretches in order in which the speed is below half the feed.
 
-    `start_s` and `seconds`; `lost_s` against the feed; where the place is slowest, `line`, `position_mm`
+    `start_s` and `seconds`; `lost_s` against the feed; where the stretch is slowest, `line`, `position_mm`
     (k, 3), `slowest_mm_s` and `feed_mm_s`; and which of `LIMITS` slows it down, as for lines."""
 
     start_s: Array
@@ -113,17 +113,17 @@ class SlowPlaces:
         return len(self.line)
 
 
-def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
-    """How the motion along a route uses its limits, by line and at slow places."""
+def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowStretches]:
+    """How the motion along a route uses its limits, by line and in slow stretches."""
     motion, limits = trajectory.motion, trajectory.limits
-    line, place = np.unique(motion.line, return_inverse=True)
+    line, row = np.unique(motion.line, return_inverse=True)
     count = len(line)
     feed = feeds_of_pieces(motion, route)
     bounds = (limits.velocity, limits.acceleration, limits.jerk)
     still: Mask = np.logical_not(motion.time[:, 1:].any(axis=1))
     at_limit, most = np.zeros((count, len(LIMITS))), np.zeros((count, len(LIMITS)))
     fastest = np.zeros(count)
-    places = _Places()
+    stretches = _StretchCollector()
     for a in range(0, len(motion), _BLOCK):
         piece = np.arange(a, min(a + _BLOCK, len(motion)))
         width = motion.start_s[piece + 1] - motion.start_s[piece]
@@ -140,14 +140,14 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
         use[:, :, 9] = speed / feed[piece]
         weight = _WEIGHT[:, None] * width
         held = weight[:, :, None] * (use >= AT_LIMIT)
-        first = np.flatnonzero(np.diff(place[piece], prepend=-1))
-        own = place[piece[first]]
+        first = np.flatnonzero(np.diff(row[piece], prepend=-1))
+        own = row[piece[first]]
         np.add.at(at_limit, own, np.add.reduceat(held.sum(axis=0), first))
         np.maximum.at(most, own, np.maximum.reduceat(use.max(axis=0), first))
         np.maximum.at(fastest, own, np.maximum.reduceat(speed.max(axis=0), first))
         time = motion.start_s[piece] + _SHARE[:, None] * width
         moving = np.flatnonzero(~still[piece])
-        places.add(
+        stretches.add(
             time[:, moving], speed[:, moving], feed[piece[moving]], motion.line[piece[moving]],
             states[0][:, moving], held[:, moving], use[:, moving],
         )  # fmt: skip
@@ -156,12 +156,12 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowPlaces]:
     length, feed_length, nominal = _lengths(route, line)
     return (
         LineUse(
-            line.astype(np.int64), _sums(place, width * ~still, count),
-            _sums(place, width * still, count), length,
-            _sums(place, width * cutting, count), feed_length, _feed(feed_length, nominal),
+            line.astype(np.int64), _sums(row, width * ~still, count),
+            _sums(row, width * still, count), length,
+            _sums(row, width * cutting, count), feed_length, _feed(feed_length, nominal),
             fastest, at_limit, most,
         ),
-        places.gathered(),
+        stretches.gathered(),
     )  # fmt: skip
 
 
@@ -215,8 +215,8 @@ def feeds_of_pieces(motion: Motion, route: Route) -> Array:
     return np.asarray(piece_feed, float)
 
 
-class _Places:
-    """Collects slow places, which may begin in one block of pieces and end in a later one."""
+class _StretchCollector:
+    """Collects slow stretches, which may begin in one block of pieces and end in a later one."""
 
     def __init__(self) -> None:
         self._count = 0
@@ -237,44 +237,44 @@ class _Places:
         sample = np.flatnonzero(flat)
         if not len(sample):
             return
-        piece, place = np.divmod(sample, len(speed))
-        seconds, lost = _below(time[:, piece], speed[:, piece] / feed[piece], place)
+        piece, part = np.divmod(sample, len(speed))
+        seconds, lost = _below(time[:, piece], speed[:, piece] / feed[piece], part)
         columns = (
-            number[sample].astype(float), time[place, piece], seconds, lost, speed[place, piece], feed[piece],
-            line[piece].astype(float), *position[place, piece].T, *held[place, piece].T,
-            *use[place, piece].T,
+            number[sample].astype(float), time[part, piece], seconds, lost, speed[part, piece], feed[piece],
+            line[piece].astype(float), *position[part, piece].T, *held[part, piece].T,
+            *use[part, piece].T,
         )  # fmt: skip
-        # the samples of a block are many, its places few
+        # the samples of a block are many, the stretches few
         self._rows.append(_reduced(columns))
 
-    def gathered(self) -> SlowPlaces:
+    def gathered(self) -> SlowStretches:
         empty = tuple(np.zeros(0) for _ in range(10 + 2 * len(LIMITS)))
         rows = self._rows or [empty]
         columns = _reduced(tuple(np.concatenate(c) for c in zip(*rows, strict=True)))
         _, time, weight, lost, speed, feed, line, x, y, z = columns[:10]
         held, most = np.split(np.stack(columns[10:], axis=1), 2, axis=1)
         limit = _limit(held, most)
-        return SlowPlaces(
+        return SlowStretches(
             time, weight, lost, line.astype(np.int64), np.stack((x, y, z), axis=1), speed, feed, limit,
         )  # fmt: skip
 
 
-def _below(time: Array, share: Array, place: Index) -> tuple[Array, Array]:
+def _below(time: Array, share: Array, sample: Index) -> tuple[Array, Array]:
     """(n,) the time below half the feed around each slow sample, and how much of it is lost against the feed.
 
-    `time` and `share` of the feed (k, n) are those of the k samples of its piece; its own number is `place`
-    (n,). Between two slow samples each has half of the time. Next to a fast one it has the part below half
-    the feed.
+    `time` and `share` of the feed (k, n) are those of the k samples of its piece; its number in that piece is
+    `sample` (n,). Between two slow samples each has half of the time. Next to a fast one it has the part
+    below half the feed.
     """
-    every = np.arange(len(place))
-    own = share[place, every]
-    seconds, lost = np.zeros(len(place)), np.zeros(len(place))
+    every = np.arange(len(sample))
+    own = share[sample, every]
+    seconds, lost = np.zeros(len(sample)), np.zeros(len(sample))
     for step in (-1, 1):
-        beside = place + step
+        beside = sample + step
         inside = (beside >= 0) & (beside < len(share))
-        beside = np.where(inside, beside, place)
+        beside = np.where(inside, beside, sample)
         other = share[beside, every]
-        span = np.abs(time[beside, every] - time[place, every])
+        span = np.abs(time[beside, every] - time[sample, every])
         slow = other < SLOW
         part = np.where(slow, 0.5, (SLOW - own) / np.where(slow, 1.0, other - own)) * span
         # mean share: over the nearer half up to a slow neighbour, or over all up to half the feed
@@ -285,7 +285,7 @@ def _below(time: Array, share: Array, place: Index) -> tuple[Array, Array]:
 
 
 def _reduced(columns: tuple[Array, ...]) -> tuple[Array, ...]:
-    """One row per place: the earliest time, sums of times, and the other values where the speed is least."""
+    """One row per stretch: the earliest time, sums of times, and other values where the speed is least."""
     number, time, weight, lost, speed, *rest = columns
     if not len(number):
         return columns
@@ -307,9 +307,9 @@ def _limit(at_limit_s: Array, most: Array) -> Index:
     return np.asarray(limit, np.int64)
 
 
-def _sums(place: npt.NDArray[np.intp], values: Array, count: int) -> Array:
-    """(count,) sums of values by place."""
-    return np.asarray(np.bincount(place, values, minlength=count), float)
+def _sums(row: npt.NDArray[np.intp], values: Array, count: int) -> Array:
+    """(count,) sums of values by row."""
+    return np.asarray(np.bincount(row, values, minlength=count), float)
 
 
 def _feed(length: Array, nominal_s: Array) -> Array:

@@ -22,7 +22,7 @@ from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
 from olp.trajectory.inertia import Inertial, capped, guaranteed_cap
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import AxisLimits, Route
-from olp.trajectory.usage import LineUse, SlowPlaces, usage
+from olp.trajectory.usage import LineUse, SlowStretches, usage
 
 #: plans with adapted accelerations before those that guarantee the bound of the inertial deviation
 _TRIALS = 3
@@ -106,7 +106,7 @@ class Plan:
     limits: AxisLimits
     trajectories: tuple[Trajectory, ...]
     lines: LineUse
-    slow: tuple[SlowPlaces, ...]
+    slow: tuple[SlowStretches, ...]
 
     @property
     def duration_s(self) -> float:

@@ -125,7 +125,8 @@ def findings(
         results.append(_finding("OLP434", what))
     doubtful = [part.name for part in parts if not part.probable and part.name not in left_out]
     if doubtful:
-        results.append(_finding("OLP435", f"{', '.join(doubtful)}: smaller than 2 sigma"))
+        what = f"{', '.join(doubtful)}: smaller than their expanded uncertainty (k = {COVERAGE:g})"
+        results.append(_finding("OLP435", what))
     if left_out:
         results.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
     if growth >= AGED:

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.control_tables.controls import Control
-from olp.calibration.control_tables.residuals import CORRECT, Residual, along, in_box, residuals_by
+from olp.calibration.control_tables.residuals import (
+    CORRECT,
+    UNCOMPENSATED,
+    Residual,
+    along,
+    in_box,
+    residuals_by,
+)
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.machine import Machine, Setup
 from olp.core.progress import silent
@@ -248,7 +255,8 @@ def residual_rows(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
     """Rows of figures: method, over the box (rms, max, rms in a frame), along the program (same)."""
     rows = []
     for name, box in report["box"]["left"].items():
-        row = [name, *(number(box[key]) for key in ("rms_um", "max_um", "rms_in_frame_um"))]
+        title = "uncompensated machine" if name == UNCOMPENSATED else name
+        row = [title, *(number(box[key]) for key in ("rms_um", "max_um", "rms_in_frame_um"))]
         if "program" in report:
             residual = report["program"]["left"][name]
             row += [number(residual[key]) for key in ("rms_um", "max_um", "rms_in_frame_um")]

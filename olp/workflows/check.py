@@ -197,7 +197,7 @@ def _case(
 
 
 def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
-    """All findings. What the run that made the case has found stands; the rest is looked for here."""
+    """All findings: those of the run that made the case, and those of the checks made here."""
     loaded, run, proof, date = case.loaded, case.run, case.proof, options.date
     tolerance_mm = options.tolerance_um * MM_PER_UM
     machine, sanity = loaded.setup.machine, loaded.setup.machine.sanity

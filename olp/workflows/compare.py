@@ -328,7 +328,7 @@ def _absorbed(
         begin = nominal.path.vertex_mm[run.pairing.segment]
         position_mm = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
     error = side.loaded.model.error(position_mm, tool if tool.ndim == 1 else tool[which])
-    whose = "that the calibration predicts for the uncorrected machine"
+    whose = "that the calibration predicts for the uncompensated machine"
     return *runs.absorbed_of_field(path, run, error), whose
 
 

@@ -95,9 +95,9 @@ def correct(
     parameter.
 
     Where the calibration states uncertainties, the report gives the probability that the tip is within
-    `part_tolerance_um` (default: `tolerance_um`). With `only_sure_components` components within their own
-    uncertainty are not corrected. Raises InputError (ProgramError with its line, ConfigError, OutsideBox) and
-    CannotCompute.
+    `part_tolerance_um` (default: the job's, else `tolerance_um`). With `only_sure_components` components
+    within their own uncertainty are not corrected. Raises InputError (ProgramError with its line,
+    ConfigError, OutsideBox) and CannotCompute.
     """
     session, source = opened(program, machine, job)
     options = CorrectOptions(

@@ -44,7 +44,7 @@ _DOES_NOT_PROVE = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProofOptions:
     """Options of every verb that proves a correction: the numerical tolerance, the part tolerance
-    (`part_tolerance_um`, default `tolerance_um`), and the day of the run."""
+    (`part_tolerance_um`, default: the job's, else `tolerance_um`), and the day of the run."""
 
     tolerance_um: float = 1.0
     contour: bool = False

@@ -20,7 +20,7 @@ from olp.files.sources import Source
 from olp.program.registry import Options, read
 from olp.proof.acceptance_tests import predicted
 from olp.reports.document import in_form
-from olp.reports.report import to_json
+from olp.reports.report import SIDES, measured_sides, to_json
 from olp.workflows.compare import Comparison
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.results import ResultCorrection
@@ -51,8 +51,9 @@ def comparison(result: Comparison, session: Session | None, name: str, date: dat
         and any(r.counted.any() for r in result.runs)
     ):
         tolerance = report.get("tolerance_um")
-        plots = _path_plots(result.path, runs, tolerance) | {
-            "components": plots_path.components(result.path, runs)
+        sides = measured_sides(runs)
+        plots = _path_plots(result.path, runs, tolerance, sides) | {
+            "components": plots_path.components(result.path, runs, sides)
         }
     return in_form(
         report_document.comparison(report, plots | _test_plots(report, name), __version__, date), name
@@ -109,13 +110,15 @@ def _test_plots(report: Mapping[str, Any], name: str) -> dict[str, bytes]:
     }
 
 
-def _path_plots(path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float | None) -> dict[str, bytes]:
+def _path_plots(
+    path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float | None, sides: Mapping[str, str]
+) -> dict[str, bytes]:
     from olp.reports.plots import path as plots_path
 
     return {
-        "picture": plots_path.picture(path, runs),
-        "along": plots_path.along(path, runs, tolerance),
-        "histogram": plots_path.histogram(runs, tolerance),
+        "picture": plots_path.picture(path, runs, sides),
+        "along": plots_path.along(path, runs, tolerance, sides),
+        "histogram": plots_path.histogram(runs, tolerance, sides),
     }
 
 
@@ -140,4 +143,4 @@ def _predicted_plots(
         runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)
     if not all(run.counted.any() for group in runs.values() for run in group):
         return {}
-    return _path_plots(path, runs, float(result.report["tolerance_um"]))
+    return _path_plots(path, runs, float(result.report["tolerance_um"]), SIDES)

@@ -266,7 +266,7 @@ def _findings(
 ) -> list[Finding]:
     findings = [Finding("OLP621", message) for message in reported.assumed]
     by_reason: dict[tuple[str, str], list[int]] = {}
-    for item in reported.carried:
+    for item in reported.unchanged:
         by_reason.setdefault((item.name, item.reason), []).append(item.line)
     for (name, reason), lines in by_reason.items():
         findings.append(_finding("OLP622", f"{name} is kept as written: {reason}", lines))

@@ -63,7 +63,7 @@ def report_of(
         },
         "sources": sorted(sources, key=lambda s: -float(s["max_um"])),
         "carried": [
-            {"line": item.line, "name": item.name, "reason": item.reason} for item in reported.carried
+            {"line": item.line, "name": item.name, "reason": item.reason} for item in reported.unchanged
         ],
         "points": [
             {"line": line, "name": label, "axis_mm": axis, "added_um": row, "size_um": away}

@@ -24,7 +24,7 @@ from olp.trajectory.from_program import axis_limits
 from olp.trajectory.inertia import compliance_of
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
-from olp.trajectory.usage import LineUse, SlowPlaces
+from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
 from olp.workflows.flatten import unrolled
 from olp.workflows.retime_report import against, proved, report_of
@@ -79,7 +79,7 @@ class Retiming:
         return self.plan.lines
 
     @property
-    def slow(self) -> tuple[SlowPlaces, ...]:
+    def slow(self) -> tuple[SlowStretches, ...]:
         """Of each stretch, where the speed is below half the feed."""
         return self.plan.slow
 

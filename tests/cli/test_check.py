@@ -85,7 +85,11 @@ def test_quiet_is_the_exit_code_alone(tmp_path: Path) -> None:
     assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (1, "", "")
     program, machine, job = written(tmp_path / "b", Call())
     proved = run("verify", program, program, "-m", machine, "-j", job, "-q", "--tolerance-um", "1000")
-    assert (proved.stdout, proved.stderr) == ("", "")
+    assert (proved.exit_code, proved.stdout, proved.stderr) == (0, "", "")
+    moved = tmp_path / "moved.nc"
+    moved.write_bytes(program.read_bytes().replace(b"X", b"X1"))
+    above = run("verify", program, moved, "-m", machine, "-j", job, "-q")
+    assert (above.exit_code, above.stdout, above.stderr) == (1, "", "")
     assert run("verify", program, program, "-m", machine, "-j", job).stdout
     simulated = run("simulate", program, "-m", machine, "-j", job, "-o", tmp_path / "m.csv", "-q")
     assert (simulated.exit_code, simulated.stdout, simulated.stderr) == (0, "", "")

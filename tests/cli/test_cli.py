@@ -236,6 +236,32 @@ def test_init_writes_a_set_that_loads_and_never_replaces_it(tmp_path: Path) -> N
     assert run("init", folder / "machine.toml").exit_code == 2
     assert run("init", tmp_path / "bad", "--travel", "X", "5", "5").exit_code == 2
     assert not (tmp_path / "bad").exists()
+    assert run("init", tmp_path / "bad", "--controller", "mach3").exit_code == 2
+    assert not (tmp_path / "bad").exists()
+
+
+def test_a_cut_below_the_zero_of_a_new_machine_is_corrected(tmp_path: Path) -> None:
+    assert run("init", tmp_path / "mill").exit_code == 0
+    program = tmp_path / "part.nc"
+    program.write_text("G21 G90 G54 G94\nG0 X0 Y0 Z5\nG1 Z-3 F200\nX20\nM2\n")
+    result = run("correct", program, "-m", tmp_path / "mill" / "machine.toml", "--fail-on", "never")
+    assert result.exit_code == 0, result.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        (["inspect", "{}/calibration.toml"], "a machine file (olp-machine-1)"),
+        (["inspect", "-m", "{}/calibration.toml"], "a machine file (olp-machine-1)"),
+        (["inspect", "-m", "{}/machine.toml", "-j", "{}/calibration.toml"], "a job file (olp-job-1)"),
+    ],
+)
+def test_a_file_of_another_kind_is_one_line(tmp_path: Path, call: list[str], expected: str) -> None:
+    assert run("init", tmp_path / "mill").exit_code == 0
+    result = run(*(word.replace("{}", str(tmp_path / "mill")) for word in call))
+    assert result.exit_code == 3
+    assert f"this is a calibration (olp-calibration-1); expected {expected}" in result.stderr
+    assert result.stderr.count("\n") == 1
 
 
 INI = """[TRAJ]
@@ -294,3 +320,40 @@ def test_inspect_wants_one_machine() -> None:
     assert run("inspect").exit_code == 2
     assert run("inspect", MACHINE, "--tool", "1").exit_code == 2
     assert run("inspect", MACHINE.with_name("none.toml")).exit_code == 3
+
+
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        ("--frob", "No such option"),
+        ("correct --frob", "No such option"),
+        ("correct --tolerance-um 5um", "'5um' is not a number; expected a number, such as 5"),
+        ("correct --tolerance-um -1", "is not in the range"),
+        ("inspect --at 1 2 z", "'z' is not a number; expected a number, such as 5"),
+        ("inspect --tool 1.5", "'1.5' is not an integer; expected an integer, such as 5"),
+        ("init x --travel X 0 2m", "'2m' is not a number"),
+        ("calibrate frob", "there is no verb 'frob'"),
+        ("inspect", "no machine file is given"),
+    ],
+)
+def test_a_wrong_call_is_headed_as_every_error(call: str, expected: str) -> None:
+    result = run(*call.split())
+    assert result.exit_code == 2
+    last = result.stderr.splitlines()[-1]
+    assert last.startswith("olp: error: ")
+    assert expected in last
+
+
+@pytest.mark.parametrize("call", [(), ("calibrate",)])
+def test_a_group_without_a_verb_shows_its_help(call: tuple[str, ...]) -> None:
+    result = run(*call)
+    assert "Verbs:" in result.output
+    assert "olp: error" not in result.output
+
+
+def test_a_dialect_in_capitals_is_recognised(tmp_path: Path) -> None:
+    assert run("init", tmp_path / "mill").exit_code == 0
+    (tmp_path / "a.nc").write_text("G0 X1\nM2\n")
+    result = run("inspect", tmp_path / "a.nc", "-m", tmp_path / "mill" / "machine.toml", "--dialect", "GRBL")
+    assert result.exit_code == 2
+    assert "there is no dialect 'GRBL'; did you mean grbl?" in result.stderr

@@ -60,6 +60,27 @@ def test_a_clean_run_has_no_findings(nominal: Path) -> None:
     assert report["after"]["iso_9283"]["RT_um"] is None
 
 
+@pytest.mark.parametrize("ending", (".txt", ".md", ".html"))
+def test_one_set_of_runs_is_measured_and_not_said_to_be_corrected(nominal: Path, ending: str) -> None:
+    once, again = (nominal.with_name(f"{name}.csv") for name in ("once", "again"))
+    once.write_text(table(bent(500) + np.array((0.0, 0.0, 0.01))))
+    again.write_text(table(bent(400) + np.array((0.0, 0.0, 0.02))))
+
+    def report(*words: object) -> str:
+        if ending == ".txt":
+            return run("compare", nominal, once, *words).stdout
+        file = nominal.with_name(f"report{ending}")
+        assert run("compare", nominal, once, *words, "--report", file, "--force").exit_code == 0
+        return file.read_text("utf-8")
+
+    alone, both = report().lower(), report("--before", again).lower()
+    assert "measured" in alone
+    assert "corrected" not in alone
+    assert "measured, uncorrected" in both
+    labelled = re.sub(r"measured, (un)?corrected|uncorrected and corrected, in um", "", both)
+    assert "corrected" not in labelled
+
+
 def test_wrong_pairing(nominal: Path) -> None:
     code, report = compared(nominal, bent(2000)[::-1] * (1, -1, 1), "--align", "none")
     assert code == 1

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
+from typing import Literal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from olp.cli.diff import _Reader, align, render
+from olp.cli.diff import BareMm, _Reader, align, render
+from olp.files.starter import starter_machine
+from olp.program.rs274.profiles.fanuc import DIALECT as FANUC
 
 LINES = st.lists(
     st.sampled_from(
@@ -21,7 +26,7 @@ LINES = st.lists(
 
 @given(before=LINES, after=LINES)
 def test_every_line_of_both_texts_shows_once_and_in_order(before: list[str], after: list[str]) -> None:
-    nominal, corrected = (_Reader(None).read("\n".join(lines).encode()) for lines in (before, after))
+    nominal, corrected = (_Reader().read("\n".join(lines).encode()) for lines in (before, after))
     pairs = list(align(nominal, corrected, 1000.0))
     assert [i for i, _ in pairs if i is not None] == list(range(len(nominal)))
     assert [j for _, j in pairs if j is not None] == list(range(len(corrected)))
@@ -70,9 +75,9 @@ def test_the_parts_of_a_full_circle_belong_to_its_line() -> None:
     assert [row.split()[0] for row in rows[1:-2]] == ["1", "+", "2", "+", "3"]
 
 
-def changes(nominal: str, corrected: str, **options: tuple[float, float, float]) -> list[str]:
+def changes(nominal: str, corrected: str, bare_mm: BareMm | None = None) -> list[str]:
     """The changes in um that the diff states, one entry a line."""
-    rows = render(nominal.encode(), corrected.encode(), **options).split("\n")
+    rows = render(nominal.encode(), corrected.encode(), bare_mm=bare_mm).split("\n")
     header = rows[0]
     return [row[header.index("change in um") :] for row in rows[1:] if re.match(r" +\d+ ", row)]
 
@@ -98,9 +103,27 @@ def test_changes_are_stated_in_um(nominal: str, corrected: str, expected: str) -
     assert changes(nominal, corrected) == [expected]
 
 
-def test_numbers_without_point_count_increments_on_such_controls() -> None:
-    assert changes("X1000", "X1012", increments_mm=(0.001, 0.001, 0.001)) == ["X+12.0"]
-    assert changes("X1000.", "X1000.012", increments_mm=(0.001, 0.001, 0.001)) == ["X+12.0"]
+def fanuc(decimal_point: Literal["increment", "calculator"]) -> BareMm:
+    """What a Fanuc with increments of 0.001 mm and 0.0001 inch takes numbers without a point for."""
+    machine = starter_machine("mill", "FXYZ", dict.fromkeys("XYZ", (0.0, 100.0)), "fanuc")
+    return partial(FANUC.bare_mm, replace(machine, decimal_point=decimal_point))
+
+
+@pytest.mark.parametrize(
+    ("decimal_point", "nominal", "corrected", "expected"),
+    [
+        ("increment", "X1000", "X1012", "X+12.0"),
+        ("increment", "X1000.", "X1000.012", "X+12.0"),
+        ("increment", "G2 X1. I1000", "G2 X1. I1.067", "I+67.0"),
+        ("increment", "G20 X10000", "G20 X1.0007", "X+17.8"),
+        ("calculator", "X10", "X10.067", "X+67.0"),
+        ("calculator", "G20 X1", "G20 X1.0007", "X+17.8"),
+    ],
+)
+def test_numbers_without_point_are_read_as_the_control_reads_them(
+    decimal_point: Literal["increment", "calculator"], nominal: str, corrected: str, expected: str
+) -> None:
+    assert changes(nominal, corrected, fanuc(decimal_point)) == [expected]
 
 
 def test_colours_are_only_around_the_text() -> None:

@@ -53,14 +53,15 @@ class Block:
 
     @property
     def set_up(self) -> bool:
-        return "set-up" in self.mark
+        """Whether the block makes an environment: it then runs in a copy of the checkout, apart."""
+        return ".venv/bin/pip" in self.body
 
 
 def blocks(path: Path, name: str) -> list[Block]:
     text = path.read_text("utf-8")
-    found, start = [], 0
+    parts, start = [], 0
     while match := _FENCE.search(text, start):
-        found.append(
+        parts.append(
             Block(
                 name,
                 match["kind"],
@@ -71,7 +72,7 @@ def blocks(path: Path, name: str) -> list[Block]:
             )
         )
         start = match.end("body") + len("```\n")
-    return found
+    return parts
 
 
 def papers() -> dict[str, list[Block]]:
@@ -99,14 +100,14 @@ def run(body: str, folder: Path, *, timeout_s: float = 300.0) -> tuple[int, str]
     return done.returncode, done.stdout
 
 
-def problems(found: list[Block], folder: Path) -> Iterator[str]:
+def problems(parts: list[Block], folder: Path) -> Iterator[str]:
     """Run all blocks of a page in a folder, one after the other; what goes wrong."""
-    for block in found:
+    for block in parts:
         if block.file is not None:
             target = folder / block.file
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(block.body, "utf-8")
-    for block in found:
+    for block in parts:
         if block.kind == "sh" and not block.set_up:
             yield from _shell(block, folder)
         elif block.kind == "python":

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Words of a sentence, at most, and in the mean.
-LONGEST, MEAN = 35, 20
+#: Words of a sentence, at most.
+LONGEST = 35
+#: Words of a sentence in the mean, at most.
+MEAN = 20
 
 
 @dataclass(frozen=True)

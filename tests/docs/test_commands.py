@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_there_is_something_to_try() -> None:
-    kinds = [block.kind for found in PAPERS.values() for block in found]
+    kinds = [block.kind for page in PAPERS.values() for block in page]
     assert kinds.count("sh") > 40
     assert kinds.count("python") > 1
 
@@ -38,8 +38,8 @@ def test_the_readme_runs_from_top_to_bottom(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_the_pages_run_in_the_order_of_reading(folder: Path) -> None:
-    pages = [found for name, found in PAPERS.items() if name != "README"]
-    assert [problem for found in pages for problem in problems(found, folder)] == []
+    pages = [page for name, page in PAPERS.items() if name != "README"]
+    assert [problem for page in pages for problem in problems(page, folder)] == []
 
 
 @pytest.mark.slow

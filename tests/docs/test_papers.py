@@ -21,7 +21,9 @@ from docs.words import PATTERN, instead
 from olp.cli import main
 from olp.files import handbook
 from olp.findings.catalogue import RULES
-from olp.reports.handbook import site
+from olp.reports import handbook_search
+from olp.reports.handbook import for_terminal
+from olp.reports.handbook_site import site
 
 #: Deviations may change a little from one version of numpy to the next.
 SAME_UM = 0.1
@@ -44,13 +46,13 @@ def anchor(title: str) -> str:
 
 @pytest.mark.parametrize("path", [*PAGES, *modules()], ids=name_of)
 def test_no_sentence_is_too_long(path: Path) -> None:
-    found = of_paper(path) if path.suffix == ".md" else of_module(path)
-    assert [f"line {s.line}: {s.text}" for s in found if s.words > LONGEST] == []
+    sentences = of_paper(path) if path.suffix == ".md" else of_module(path)
+    assert [f"line {s.line}: {s.text}" for s in sentences if s.words > LONGEST] == []
 
 
-def mean(found: Iterator[Sentence]) -> float:
+def mean(sentences: Iterator[Sentence]) -> float:
     """Words of a sentence in the mean, of those that are sentences and not cells or titles."""
-    return statistics.fmean([s.words for s in found if s.words > 3] or [0])
+    return statistics.fmean([s.words for s in sentences if s.words > 3] or [0])
 
 
 @pytest.mark.parametrize("path", PAGES, ids=name_of)
@@ -65,12 +67,12 @@ def test_messages_are_short_in_the_mean() -> None:
 @pytest.mark.parametrize("path", sorted({*PAGES, *modules()} - HISTORY), ids=name_of)
 def test_words_are_those_of_the_field(path: Path) -> None:
     lines = path.read_text("utf-8").splitlines()
-    found = [
+    banned = [
         f"line {number}: {match[0]!r}, say: {instead(match[0])}"
         for number, line in enumerate(lines, 1)
         for match in PATTERN.finditer(line)
     ]
-    assert found == []
+    assert banned == []
 
 
 def test_the_readme_is_a_page_for_a_stranger() -> None:
@@ -177,17 +179,42 @@ def test_figures_are_those_of_today(job: str) -> None:
 #: What a new user asks, and what the answer has to say.
 QUESTIONS = {
     "my Grbl router is out of square": "C0Y",
-    "which sign does a level have": "sign",
-    "what does OLP306 mean": "OLP306",
+    "which sign does a level have": "olp help background/conventions",
+    "what does OLP306 mean": "What to do:",
     "how do I add my control": "DIALECT",
     "what does the proof not prove": "calibration",
-    "what is backlash": "backlash",
+    "what is backlash": "olp help background/model",
     "how certain is the correction": "uncertainty",
     "my program has loops and subprograms": "--flatten",
-    "which exit codes are there": "exit",
-    "can it read Heidenhain programs": "Heidenhain",
+    "which exit codes are there": "exit code 0",
+    "can it read Heidenhain programs": "olp help background/limits",
     "how do I stop a bad program before it runs": "olp check",
     "how do I correct CMM results": "olp results",
+    "out of square": "five minutes to a corrected program",
+    "sign of C0Y": "positive",
+    "is a 5 axis machine corrected": "three linear axes",
+    "rotary table": "three linear axes",
+    "can it read Renishaw files": "laser",
+    "siemens-cec": "table",
+}
+#: Questions and the pages that answer them, best or in the list below it.
+ANSWERS = {
+    "out of square": "tutorials/one-known-number",
+    "sign of C0Y": "tutorials/one-known-number",
+    "5 axis": "background/limits",
+    "rotary table": "background/limits",
+    "robot": "background/limits",
+    "renishaw": "howto/instrument-files",
+    "XL-80": "howto/instrument-files",
+    "ballbar": "tutorials/laser-and-ball-bar",
+    "sinumerik": "reference/control-tables",
+    "will my program get longer": "howto/correct",
+    "why no changes": "howto/correct",
+    "how do I add my control": "contributing/add-a-dialect",
+    "windows": "howto/windows",
+    "is my calibration still good": "howto/still-good",
+    "inches": "howto/correct",
+    "G20": "howto/correct",
 }
 
 
@@ -207,9 +234,53 @@ def test_help_lists_every_page() -> None:
     assert [name for name in handbook.pages() if name not in text] == []
 
 
+@pytest.mark.parametrize("question", ANSWERS)
+def test_questions_lead_to_the_right_page(question: str) -> None:
+    sections = [section for page in handbook.pages().values() for section in page.sections]
+    assert ANSWERS[question] in [section.page for section in handbook_search.best(question, sections)][:3]
+
+
+def test_no_question_leads_to_the_plan_of_the_code_first() -> None:
+    sections = [section for page in handbook.pages().values() for section in page.sections]
+    for question in [*QUESTIONS, *ANSWERS]:
+        best = handbook_search.best(question, sections)
+        assert best[0].page not in ("contributing/house", "contributing/moved")
+
+
+def test_pages_about_a_subject_exist() -> None:
+    named = {page for subject in handbook_search.SUBJECTS for page in subject.pages}
+    assert named <= handbook.pages().keys()
+
+
 def test_help_shows_a_page_by_its_name() -> None:
     for name, page in handbook.pages().items():
-        assert asked("help", name) == page.text
+        assert asked("help", name) == for_terminal(page.text, name)
+
+
+@pytest.mark.parametrize(
+    "name", ["howto/doctor.md", "../howto/doctor.md", "../howto/doctor.md#the-file-of-points", "doctor"]
+)
+def test_help_takes_a_page_as_links_name_it(name: str) -> None:
+    assert asked("help", name) == asked("help", "howto/doctor")
+
+
+def test_a_terminal_shows_neither_links_nor_pictures_nor_comments() -> None:
+    text = (
+        "[the `doctor`](../howto/doctor.md#x), [here](#y), [ISO](https://iso.org)\n![A curve.](../a.png)\n"
+        "`[a](b.md)`\n```\n[a](b.md)\n```\n"
+    )
+    assert for_terminal(text, "reference/verbs") == (
+        "the `doctor` (`olp help howto/doctor`), here, ISO (https://iso.org)\nPicture: A curve.\n"
+        "`[a](b.md)`\n```\n[a](b.md)\n```\n"
+    )
+    for name, page in handbook.pages().items():
+        assert "<!--" not in page.text
+        prose = re.sub(
+            r"^```.*?^```|`[^`\n]*`", "", for_terminal(page.text, name), flags=re.DOTALL | re.MULTILINE
+        )
+        assert not re.search(r"\]\(\S+\)", prose), name
+        for call in re.findall(r"\(`olp help ([\w/-]+)`\)", for_terminal(page.text, name)):
+            assert call in handbook.pages() or call.startswith(".."), (name, call)
 
 
 def test_what_no_page_answers_is_refused_with_a_hint() -> None:
@@ -225,6 +296,39 @@ def test_explain_finds_terms_and_codes() -> None:
         assert " ".join(meaning.split())[:30] in " ".join(asked("explain", term).split())
     for code in RULES:
         assert code in asked("explain", code)
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [
+        ("306", ["OLP306"]),
+        ("tolerance", ["numerical tolerance", "part tolerance", "path tolerance"]),
+        ("reversal", ["reversal error"]),
+        ("sense", ["sign convention"]),
+        ("sign", ["sign convention"]),
+        ("ballbar", ["ball-bar"]),
+        ("datum_mm", ["datum"]),
+    ],
+)
+def test_explain_finds_parts_and_other_spellings(word: str, expected: list[str]) -> None:
+    lines = asked("explain", word).splitlines()
+    assert all(any(line.startswith(term) for line in lines) for term in expected)
+
+
+@pytest.mark.parametrize("code", ["OLP9999", "OLP399", "9999"])
+def test_explain_offers_no_other_code_for_one_that_does_not_exist(code: str) -> None:
+    result = CliRunner().invoke(main, ["explain", code])
+    assert result.exit_code == 2
+    assert f"there is no finding OLP{code.removeprefix('OLP')}; olp explain lists the codes" in result.output
+
+
+def test_pictures_of_pages_ship_with_the_package() -> None:
+    targets = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hatch"]["build"]["targets"]
+    shipped = targets["wheel"]["force-include"]
+    pictures = handbook.pictures()
+    assert len(pictures) > 6
+    assert {f"viewer/pictures/{name}" for name in pictures} == {k for k in shipped if k.endswith(".png")}
+    assert all(shipped[f"viewer/pictures/{name}"] == f"olp/_pictures/{name}" for name in pictures)
 
 
 class Links(HTMLParser):
@@ -244,7 +348,7 @@ class Links(HTMLParser):
 
 
 def test_the_html_is_linked_and_needs_no_network() -> None:
-    files = site(handbook.pages())
+    files = site(handbook.pages(), handbook.pictures())
     seen = {name: Links() for name in files if name.endswith(".html")}
     for name, parser in seen.items():
         parser.feed(files[name].decode())
@@ -258,15 +362,18 @@ def test_the_html_is_linked_and_needs_no_network() -> None:
             for piece in path.parts:
                 parts = parts[:-1] if piece == ".." else [*parts, piece]
             file = "/".join(parts)
-            assert file in files or not target.endswith(".html"), (name, link)
+            assert file in files, (name, link)
             assert not part or part in seen[file].names, (name, link)
-    scripts = b"".join(files.values())
+    scripts = b"".join(data for file, data in files.items() if not file.endswith(".png"))
     assert b"http://" not in scripts.replace(b"http://localhost", b"")
 
 
 def test_the_html_is_written_and_not_overwritten(tmp_path: Path) -> None:
     target = tmp_path / "pages"
     asked("help", "--html", str(target))
-    assert (target / "howto" / "check.html").is_file()
+    page = (target / "howto" / "evaluate.html").read_text("utf-8")
+    assert 'src="../pictures/calibrate-angles.png"' in page
+    assert (target / "pictures" / "calibrate-angles.png").read_bytes().startswith(b"\x89PNG")
+    assert "`" not in page[page.index("<nav") : page.index("</nav>")]
     assert CliRunner().invoke(main, ["help", "--html", str(target)]).exit_code == 2
     asked("help", "--html", str(target), "--force")

@@ -29,6 +29,6 @@ BANNED: dict[str, str] = {
 PATTERN = re.compile("|".join(rf"(?<![\w-])(?:{word})(?![\w-])" for word in BANNED), re.IGNORECASE)
 
 
-def instead(found: str) -> str:
+def instead(banned: str) -> str:
     """What to say instead of a banned word."""
-    return next(better for word, better in BANNED.items() if re.fullmatch(word, found, re.IGNORECASE))
+    return next(better for word, better in BANNED.items() if re.fullmatch(word, banned, re.IGNORECASE))

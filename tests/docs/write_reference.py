@@ -156,7 +156,7 @@ def dialects() -> str:
     ]
     for dialect in [*registry.DIALECTS.values(), *(d for d in shipped if d is not None)]:
         parts.append(f"## {dialect.name}\n\n{dialect.title}.\n\n")
-        rows = ((f"`{row.statement}`", row.support.value, row.why) for row in dialect.rows())
+        rows = ((f"`{row.statement}`", row.support.title, row.why) for row in dialect.rows())
         parts.append(table(("statement", "what becomes of it", "why, or how"), rows))
     return "".join(parts)
 

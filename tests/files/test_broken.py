@@ -25,7 +25,7 @@ MACHINE = {
     "schema of another version": (
         '"olp-machine-1"',
         '"olp-machine-9"',
-        ["schema", "olp-machine-9", "olp-machine-1"],
+        ['schema = "olp-machine-9"; expected the format, "olp-machine-1"'],
     ),
     "name empty": ('name = "gantry-2"', 'name = ""', ["name", "text that is not empty"]),
     "name a number": ('name = "gantry-2"', "name = 2", ["name = 2", "expected text in quotes"]),
@@ -36,6 +36,7 @@ MACHINE = {
         '"sinumerik"',
         ["controller", "sinumerik", "linuxcnc, fanuc, grbl, haas"],
     ),
+    "controller in capitals": ('"linuxcnc"', '"GRBL"', ["controller", '"GRBL"', "did you mean grbl?"]),
     "key misspelt": (
         "compensated_by_controller =",
         "compensated_by_control =",
@@ -170,7 +171,11 @@ MACHINE = {
     "calibration a number": ('= "calibration.toml"', "= 1", ["calibration = 1", "text in quotes", "path"]),
 }
 CALIBRATION = {
-    "schema of a job": ('"olp-calibration-1"', '"olp-job-1"', ["schema", '"olp-job-1"', "olp-calibration-1"]),
+    "schema of a job": (
+        '"olp-calibration-1"',
+        '"olp-job-1"',
+        ["this is a job file (olp-job-1)", "expected a calibration (olp-calibration-1)"],
+    ),
     "another machine": ('"gantry-2"', '"gantry-3"', ["machine", "gantry-3", 'expected "gantry-2"']),
     "sign of corrections": (
         "actual-minus",

@@ -200,6 +200,28 @@ def test_starter_machine_refuses_what_no_machine_is(
         starter_machine("mill", chain, travel)
 
 
+def test_the_starter_offset_is_touched_off_at_the_middle_of_the_travel() -> None:
+    machine = starter_machine("mill", "FXYZ", TRAVEL)
+    middle = tuple(sum(TRAVEL[axis]) / 2 for axis in "XYZ")
+    assert (machine.work_offsets["G54"].set_by, machine.work_offsets["G54"].offset_mm) == ("touch", middle)
+    text = starter_set(machine)["machine.toml"]
+    assert 'set_by = "touch"  # "true" if located by other means' in text
+    assert "G54 is the middle of the travel" in text
+
+
+def test_the_starter_calibration_says_what_happens_outside_the_box() -> None:
+    text = starter_set(starter_machine("mill", "FXYZ", TRAVEL))["calibration.toml"]
+    assert "is refused, or" in text
+    assert "--outside-box hold" in text
+
+
+def test_starter_machine_refuses_a_control_without_dialect() -> None:
+    with pytest.raises(UsageError, match='"mach3" is not a dialect that olp knows; expected one of linuxcnc'):
+        starter_machine("mill", "FXYZ", TRAVEL, "mach3")
+    with pytest.raises(UsageError, match="did you mean grbl"):
+        starter_machine("mill", "FXYZ", TRAVEL, "GRBL")
+
+
 def test_untouched_starter_set_counts_as_expired() -> None:
     text = starter_set(starter_machine("mill", "FXYZ", TRAVEL))["calibration.toml"]
     values, _ = read_toml(text.encode(), "calibration.toml")

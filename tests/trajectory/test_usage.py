@@ -1,4 +1,4 @@
-"""What a motion uses of its limits, by line and at slow places: closed forms and laws."""
+"""What a motion uses of its limits, by line and at slow stretches: closed forms and laws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from olp.trajectory.plan import plan
 from olp.trajectory.route import Route
 from olp.trajectory.summary import compare, partners, summary
 from olp.trajectory.usage import LIMITS as NAMES
-from olp.trajectory.usage import LineUse, SlowPlaces, feeds_of_pieces, usage
+from olp.trajectory.usage import LineUse, SlowStretches, feeds_of_pieces, usage
 
 FEED = 60.0
 #: a ramp to FEED along X never reaches the acceleration limit: it takes 2 sqrt(F / J)
@@ -126,7 +126,7 @@ def test_blocks_of_pieces_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("olp.trajectory.usage._BLOCK", 3)
     again, places = usage(trajectory, route)
     assert len(slow) == len(places) > 1
-    for name in SlowPlaces.__slots__:
+    for name in SlowStretches.__slots__:
         np.testing.assert_allclose(getattr(slow, name), getattr(places, name), rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(lines.at_limit_s, again.at_limit_s, rtol=1e-12, atol=1e-12)
 

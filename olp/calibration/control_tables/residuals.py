@@ -23,7 +23,7 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import play_states, plays
 from olp.proof.deviation import Tracer
 
-#: The key of the uncompensated machine.
+#: The key of the uncompensated machine in reports.
 UNCOMPENSATED = "as it is"
 #: The key of a corrected program.
 CORRECT = "olp correct"

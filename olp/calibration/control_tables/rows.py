@@ -35,7 +35,7 @@ _MOST_DENSE = 10_001
 _MM_DECIMALS = 8
 #: Decimals of computed values in rad.
 _RAD_DECIMALS = 12
-#: In mm.
+#: The step of tables in um, in mm.
 _MICROMETRE = Decimal("0.001")
 
 

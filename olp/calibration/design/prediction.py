@@ -13,7 +13,7 @@ from olp.calibration.estimator.basis import CurveSpace, Spline
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.model import mean_slopes
 from olp.calibration.estimator.normal import Normal, solve
-from olp.calibration.estimator.parameters import Parameters, Place, frame_columns
+from olp.calibration.estimator.parameters import MeasuringLine, Parameters, frame_columns
 from olp.calibration.estimator.prior import POSE, Prior
 from olp.calibration.estimator.summary import squareness_unobservable, unobservable
 from olp.calibration.observations.base import State
@@ -81,7 +81,7 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
 def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
     x, y, z = (float(np.clip(0.0, *side)) for side in box_mm)
     datum = (x, y, z)
-    spaces, places = {}, {}
+    spaces, measuring_lines = {}, {}
     for name in COMPONENTS:
         axis = AXES.index(name[2])
         spline = Spline(float(box_mm[axis, 0]), float(box_mm[axis, 1]), POINT_CELLS)
@@ -92,9 +92,9 @@ def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
             line_mm = list(own[0].line_mm if own else datum)
             line_mm[axis] = datum[axis]
             tool = own[0].tool_mm if own else (0.0, 0.0, 0.0)
-            places[name] = Place((line_mm[0], line_mm[1], line_mm[2]), tool)
+            measuring_lines[name] = MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), tool)
     shared = sorted({n for line in taken.lines if line.square is not None for n in square_names(line)})
-    return Parameters(chain, datum, spaces, places, shared=tuple(shared))
+    return Parameters(chain, datum, spaces, measuring_lines, shared=tuple(shared))
 
 
 def _spread(

@@ -1,5 +1,5 @@
 """Blunders that change the curves of one axis as a whole: exchanged columns, positions counted from the other
-end, a reflector that stood on the table."""
+end, a reflector that was on the table."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def arrangements(calibration: Calibration, chain: str) -> Iterator[Arrangement]:
         if own and chain.index(letter) < chain.index("F"):
             on_table = all(curve.reference == "table" for curve in own)
             place = "at the tool, not on the table" if on_table else "on the table, not at the tool"
-            yield Arrangement(axis, f"the reflector of the lines of {letter} stood {place}", _refer(letter))
+            yield Arrangement(axis, f"the reflector of the lines of {letter} was {place}", _refer(letter))
 
 
 def scaled(calibration: Calibration, factors: Mapping[str, float]) -> Calibration:

@@ -34,7 +34,7 @@ BETTER = 0.8
 #: The adjustment is repeated at most so often, after cyclic terms or points were left out.
 PASSES = 8
 #: A cyclic term below so many standard deviations is noise.
-CYCLIC_SEEN = 4.0
+CYCLIC_SIGNIFICANT = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,6 +179,6 @@ def _waves_seen(parameters: Parameters, solved: Solved) -> dict[str, tuple[Wave,
         for k, wave in enumerate(waves):
             pair = slice(start + 2 * k, start + 2 * k + 2)
             sigma = float(np.sqrt(np.trace(solved.covariance[pair, pair]) / 2.0))
-            if float(np.hypot(*solved.theta[pair])) > CYCLIC_SEEN * sigma:
+            if float(np.hypot(*solved.theta[pair])) > CYCLIC_SIGNIFICANT * sigma:
                 seen[name] = (*seen.get(name, ()), wave)
     return seen

@@ -22,9 +22,10 @@ from olp.errormodel.uncertainty import Uncertainty, fingerprint
 _PER_CELL = 3
 #: Positions in a step, as shares of its length. Its uncertainty over this length is a half circle.
 _IN_STEP = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9))
-#: The factor drops no more than this share of the variance of a number.
+#: Largest share of the variance of a number that the factor drops; of a small variance, see _FLOOR.
 DROPPED = 1e-3
-#: No number of a curve counts as known better than this share of its largest sigma. At the datum it may be.
+#: Least sigma of a number in the choice of principal components, as a share of the largest of its curve. A
+#: sigma near zero, as at the datum, would ask for all components.
 _FLOOR = 0.2
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from olp.calibration.estimator.basis import Kink, Step
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.parameters import Place
+from olp.calibration.estimator.parameters import MeasuringLine
 from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.core.machine import SQUARENESS
@@ -41,8 +41,8 @@ def calibration_of(fit: Fit, valid_until: datetime.date | None = None) -> Calibr
         directed = _directed(fit, letter)
         if not directed:
             backlash[axis] = _backlash(fit, letter)
-        for (place, two_way), names in _groups(fit, letter, directed).items():
-            curves.append(_curve(fit, axis, place, names, two_way))
+        for (line, two_way), names in _groups(fit, letter, directed).items():
+            curves.append(_curve(fit, axis, line, names, two_way))
     x, y, z = (round(value, 7) for value in backlash)
     return Calibration(
         machine=m.machine,
@@ -97,20 +97,20 @@ def _backlash(fit: Fit, letter: str) -> float:
     return float(-2.0 * half_of(fit, f"E{letter}{letter}", fit.box_mm[AXES.index(letter), :1])[0]) + 0.0
 
 
-def _groups(fit: Fit, letter: str, directed: bool) -> Mapping[tuple[Place, bool], list[str]]:
+def _groups(fit: Fit, letter: str, directed: bool) -> Mapping[tuple[MeasuringLine, bool], list[str]]:
     """Components that share a file: measured on the same line, and with or without directions."""
-    groups: dict[tuple[Place, bool], list[str]] = {}
-    own = fit.parameters.places[f"E{letter}{letter}"]
+    groups: dict[tuple[MeasuringLine, bool], list[str]] = {}
+    own = fit.parameters.measuring_lines[f"E{letter}{letter}"]
     for kind in "XYZABC":
         name = f"E{kind}{letter}"
         if kind in "ABC" and not fit.parameters.framed and not np.any(fit.theta[fit.parameters.slices[name]]):
             continue
         two_way = directed and name in fit.parameters.halves
-        groups.setdefault((fit.parameters.places.get(name, own), two_way), []).append(name)
+        groups.setdefault((fit.parameters.measuring_lines.get(name, own), two_way), []).append(name)
     return groups
 
 
-def _curve(fit: Fit, axis: int, place: Place, names: list[str], two_way: bool) -> Curve:
+def _curve(fit: Fit, axis: int, line: MeasuringLine, names: list[str], two_way: bool) -> Curve:
     low, high = (float(side) for side in fit.box_mm[axis])
     features = [f for name in names for f in fit.parameters.spaces[name].features]
     breaks = {low, high}
@@ -143,8 +143,8 @@ def _curve(fit: Fit, axis: int, place: Place, names: list[str], two_way: bool) -
         columns={} if two_way else columns(0.0),
         forward=columns(1.0) if two_way else {},
         backward=columns(-1.0) if two_way else {},
-        line_mm=place.line_mm,
-        tool_mm=place.tool_mm,
+        line_mm=line.line_mm,
+        tool_mm=line.tool_mm,
         interpolation="linear" if features else "pchip",
     )
 

@@ -135,7 +135,7 @@ class Fit:
         row = AXES.index(name[1])
         if not self.parameters.after(axis):
             # its angles count from the tool of its line
-            tool = np.array([self.parameters.places[name].tool_mm])
+            tool = np.array([self.parameters.measuring_lines[name].tool_mm])
             rows[:, start + 6 : start + 9] = frame_columns(tool)[0, row, 3:]
         if axis == 0:
             rows[:, start + row] = 1.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olp.calibration.estimator.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
-from olp.calibration.estimator.parameters import Parameters, Place
+from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.prior import POSE
 from olp.calibration.estimator.smoothing import Shape, shape_of
 from olp.calibration.iso230.separation import aliased
@@ -67,7 +67,7 @@ class Model:
     def parameters(self, waves: Mapping[str, tuple[Wave, ...]]) -> Parameters:
         """The layout of theta with some cyclic terms."""
         own_lines = [line for line, _ in self.lines]
-        spaces, halves, places = {}, {}, {}
+        spaces, halves, lines = {}, {}, {}
         for name in COMPONENTS:
             axis = AXES.index(name[2])
             spline, shape = self.splines[axis], self.shapes.get(name)
@@ -80,13 +80,13 @@ class Model:
             if name[1] in AXES:
                 own = [line for line in own_lines if line.component == name]
                 near = own or [line for line in own_lines if line.axis == axis and line.quantity != "angle"]
-                place = _place(near[0]) if near else Place(self.datum_mm, ZERO)
-                line_mm = list(place.line_mm)
+                line_of = _measuring_line(near[0]) if near else MeasuringLine(self.datum_mm, ZERO)
+                line_mm = list(line_of.line_mm)
                 line_mm[axis] = self.datum_mm[axis]
-                places[name] = Place((line_mm[0], line_mm[1], line_mm[2]), place.tool_mm)
+                lines[name] = MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), line_of.tool_mm)
         shared = sorted({n for line in own_lines if line.square is not None for n in square_names(line)})
         return Parameters(
-            self.chain, self.datum_mm, spaces, places, halves, dict(waves), tuple(shared), self.framed
+            self.chain, self.datum_mm, spaces, lines, halves, dict(waves), tuple(shared), self.framed
         )
 
 
@@ -200,14 +200,14 @@ def _own_lines(name: str, lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Lin
     own = [(line, noise) for line, noise in lines if line.component == name]
     if not own:
         return []
-    place = _place(own[0][0])
-    return [(line, noise) for line, noise in own if name[1] in "ABC" or _place(line) == place]
+    first = _measuring_line(own[0][0])
+    return [(line, noise) for line, noise in own if name[1] in "ABC" or _measuring_line(line) == first]
 
 
-def _place(line: Line) -> Place:
+def _measuring_line(line: Line) -> MeasuringLine:
     line_mm = list(line.line_mm)
     line_mm[line.axis] = 0.0
-    return Place((line_mm[0], line_mm[1], line_mm[2]), line.tool_mm)
+    return MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), line.tool_mm)
 
 
 def mean_slopes(parameters: Parameters) -> dict[str, Array]:

@@ -38,7 +38,7 @@ class Unknowns(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class MeasuringLine:
     """Where a displacement was measured: the other axes' positions and the vector to the reflector."""
 
     line_mm: Vector
@@ -50,16 +50,16 @@ class Parameters:
     """The layout of theta: `spaces` of the means of all 18 curves, `halves` of those whose half difference of
     directions is estimated, `waves` of cyclic terms, the three squareness errors, and `shared` nuisances.
 
-    `places` holds the place of each displacement curve. `slices` says where in theta each is: "EXX",
-    "half EXX", "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were measured
-    in the machine's frame. "frame" then is the shift (mm) and turn about the datum (rad times LEVER_ARM_MM)
-    of all axes in it, and the turn of the tool vectors (the same).
+    `measuring_lines` holds that of each displacement curve. `slices` holds the part of theta by name:
+    "EXX", "half EXX", "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were
+    measured in the machine's frame. Theta then has a part "frame" of nine numbers: shift (mm) and turn of the
+    axes in that frame, and turn of the tool vectors. Turns are in rad times LEVER_ARM_MM.
     """
 
     chain: str
     datum_mm: Vector
     spaces: Mapping[str, CurveSpace]
-    places: Mapping[str, Place]
+    measuring_lines: Mapping[str, MeasuringLine]
     halves: Mapping[str, CurveSpace] = field(default_factory=dict)
     waves: Mapping[str, tuple[Wave, ...]] = field(default_factory=dict)
     shared: tuple[str, ...] = ()
@@ -119,9 +119,9 @@ class Parameters:
 
     def lever_arm(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
         """(n,) coordinate `k` of the lever arm by which angles of `axis` act on displacement `row`."""
-        place = self.places[f"E{AXES[row]}{AXES[axis]}"]
-        lever_arm = np.broadcast_to(tool[..., k] - place.tool_mm[k], (len(position),))
-        return lever_arm + (position[:, k] - place.line_mm[k]) if k in self.after(axis) else lever_arm
+        line = self.measuring_lines[f"E{AXES[row]}{AXES[axis]}"]
+        lever_arm = np.broadcast_to(tool[..., k] - line.tool_mm[k], (len(position),))
+        return lever_arm + (position[:, k] - line.line_mm[k]) if k in self.after(axis) else lever_arm
 
     def shear(self, row: int, position: Array) -> Iterator[Part]:
         """The parts of what squareness adds to displacement `row` at axis positions (n, 3)."""

@@ -111,7 +111,10 @@ def cost_um(fit: Fit, name: str, sigma: float, tools: Sequence[Vector]) -> float
         if k == turn:
             continue
         tool = max(
-            (abs(t[k] - fit.parameters.places[f"E{AXES[axis]}{AXES[axis]}"].tool_mm[k]) for t in tools),
+            (
+                abs(t[k] - fit.parameters.measuring_lines[f"E{AXES[axis]}{AXES[axis]}"].tool_mm[k])
+                for t in tools
+            ),
             default=0.0,
         )
         lever_arm.append(tool + (float(np.ptp(fit.box_mm[k])) if k in fit.parameters.after(axis) else 0.0))

@@ -132,8 +132,8 @@ class CircleFit:
             add(f"servo lag {first} less {second}", "servo", "ms", 2e3 / c.feed_mm_s)
         else:
             add("servo mismatch on the circle", "servo", "um", UM_PER_MM)
-        add(f"backlash {first}", "lost_1", "um", UM_PER_MM)
-        add(f"backlash {second}", "lost_2", "um", UM_PER_MM)
+        add(f"backlash {first}", "backlash_1", "um", UM_PER_MM)
+        add(f"backlash {second}", "backlash_2", "um", UM_PER_MM)
         report["found"] = values
         report["not_determined"] = [name for name in UNKNOWNS if name not in self.determined]
         return report

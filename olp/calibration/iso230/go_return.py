@@ -255,7 +255,7 @@ def program(
     step = machine.axes[axis].least_increment_mm
     lines = [
         f"(go and return on {axis}: {len(x)} targets, {runs} runs, {over_mm:g} mm past each)",
-        "(the other axes stay where they stand; read the instrument in each dwell)",
+        "(the other axes keep their positions; read the instrument in each dwell)",
         "G21 G90 G94 G61",
     ]
 

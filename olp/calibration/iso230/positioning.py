@@ -187,8 +187,8 @@ def evaluate(line: Line, zone: Zone = "least-squares") -> Evaluation:
     value = line.value
     if line.quantity == "straightness":
         # runs of both sides weigh the same, so the line through all readings is that of the means
-        target, place = targets_of(line.target_mm)
-        slope, offset = reference_line(target, np.bincount(place, value) / np.bincount(place), zone)
+        target, target_of = targets_of(line.target_mm)
+        slope, offset = reference_line(target, np.bincount(target_of, value) / np.bincount(target_of), zone)
         value = value - (offset + slope * line.target_mm)
     result = statistics(line.target_mm, value, line.direction, label, line.source)
     return Evaluation(result.target_mm, result.runs, result.up, result.down, line, slope)
@@ -197,13 +197,13 @@ def evaluate(line: Line, zone: Zone = "least-squares") -> Evaluation:
 def statistics(target_mm: Array, value: Array, direction: Index, label: str, source: str = "") -> Statistics:
     """Means and spreads of readings (n,) at targets (n,). Raises ConfigError as `evaluate` does."""
     runs = checked_runs(target_mm, direction, label, source)
-    target, place = targets_of(target_mm)
+    target, target_of = targets_of(target_mm)
     sides: dict[int, Side] = {}
     for d in (1, -1):
         rows = direction == d
         if rows.any():
-            mean = np.bincount(place[rows], value[rows]) / runs
-            square = np.bincount(place[rows], (value[rows] - mean[place[rows]]) ** 2)
+            mean = np.bincount(target_of[rows], value[rows]) / runs
+            square = np.bincount(target_of[rows], (value[rows] - mean[target_of[rows]]) ** 2)
             sides[d] = Side(d, mean, np.sqrt(square / (runs - 1)))
     return Statistics(target, runs, sides.get(1), sides.get(-1))
 
@@ -211,18 +211,18 @@ def statistics(target_mm: Array, value: Array, direction: Index, label: str, sou
 def targets_of(target_mm: Array) -> tuple[Array, Index]:
     """(m,) targets, ascending, and (n,) the target of each reading."""
     order = np.argsort(target_mm, kind="stable")
-    place = np.zeros(len(target_mm), np.int64)
-    place[order[1:]] = np.cumsum(np.diff(target_mm[order]) > SAME_MM)
-    return np.bincount(place, target_mm) / np.bincount(place), place
+    target_of = np.zeros(len(target_mm), np.int64)
+    target_of[order[1:]] = np.cumsum(np.diff(target_mm[order]) > SAME_MM)
+    return np.bincount(target_of, target_mm) / np.bincount(target_of), target_of
 
 
 def checked_runs(target_mm: Array, direction: Index, label: str, source: str) -> int:
     """How many readings each target has from each side. Raises ConfigError where they differ."""
-    target, place = targets_of(target_mm)
+    target, target_of = targets_of(target_mm)
     if len(target) < 2:
         raise ConfigError(f"{label}: one target; expected at least 2, better {TARGETS}", file=source)
     directions = [d for d in (1, -1) if (direction == d).any()]
-    count = {d: np.bincount(place[direction == d], minlength=len(target)) for d in directions}
+    count = {d: np.bincount(target_of[direction == d], minlength=len(target)) for d in directions}
     runs = int(max(c.max() for c in count.values()))
     for d, counts in count.items():
         if (counts != runs).any() or runs < 2:
@@ -290,12 +290,12 @@ def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
 def _outliers(line: Line) -> Iterator[Finding]:
     """Readings far from their repetitions: the deviation from the median of their target and direction, with
     the level of their run removed, in units of the usual deviation."""
-    place = targets_of(line.target_mm)[1] * 2 + (line.direction > 0)
+    group = targets_of(line.target_mm)[1] * 2 + (line.direction > 0)
     run = np.unique(line.run, return_inverse=True)[1]
     rest = line.value.copy()
-    for label in (place, run, place):
+    for label in (group, run, group):
         rest -= _medians(rest, label)[label]
-    counts = np.bincount(place)[place]
+    counts = np.bincount(group)[group]
     size = np.where(counts >= _REPEATED, np.abs(rest), 0.0)
     # the largest twentieth left out, which of normal readings makes it smaller by 0.87
     kept = np.sort(size[counts >= _REPEATED])[: int(_KEPT * (counts >= _REPEATED).sum())]

@@ -25,7 +25,7 @@ from olp.findings.catalogue import Finding
 
 #: A pair of harmonic columns must keep this share of its length beside all smooth columns, else its period is
 #: not observable: the amplitude would be uncertain by more than four times what the same readings could give.
-SEEN = 0.25
+LEAST_OBSERVABLE_SHARE = 0.25
 #: A smooth curve changes on no less than so many steps between targets.
 _STEPS = 6.0
 #: A smooth curve changes on no less than so many periods.
@@ -112,10 +112,10 @@ def aliased(targets_mm: npt.ArrayLike, period_mm: float) -> str | None:
     if not (np.isfinite(period_mm) and period_mm > 0.0):
         raise ConfigError(f"period {period_mm} mm; expected more than 0")
     x = _distinct(targets_mm)
-    return None if seen([x], period_mm) >= SEEN else _reason(x, period_mm)
+    return None if observable_share([x], period_mm) >= LEAST_OBSERVABLE_SHARE else _reason(x, period_mm)
 
 
-def seen(blocks: Sequence[Array], period_mm: float, taken: Sequence[float] = ()) -> float:
+def observable_share(blocks: Sequence[Array], period_mm: float, taken: Sequence[float] = ()) -> float:
     """Share (0 to 1) of its length that the weaker combination of sine and cosine of the period keeps beside
     the smooth columns of every block of targets (each (n,), ascending) and the harmonics `taken`."""
     smooth = _block_diagonal([_smooth_columns(x, period_mm) for x in blocks])
@@ -152,9 +152,9 @@ def separate(
     taken: list[float] = []
     refused: list[tuple[float, str]] = []
     for period in dict.fromkeys(wanted):
-        if seen(blocks, period, taken) >= SEEN:
+        if observable_share(blocks, period, taken) >= LEAST_OBSERVABLE_SHARE:
             taken.append(period)
-        elif seen(blocks, period) >= SEEN:
+        elif observable_share(blocks, period) >= LEAST_OBSERVABLE_SHARE:
             others = " and ".join(f"{p:g}" for p in taken)
             refused.append((period, f"at these targets it looks like the period of {others} mm"))
         else:

@@ -21,7 +21,7 @@ from olp.core.units import AXES
 
 #: First and second axis of each plane, counter-clockwise seen from + of the third, and its squareness.
 PLANES = {"XY": (0, 1, "C0Y"), "YZ": (1, 2, "A0Z"), "ZX": (2, 0, "B0Z")}
-UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "lost_1", "lost_2")
+UNKNOWNS = ("radius", "centre_1", "centre_2", "scale", "square", "servo", "backlash_1", "backlash_2")
 #: Readings this near to the reversal of an axis are left out of the fit: friction makes spikes there.
 SKIP_DEG = 2.5
 #: A circle needs so many readings.

@@ -49,10 +49,10 @@ class Line(Observation):
 
     `component` is an ISO 230-1 name such as EXX (positioning), EYX (straightness) or EBX (angle); the moving
     axis is its last letter. `target_mm` (n,) axis positions, `value` (n,) in mm or rad, `run` (n,) from 1,
-    `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` is where the other axes
-    stood (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference` "table"
-    the reflector was fixed on a moving table. The zero of the values is arbitrary, so is the slope of a
-    straightness. Straightness lines that name the same `square` were read against its two legs.
+    `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` holds the positions of
+    the other axes (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference`
+    "table" the reflector was fixed on a moving table. The zero of the values is arbitrary, so is the slope of
+    a straightness. Straightness lines that name the same `square` were read against its two legs.
     `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
     all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then follows from
     the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it. Raises

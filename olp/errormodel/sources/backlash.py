@@ -39,7 +39,8 @@ class BacklashNumbers(Numbers):
 class Backlash(ErrorSource[BacklashTable, Vector]):
     """The table [backlash]; values are in mm."""
 
-    key, field = "backlash", "backlash_mm"
+    key = "backlash"
+    field = "backlash_mm"
     numbers = (BacklashNumbers(),)
     schema: Schema = (BacklashTable, Field(default_factory=BacklashTable, description="the table [backlash]"))
 

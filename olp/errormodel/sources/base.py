@@ -242,13 +242,13 @@ def vector(values: Sequence[float]) -> Vector:
 
 
 def line_at(stated: Position, datum_mm: Vector) -> Vector:
-    """Where the other axes stood; an axis left out stood at the datum."""
+    """The positions of the other axes; an axis left out was at the datum."""
     positions = zip(stated.values, datum_mm, strict=True)
     return vector([datum if position is None else position for position, datum in positions])
 
 
 def line_key(line_mm: Vector | None, axis: str) -> dict[str, float] | None:
-    """The key line_mm of a table: where the axes other than its own stood."""
+    """The key line_mm of a table: the positions of the axes other than its own."""
     if line_mm is None:
         return None
     return {a: float(v) for a, v in zip(AXES, line_mm, strict=True) if a != axis}

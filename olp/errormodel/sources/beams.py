@@ -179,7 +179,8 @@ class BeamTable(OnLine):
 class Beams(ErrorSource[list[BeamTable], tuple[Beam, ...]]):
     """Tables [[compliance_beam]]."""
 
-    key, field = "compliance_beam", "beams"
+    key = "compliance_beam"
+    field = "beams"
     schema: Schema = (
         list[BeamTable],
         Field(default=[], description="tables [[compliance_beam]], beams that bend under the payload"),

@@ -32,11 +32,11 @@ from olp.errormodel.sources.base import (
 
 
 class OnLine(Table):
-    """Where the other axes stood, and the tool vector."""
+    """The positions of the other axes, and the tool vector."""
 
     line_mm: Position = Field(
         default_factory=Position,
-        description="where the other axes stood, such as { Y = 0.0, Z = 0.0 } in mm; the datum if left out",
+        description="positions of the other axes, such as { Y = 0.0, Z = 0.0 } in mm; the datum if left out",
     )
     tool_mm: Triple = Field(default=(0.0, 0.0, 0.0), description="the tool vector then, [X, Y, Z] in mm")
 
@@ -57,7 +57,8 @@ class ComplianceTable(OnLine):
 class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]]):
     """Tables [[compliance]], each with a CSV file."""
 
-    key = field = "compliance"
+    key = "compliance"
+    field = "compliance"
     schema: Schema = (
         list[ComplianceTable],
         Field(default=[], description="tables [[compliance]], errors per kg of payload"),

@@ -49,8 +49,8 @@ class Curve:
     """Component errors of one axis along one measuring line.
 
     `position_mm` (n,) strictly increasing; either `columns` (mean of both directions) or `forward` and
-    `backward` with the same names, each (n,) in mm or rad. `line_mm` says where the other axes stood
-    (the entry of the own axis is ignored), None means the datum; `tool_mm` is the tool vector then.
+    `backward` with the same names, each (n,) in mm or rad. `line_mm` holds the positions of the other
+    axes (the entry of the own axis is ignored), None means the datum; `tool_mm` is the tool vector then.
     A value is what was measured at the functional point on that line; with `reference` "table" the
     reflector was fixed on a moving table. Raises ConfigError.
     """
@@ -119,7 +119,7 @@ class CurveTable(Table):
     file: Text = Field(description="the path of a CSV file with columns such as X_mm, EXX_um, EBX_urad")
     line_mm: Position = Field(
         default_factory=Position,
-        description="where the other axes stood while measuring, such as { Y = 0.0, Z = 0.0 } in mm; the "
+        description="positions of the other axes while measuring, such as { Y = 0.0, Z = 0.0 } in mm; the "
         "datum if left out",
     )
     tool_mm: Triple = Field(
@@ -186,7 +186,8 @@ def _cells(entry: Entry) -> int:
 class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):
     """Tables [[curves]], each with a CSV file."""
 
-    key = field = "curves"
+    key = "curves"
+    field = "curves"
     numbers = (Mean(), Half())
     schema: Schema = (list[CurveTable], Field(default=[], description="tables [[curves]]"))
 

@@ -105,7 +105,8 @@ class Wave(Numbers):
 class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
     """Tables [[cyclic]]."""
 
-    key = field = "cyclic"
+    key = "cyclic"
+    field = "cyclic"
     numbers = (Wave(),)
     schema: Schema = (list[CyclicTable], Field(default=[], description="tables [[cyclic]]"))
 

@@ -120,7 +120,8 @@ class ThermalTable(Table):
 class ScaleExpansion(ErrorSource[ThermalTable | None, Thermal | None]):
     """The table [thermal]; its key `structure` belongs to `olp.errormodel.sources.structure`."""
 
-    key = field = "thermal"
+    key = "thermal"
+    field = "thermal"
     schema: Schema = (ThermalTable | None, Field(default=None, description="the table [thermal]"))
     covered = False
 

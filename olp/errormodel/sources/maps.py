@@ -157,7 +157,8 @@ class MapTable(Table):
 class Maps(ErrorSource[list[MapTable], tuple[DeviationMap, ...]]):
     """Tables [[maps]], each with a CSV file."""
 
-    key = field = "maps"
+    key = "maps"
+    field = "maps"
     schema: Schema = (
         list[MapTable],
         Field(default=[], description="tables [[maps]], measured deviations of the tip"),

@@ -22,7 +22,8 @@ class RepeatabilityTable(Table):
 class Repeatability(ErrorSource[RepeatabilityTable | None, Vector | None]):
     """The table [repeatability]; values are standard deviations in mm at one position."""
 
-    key, field = "repeatability", "repeatability_mm"
+    key = "repeatability"
+    field = "repeatability_mm"
     correctable = False
     schema: Schema = (
         RepeatabilityTable | None,

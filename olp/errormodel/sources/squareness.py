@@ -32,9 +32,21 @@ def shears(angles: Angles, skip: frozenset[str]) -> dict[str, Vector]:
 
 
 class SquarenessTable(Table):
-    C0Y_urad: float = Field(default=0.0, description="the squareness of Y to X, in urad")
-    B0Z_urad: float = Field(default=0.0, description="the squareness of Z to X, in urad")
-    A0Z_urad: float = Field(default=0.0, description="the squareness of Z to Y, in urad")
+    C0Y_urad: float = Field(
+        default=0.0,
+        description="the squareness of Y to X, in urad; + where the angle between "
+        "+X and +Y is above 90 degrees",
+    )
+    B0Z_urad: float = Field(
+        default=0.0,
+        description="the squareness of Z to X, in urad; + where the angle between "
+        "+X and +Z is below 90 degrees",
+    )
+    A0Z_urad: float = Field(
+        default=0.0,
+        description="the squareness of Z to Y, in urad; + where the angle between "
+        "+Y and +Z is above 90 degrees",
+    )
     sigma_C0Y_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of C0Y, in urad")
     sigma_B0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of B0Z, in urad")
     sigma_A0Z_urad: NotNegative = Field(default=0.0, description="the standard uncertainty of A0Z, in urad")
@@ -54,7 +66,8 @@ class Tilt(Numbers):
 class Squareness(ErrorSource[SquarenessTable, Angles]):
     """The table [squareness]."""
 
-    key = field = "squareness"
+    key = "squareness"
+    field = "squareness"
     numbers = (Tilt(),)
     schema: Schema = (
         SquarenessTable,

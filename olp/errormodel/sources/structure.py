@@ -46,7 +46,7 @@ class Distortion:
     """What one K of one sensor's part adds to a component over `span_mm` of its axis, in mm or rad per K.
 
     It is offset + growth * (q - middle) + bow * (1 - ((q - middle) / half)^2), the growth per mm.
-    `line_mm` and `tool_mm` as of a curve: where the other axes stood and the tool vector while measuring."""
+    `line_mm` and `tool_mm` as of a curve: positions of the other axes and tool vector while measuring."""
 
     component: str
     sensor: str
@@ -142,8 +142,8 @@ class Structure:
             low, high = ranges[name]
             raise ConfigError(
                 f"sensor {name}: the structure is at {value:.2f} degC; expected {low:.2f} to {high:.2f} "
-                "degC, the range that was identified; log the drift there too, or take the end of the range "
-                "with --outside-box hold"
+                "degC, the range that was identified. Log the drift there too, or take the end of the range "
+                "with --outside-box hold (of olp correct, check, view and results)"
             )
         return {
             s.name: float(np.clip(stated[s.name], *s.range_degC)) - s.reference_degC for s in self.sensors
@@ -224,7 +224,7 @@ class DistortionTable(Table):
         description="a parabola, 0 at both ends of the span, its middle in urad per K",
     )
     line_mm: Position | None = Field(
-        default=None, description="where the other axes stood while measuring; the datum if left out"
+        default=None, description="positions of the other axes while measuring; the datum if left out"
     )
     tool_mm: Triple = Field(
         default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"
@@ -263,7 +263,8 @@ class ThermalFile(Table):
 class ThermalStructure(ErrorSource[str | None, Structure | None]):
     """An olp-thermal-1 file, which the key `structure` of the table [thermal] names."""
 
-    key = field = "structure"
+    key = "structure"
+    field = "structure"
     covered = False
 
     def example(self, by: float) -> Example:
@@ -365,11 +366,13 @@ def _distortion(table: DistortionTable) -> Distortion:
 
 
 def _line(stated: Position, component: str) -> Vector:
-    """Where the other axes stood; that of the component's own axis does not matter."""
+    """The positions of the other axes; that of the component's own axis does not matter."""
     positions = zip(AXES, stated.values, strict=True)
     missing = [a for a, position in positions if position is None and a != component[2]]
     if missing:
-        raise ConfigError(f"line_mm of {component} names no {missing[0]}; expected where each axis stood")
+        raise ConfigError(
+            f"line_mm of {component} names no {missing[0]}; expected the position of each other axis"
+        )
     return vector([0.0 if position is None else position for position in stated.values])
 
 

@@ -11,7 +11,8 @@ from olp.core.arrays import Array, Index
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES
 from olp.files.columns import Row, names, read_sheet
-from olp.files.problems import Problem, config_error, nearest
+from olp.files.fields import nearest
+from olp.files.problems import Problem, config_error
 from olp.files.tables import unit_columns
 from olp.files.write import PathLike, Reader, read_bytes
 

@@ -19,6 +19,7 @@ from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration, Curve, Reference
+from olp.errormodel.sources.registry import SOURCES
 from olp.files.problems import Problem, config_error
 from olp.findings.catalogue import Finding
 from olp.program.text.rows import Form
@@ -245,8 +246,11 @@ def not_held(
     cyclic = sorted({c.component for c in calibration.cyclic if c.amplitude} - followed)
     if cyclic:
         parts.append(f"the rows do not follow cyclic errors of {', '.join(cyclic)}")
+    keys = {source.field: source.key for source in SOURCES if source.field}
     others = [
-        f.name for f in fields(calibration) if f.name not in _IN_TABLES and _states(calibration, f.name)
+        keys.get(f.name, f.name)
+        for f in fields(calibration)
+        if f.name not in _IN_TABLES and _states(calibration, f.name)
     ]
     others += [key for key, _ in calibration.more]
     if others:

@@ -8,7 +8,7 @@ from pathlib import Path
 from olp.core.errors import UsageError
 from olp.errormodel.calibration import Calibration
 from olp.files.control_tables.base import Exported, Format, Given, Imported, Load
-from olp.files.problems import nearest
+from olp.files.fields import nearest
 from olp.files.write import read_bytes
 
 #: The modules of this package that hold a FORMAT, in the order in which formats are listed.

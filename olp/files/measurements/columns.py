@@ -13,8 +13,9 @@ import numpy.typing as npt
 from olp.core.arrays import Array
 from olp.core.schema import Table
 from olp.files.columns import Wanted, decoded, finite, missing, read_sheet
+from olp.files.fields import nearest
 from olp.files.measurements.stated import stated_as, stated_keys
-from olp.files.problems import Problem, config_error, nearest
+from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, read_bytes
 
 T = TypeVar("T", bound=Table)

@@ -61,8 +61,8 @@ RULES = (
         "OLP606",
         "points not in the order of the path",
         Severity.INFO,
-        "The points run against the path, or in no order along it. Each was paired with the nearest "
-        "position of the path.",
+        "The points run against the path, or in no order along it. Points in no order were each paired with "
+        "the nearest position of the path.",
         "Nothing to do where the path neither repeats nor crosses itself. Otherwise measure in order.",
         "A CMM sorted the points by their numbers.",
     ),
@@ -87,9 +87,10 @@ RULES = (
         "OLP609",
         "measured path above tolerance",
         Severity.ERROR,
-        "The measured path deviates from the nominal one by more than --tolerance-um.",
+        "The measured path deviates from the nominal one by more than --part-tolerance-um, or "
+        "part_tolerance_um of the job.",
         "Look at the worst lines. With --before, the table shows what the correction gained.",
-        "12 um at line 340 with `--tolerance-um 5`.",
+        "12 um at line 340 with `--part-tolerance-um 5`.",
     ),
     _rule(
         "OLP611",

@@ -15,8 +15,9 @@ RULES = (
         Severity.ERROR,
         "The written program, read back and run through the error model, deviates from the nominal path at "
         "these lines. The deviation exceeds the tolerance plus what rounding to the last digit explains.",
-        "Look at the listed blocks. Raise --tolerance-um, or give a smaller least_increment_mm if the "
-        "control takes more digits.",
+        "Correct the nominal program again, or undo the edit. If it fails again, look at the listed blocks. "
+        "Give a smaller least_increment_mm if the control takes more digits, or raise --tolerance-um if so "
+        "much is allowed.",
         "A hand-edited corrected program: `G1 X100.050` where X100.012 was written.",
     ),
     _rule(
@@ -52,7 +53,7 @@ RULES = (
         Severity.WARNING,
         "A canned cycle moves straight along the tool axis, so it can be exact at one depth only. The rest "
         "of this stroke deviates from the nominal path by more than the tolerance.",
-        "Write the cycles out as plain moves with --expand-cycles.",
+        "Write the cycles out as plain moves with olp correct --expand-cycles.",
         "`G81 Z-80 R2` where the column leans by 3 um over 80 mm.",
     ),
     _rule(

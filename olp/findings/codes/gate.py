@@ -136,7 +136,7 @@ RULES = (
         "errors, or an input is wrong: a sign, a unit, an offset, another machine.",
         "Look at the error with `olp inspect machine.toml --at` that position. Raise the limit where the "
         "error is real.",
-        "EXX written in mm into a column EXX_um of a thousand times the value.",
+        "EXX in nm, written into the column EXX_um.",
     ),
     _rule(
         "OLP410",

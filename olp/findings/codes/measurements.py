@@ -22,9 +22,9 @@ RULES = (
         "OLP852",
         "targets at equal steps",
         Severity.INFO,
-        "Targets with equal steps read an error that repeats with the screw or the scale at the same phases "
-        "again and again. That error is hidden, or looks like a slow one. ISO 230-2 moves each target by a "
-        "random part of a pitch.",
+        "An error that repeats with the screw or the scale has the same few phases at targets with equal "
+        "steps. There it is hidden, or looks like a slow error. ISO 230-2 moves each target by a random part "
+        "of a pitch.",
         "Move each target by a random part of the pitch, or add a fine sweep over two pitches.",
         "Targets at 0, 50, 100 ... mm on a screw of 10 mm pitch.",
     ),

@@ -85,8 +85,10 @@ RULES = (
         Severity.WARNING,
         "A feed move starts where a rapid ended uncorrected, so its beginning deviates from the nominal "
         "path.",
-        "Command all axes in rapids first, or give start_mm in the job file.",
-        "`G0 X10`, then `G1 X50 F600`, with Y and Z unknown at the G0.",
+        "Command all axes in rapids first, or put a rapid in front, after (olp on). Or give start_mm in the "
+        "job file.",
+        "`G0 X10`, then `G1 X50 Y10 Z1 F600`, with Y and Z unknown at the G0. Or a feed move after (olp off) "
+        "and (olp on).",
     ),
     _rule(
         "OLP331",

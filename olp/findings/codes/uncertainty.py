@@ -17,7 +17,7 @@ RULES = (
         "make the deviation larger. It is still the better estimate, and a mix of corrected and nominal "
         "moves would make steps. These lines are corrected like the others.",
         "Measure what the report lists as most uncertain. --only-sure-components leaves out components that "
-        "are smaller than their uncertainty.",
+        "are smaller than their expanded uncertainty (k = 2).",
         "3 um of correction, and a squareness with an expanded uncertainty of 5 um there.",
     ),
     _rule(
@@ -33,8 +33,9 @@ RULES = (
         "OLP433",
         "part tolerance not assured",
         Severity.WARNING,
-        "The part tolerance of --part-tolerance-um is small against the uncertainty of the calibration. All "
-        "waypoints of the corrected program are within it with a probability below 95 %.",
+        "The part tolerance (--part-tolerance-um, or part_tolerance_um of the job) is small against the "
+        "uncertainty of the calibration. All waypoints of the corrected program are within it with a "
+        "probability below 95 %.",
         "Widen the tolerance, or lower the uncertainty. The report lists its contributions.",
         "--part-tolerance-um 5 with an expanded uncertainty of 8 um.",
     ),
@@ -62,9 +63,9 @@ RULES = (
         "components left out",
         Severity.INFO,
         "--only-sure-components left these components uncorrected, because they are smaller than their "
-        "uncertainty. Their expected effect stays, and counts as deviation.",
+        "expanded uncertainty (k = 2). Their expected effect stays, and counts as deviation.",
         "Nothing to do. Without the option they are corrected.",
-        "--only-sure-components, and a squareness of 4 urad known to 5 urad.",
+        "--only-sure-components, and a squareness of 4 urad with a standard uncertainty of 5 urad.",
     ),
     _rule(
         "OLP437",

@@ -18,7 +18,9 @@ from olp.program.described.language import Rule, UserDialect
 from olp.program.rs274.lexer import Bytes, numbers, runs
 from olp.program.text.numbers import LONGEST
 
+#: Bytes of a number without a sign.
 _DIGITS = b"0123456789."
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
 #: a mantissa below this is exact as a double
 _MOST = 10**15

@@ -17,10 +17,13 @@ from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import MM_PER_INCH
 from olp.program.program import Program, Words
 
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
-#: G codes of feed modes, ten times their number
+#: G94, feed per minute, as ten times its number.
 _PER_MINUTE = 940
+#: G95, feed per turn of the spindle, as ten times its number.
 _PER_TURN = 950
+#: G93, inverse time, as ten times its number.
 _INVERSE = 930
 
 

@@ -17,6 +17,7 @@ from olp.program.text.numbers import LONGEST
 
 #: mantissas of positions are smaller, and below this they are exact as doubles
 _MOST = 10**15
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
 
 

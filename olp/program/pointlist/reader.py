@@ -85,8 +85,8 @@ def read_list(
         layout = dialect.layout or detected_layout(first_lines(data))
         if layout is None:
             raise ProgramError(
-                "does not show which columns hold X, Y and Z; give their names or numbers with --column X=.. "
-                "--column Y=.. --column Z=.., or give a profile with --profile"
+                "does not show which columns hold X, Y and Z; name them in the header, or give olp correct "
+                "--column X=.. --column Y=.. --column Z=.., or give any verb a profile with --dialect"
                 if data.strip()
                 else "has no positions; expected one row per waypoint"
             )
@@ -171,7 +171,10 @@ def _rows(data: bytes, layout: Layout) -> _Rows:
     cells = Cells(data, layout)
     places = [cells.place(axis) for axis in AXES]
     if None in places:
-        raise InputError("has no columns for X, Y and Z; name them with --column X=.. or in a profile")
+        raise InputError(
+            "has no columns for X, Y and Z; name them with --column X=.. of olp correct, or in a profile "
+            "(--dialect)"
+        )
     xyz = [p for p in places if p is not None]
     tool, speed = cells.place("tool"), cells.place("speed")
     factor = MM_S[layout.speed_unit] if layout.speed_unit else float("nan")

@@ -29,11 +29,12 @@ from olp.program.rs274.codes import (
     WRITE_OFFSET,
 )
 from olp.program.rs274.offsets import Offsets
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.profiles.base import Profile, increment
 from olp.program.rs274.state import NAN, Capture, PathMode, State
 
-#: ten times M6 and M61
+#: M6, as ten times its number.
 TOOL_CHANGE = 60
+#: M61, as ten times its number.
 SET_TOOL = 610
 
 #: RS-274's order of execution within a block; other codes come last.
@@ -177,22 +178,16 @@ class AxisState(State):
 
     def word_scale(self, letter: str, pointed: bool) -> float:
         """mm per unit of the number as written."""
-        if pointed or not self.bare_increments:
-            return self.unit_mm
-        return self.increment(letter) * self.unit_mm
+        return self.unit_mm if pointed else self.profile.bare_mm(self.setup.machine, letter, self.unit_mm)
 
     @property
     def bare_increments(self) -> bool:
         """Whether a length without a decimal point counts least increments."""
-        return self.profile.increments_without_point and self.setup.machine.decimal_point == "increment"
+        return self.profile.counts_increments(self.setup.machine)
 
     def increment(self, letter: str) -> float:
-        """Least increment in program units: 0.001 mm goes with 0.0001 inch (IS-B), 0.0001 mm with 0.00001
-        inch."""
-        axis = {"I": "X", "J": "Y", "K": "Z"}.get(letter, letter)
-        least = self.setup.machine.axes[axis if axis in "XYZ" else "X"].least_increment_mm
-        metric = 0.0001 if least < 0.0005 else 0.001
-        return metric if self.unit_mm == 1.0 else metric / 10
+        """Least increment in program units."""
+        return increment(self.setup.machine, letter, self.unit_mm)
 
     # -- events ------------------------------------------------------------------------------------
 

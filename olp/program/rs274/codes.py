@@ -5,22 +5,32 @@ The reader and the unroller use the same sets. The profile of a control says whi
 
 from __future__ import annotations
 
+#: Canned cycles: G73, G74, G81 to G89.
 CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
+#: Probing moves: G38.2 to G38.5.
 PROBES = frozenset({382, 383, 384, 385})
+#: Splines and NURBS: G5, G5.1, G5.2, G5.3.
 SPLINES = frozenset({50, 51, 52, 53})
 #: Motion that ends where its axis words say.
 LINEAR = frozenset({0, 10, 20, 30, 330})
+#: Cutter compensation: G41, G41.1, G42, G42.1.
 CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
 
+#: G20, lengths in inches.
 INCH = 200
+#: G21, lengths in mm.
 METRIC = 210
+#: G90, absolute positions.
 ABSOLUTE = 900
+#: G91, positions counted from the last one.
 INCREMENTAL = 910
+#: G93, feeds as the inverse of the time of a block.
 INVERSE_TIME = 930
 #: A cycle returns to the level before its series.
 RETRACT_TO_INITIAL = 980
 #: A cycle returns to its R.
 RETRACT_TO_R = 990
+#: G80, no motion, end of canned cycles.
 END_OF_CYCLES = 800
 
 #: Modal groups besides motion, by the field of `State` that holds their code. A control takes one code of a
@@ -32,13 +42,20 @@ GROUPS: dict[str, tuple[int, ...]] = {
     "retract": (RETRACT_TO_INITIAL, RETRACT_TO_R),
     "feed_mode": (940, 950, INVERSE_TIME),
 }
+#: Units of length.
 UNITS = (INCH, METRIC)
+#: How the control moves from block to block: G61, G61.1, G64.
 PATH_MODES = frozenset({610, 611, 640})
 
+#: G4, a dwell.
 DWELL = 40
+#: G10, which writes offsets.
 WRITE_OFFSET = 100
+#: G52, a local offset.
 LOCAL_OFFSET = 520
+#: G92, a preset position.
 PRESET = 920
+#: G53, a move in machine positions.
 MACHINE = 530
 #: To the reference positions, through the point that the axis words state.
 HOMES = frozenset({280, 300})
@@ -46,7 +63,9 @@ HOMES = frozenset({280, 300})
 SHIFTS = frozenset({LOCAL_OFFSET, PRESET, 921, 922, 923})
 #: Tool lengths from the table of tools, and G43.1 and G43.2.
 TABLE_LENGTHS = frozenset({430, 440, 490})
+#: G43.1, a tool length from the words of the block.
 LENGTH_FROM_WORDS = 431
+#: Every code that sets a tool length.
 LENGTHS = TABLE_LENGTHS | {LENGTH_FROM_WORDS, 432}
 #: G54 to G59.3, and G54.1 P.
 WORK_OFFSETS = frozenset({540, 541, *range(550, 594)})

@@ -22,8 +22,11 @@ Bytes = npt.NDArray[np.uint8]
 CHUNK = 1 << 18
 
 _U = np.uint64
+#: Bytes before and after the text, so that eight bytes can be read at a time at either end.
 _PAD = 8
+#: Masks of the high bytes of a number of eight bytes, by how many of them are kept.
 _HIGH = np.array([0] + [(~((1 << (8 * (8 - n))) - 1)) & (2**64 - 1) for n in range(1, 9)], dtype=np.uint64)
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
 
 

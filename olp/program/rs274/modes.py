@@ -199,7 +199,8 @@ def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
         shown = text[:60].decode("latin-1")
         if _FLOW.search(text):
             raise ProgramError(
-                f"`{shown}` uses parameters, expressions or flow control; unroll the program with --flatten",
+                f"`{shown}` uses parameters, expressions or flow control; unroll the program with olp "
+                "correct --flatten",
                 line=number,
             )
         raise ProgramError(

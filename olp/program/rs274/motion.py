@@ -16,6 +16,7 @@ from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.program.rs274.lexer import WordChunk
 
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
 _AXIS_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"XYZ"):

@@ -90,8 +90,8 @@ class Layout:
         """mm per unit of X, Y and Z. Raises InputError where nothing states the unit."""
         if self.unit is None:
             raise InputError(
-                "states no unit of X, Y and Z; give it in the header (X_mm or `X [inch]`), with --unit, "
-                "or with the key unit of a profile"
+                "states no unit of X, Y and Z; give it in the header (X_mm or `X [inch]`), with the key unit "
+                "of a profile, or with --unit of olp correct, results or compare"
             )
         return MM[self.unit]
 

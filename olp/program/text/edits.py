@@ -15,6 +15,7 @@ from olp.core.arrays import Index
 
 Bytes = npt.NDArray[np.uint8]
 
+#: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
 #: four digits of text at a time
 _DIGITS = np.frombuffer("".join(f"{i:04d}" for i in range(10_000)).encode(), np.uint32).copy()

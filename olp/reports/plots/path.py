@@ -33,8 +33,8 @@ _FLOOR_UM = 1e-2
 Runs = Mapping[str, Sequence[Run]]
 
 
-def picture(path: Path, runs: Runs) -> bytes:
-    """The path in plan view, coloured by its distance from the nominal one, uncorrected and corrected."""
+def picture(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
+    """The path in plan view, coloured by its distance from the nominal one; `sides` labels the groups."""
 
     def draw(figure: Figure) -> None:
         from matplotlib.collections import LineCollection
@@ -57,14 +57,14 @@ def picture(path: Path, runs: Runs) -> bytes:
                     linewidths=1.1, rasterized=True,
                 )  # fmt: skip
                 plot.add_collection(pieces)
-            plot.set(aspect="equal", title=SIDES[name], xlabel="X in mm", ylabel="Y in mm")
+            plot.set(aspect="equal", title=sides[name], xlabel="X in mm", ylabel="Y in mm")
             plot.autoscale_view()
         if pieces is not None:
             figure.colorbar(pieces, ax=list(plots), label="distance from the nominal path in um", shrink=0.8)
 
     span = np.ptp(path.vertex_mm[:, :2], axis=0)
-    sides = sum(bool(runs.get(name)) for name in ("before", "after"))
-    height = (6.0 / max(sides, 1)) * float(span[1] / max(span[0], 1e-9)) + 0.7
+    count = sum(bool(runs.get(name)) for name in ("before", "after"))
+    height = (6.0 / max(count, 1)) * float(span[1] / max(span[0], 1e-9)) + 0.7
     return drawn("picture", (7.4, min(max(height, 1.8), 5.0)), draw)
 
 
@@ -89,7 +89,7 @@ def _sampled(run: Run) -> tuple[Array, Array]:
     return run.pairing.foot_mm[rows][:, :2], run.deviation.across[rows] * UM_PER_MM
 
 
-def along(path: Path, runs: Runs, tolerance_um: float | None) -> bytes:
+def along(path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
     """Distance from the nominal path along it; bands from least to most where points are many."""
 
     def draw(figure: Figure) -> None:
@@ -112,7 +112,7 @@ def along(path: Path, runs: Runs, tolerance_um: float | None) -> bytes:
             )
             middle = (edges[1:] + edges[:-1]) / 2e3
             plot.fill_between(middle, *bands, color=COLOURS[name], alpha=0.35, linewidth=0, step="mid")
-            plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{SIDES[name]}, largest")
+            plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{sides[name]}, largest")
         _tolerance(plot, tolerance_um)
         plot.set_yscale("log")
         plot.set(xlabel="along the path in m", ylabel="distance in um", xlim=(0.0, path.length_mm / 1e3))
@@ -127,8 +127,8 @@ def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
         plot.axhline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
 
 
-def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
-    """Histogram of the distances from the nominal path, uncorrected and corrected."""
+def histogram(runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
+    """Histogram of the distances from the nominal path, by groups of runs."""
 
     def draw(figure: Figure) -> None:
         plot = figure.subplots()
@@ -142,7 +142,7 @@ def histogram(runs: Runs, tolerance_um: float | None) -> bytes:
         for name, size in sizes.items():
             count, _ = np.histogram(np.maximum(size, _FLOOR_UM * 1.001), edges)
             plot.stairs(count / len(size) * 100, edges, fill=True, alpha=0.35, color=COLOURS[name])
-            plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=SIDES[name])
+            plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=sides[name])
         if tolerance_um is not None:
             plot.axvline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
         plot.set_xscale("log")
@@ -189,7 +189,7 @@ def bands(confidence: Confidence) -> bytes:
     return drawn("bands", (7.4, 3.4), draw)
 
 
-def components(path: Path, runs: Runs) -> bytes:
+def components(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
     """Normal and binormal deviation of the first run of each group along the path."""
 
     def draw(figure: Figure) -> None:
@@ -201,7 +201,7 @@ def components(path: Path, runs: Runs) -> bytes:
                     rows = rows[:: max(len(rows) // _DRAWN, 1)]
                     value = getattr(run.deviation, side)[rows] * UM_PER_MM
                     plot.plot(run.pairing.s_mm[rows] / 1e3, value, ",", color=COLOURS[name], rasterized=True)
-                    plot.plot([], [], color=COLOURS[name], label=SIDES[name])
+                    plot.plot([], [], color=COLOURS[name], label=sides[name])
             plot.set_ylabel(f"{side} in um")
             plot.grid(color="0.92", linewidth=0.5)
         plots[0].legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))

@@ -8,7 +8,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from olp.calibration.iso230.go_return import backlash_toml, findings_of, program, reversal_of
-from olp.calibration.iso230.separation import SEEN, Separation, aliased, seen, separate
+from olp.calibration.iso230.separation import (
+    LEAST_OBSERVABLE_SHARE,
+    Separation,
+    aliased,
+    observable_share,
+    separate,
+)
 from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Axis, Machine
@@ -80,7 +86,8 @@ def test_recovery(seed: int, amplitude: float, phase: float, backlash: float, pe
     """A smooth curve, a cyclic error and backlash are separated again."""
     random = np.random.default_rng(seed)
     x = np.arange(0.0, 1000.0, 40.0) + random.uniform(0, period, 25)
-    assume(seen([x], period) > SEEN and seen([x], period / 2, [period]) > SEEN)
+    assume(observable_share([x], period) > LEAST_OBSERVABLE_SHARE)
+    assume(observable_share([x], period / 2, [period]) > LEAST_OBSERVABLE_SHARE)
     smooth = 8.0 * (x / 1000.0) - 3.0
     cyclic = amplitude * np.sin(2 * np.pi * x / period + phase)
     result = separate(line(x, smooth + cyclic - backlash / 2, smooth + cyclic + backlash / 2), [period])

@@ -357,7 +357,7 @@ def test_one_direction_gives_no_squareness_and_reports_it() -> None:
     result = ballbar.fit(circles("XY", (1, 1), noise=2e-4, servo=3e-3))
     assert result.reading() is None
     assert {"square", "servo"} & result.determined == set()
-    assert {"scale", "lost_1", "lost_2", "radius"} <= result.determined
+    assert {"scale", "backlash_1", "backlash_2", "radius"} <= result.determined
     assert result.value[6:] == pytest.approx([8e-3, 5e-3], abs=3e-4)
     [finding] = result.findings
     assert finding.code == "OLP856" and "one direction only" in finding.message

@@ -12,7 +12,7 @@ from cases.instruments import BOX, DATUM, EXAMPLES, TOOL, Error
 
 from olp.calibration.estimator.basis import CurveSpace, Spline
 from olp.calibration.estimator.normal import residuals_of
-from olp.calibration.estimator.parameters import Parameters, Place
+from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.summary import TALLIES
 from olp.calibration.observations.base import OUTLIER, Observation, Result, ScatteredState, State
 from olp.core.arrays import Array
@@ -28,13 +28,13 @@ PLAN = 'schema = "olp-measurements-1"\nmachine = "m"\nmeasured = 2026-05-14\ntem
 
 
 def _parameters() -> Parameters:
-    spaces, places = {}, {}
+    spaces, measuring_lines = {}, {}
     for name in COMPONENTS:
         axis = AXES.index(name[2])
         kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
         spaces[name] = CurveSpace.of(Spline(*BOX[axis], 5), (), DATUM[axis], kind)  # type: ignore[arg-type]
-        places[name] = Place(DATUM, TOOL)
-    return Parameters(CHAIN, DATUM, spaces, places)
+        measuring_lines[name] = MeasuringLine(DATUM, TOOL)
+    return Parameters(CHAIN, DATUM, spaces, measuring_lines)
 
 
 P = _parameters()

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from enum import IntEnum
 
+from olp.core.machine import Machine
+from olp.core.units import AXES
 from olp.program.dialect import Dialect, Row, Support
 from olp.program.rs274.codes import CYCLES, PROBES
 from olp.program.rs274.cycles import CycleRules
@@ -85,6 +87,15 @@ class Profile(Dialect):
         """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
         return number / 1000.0 if self.increments_without_point and not pointed else number
 
+    def counts_increments(self, machine: Machine) -> bool:
+        """Whether a length without a decimal point counts least increments."""
+        return self.increments_without_point and machine.decimal_point == "increment"
+
+    def bare_mm(self, machine: Machine, letter: str, unit_mm: float) -> float:
+        """mm per unit of a length without a decimal point, as the control reads it."""
+        counted = increment(machine, letter, unit_mm) if self.counts_increments(machine) else 1.0
+        return counted * unit_mm
+
     def rows(self) -> Sequence[Row]:
         return [
             Row(
@@ -94,6 +105,14 @@ class Profile(Dialect):
             )
             for code, act in sorted(self.codes.items())
         ]
+
+
+def increment(machine: Machine, letter: str, unit_mm: float) -> float:
+    """Least increment in program units: 0.001 mm goes with 0.0001 inch, 0.0001 mm with 0.00001 inch."""
+    axis = {"I": "X", "J": "Y", "K": "Z"}.get(letter, letter)
+    least = machine.axes[axis if axis in AXES else "X"].least_increment_mm
+    metric = 0.0001 if least < 0.0005 else 0.001
+    return metric if unit_mm == 1.0 else metric / 10
 
 
 #: Why codes are refused, where a control has no other reason.
