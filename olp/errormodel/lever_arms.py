@@ -1,8 +1,9 @@
 """The lever arms on which the angles of an axis act.
 
 Contribution of axis j: E_j(q) + eps_j(q) x [L_j(P, t) - L_j(P_line(q), t_line)] with L_j the tool vector plus
-the axes after j toward the tool, plus axis j itself where it carries the workpiece. Every translation
-component returns its measured value on its own line; so each row has its own lever arm.
+the axes after j toward the tool, plus axis j itself where it carries the workpiece. P_line takes the axes by
+whose position the values are tabled from P, and the others from the line. So every translation component
+returns its measured value at its own node, and each row has its own lever arm.
 """
 
 from __future__ import annotations
@@ -29,10 +30,13 @@ CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0
 
 
 class Measured(Protocol):
-    """What was measured along a line of one axis: names of components, and where and with what."""
+    """What was measured of one axis: names of components, the axes by whose position they are tabled, and
+    where the others stood and with what tool."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
+    @property
+    def arguments(self) -> tuple[str, ...]: ...
     @property
     def line_mm(self) -> Vector | None: ...
     @property
@@ -77,11 +81,13 @@ def lever_arms_of(
         for k, source in enumerate(sources):
             tool = source.tool_mm[k] if source is not None and tool_terms else 0.0
             own = AXES[k] == axis
-            table = own and carries and source is not None and source.reference == "table"
-            moves[k] = AXES[k] in after or table
-            line = source.line_mm if source is not None and not own else None
-            # On its own line an axis has no coordinate; seen from a reflector on its table, it has moved from
+            on_table = own and source is not None and source.reference == "table"
+            arguments = (axis,) if source is None else source.arguments
+            # An argument has no coordinate on the line; seen from a reflector on its table, it has moved from
             # the datum.
+            carried = AXES[k] in after or (own and carries)
+            moves[k] = carried and (on_table or AXES[k] not in arguments)
+            line = None if source is None or on_table else source.line_mm
             stood_mm = (datum_mm if line is None else line)[k] if moves[k] else 0.0
             offset[k] = stood_mm + tool
         return LeverArm((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))

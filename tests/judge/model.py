@@ -308,7 +308,8 @@ class JudgeModel:
                 target, column = (shift, "XYZ") if name[1] in "XYZ" else (own, "ABC")
                 target[:, column.index(name[1])] += value
             angle += own
-            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_arm(load, q))
+            arm = self._node_arm(load, points)
+            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), arm)
         for name, period, amplitude, phase in self.cyclic:
             if name[2] == AXES[axis]:
                 value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
@@ -316,7 +317,17 @@ class JudgeModel:
         shift[:, axis] -= 0.5 * self.backlash_mm[axis] * play
         return shift, angle, tool_vector
 
-    def _line_arm(self, curve: _CurveFile | _LoadFile, q: np.ndarray) -> np.ndarray:
+    def _node_arm(self, load: _LoadFile, points: np.ndarray) -> np.ndarray:
+        """(n, 3) lever arm at which the load was read: each point counts as a node of the table, so there the
+        axes of the table stand as at the point, and the others on the line."""
+        position = np.tile(load.line_mm, (len(points), 1))
+        for argument in load.arguments:
+            position[:, argument] = points[:, argument] - self.datum[argument]
+        if load.on_table:
+            position[:, load.axis] = 0.0
+        return np.asarray(position * self._reach(load.axis) + load.tool_mm)
+
+    def _line_arm(self, curve: _CurveFile, q: np.ndarray) -> np.ndarray:
         """(n, 3) lever arm of the measured line: tool vector + axes toward the tool (+ own axis)."""
         position = np.tile(curve.line_mm, (len(q), 1))
         position[:, curve.axis] = 0.0 if curve.on_table else q - self.datum[curve.axis]

@@ -247,8 +247,8 @@ def line_at(stated: Position, datum_mm: Vector) -> Vector:
     return vector([datum if position is None else position for position, datum in positions])
 
 
-def line_key(line_mm: Vector | None, axis: str) -> dict[str, float] | None:
-    """The key line_mm of a table: where the axes other than its own stood."""
+def line_key(line_mm: Vector | None, axis: str = "") -> dict[str, float] | None:
+    """The key line_mm of a table: where the axes stood, `axis` left out, by whose position it is tabled."""
     if line_mm is None:
         return None
     return {a: float(v) for a, v in zip(AXES, line_mm, strict=True) if a != axis}

@@ -32,11 +32,12 @@ from olp.errormodel.sources.base import (
 
 
 class OnLine(Table):
-    """Where the other axes stood, and the tool vector."""
+    """Where the axes stood that are no argument, and the tool vector."""
 
     line_mm: Position = Field(
         default_factory=Position,
-        description="where the other axes stood, such as { Y = 0.0, Z = 0.0 } in mm; the datum if left out",
+        description="where the axes stood that are no argument of the table, such as { Y = 0.0, Z = 0.0 } in "
+        "mm; the datum if left out",
     )
     tool_mm: Triple = Field(default=(0.0, 0.0, 0.0), description="the tool vector then, [X, Y, Z] in mm")
 
@@ -97,7 +98,7 @@ class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]])
                 "[[compliance]]",
                 {
                     "file": writing.csv("load", _csv(table)),
-                    "line_mm": line_key(table.line_mm, table.axis),
+                    "line_mm": line_key(table.line_mm, table.axis if table.axis in table.arguments else ""),
                     "tool_mm": floats(table.tool_mm),
                     "reference": None if table.reference == "functional-point" else table.reference,
                     "interpolation": table.interpolation,
