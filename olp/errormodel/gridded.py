@@ -75,8 +75,8 @@ class ComponentTable:
     """Component errors of one axis over a grid of one to three axis positions: load per kg, or temperature.
 
     `arguments` names the axes of the grid, `knots_mm` their levels, `columns` the values by ISO 230-1 name,
-    all of one shape. `line_mm` is where the axes stood that are no argument, `tool_mm` the tool vector then: a
-    value holds as it is at its own node. Raises ConfigError.
+    all of one shape. `line_mm` is where the axes stood that are no argument, `tool_mm` the tool vector then:
+    a value holds as it is at its own node. Raises ConfigError.
     """
 
     axis: str

@@ -110,6 +110,15 @@ def test_temperatures_of_scale_and_workpiece(tmp_path: Path) -> None:
     assert words(corrected(path, b"G0 X1000. Y0. Z0.\n"), "X") == [pytest.approx(999.9955, abs=1e-9)]
 
 
+def test_tools_of_two_lengths_cut_one_plane_of_a_warm_part(tmp_path: Path) -> None:
+    """A part of 23 um/(m K), 10 K warm; its plane at machine Z 200 lies 46 um higher than in the cold."""
+    frame = '[work_offsets.G54]\nZ_mm = 200.0\nset_by = "true"\n[tools]\n1.Z_mm = 120.0\n2.Z_mm = 20.0\n'
+    job = "[temperatures_degC]\nworkpiece = 30.0\n"
+    path = machine(tmp_path, "[thermal]\nworkpiece_um_m_K = 23.0\n", tables=frame, job=job)
+    body = b"T1 M6\nG43 H1\nG0 X0. Y0. Z0.\nG1 X1. F60\nT2 M6\nG43 H2\nG0 X0. Y0. Z0.\nG1 X1.\n"
+    assert words(corrected(path, body), "Z") == [0.046, 0.046]
+
+
 # -- backlash -----------------------------------------------------------------------------------------
 
 PLAY = "[backlash]\nX_um = 6.0\n"
