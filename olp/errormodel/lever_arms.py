@@ -8,15 +8,15 @@ returns its measured value at its own node, and each row has its own lever arm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.interpolation import Column
-from olp.core.machine import Vector
+from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
 
 #: Component errors of an axis in this order.
@@ -43,6 +43,24 @@ class Measured(Protocol):
     def tool_mm(self) -> Vector: ...
     @property
     def reference(self) -> str: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Where and with what components of one axis were measured, without their values."""
+
+    names: tuple[str, ...]
+    arguments: tuple[str, ...]
+    line_mm: Vector | None = None
+    tool_mm: Vector = ZERO
+    reference: str = "functional-point"
+
+
+def measured_as(curves: Sequence[Measured], axis: str, stated: Mapping[str, Any]) -> tuple[Measurement, ...]:
+    """How the curves of an axis were measured, with what is `stated` by name instead; where it has no curve,
+    one measurement through the datum without tool."""
+    own = [Measurement(c.names, c.arguments, c.line_mm, c.tool_mm, c.reference) for c in curves]
+    return tuple(replace(one, **stated) for one in own or [Measurement((), (axis,))])
 
 
 @dataclass(frozen=True, slots=True)

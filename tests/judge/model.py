@@ -232,11 +232,37 @@ class JudgeModel:
                 float(entry["period_mm"]),
                 1e-3 * entry["amplitude_um"] if "amplitude_um" in entry else 1e-6 * entry["amplitude_urad"],
                 float(entry.get("phase_rad", 0.0)),
+                self._cyclic_line(entry),
             )
             for entry in cal.get("cyclic", [])
         ]
         if self.silent & {entry[0] for entry in self.cyclic}:
             raise NotImplementedError("a cyclic term of a component that the control corrects")
+
+    def _cyclic_line(self, entry: dict[str, Any]) -> _CurveFile:
+        """Where a cyclic angle was measured: as it says; what it leaves out is as of the curve file of its
+        axis, or at the datum without a tool where there is no file."""
+        _only(
+            entry,
+            {"component", "period_mm", "amplitude_um", "amplitude_urad", "phase_rad"}
+            | {"line_mm", "tool_mm", "reference"},
+            "cyclic",
+        )
+        axis = AXES.index(entry["component"][2])
+        files = [curve for curve in self.curves if curve.axis == axis]
+        angular = entry["component"][1] in "ABC"
+        if angular and len(files) > 1:
+            raise NotImplementedError("a cyclic angle of an axis with several curve files")
+        line = files[0].line_mm if files else np.zeros(3)
+        tool = files[0].tool_mm if files else np.zeros(3)
+        on_table = files[0].on_table if files else False
+        if "line_mm" in entry:
+            line = np.array([entry["line_mm"].get(a, self.datum[i]) for i, a in enumerate(AXES)]) - self.datum
+        if "tool_mm" in entry:
+            tool = np.array(entry["tool_mm"], float)
+        if "reference" in entry:
+            on_table = entry["reference"] == "table"
+        return _CurveFile(axis, {}, False, line, tool, on_table)
 
     # -- the error ---------------------------------------------------------------------------------
 
@@ -310,10 +336,21 @@ class JudgeModel:
             angle += own
             arm = self._node_arm(load, points)
             tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), arm)
-        for name, period, amplitude, phase in self.cyclic:
-            if name[2] == AXES[axis]:
-                value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
-                (shift if name[1] in "XYZ" else angle)[:, "XYZABC".index(name[1]) % 3] += value
+        for name, period, amplitude, phase, measured in self.cyclic:
+            if name[2] != AXES[axis]:
+                continue
+            value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
+            if name[1] in "XYZ":
+                shift[:, "XYZ".index(name[1])] += value
+                continue
+            own = np.zeros((len(q), 3))
+            own[:, "ABC".index(name[1])] = value
+            angle += own
+            line = self._line_arm(measured, q)
+            if self.first_order:
+                tool_vector -= np.cross(own, line)
+            else:
+                tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), line)
         shift[:, axis] -= 0.5 * self.backlash_mm[axis] * play
         return shift, angle, tool_vector
 
