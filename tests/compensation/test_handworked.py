@@ -61,13 +61,6 @@ def test_the_length_of_the_touch_tool_counts(tmp_path: Path) -> None:
     assert words(corrected(path, b"G0 X0 Y0 Z0.\n"), "Z") == [pytest.approx(0.005, abs=1e-4)]
 
 
-def test_a_tool_length_set_on_the_raw_machine(tmp_path: Path) -> None:
-    tool = '[tools.1]\nZ_mm = 50.0\nset_by = "touch"\ntouched_at_mm = { X = 200.0, Y = 0.0, Z = 0.0 }\n'
-    path = machine(tmp_path, CURVE_X, {"x.csv": STEP}, tables=TRUE_ZERO + tool)
-    text = corrected(path, b"T1 M6\nG43 H1\nG0 X0. Y0. Z0.\n")
-    assert words(text, "X") == [pytest.approx(0.015, abs=1e-9)]
-
-
 # -- lever arms, squareness, temperature ----------------------------------------------------------------
 
 

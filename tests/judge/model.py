@@ -491,10 +491,41 @@ class JudgeModel:
         position = _position(entry.get("touched_at_mm", {}), default)
         return np.asarray(self.error_mm(position[None], self.tool_vector_mm(tool))[0])
 
-    def tool_shift(self, tool: int | None) -> np.ndarray:
-        """(3,) the same for an active tool length that was set on the uncompensated machine."""
+    def length_error_mm(self, tool: int | None) -> tuple[float, str | None, float | None]:
+        """How much longer a tool is than its stored length, but for the constant of its setter; the setter,
+        None where the length is true; and its constant, None where it is not known.
+
+        Stored = true - error along the tool where it was set + constant, along Z.
+        """
         entry = self.machine.get("tools", {}).get(str(tool), {})
-        if entry.get("set_by", "true") == "true":
-            return np.zeros(3)
-        position = _position(entry["touched_at_mm"], np.zeros(3))
-        return np.asarray(self.error_mm(position[None], self.tool_vector_mm(tool))[0])
+        touched = entry.get("set_by", "true") == "touch"
+        if not touched and "setter" not in entry:
+            return 0.0, None, 0.0
+        setter = entry.get("setter", "")
+        known = [
+            1e-3 * other["k_um"]
+            for other in self.machine["tools"].values()
+            if "k_um" in other and other.get("setter", "") == setter
+        ]
+        longer = 0.0
+        if touched:
+            position = _position(entry["touched_at_mm"], np.zeros(3))
+            longer = float(self.error_mm(position[None], self.tool_vector_mm(tool))[0, 2])
+        return longer, setter, known[0] if known else None
+
+    def tool_shift(self, tool: int | None, work_offset: str) -> np.ndarray:
+        """(3,) target - nominal where the length of `tool` is active: its tip hangs lower by what it is
+        longer, and the tip that touched the work offset did so by what its own tool was longer."""
+        offset = self.machine.get("work_offsets", {}).get(work_offset, {})
+        by_touch = offset.get("set_by", "touch") == "touch" and "touch_tool" in offset
+        own, setter, constant = self.length_error_mm(tool)
+        other, other_setter, other_constant = 0.0, None, 0.0
+        if by_touch:
+            if offset["touch_tool"] == tool:
+                return np.zeros(3)
+            other, other_setter, other_constant = self.length_error_mm(offset["touch_tool"])
+        if by_touch and setter == other_setter:
+            return np.array([0.0, 0.0, own - other])
+        if constant is None or other_constant is None:
+            raise ValueError(f"tool {tool}: the constant of a setter does not cancel and is not stated")
+        return np.array([0.0, 0.0, own - constant - other + other_constant])
