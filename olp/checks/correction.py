@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from olp.checks.along import Figure, figures
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import remark_findings
-from olp.core.arrays import Index
+from olp.core.arrays import Array, Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
@@ -20,8 +22,6 @@ from olp.program.program import Program
 from olp.proof.judgement import Judgements
 from olp.proof.proof import Counts, Proof
 
-#: moves that are sampled for a table
-_SAMPLED = 4096
 #: blocks that the report lists
 _WORST = 5
 
@@ -182,35 +182,31 @@ def part_findings(table: Judgements, part_tolerance_um: float | None) -> list[Fi
 
 
 def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
-    """Size of each error source over the nominal path, largest first, from up to 4096 of its moves."""
-    known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))
-    if not len(known):
-        return []
-    pick = known[np.linspace(0, len(known) - 1, min(len(known), _SAMPLED)).astype(np.int64)]
+    """Size of each error source over the nominal path, at waypoints and between them, largest first."""
     tool = path.tool_mm()
-    rows = []
-    for name, part in model.contributions(path.end_mm[pick], tool if tool.ndim == 1 else tool[pick]):
-        size = np.sqrt((part * part).sum(axis=1))
-        rows.append(
-            {
-                "name": name,
-                "max_um": float(size.max()) * 1e3,
-                "rms_um": float(np.sqrt(np.mean(size * size))) * 1e3,
-            }
-        )
+
+    def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
+        for name, part in model.contributions(point, tool if tool.ndim == 1 else tool[move]):
+            yield name, np.sqrt((part * part).sum(axis=1))
+
+    rows = [
+        {"name": figure.name, "max_um": figure.largest * 1e3, "rms_um": figure.rms * 1e3}
+        for figure in figures(path, sizes)
+    ]
     return sorted(rows, key=lambda row: -row["max_um"])
 
 
 def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
-    """Largest and rms angle of the tool in urad, which a machine with three linear axes cannot correct."""
-    known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))
-    if not len(known):
-        return {"max_urad": 0.0, "rms_urad": 0.0}
-    pick = known[np.linspace(0, len(known) - 1, min(len(known), _SAMPLED)).astype(np.int64)]
+    """Largest and rms angle of the tool in urad along the nominal path, which a machine with three linear
+    axes cannot correct."""
     payload = path.per_frame([(f.payload_kg,) for f in path.frames])[..., 0]
-    turned = model.rotation(path.end_mm[pick], None, payload if payload.ndim == 0 else payload[pick])
-    angle = np.sqrt((turned**2).sum(axis=1)) * 1e6
-    return {"max_urad": float(angle.max()), "rms_urad": float(np.sqrt(np.mean(angle * angle)))}
+
+    def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
+        turned = model.rotation(point, None, payload if payload.ndim == 0 else payload[move])
+        yield "", np.sqrt((turned**2).sum(axis=1)) * 1e6
+
+    angle = next(iter(figures(path, sizes)), Figure("", 0.0, 0.0))
+    return {"max_urad": angle.largest, "rms_urad": angle.rms}
 
 
 def worst_blocks(program: Program, proof: Proof) -> list[dict[str, Any]]:

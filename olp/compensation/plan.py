@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import Vector
-from olp.core.toolpath import Frame, Toolpath
+from olp.core.toolpath import Frame, Toolpath, Touch
 from olp.errormodel.base import ErrorModel
 
 
@@ -58,13 +58,21 @@ def zero_shifts(frames: tuple[Frame, ...], model: ErrorModel) -> Array:
     """(frames, 3): where the part really lies from where the offset says, per frame.
 
     A point touched off on the uncompensated machine at axis position c0 is at c0 + e(c0), and remains there.
+    A tool length that was set on it at s is too short by Z of e(s): that of the tool that cuts counts, less
+    that of the tool that touched.
     """
+
+    def error_at(touch: Touch) -> Array:
+        position, tool = touch
+        return np.asarray(model.error(np.array([position]), np.array(tool, float))[0])
+
     shifts = np.zeros((len(frames), 3))
     for i, frame in enumerate(frames):
-        for touch in (frame.touched, frame.tool_touched):
-            if touch is not None:
-                position, tool = touch
-                shifts[i] += model.error(np.array([position]), np.array(tool, float))[0]
+        if frame.touched is not None:
+            shifts[i] += error_at(frame.touched)
+        for length in frame.lengths:
+            set_mm = 0.0 if length.touched is None else float(error_at(length.touched)[2])
+            shifts[i] += np.array(length.along) * (set_mm - length.constant_mm)
     return shifts
 
 

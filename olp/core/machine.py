@@ -88,8 +88,9 @@ class Tool:
 
     `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to minus the
     length; a negative Z length is a touch-off value and gives no tool vector. `set_by` "touch" means that the
-    length was set on the uncompensated machine at axis position `touched_at_mm`. `cutting_length_mm` counts
-    from the tip up, None: all that the holder leaves free. `holder` is stacked upwards and ends at the gauge
+    length was set on the uncompensated machine at axis position `touched_at_mm`. Lengths of one `setter` are
+    too long by one constant, `constant_mm` where it is known. `cutting_length_mm` counts from the tip up,
+    None: all that the holder leaves free. `holder` is stacked upwards and ends at the gauge
     point.
     """
 
@@ -99,6 +100,8 @@ class Tool:
     gauge_to_tip_mm: Vector | None = None
     set_by: Literal["touch", "true"] = "true"
     touched_at_mm: Vector | None = None
+    setter: str | None = None
+    constant_mm: float | None = None
     cutting_length_mm: float | None = None
     holder: tuple[HolderPart, ...] = ()
 

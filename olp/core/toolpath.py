@@ -19,6 +19,21 @@ Tool = tuple[float, ...]
 Touch = tuple[Vector, Tool]
 
 
+@dataclass(frozen=True, slots=True)
+class LengthError:
+    """How far the tip is from where the stored length of a tool has it, because of how that was set.
+
+    The target lies farther by Z of the error at `touched` less `constant_mm`, in the direction `along`: that
+    of the tool while cutting, and against that of the tool that touched the work offset. `touched` is where
+    the length was set on the uncompensated machine, None where it was measured by other means. `constant_mm`
+    is by how much all lengths of its setter are too long.
+    """
+
+    along: Vector
+    touched: Touch | None
+    constant_mm: float = 0.0
+
+
 class Kind(IntEnum):
     """What a move is. Arcs run clockwise or counter-clockwise seen against their plane's normal."""
 
@@ -54,10 +69,10 @@ class Frame:
     Axis position = word x `unit_mm` + `offset_mm` (work offset, shifts and the active tool length
     `length_mm`). `tool_mm` is the tool vector, gauge point to tip; `payload_kg` is what the machine carries.
     `touched` is (axis position, tool vector and payload) of the touch-off of the work offset on the
-    uncompensated machine, None where it was located by other means. `tool_touched` is the same for the length
-    of the active tool. In a rotated frame the words are turned first, by the rows of `turn`, None where
-    nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is the part of the
-    offset by which the tip keeps off the programmed point, as over a hole.
+    uncompensated machine, None where it was located by other means. `lengths` are errors of the lengths of
+    tools that are not common to touch-off and cut. In a rotated frame the words are turned first, by the rows
+    of `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is
+    the part of the offset by which the tip keeps off the programmed point, as over a hole.
     """
 
     unit_mm: float = 1.0
@@ -67,7 +82,7 @@ class Frame:
     tool: int | None = None
     work_offset: str = ""
     touched: Touch | None = None
-    tool_touched: Touch | None = None
+    lengths: tuple[LengthError, ...] = ()
     payload_kg: float = 0.0
     turn: tuple[Vector, Vector, Vector] | None = None
     lift_mm: Vector = ZERO

@@ -11,8 +11,8 @@ from olp.core.errors import ConfigError
 from olp.core.machine import CHAINS, Vector
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
-from olp.errormodel.components import AxisComponents
-from olp.errormodel.lever_arms import LeverArms, lever_arms_of
+from olp.errormodel.components import ActingTerm, AxisComponents
+from olp.errormodel.lever_arms import LeverArms, lever_arms_of, measured_as
 from olp.errormodel.sources.squareness import shears
 
 #: mm; short series of sine and cosine may be wrong by so much at the tip, anywhere in the box.
@@ -49,12 +49,17 @@ def build_bodies(
         axis, after = order[place], order[place + 1 :]
         carries = chain.index(axis) < chain.index("F")
         j = AXES.index(axis)
-        components = AxisComponents.of(calibration, axis, skip)
-        lever_arms = lever_arms_of(
-            calibration.curves_of(axis), calibration.datum_mm, axis, after, carries, tool_terms
-        )
+        curves, datum_mm = calibration.curves_of(axis), calibration.datum_mm
+        lever_arms = lever_arms_of(curves, datum_mm, axis, after, carries, tool_terms)
+        cyclic = []
+        for term in calibration.cyclic:
+            if term.component[2] == axis and term.amplitude != 0.0 and term.component not in skip:
+                measured = measured_as(curves, axis, term.measured())
+                own = lever_arms_of(measured, datum_mm, axis, after, carries, tool_terms)
+                cyclic.append(ActingTerm.of(term, own, lever_arms))
+        components = AxisComponents.of(calibration, axis, skip, tuple(cyclic))
         terms = _sine_terms(components, lever_arms, calibration.box_mm)
-        bodies.append(Body(j, carries, components, tilts[axis], calibration.datum_mm[j], lever_arms, terms))
+        bodies.append(Body(j, carries, components, tilts[axis], datum_mm[j], lever_arms, terms))
     return tuple(bodies)
 
 

@@ -74,9 +74,11 @@ class Variation:
         )
 
     @classmethod
-    def of_cyclic(cls, term: Cyclic) -> Variation:
-        peak, rate = abs(term.amplitude), 2.0 * math.pi / term.period_mm
-        slope, curvature = peak * rate, peak * rate * rate
+    def of_cyclic(cls, term: Cyclic, most: float = 1.0, growth: float = 0.0) -> Variation:
+        """Of the term times a factor that is linear in its position: at most `most`, with slope `growth`."""
+        size, rate = abs(term.amplitude), 2.0 * math.pi / term.period_mm
+        peak, slope = size * most, size * (rate * most + abs(growth))
+        curvature = size * rate * (rate * most + 2.0 * abs(growth))
         smooth = np.minimum(curvature / 8.0 * UPPER_MM**2, 2.0 * peak)
         return cls(peak, slope, curvature, smooth, np.zeros(_COUNT), np.minimum(slope, 2.0 * peak / LOWER_MM))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from olp.core.interpolation import ON_GRID_MM, Column, DenseTable, Interpolant, 
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.chord import Variation
-from olp.errormodel.lever_arms import DIRECTIONS
+from olp.errormodel.lever_arms import CROSS, DIRECTIONS, LeverArms
 from olp.errormodel.sources.cyclic import Cyclic, cyclic_value
 
 #: mm; the largest error of resampling a curve of translations, a ten-thousandth of a micrometre.
@@ -19,7 +20,48 @@ TABLE_MM = 1e-7
 #: rad; the same for angles: as much at a lever arm of 1 m.
 TABLE_RAD = 1e-10
 
+#: A row X, Y or Z and how far a cyclic angle moves the tip along it beside its axis' lever arms: by the angle
+#: times (a + b q), a in mm.
+Moved = tuple[int, float, float]
+
 Six = tuple[Column | None, Column | None, Column | None, Column | None, Column | None, Column | None]
+
+
+@dataclass(frozen=True, slots=True)
+class ActingTerm:
+    """A cyclic term, and what it moves beside the lever arms of its axis because it was measured
+    elsewhere."""
+
+    term: Cyclic
+    moved: tuple[Moved, ...] = ()
+
+    @classmethod
+    def of(cls, term: Cyclic, own: LeverArms, shared: LeverArms) -> ActingTerm:
+        """`own` are the lever arms on which the term acts, `shared` those of all angles of its axis."""
+        a, j = DIRECTIONS.index(term.component[1]) - 3, AXES.index(term.component[2])
+        arms, others = ({i: arm for rows, arm in arms for i in rows} for arms in (own, shared))
+        moved = []
+        for i, angle, k, sign in CROSS:
+            if angle == a and arms[i] != others[i]:
+                slope = float(arms[i].moves[k]) - float(others[i].moves[k]) if k == j else 0.0
+                moved.append((i, sign * (others[i].offset_mm[k] - arms[i].offset_mm[k]), sign * slope))
+        return cls(term, tuple(moved))
+
+    def six(self, q: Array) -> list[Column | None]:
+        """Component errors at positions q (n,)."""
+        values: list[Column | None] = [None] * 6
+        value = cyclic_value(self.term, q)
+        values[DIRECTIONS.index(self.term.component[1])] = value
+        for i, constant, slope in self.moved:
+            values[i] = value * (constant + slope * q)
+        return values
+
+    def variations(self, low_mm: float, high_mm: float) -> Iterator[tuple[int, Variation]]:
+        """Bounds of each component that it changes, for positions in a range."""
+        yield DIRECTIONS.index(self.term.component[1]), Variation.of_cyclic(self.term)
+        for i, constant, slope in self.moved:
+            most = max(abs(constant + slope * low_mm), abs(constant + slope * high_mm))
+            yield i, Variation.of_cyclic(self.term, most, slope)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,25 +76,27 @@ class AxisComponents:
     table: DenseTable
     mean: tuple[int | None, ...]
     half: tuple[int | None, ...]
-    cyclic: tuple[Cyclic, ...]
+    cyclic: tuple[ActingTerm, ...]
     backlash_mm: float
     variation: tuple[Variation | None, ...]
     varies: tuple[bool, ...]
 
     @classmethod
-    def of(cls, calibration: Calibration, axis: str, skip: frozenset[str]) -> AxisComponents:
+    def of(
+        cls, calibration: Calibration, axis: str, skip: frozenset[str], cyclic: tuple[ActingTerm, ...]
+    ) -> AxisComponents:
+        j = AXES.index(axis)
         columns = _Columns(calibration, axis, skip)
         mean, half = columns.slots("mean"), columns.slots("half")
         table = columns.table()
-        own = [c for c in calibration.cyclic if c.component[2] == axis and c.amplitude != 0.0]
-        cyclic = tuple(c for c in own if c.component not in skip)
+        low, high = (float(face) for face in calibration.box_mm[j])
+        waves = [wave for acting in cyclic for wave in acting.variations(low, high)]
         variation, varies = [], []
-        for d, direction in enumerate(DIRECTIONS):
+        for d in range(len(DIRECTIONS)):
             parts = [columns.variation(slot, table) for slot in (mean[d], half[d]) if slot is not None]
-            repeating = [Variation.of_cyclic(c) for c in cyclic if c.component[1] == direction]
+            repeating = [wave for i, wave in waves if i == d]
             varies.append(bool(repeating) or any(p.varies for p in parts))
             variation.append(Variation.total([*parts, *repeating]) if parts or repeating else None)
-        j = AXES.index(axis)
         return cls(j, table, mean, half, cyclic, calibration.backlash_mm[j], tuple(variation), tuple(varies))
 
     def evaluate(self, q: Array, play: Array | None) -> Six:
@@ -66,9 +110,10 @@ class AxisComponents:
                     values[d] = _plus(values[d], play * difference)
             if self.backlash_mm != 0.0:
                 values[self.axis] = _plus(values[self.axis], play * (-0.5 * self.backlash_mm))
-        for term in self.cyclic:
-            d = DIRECTIONS.index(term.component[1])
-            values[d] = _plus(values[d], cyclic_value(term, q))
+        for acting in self.cyclic:
+            for d, value in enumerate(acting.six(q)):
+                if value is not None:
+                    values[d] = _plus(values[d], value)
         return _six(values)
 
     def sources(self, q: Array, play: Array | None) -> list[tuple[str, Six]]:
@@ -78,9 +123,7 @@ class AxisComponents:
         contributions = [
             (f"E{DIRECTIONS[d]}{axis}", _only(d, value)) for d, value in enumerate(mean) if value is not None
         ]
-        for term in self.cyclic:
-            d = DIRECTIONS.index(term.component[1])
-            contributions.append((f"cyclic {term.component}", _only(d, cyclic_value(term, q))))
+        contributions += [(f"cyclic {acting.term.component}", _six(acting.six(q))) for acting in self.cyclic]
         if play is not None:
             directional: list[Column | None] = [None if value is None else play * value for value in half]
             if self.backlash_mm != 0.0:

@@ -75,8 +75,8 @@ class ComponentTable:
     """Component errors of one axis over a grid of one to three axis positions: load per kg, or temperature.
 
     `arguments` names the axes of the grid, `knots_mm` their levels, `columns` the values by ISO 230-1 name,
-    all of one shape. `line_mm` and `tool_mm` as of a `Curve`: the positions of the other axes and the tool
-    vector then. Raises ConfigError.
+    all of one shape. `line_mm` gives the positions of the axes that are no argument, `tool_mm` the tool
+    vector then: a value holds as it is at its own node. Raises ConfigError.
     """
 
     axis: str

@@ -1,21 +1,22 @@
 """The lever arms on which the angles of an axis act.
 
 Contribution of axis j: E_j(q) + eps_j(q) x [L_j(P, t) - L_j(P_line(q), t_line)] with L_j the tool vector plus
-the axes after j toward the tool, plus axis j itself where it carries the workpiece. Every translation
-component returns its measured value on its own line; so each row has its own lever arm.
+the axes after j toward the tool, plus axis j itself where it carries the workpiece. P_line takes the axes by
+whose position the values are tabled from P, and the others from the line. So every translation component
+returns its measured value at its own node, and each row has its own lever arm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.interpolation import Column
-from olp.core.machine import Vector
+from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
 
 #: Component errors of an axis in this order.
@@ -29,16 +30,37 @@ CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0
 
 
 class Measured(Protocol):
-    """What was measured along a line of one axis: names of components, and where and with what."""
+    """What was measured of one axis: names of components, the axes by whose position they are tabled, and
+    where the others stood and with what tool."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
+    @property
+    def arguments(self) -> tuple[str, ...]: ...
     @property
     def line_mm(self) -> Vector | None: ...
     @property
     def tool_mm(self) -> Vector: ...
     @property
     def reference(self) -> str: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Where and with what components of one axis were measured, without their values."""
+
+    names: tuple[str, ...]
+    arguments: tuple[str, ...]
+    line_mm: Vector | None = None
+    tool_mm: Vector = ZERO
+    reference: str = "functional-point"
+
+
+def measured_as(curves: Sequence[Measured], axis: str, stated: Mapping[str, Any]) -> tuple[Measurement, ...]:
+    """How the curves of an axis were measured, with what is `stated` by name instead; where it has no curve,
+    one measurement through the datum without tool."""
+    own = [Measurement(c.names, c.arguments, c.line_mm, c.tool_mm, c.reference) for c in curves]
+    return tuple(replace(one, **stated) for one in own or [Measurement((), (axis,))])
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +99,13 @@ def lever_arms_of(
         for k, source in enumerate(sources):
             tool = source.tool_mm[k] if source is not None and tool_terms else 0.0
             own = AXES[k] == axis
-            table = own and carries and source is not None and source.reference == "table"
-            moves[k] = AXES[k] in after or table
-            line = source.line_mm if source is not None and not own else None
-            # On its own line an axis has no coordinate; seen from a reflector on its table, it has moved from
+            on_table = own and source is not None and source.reference == "table"
+            arguments = (axis,) if source is None else source.arguments
+            # An argument has no coordinate on the line; seen from a reflector on its table, it has moved from
             # the datum.
+            carried = AXES[k] in after or (own and carries)
+            moves[k] = carried and (on_table or AXES[k] not in arguments)
+            line = None if source is None or on_table else source.line_mm
             stood_mm = (datum_mm if line is None else line)[k] if moves[k] else 0.0
             offset[k] = stood_mm + tool
         return LeverArm((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))

@@ -34,9 +34,9 @@ Rows = npt.NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expansion:
-    """Standard uncertainties of expansion: of each scale and of the workpiece, per mm from where it is
-    held. `unmodelled_K` is the largest temperature difference that the job states and for which the
-    calibration has no expansion coefficient."""
+    """Standard uncertainties of expansion: of each scale by axis position and of the workpiece by place of
+    the part, per mm from where it is held. `unmodelled_K` is the largest temperature difference that the job
+    states and for which the calibration has no expansion coefficient."""
 
     scale: Vector
     fixed_at_mm: Vector
@@ -149,7 +149,8 @@ class Sensitivity:
                     slots[row].extend((number, weight * coefficient) for number, weight in own)
         if self.expansion is not None:
             for j, taken in enumerate(slots):
-                taken.extend(_expansion(self.expansion, j, unknowns - 4, position[j]))
+                tip = position[j] + tool_mm[..., j]
+                taken.extend(_expansion(self.expansion, j, unknowns - 4, position[j], tip))
         matrices = []
         for taken in slots:
             width = len(taken)
@@ -174,10 +175,11 @@ def value_rows(entry: Entry, q: Array) -> Array:
     return rows
 
 
-def _expansion(expansion: Expansion, j: int, first: int, q: Array) -> Iterator[Slot]:
+def _expansion(expansion: Expansion, j: int, first: int, q: Array, tip: Array) -> Iterator[Slot]:
+    """Of axis j, at its positions q (n,) and with the tip at `tip` (n,), both in mm."""
     n = len(q)
     yield np.full(n, first + j, np.int32), expansion.scale[j] * (q - expansion.fixed_at_mm[j])
-    yield np.full(n, first + 3, np.int32), -expansion.workpiece * (q - expansion.clamped_at_mm[j])
+    yield np.full(n, first + 3, np.int32), -expansion.workpiece * (tip - expansion.clamped_at_mm[j])
 
 
 def _own(entry: Entry, first: int, spare: int, q: Array) -> Iterator[Slot]:

@@ -11,7 +11,7 @@ from pathlib import Path as FilePath
 
 from olp.core.errors import UsageError
 from olp.core.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
-from olp.core.units import AXES, MM_PER_UM
+from olp.core.units import AXES, MM_PER_UM, shifted
 from olp.files.calibration.reader import load_calibration
 from olp.files.problems import Problem, config_error, validate
 from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
@@ -188,6 +188,8 @@ def _tools(tables: Tools) -> dict[int, Tool]:
             gauge_to_tip_mm=table.gauge_to_tip_mm,
             set_by=table.set_by,
             touched_at_mm=table.touched_at_mm.complete if table.touched_at_mm else None,
+            setter=table.setter,
+            constant_mm=None if table.k_um is None else shifted(table.k_um, -3),
             cutting_length_mm=table.cutting_length_mm,
             holder=tuple(
                 HolderPart(

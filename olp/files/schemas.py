@@ -114,6 +114,15 @@ class ToolTable(Table):
         validate_default=True,
         description="the axis positions in mm where the length was set, { X = .., Y = .., Z = .. }",
     )
+    setter: Text | None = Field(
+        default=None,
+        description="the name of the device on which the length was set; all lengths of one setter are too "
+        'long by one constant. With set_by = "touch" all tools that name none have one setter',
+    )
+    k_um: float | None = Field(
+        default=None,
+        description="how much too long the lengths of this setter are, in um, from a master of known length",
+    )
 
     cutting_length_mm: Positive | None = Field(
         default=None,
@@ -135,6 +144,15 @@ class ToolTable(Table):
             raise refusal(
                 f"is {total:g} mm long, and the tip is {reach:g} mm below the gauge point; expected a holder "
                 "that ends above the tip"
+            )
+        return value
+
+    @field_validator("k_um")
+    @classmethod
+    def _of_a_setter(cls, value: float | None, info: ValidationInfo) -> float | None:
+        if value is not None and info.data.get("set_by") == "true" and info.data.get("setter") is None:
+            raise refusal(
+                'is that of a setter; expected setter = "..", set_by = "touch", or this key left out'
             )
         return value
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from olp.core.errors import UsageError
 from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
-from olp.core.units import AXES
+from olp.core.units import AXES, in_unit
 from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
 from olp.files.linuxcnc import Imported, from_linuxcnc
 from olp.files.toml_text import comment, toml_key, toml_lines, toml_value
@@ -83,6 +83,8 @@ def _tool(tool: Tool) -> Iterator[str]:
     if tool.touched_at_mm is not None:
         touched = dict(zip(AXES, tool.touched_at_mm, strict=True))
         yield from toml_lines({"set_by": tool.set_by, "touched_at_mm": touched})
+    constant_um = None if tool.constant_mm is None else in_unit(tool.constant_mm, -3)
+    yield from toml_lines({"setter": tool.setter, "k_um": constant_um})
 
 
 def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = "linuxcnc") -> Machine:

@@ -20,5 +20,6 @@ def frame_index(
         if entry is not None and setup.machine.length_active:
             length = entry.length_mm
     return table.index(
-        work, line, unit_mm=unit_mm, tool=number or None, length=length, tool_vector=tool_vector
-    )
+        work, line, unit_mm=unit_mm, tool=number or None, length=length, tool_vector=tool_vector,
+        length_active=setup.machine.length_active,
+    )  # fmt: skip

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from olp.core.errors import ProgramError
+from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import Frame, Touch, carried
+from olp.core.toolpath import Frame, LengthError, Touch, carried
+from olp.core.units import UM_PER_MM
 
 Turn = tuple[Vector, Vector, Vector]
 
 UP: Vector = (0.0, 0.0, 1.0)
+DOWN: Vector = (0.0, 0.0, -1.0)
 #: A direction is an axis of the machine where its other components are below this.
 ALONG = 1e-7
 
@@ -81,6 +83,99 @@ def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
     return (axis_mm[0], axis_mm[1], axis_mm[2]), carried(tool_vector, payload)
 
 
+def touch_tool_of(work: WorkOffset) -> int | None:
+    """The tool whose length is in a work offset; None where it was located by other means or without a
+    tool."""
+    return work.touch_tool if work.set_by == "touch" else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Setting:
+    """How the length of a tool was set: where on the uncompensated machine (None: not there), by which setter
+    (None: its length is true), and the constant of the setter where it is known."""
+
+    number: int
+    touched: Touch | None
+    setter: str | None
+    constant_mm: float | None
+
+
+def length_errors_of(
+    setup: Setup, cutting: int, touching: int | None, axis: Vector = UP
+) -> tuple[LengthError, ...]:
+    """The errors of stored lengths between a cut with tool `cutting`, its length active and pointing along
+    `axis` from tip to gauge point, and a work offset that tool `touching` touched along Z. None of them where
+    one tool does both. `touching` None: the offset has no tool length in it.
+
+    Raises ConfigError where the constant of a setter does not cancel and is not stated.
+    """
+    if cutting == touching and axis == UP:
+        return ()
+    cut = _setting(setup, cutting)
+    base = None if touching is None else _setting(setup, touching)
+    cancels = base is not None and cut.setter == base.setter and axis == UP
+    parts = [(cut, axis)] + ([] if base is None else [(base, DOWN)])
+    errors = []
+    for setting, along in parts:
+        constant_mm = 0.0 if cancels or setting.setter is None else setting.constant_mm
+        if constant_mm is None:
+            raise ConfigError(_unknown_constant(setting, cut, base, axis))
+        if setting.touched is not None or constant_mm:
+            errors.append(LengthError(along, setting.touched, constant_mm))
+    return tuple(errors)
+
+
+def _setting(setup: Setup, number: int) -> _Setting:
+    tool = setup.tool(number)
+    if tool is None or (tool.set_by == "true" and tool.setter is None):
+        return _Setting(number, None, None, None)
+    setter = tool.setter or ""
+    touched = None
+    if tool.set_by == "touch" and tool.touched_at_mm is not None:
+        if tool.gauge_to_tip_mm is None and tool.length_mm[2] <= 0.0:
+            raise ConfigError(
+                f"tools.{number}.Z_mm = {tool.length_mm[2]:g} is relative to another tool and no length; "
+                f"give tools.{number}.gauge_to_tip_mm"
+            )
+        assert tool.tool_vector_mm is not None
+        touched = tool.touched_at_mm, carried(tool.tool_vector_mm, setup.job.payload_kg)
+    return _Setting(number, touched, setter, _constant_mm(setup, setter))
+
+
+def _constant_mm(setup: Setup, setter: str) -> float | None:
+    """The constant that any tool of a setter states, in mm. Raises ConfigError where two of them differ."""
+    tools = {**setup.machine.tools, **setup.job.tools}.values()
+    stated = [
+        (t.constant_mm, t.number) for t in tools if (t.setter or "") == setter and t.constant_mm is not None
+    ]
+    if not stated:
+        return None
+    (least, a), (most, b) = min(stated), max(stated)
+    if least != most:
+        raise ConfigError(
+            f"tools.{a}.k_um = {least * UM_PER_MM:g} and tools.{b}.k_um = {most * UM_PER_MM:g} are of one "
+            "setter; expected one constant, or the key setter in both"
+        )
+    return least
+
+
+def _unknown_constant(setting: _Setting, cut: _Setting, base: _Setting | None, axis: Vector) -> str:
+    """Why the constant of a setter is needed, and what to do."""
+    if base is None:
+        why = f"the work offset was not touched off with a tool, and tool {cut.number} cuts"
+        way = "name the tool that touched in touch_tool of the work offset, or give"
+    elif axis != UP:
+        why = f"tool {cut.number} is tilted, and tool {base.number} touched the work offset along Z"
+        way = "give"
+    else:
+        why = f"tool {base.number} touched the work offset, and tool {cut.number} with another setter cuts"
+        way = "set both lengths on one setter, or give"
+    return (
+        f"tools.{setting.number}: {why}, so the constant of its setter counts and is not known; {way} "
+        f"tools.{setting.number}.k_um, from a master of known length"
+    )
+
+
 class FrameTable:
     """Frames of one program: each is made once, where it is first used."""
 
@@ -110,16 +205,20 @@ class FrameTable:
         length: Vector = ZERO,
         tool_vector: Vector = ZERO,
         axis: Vector = UP,
-        tool_touched: Touch | None = None,
+        length_active: bool = False,
     ) -> int:
         """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
-        machine from tip to gauge point. Raises ProgramError for a tilted tool with X or Y in its vector."""
+        machine from tip to gauge point. Raises ProgramError for a tilted tool with X or Y in its vector, and
+        ConfigError where the constant of a setter of lengths is not known."""
         if axis != UP:
             length, tool_vector = (_tilted(v, axis, tool, line) for v in (length, tool_vector))
         x, y, z = (o + n for o, n in zip(work.offset_mm, length, strict=True))
+        lengths: tuple[LengthError, ...] = ()
+        if length_active and tool is not None:
+            lengths = length_errors_of(self.setup, tool, touch_tool_of(work), axis)
         frame = Frame(
             unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=tool_vector, tool=tool,
-            work_offset=work.name, touched=touch_of(self.setup, work, line), tool_touched=tool_touched,
+            work_offset=work.name, touched=touch_of(self.setup, work, line), lengths=lengths,
             turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg,
         )  # fmt: skip
         return self._known(frame)

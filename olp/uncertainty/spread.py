@@ -17,7 +17,7 @@ from olp.compensation.plan import zero_shifts
 from olp.core.arrays import Array, Index
 from olp.core.machine import Vector
 from olp.core.progress import Progress
-from olp.core.toolpath import Flag, Frame, Kind, Toolpath
+from olp.core.toolpath import Flag, Frame, Kind, Toolpath, Touch
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.errormodel.sensitivity import Rows, Sensitivity
@@ -73,16 +73,24 @@ class Unknowns:
     repeatability_mm: Vector
 
     def touches(self, frames: tuple[Frame, ...]) -> tuple[Rows, Array]:
-        """(frames, 3, columns): the part of the unknowns in the touch-offs of each frame; and (frames,) their
-        number."""
+        """(frames, 3, columns): the part of the unknowns in the touch-offs of each frame; and (frames, 3)
+        their number by axis. A length that was set on the machine holds those along the tool."""
         rows = np.zeros((len(frames), 3, self.sensitivity.columns), np.float32)
-        count = np.zeros(len(frames))
+        count = np.zeros((len(frames), 3))
+
+        def of(touch: Touch) -> Rows:
+            position, tool_vector = touch
+            return self.sensitivity.rows(np.array([position]), np.array(tool_vector, float))[:, 0]
+
         for k, frame in enumerate(frames):
-            for touch in (frame.touched, frame.tool_touched):
-                if touch is not None:
-                    position, tool_vector = touch
-                    rows[k] += self.sensitivity.rows(np.array([position]), np.array(tool_vector, float))[:, 0]
-                    count[k] += 1
+            if frame.touched is not None:
+                rows[k] += of(frame.touched)
+                count[k] += 1.0
+            for length in frame.lengths:
+                if length.touched is not None:
+                    along = np.array(length.along, np.float32)
+                    rows[k] += along[:, None] * of(length.touched)[2]
+                    count[k] += along**2
         return rows, count
 
 
@@ -275,8 +283,8 @@ def _covariance(rows: Rows) -> Array:
 def _scatter(unknowns: Unknowns, count: Array, path: Toolpath, points: Points) -> Array:
     """(n, 3, 3) of the machine's own scatter, at the waypoint and at each touch."""
     own = np.diag(np.array(unknowns.repeatability_mm) ** 2)
-    touches = count[path.frame[points.move]] if len(count) else np.zeros(len(points))
-    return np.asarray((1.0 + touches)[:, None, None] * own)
+    touches = count[path.frame[points.move]] if len(count) else np.zeros((len(points), 3))
+    return np.asarray((1.0 + touches)[:, None, :] * own)
 
 
 def _scatter_of_sum(unknowns: Unknowns, count: Array, path: Toolpath, points: Points, change: Array) -> float:
@@ -284,8 +292,8 @@ def _scatter_of_sum(unknowns: Unknowns, count: Array, path: Toolpath, points: Po
     square = np.array(unknowns.repeatability_mm) ** 2
     total = float((change**2 @ square).sum())
     frame = path.frame[points.move]
-    for k in np.flatnonzero(count):
-        total += float(count[k] * (change[frame == k].sum(axis=0) ** 2 @ square))
+    for k in np.flatnonzero(count.any(axis=1)):
+        total += float(change[frame == k].sum(axis=0) ** 2 @ (count[k] * square))
     return total
 
 
@@ -306,7 +314,7 @@ class _Joint:
         self.held = touch @ drawn
         if self.scatter.any() and count.any():
             noise = self.random.standard_normal(self.held.shape, dtype=np.float32)
-            noise *= (np.sqrt(count)[:, None] * self.scatter)[:, :, None]
+            noise *= (np.sqrt(count) * self.scatter)[:, :, None]
             self.held = self.held + noise
         self.touched = bool(count.any())
         self.lines: list[int] = []

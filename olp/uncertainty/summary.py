@@ -44,7 +44,7 @@ def summary(
     band = confidence.band_mm * UM_PER_MM
     variance = (confidence.sigma_mm**2).sum(axis=1)
     frames = {int(k) for k in np.unique(path.frame[points.move])}
-    touched = [k for k in frames if path.frames[k].touched or path.frames[k].tool_touched]
+    touched = [k for k in frames if path.frames[k].touched]
     return {
         "coverage_factor": COVERAGE,
         "source": uncertainty.source,

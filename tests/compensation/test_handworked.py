@@ -61,13 +61,6 @@ def test_the_length_of_the_touch_tool_counts(tmp_path: Path) -> None:
     assert words(corrected(path, b"G0 X0 Y0 Z0.\n"), "Z") == [pytest.approx(0.005, abs=1e-4)]
 
 
-def test_a_tool_length_set_on_the_raw_machine(tmp_path: Path) -> None:
-    tool = '[tools.1]\nZ_mm = 50.0\nset_by = "touch"\ntouched_at_mm = { X = 200.0, Y = 0.0, Z = 0.0 }\n'
-    path = machine(tmp_path, CURVE_X, {"x.csv": STEP}, tables=TRUE_ZERO + tool)
-    text = corrected(path, b"T1 M6\nG43 H1\nG0 X0. Y0. Z0.\n")
-    assert words(text, "X") == [pytest.approx(0.015, abs=1e-9)]
-
-
 # -- lever arms, squareness, temperature ----------------------------------------------------------------
 
 
@@ -108,6 +101,15 @@ def test_temperatures_of_scale_and_workpiece(tmp_path: Path) -> None:
     file = path.with_name("calibration.toml")
     file.write_text(file.read_text().replace("temperature_degC = 20.0", "temperature_degC = 22.0"))
     assert words(corrected(path, b"G0 X1000. Y0. Z0.\n"), "X") == [pytest.approx(999.9955, abs=1e-9)]
+
+
+def test_tools_of_two_lengths_cut_one_plane_of_a_warm_part(tmp_path: Path) -> None:
+    """A part of 23 um/(m K), 10 K warm; its plane at machine Z 200 lies 46 um higher than in the cold."""
+    frame = '[work_offsets.G54]\nZ_mm = 200.0\nset_by = "true"\n[tools]\n1.Z_mm = 120.0\n2.Z_mm = 20.0\n'
+    job = "[temperatures_degC]\nworkpiece = 30.0\n"
+    path = machine(tmp_path, "[thermal]\nworkpiece_um_m_K = 23.0\n", tables=frame, job=job)
+    body = b"T1 M6\nG43 H1\nG0 X0. Y0. Z0.\nG1 X1. F60\nT2 M6\nG43 H2\nG0 X0. Y0. Z0.\nG1 X1.\n"
+    assert words(corrected(path, body), "Z") == [0.046, 0.046]
 
 
 # -- backlash -----------------------------------------------------------------------------------------

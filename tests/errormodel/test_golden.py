@@ -133,3 +133,16 @@ def test_scales_grow_from_where_they_are_fixed_and_parts_from_where_they_are_cla
     np.testing.assert_allclose(
         error * 1e3, [[-30.0, 0.0, 0.0], [-10.0, 0.0, 6.0], [10.0 - 60.0, -6.0, 0.0]], atol=1e-9
     )
+
+
+def test_a_warm_part_grows_from_places_of_the_part_and_scales_from_axis_positions() -> None:
+    """The tip of tools of 120 and 20 mm at one place: the part of 23 um/(m K) and 10 K has one error there;
+    the scale of Z, of 8 um/(m K) and 2 K, has 16 um/m more of the longer tool."""
+    part = Thermal(workpiece_per_K=23e-6, clamped_at_mm=(0.0, 0.0, 40.0), workpiece_degC=30.0)
+    scale = Thermal(scale_per_K=(0.0, 0.0, 8e-6), scale_degC=(20.0, 20.0, 22.0))
+    place = np.array([100.0, 50.0, -60.0])
+    tools = np.array([[0.0, 0.0, -120.0], [3.0, -2.0, -20.0]])
+    grown = build(Calibration("m", BOX, thermal=part), "FXYZ").error(place - tools, tools)
+    np.testing.assert_allclose(grown * 1e3, [[-23.0, -11.5, 23.0]] * 2, atol=1e-9)
+    grown = build(Calibration("m", BOX, thermal=scale), "FXYZ").error(place - tools, tools)
+    np.testing.assert_allclose(grown[0] - grown[1], [0.0, 0.0, 1.6e-3], atol=1e-15)

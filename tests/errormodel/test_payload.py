@@ -485,3 +485,58 @@ def test_planned_feeds_are_written_into_a_program_with_payloads_by_line(tmp_path
     text = olp.retime(source, path, job).with_feeds()
     assert b"F60000" not in text
     assert z_words(olp.correct(text, path, job).data) == z_words(olp.correct(source, path, job).data)
+
+
+# -- a value of a table is what was read at its own node ----------------------------------------------
+
+
+@pytest.mark.parametrize("chain", sorted(CHAINS))
+@pytest.mark.parametrize("arguments", [("Y", "Z"), ("X", "Y", "Z"), ("X", "Z"), ("X",)])
+def test_at_its_own_nodes_a_table_gives_what_was_read(chain: str, arguments: tuple[str, ...]) -> None:
+    rng = np.random.default_rng(4)
+    datum, line, tool = (17.0, -40.0, 30.0), (300.0, 100.0, -50.0), (5.0, 2.0, -120.0)
+    knots = tuple(np.linspace(*BOX["XYZ".index(a)], 3) for a in arguments)
+    columns = {f"E{d}Y": rng.normal(size=(3,) * len(arguments)) * 1e-3 for d in "XYZ"}
+    columns |= {f"E{d}Y": rng.normal(size=(3,) * len(arguments)) * 1e-5 for d in "ABC"}
+    table = ComponentTable("Y", arguments, knots, columns, line, tool, interpolation="linear")
+    model = build(Calibration("m", BOX, datum_mm=datum, compliance=(table,)), chain)
+    nodes = np.tile(line, (3 ** len(arguments), 1))
+    for k, levels in zip(arguments, np.meshgrid(*knots, indexing="ij"), strict=True):
+        nodes[:, "XYZ".index(k)] = levels.ravel()
+    read = np.stack([columns[f"E{d}Y"].ravel() for d in "XYZ"], axis=1)
+    np.testing.assert_allclose(model.error(nodes, np.array([*tool, 1.0])), read, atol=1e-15)
+
+
+def test_the_load_of_a_node_counts_from_no_axis_of_the_table(tmp_path: Path) -> None:
+    """By hand: 10 urad/kg about X and a tip 60 mm below the gauge point; 1 um/kg was read at every node."""
+    rows = "Y_mm,Z_mm,EYY_um_kg,EAY_urad_kg\n" + "".join(
+        f"{y},{z},1,10\n" for y in (-1000, 2000) for z in (-1000, 2000)
+    )
+    load = '[[compliance]]\nfile = "load2.csv"\ntool_mm = [0.0, 0.0, -60.0]\nline_mm = { X = 100.0 }\n'
+    path = machine(
+        tmp_path, f'{load}interpolation = "linear"\n', {"load2.csv": rows},
+        tables=TRUE_ZERO, job="payload_kg = 1.0",
+    )  # fmt: skip
+    job = path.with_name("job.toml")
+    for z in (-300.0, 0.0, 200.0):
+        shown = olp.error_at(path, (100.0, 200.0, z), (0.0, 0.0, -60.0), job)
+        np.testing.assert_allclose(shown["error_um"], [0.0, 1.0, 0.0], atol=1e-9)
+        # a tip 40 mm lower: 10 urad times -40 mm, against the axis
+        shown = olp.error_at(path, (100.0, 200.0, z), (0.0, 0.0, -100.0), job)
+        np.testing.assert_allclose(shown["error_um"], [0.0, 1.4, 0.0], atol=1e-9)
+
+
+def test_an_axis_that_is_no_argument_stood_on_the_line_and_stays_in_the_file(tmp_path: Path) -> None:
+    """The table carries the workpiece in X and is tabled by Z alone: an arm along X counts from line_mm."""
+    table = ComponentTable(
+        "X", ("Z",), (BOX[2],), {"EZX": [0.0, 0.0], "EBX": [1e-5, 1e-5]}, (300.0, 20.0, 0.0), (0.0, 0.0, 0.0)
+    )
+    calibration = Calibration(
+        "m", BOX, compliance=(table,), measured=datetime.date(2026, 5, 14), temperature_degC=20.0
+    )
+    error = build(calibration, "XFYZ").error(np.array([[340.0, 0.0, -100.0]]), np.array([0.0, 0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(error, [[0.0, 0.0, -1e-5 * 40.0]], atol=1e-15)
+    files = calibration_files(calibration, tmp_path / "calibration.toml")
+    write_files(files)
+    (again,) = load_calibration(tmp_path / "calibration.toml").compliance
+    assert again.line_mm == (300.0, 20.0, 0.0)

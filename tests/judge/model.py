@@ -232,11 +232,37 @@ class JudgeModel:
                 float(entry["period_mm"]),
                 1e-3 * entry["amplitude_um"] if "amplitude_um" in entry else 1e-6 * entry["amplitude_urad"],
                 float(entry.get("phase_rad", 0.0)),
+                self._cyclic_line(entry),
             )
             for entry in cal.get("cyclic", [])
         ]
         if self.silent & {entry[0] for entry in self.cyclic}:
             raise NotImplementedError("a cyclic term of a component that the control corrects")
+
+    def _cyclic_line(self, entry: dict[str, Any]) -> _CurveFile:
+        """Where a cyclic angle was measured: as it says; what it leaves out is as of the curve file of its
+        axis, or at the datum without a tool where there is no file."""
+        _only(
+            entry,
+            {"component", "period_mm", "amplitude_um", "amplitude_urad", "phase_rad"}
+            | {"line_mm", "tool_mm", "reference"},
+            "cyclic",
+        )
+        axis = AXES.index(entry["component"][2])
+        files = [curve for curve in self.curves if curve.axis == axis]
+        angular = entry["component"][1] in "ABC"
+        if angular and len(files) > 1:
+            raise NotImplementedError("a cyclic angle of an axis with several curve files")
+        line = files[0].line_mm if files else np.zeros(3)
+        tool = files[0].tool_mm if files else np.zeros(3)
+        on_table = files[0].on_table if files else False
+        if "line_mm" in entry:
+            line = np.array([entry["line_mm"].get(a, self.datum[i]) for i, a in enumerate(AXES)]) - self.datum
+        if "tool_mm" in entry:
+            tool = np.array(entry["tool_mm"], float)
+        if "reference" in entry:
+            on_table = entry["reference"] == "table"
+        return _CurveFile(axis, {}, False, line, tool, on_table)
 
     # -- the error ---------------------------------------------------------------------------------
 
@@ -308,15 +334,37 @@ class JudgeModel:
                 target, column = (shift, "XYZ") if name[1] in "XYZ" else (own, "ABC")
                 target[:, column.index(name[1])] += value
             angle += own
-            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), self._line_arm(load, q))
-        for name, period, amplitude, phase in self.cyclic:
-            if name[2] == AXES[axis]:
-                value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
-                (shift if name[1] in "XYZ" else angle)[:, "XYZABC".index(name[1]) % 3] += value
+            arm = self._node_arm(load, points)
+            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), arm)
+        for name, period, amplitude, phase, measured in self.cyclic:
+            if name[2] != AXES[axis]:
+                continue
+            value = amplitude * np.sin(2.0 * np.pi * q / period + phase)
+            if name[1] in "XYZ":
+                shift[:, "XYZ".index(name[1])] += value
+                continue
+            own = np.zeros((len(q), 3))
+            own[:, "ABC".index(name[1])] = value
+            angle += own
+            line = self._line_arm(measured, q)
+            if self.first_order:
+                tool_vector -= np.cross(own, line)
+            else:
+                tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), line)
         shift[:, axis] -= 0.5 * self.backlash_mm[axis] * play
         return shift, angle, tool_vector
 
-    def _line_arm(self, curve: _CurveFile | _LoadFile, q: np.ndarray) -> np.ndarray:
+    def _node_arm(self, load: _LoadFile, points: np.ndarray) -> np.ndarray:
+        """(n, 3) lever arm at which the load was read: each point counts as a node of the table, so there the
+        axes of the table stand as at the point, and the others on the line."""
+        position = np.tile(load.line_mm, (len(points), 1))
+        for argument in load.arguments:
+            position[:, argument] = points[:, argument] - self.datum[argument]
+        if load.on_table:
+            position[:, load.axis] = 0.0
+        return np.asarray(position * self._reach(load.axis) + load.tool_mm)
+
+    def _line_arm(self, curve: _CurveFile, q: np.ndarray) -> np.ndarray:
         """(n, 3) lever arm of the measured line: tool vector + axes toward the tool (+ own axis)."""
         position = np.tile(curve.line_mm, (len(q), 1))
         position[:, curve.axis] = 0.0 if curve.on_table else q - self.datum[curve.axis]
@@ -443,10 +491,41 @@ class JudgeModel:
         position = _position(entry.get("touched_at_mm", {}), default)
         return np.asarray(self.error_mm(position[None], self.tool_vector_mm(tool))[0])
 
-    def tool_shift(self, tool: int | None) -> np.ndarray:
-        """(3,) the same for an active tool length that was set on the uncompensated machine."""
+    def length_error_mm(self, tool: int | None) -> tuple[float, str | None, float | None]:
+        """How much longer a tool is than its stored length, but for the constant of its setter; the setter,
+        None where the length is true; and its constant, None where it is not known.
+
+        Stored = true - error along the tool where it was set + constant, along Z.
+        """
         entry = self.machine.get("tools", {}).get(str(tool), {})
-        if entry.get("set_by", "true") == "true":
-            return np.zeros(3)
-        position = _position(entry["touched_at_mm"], np.zeros(3))
-        return np.asarray(self.error_mm(position[None], self.tool_vector_mm(tool))[0])
+        touched = entry.get("set_by", "true") == "touch"
+        if not touched and "setter" not in entry:
+            return 0.0, None, 0.0
+        setter = entry.get("setter", "")
+        known = [
+            1e-3 * other["k_um"]
+            for other in self.machine["tools"].values()
+            if "k_um" in other and other.get("setter", "") == setter
+        ]
+        longer = 0.0
+        if touched:
+            position = _position(entry["touched_at_mm"], np.zeros(3))
+            longer = float(self.error_mm(position[None], self.tool_vector_mm(tool))[0, 2])
+        return longer, setter, known[0] if known else None
+
+    def tool_shift(self, tool: int | None, work_offset: str) -> np.ndarray:
+        """(3,) target - nominal where the length of `tool` is active: its tip hangs lower by what it is
+        longer, and the tip that touched the work offset did so by what its own tool was longer."""
+        offset = self.machine.get("work_offsets", {}).get(work_offset, {})
+        by_touch = offset.get("set_by", "touch") == "touch" and "touch_tool" in offset
+        own, setter, constant = self.length_error_mm(tool)
+        other, other_setter, other_constant = 0.0, None, 0.0
+        if by_touch:
+            if offset["touch_tool"] == tool:
+                return np.zeros(3)
+            other, other_setter, other_constant = self.length_error_mm(offset["touch_tool"])
+        if by_touch and setter == other_setter:
+            return np.array([0.0, 0.0, own - other])
+        if constant is None or other_constant is None:
+            raise ValueError(f"tool {tool}: the constant of a setter does not cancel and is not stated")
+        return np.array([0.0, 0.0, own - constant - other + other_constant])

@@ -181,8 +181,9 @@ def shifts(moves: CanonMoves, model: JudgeModel, by_frame: Mapping[str, Any] | N
         shifts[moves.frame == frame] = shift
     for tool in np.unique(moves.tool):
         active = (moves.tool == tool) & (moves.length != 0).any(axis=1)
-        if active.any() and tool > 0:
-            shifts[active] += model.tool_shift(int(tool))
+        for frame in np.unique(moves.frame[active]):
+            if tool > 0:
+                shifts[active & (moves.frame == frame)] += model.tool_shift(int(tool), FRAMES[frame])
     return shifts
 
 

@@ -105,6 +105,27 @@ def test_the_corrected_path_is_the_nominal_one(tmp_path: Path, seed: int) -> Non
     check(seed, tmp_path)
 
 
+@pytest.mark.parametrize("seed", range(1100, 1106))
+def test_lengths_that_were_set_on_the_uncompensated_machine(tmp_path: Path, seed: int) -> None:
+    """Every tool set on one setter, each elsewhere; one tool touched the work offsets and others cut too."""
+    recipe, _ = draw(seed)
+    rng = np.random.default_rng(seed)
+    low, high = np.array(recipe.travel).T
+    tools = {}
+    for number, entry in recipe.tools.items():
+        place = low + rng.uniform(0.2, 0.8, 3) * (high - low)
+        at = dict(zip("XYZ", np.round(place, 3).tolist(), strict=True))
+        tools[number] = {**entry, "set_by": "touch", "touched_at_mm": at}
+    frames = {n: {**f, "set_by": "touch", "touch_tool": 2} for n, f in recipe.work_offsets.items()}
+    recipe = replace(recipe, tools=tools, work_offsets=frames, backlash_um={}, directed="")
+    path = machines.random_machine(tmp_path, seed, recipe)
+    nominal = programs.random_program(seed, features=["lines", "tools", "frames"], blocks=12)
+    result = olp.correct(nominal, path)
+    verdict = judged(nominal, result.data, tmp_path)
+    assert verdict.after.judged > 0
+    assert verdict.max_um <= allowed_um(nominal) + SLACK_UM
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(20))
 def test_the_corrected_path_is_the_nominal_one_at_length(tmp_path: Path, block: int) -> None:

@@ -247,8 +247,9 @@ def line_at(stated: Position, datum_mm: Vector) -> Vector:
     return vector([datum if position is None else position for position, datum in positions])
 
 
-def line_key(line_mm: Vector | None, axis: str) -> dict[str, float] | None:
-    """The key line_mm of a table: the positions of the axes other than its own."""
+def line_key(line_mm: Vector | None, axis: str = "") -> dict[str, float] | None:
+    """The key line_mm of a table: the positions of the axes other than `axis`, by whose position it is
+    tabled."""
     if line_mm is None:
         return None
     return {a: float(v) for a, v in zip(AXES, line_mm, strict=True) if a != axis}

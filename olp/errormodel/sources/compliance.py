@@ -32,11 +32,12 @@ from olp.errormodel.sources.base import (
 
 
 class OnLine(Table):
-    """The positions of the other axes, and the tool vector."""
+    """The positions of the axes that are no argument, and the tool vector."""
 
     line_mm: Position = Field(
         default_factory=Position,
-        description="positions of the other axes, such as { Y = 0.0, Z = 0.0 } in mm; the datum if left out",
+        description="positions of the axes that are no argument of the table, such as { Y = 0.0, Z = 0.0 } "
+        "in mm; the datum if left out",
     )
     tool_mm: Triple = Field(default=(0.0, 0.0, 0.0), description="the tool vector then, [X, Y, Z] in mm")
 
@@ -98,7 +99,7 @@ class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]])
                 "[[compliance]]",
                 {
                     "file": writing.csv("load", _csv(table)),
-                    "line_mm": line_key(table.line_mm, table.axis),
+                    "line_mm": line_key(table.line_mm, table.axis if table.axis in table.arguments else ""),
                     "tool_mm": floats(table.tool_mm),
                     "reference": None if table.reference == "functional-point" else table.reference,
                     "interpolation": table.interpolation,

@@ -106,6 +106,10 @@ class Curve:
     def names(self) -> tuple[str, ...]:
         return tuple(self.columns) or tuple(self.forward)
 
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        return (self.axis,)
+
     def mean(self, name: str) -> Array:
         """(n,) mean of both directions."""
         return self.columns[name] if self.columns else 0.5 * (self.forward[name] + self.backward[name])

@@ -1,7 +1,8 @@
 """Errors that repeat with the pitch of a screw or the period of a scale.
 
-They act on components, so an angular one has its lever arms too (`olp.errormodel.components`). They are
-evaluated directly: no table of affordable size resolves a period of some hundredths of a millimetre.
+They act on components, so an angular one has lever arms too (`olp.errormodel.bodies`): those of the curves of
+its axis, unless it states where and with what tool it was measured. They are evaluated directly: no table of
+affordable size resolves a period of some hundredths of a millimetre.
 """
 
 from __future__ import annotations
@@ -17,21 +18,39 @@ from pydantic import Field, ValidationInfo, field_validator
 from olp.core.arrays import Array
 from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, Vector
-from olp.core.schema import Positive, Table, refusal
-from olp.core.units import RAD_PER_URAD, UM_PER_MM, in_unit, shifted
+from olp.core.schema import Position, Positive, Table, Triple, refusal
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, component_acts
 from olp.errormodel.gridded import refuse
-from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, digits
+from olp.errormodel.sources.base import (
+    ErrorSource,
+    Example,
+    Frame,
+    Reading,
+    Schema,
+    Writing,
+    digits,
+    floats,
+    line_at,
+    line_key,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Cyclic:
-    """amplitude * sin(2 pi q / period + phase) on a component, q the position of its axis; mm or rad."""
+    """amplitude * sin(2 pi q / period + phase) on a component, q the position of its axis; mm or rad.
+
+    An angular one may have been measured on another line than the curves of its axis, with another tool or
+    another reference (see `Curve`); None stands for those of the curves. Raises ConfigError.
+    """
 
     component: str
     period_mm: float
     amplitude: float
     phase_rad: float = 0.0
+    line_mm: Vector | None = None
+    tool_mm: Vector | None = None
+    reference: Literal["functional-point", "table"] | None = None
 
     def __post_init__(self) -> None:
         problems = []
@@ -41,7 +60,16 @@ class Cyclic:
             problems.append(f"cyclic {self.component}: period {self.period_mm} mm; expected more than 0")
         if not (np.isfinite(self.amplitude) and np.isfinite(self.phase_rad)):
             problems.append(f"cyclic {self.component}: amplitude and phase must be finite")
+        if self.component[1:2] in AXES and self.measured():
+            problems.append(
+                f"cyclic {self.component} has no lever arm; expected no {', '.join(self.measured())}"
+            )
         refuse(problems)
+
+    def measured(self) -> dict[str, Any]:
+        """What it states of its measurement, by the names that a `Curve` has for it."""
+        stated = {"line_mm": self.line_mm, "tool_mm": self.tool_mm, "reference": self.reference}
+        return {name: value for name, value in stated.items() if value is not None}
 
 
 def cyclic_value(term: Cyclic, q: Array) -> Array:
@@ -65,6 +93,31 @@ class CyclicTable(Table):
         default=None, validate_default=True, description="the amplitude (peak) of an angular error, in urad"
     )
     phase_rad: float = Field(default=0.0, description="the phase at axis position 0, in rad")
+    line_mm: Position | None = Field(
+        default=None,
+        description="where the other axes stood while an angular error was measured, such as "
+        "{ Y = 0.0, Z = 0.0 } in mm; as of the axis's curve if left out, else the datum",
+    )
+    tool_mm: Triple | None = Field(
+        default=None,
+        description="the tool vector then, [X, Y, Z] in mm; as of the axis's curve if left out, else zero",
+    )
+    reference: Literal["functional-point", "table"] | None = Field(
+        default=None,
+        description='"functional-point" or "table"; as of the axis\'s curve if left out, else '
+        '"functional-point"',
+    )
+
+    @field_validator("line_mm", "tool_mm", "reference")
+    @classmethod
+    def _only_of_angles(cls, value: object, info: ValidationInfo) -> object:
+        component = info.data.get("component")
+        if value is not None and component is not None and component[1] not in "ABC":
+            raise refusal(
+                f"does not fit component {component}, which has no lever arm; expected this key left out, or "
+                "an angular component such as EAX"
+            )
+        return value
 
     @field_validator("amplitude_urad")
     @classmethod
@@ -113,7 +166,8 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
     def example(self, by: float) -> Example:
         screw = f'[[cyclic]]\ncomponent = "EXX"\nperiod_mm = 10.0\namplitude_um = {2.0 * by}\n'
         roll = f'[[cyclic]]\ncomponent = "EAZ"\nperiod_mm = 40.0\namplitude_urad = {15.0 * by}\n'
-        return Example(f"{screw}{roll}phase_rad = 0.7\n")
+        measured = 'line_mm = { X = 50.0, Y = 20.0 }\ntool_mm = [0.0, 10.0, -60.0]\nreference = "table"\n'
+        return Example(f"{screw}{roll}phase_rad = 0.7\n{measured}")
 
     def read(self, stated: list[CyclicTable], reading: Reading) -> tuple[Cyclic, ...]:
         return tuple(
@@ -124,6 +178,9 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
                 if table.amplitude_um is None
                 else shifted(table.amplitude_um, -3),
                 table.phase_rad,
+                None if table.line_mm is None else line_at(table.line_mm, reading.datum_mm),
+                table.tool_mm,
+                table.reference,
             )
             for table in stated
         )
@@ -139,12 +196,18 @@ class CyclicErrors(ErrorSource[list[CyclicTable], tuple[Cyclic, ...]]):
                     "amplitude_um": None if angular else in_unit(term.amplitude, -3),
                     "amplitude_urad": in_unit(term.amplitude, -6) if angular else None,
                     "phase_rad": term.phase_rad,
+                    "line_mm": line_key(term.line_mm, term.component[2]),
+                    "tool_mm": None if term.tool_mm is None else floats(term.tool_mm),
+                    "reference": term.reference,
                 },
             )
 
     def fingerprint(self, values: tuple[Cyclic, ...], datum_mm: Vector) -> Iterator[str]:
         for term in values:
             yield f"{term.component} {digits([term.period_mm, term.amplitude, term.phase_rad])}"
+            # a term that states nothing keeps the fingerprint that it had before these keys
+            for name, value in term.measured().items():
+                yield f"{name} {value if name == 'reference' else digits(value)}"
 
     def inspect(self, values: tuple[Cyclic, ...], frame: Frame) -> dict[str, Any]:
         return {

@@ -1,6 +1,8 @@
 """Expansion of scales and workpiece against the calibration's state: one affine error per axis.
 
-E_jj += a_s (T_s - T_cal)(q - q_fix) - a_w (T_w - 20)(p - p_clamp); the axis position serves as q and p.
+E_jj += a_s (T_s - T_cal)(q - q_fix) - a_w (T_w - 20)(p - p_clamp). A scale grows with its axis position q.
+The workpiece grows with the place p of the part that the tip is at: axis position + tool vector, so that
+tools of all lengths find one place of the part where it is.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from olp.core.machine import ZERO, Vector
 from olp.core.schema import Table, Text, Triple
 from olp.core.units import AXES, in_unit, shifted
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.boxed import Boxed, as_points
+from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, floats, vector
 
 #: degC; geometrical product specifications hold at this temperature (ISO 1).
@@ -28,7 +30,8 @@ REFERENCE_DEGC = 20.0
 class Thermal:
     """Expansion of the scales (X, Y, Z) and of the workpiece, against the calibration's state.
 
-    E_jj += scale * (T_scale - T_cal) * (q - fixed) - workpiece * (T_workpiece - 20) * (q - clamped)
+    E_jj += scale * (T_scale - T_cal) * (q - fixed) - workpiece * (T_workpiece - 20) * (p - clamped), q the
+    axis position and p the position of the tip.
     """
 
     scale_per_K: Vector = ZERO
@@ -48,7 +51,8 @@ class Thermal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ThermalExpansion(Boxed):
-    """Error along each axis: slope * (q - zero), for the scales and for the workpiece; all (3,)."""
+    """Error along each axis: slope * (position - zero), of the axis for the scales and of the tip for the
+    workpiece; all (3,)."""
 
     scale_slope: Array
     scale_zero_mm: Array
@@ -64,7 +68,7 @@ class ThermalExpansion(Boxed):
         )
 
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-        return sum((value for _, value in self._parts(axis_mm)), np.zeros(np.shape(axis_mm)))
+        return sum((value for _, value in self._parts(axis_mm, tool_mm)), np.zeros(np.shape(axis_mm)))
 
     def rotation(self, axis_mm: Array, play: Array | None = None, payload_kg: Array | float = 0.0) -> Array:
         return np.zeros(as_points(axis_mm).shape)
@@ -72,20 +76,21 @@ class ThermalExpansion(Boxed):
     def contributions(
         self, axis_mm: Array, tool_mm: Array, play: Array | None = None
     ) -> Iterator[tuple[str, Array]]:
-        for name, value in self._parts(axis_mm):
+        for name, value in self._parts(axis_mm, tool_mm):
             for j in np.flatnonzero(np.any(value != 0.0, axis=0)):
                 one = np.zeros_like(value)
                 one[:, j] = value[:, j]
                 yield f"{name} {AXES[j]}", one
 
-    def _parts(self, axis_mm: Array) -> Iterator[tuple[str, Array]]:
+    def _parts(self, axis_mm: Array, tool_mm: Array) -> Iterator[tuple[str, Array]]:
         q = self.clamped(as_points(axis_mm))
-        for name, slope, zero in (
-            ("scale expansion", self.scale_slope, self.scale_zero_mm),
-            ("workpiece expansion", self.workpiece_slope, self.workpiece_zero_mm),
+        tip = q + as_tool(tool_mm, len(q))
+        for name, position, slope, zero in (
+            ("scale expansion", q, self.scale_slope, self.scale_zero_mm),
+            ("workpiece expansion", tip, self.workpiece_slope, self.workpiece_zero_mm),
         ):
             # An axis without expansion must not turn an unknown position into an unknown error.
-            yield name, np.where(slope != 0.0, slope * (q - zero), 0.0)
+            yield name, np.where(slope != 0.0, slope * (position - zero), 0.0)
 
     @property
     def depends_on(self) -> Mask:
@@ -113,7 +118,8 @@ class ThermalTable(Table):
     )
     clamped_at_mm: Triple = Field(
         default=(0.0, 0.0, 0.0),
-        description="the axis positions where the workpiece is clamped, [X, Y, Z] in mm",
+        description="the place where the workpiece is clamped: axis positions without tool length, [X, Y, Z] "
+        "in mm",
     )
 
 

@@ -123,20 +123,17 @@ class Events:
             name, line, "the program" if count == 1 else f"coordinate system {count} of the program"
         )
         length = tool_vector = ZERO
-        touched = None
         if self.tool:
             tool_vector = tool_vector_of(self.setup, self.tool, line)
             if self.length_active:
                 tool = self.setup.tool(self.tool)
                 assert tool is not None
                 length = tool.length_mm
-                if tool.set_by == "touch" and tool.touched_at_mm is not None:
-                    touched = (tool.touched_at_mm, tool_vector)
         # an axis that was never stated is the Z axis of the machine
         self.up = UP if self.axis == UP else turned(turn_of(work.rotation_deg), self.axis)
         return self.table.index(
             work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=tool_vector,
-            axis=self.up, tool_touched=touched,
+            axis=self.up, length_active=self.length_active and bool(self.tool),
         )  # fmt: skip
 
     def _feed(self, statement: Statement, row: int) -> None:

@@ -78,8 +78,9 @@ class Events:
         # stylus
         x, y, z = (0.0 - v for v in tool_vector)
         return self.table.index(
-            work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), tool_vector=tool_vector
-        )
+            work, line, unit_mm=self.unit_mm, tool=tool, length=(x, y, z), tool_vector=tool_vector,
+            length_active=tool is not None,
+        )  # fmt: skip
 
     def _stylus(self, name: str, line: int) -> Vector:
         stated = self.setup.stylus(name)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import Frame, Touch, carried
-from olp.program.frames import tool_vector_of, touch_of
+from olp.core.toolpath import Frame, LengthError, Touch
+from olp.program.frames import length_errors_of, tool_vector_of, touch_of, touch_tool_of
 from olp.program.rs274.codes import (
     DWELL,
     FURTHER_OFFSETS,
@@ -72,6 +72,7 @@ class AxisState(State):
     setup: Setup
     offsets: Offsets
     inherited: dict[str, Touch | None] = field(default_factory=dict)
+    located: dict[str, str] = field(default_factory=dict)
     length_tool: int | None = None
     selected: int | None = None
     spindle: int | None = None
@@ -123,7 +124,7 @@ class AxisState(State):
             tool=self.spindle,
             work_offset=name,
             touched=self._touch(name, base, line),
-            tool_touched=self._tool_touched(line),
+            lengths=self._lengths(name),
             payload_kg=self.payload_kg,
         )
         known = self._index.get(frame)
@@ -149,14 +150,13 @@ class AxisState(State):
         work = self._work_offset(name) or WorkOffset(name, (base[0], base[1], base[2]))
         return touch_of(self.setup, work, line)
 
-    def _tool_touched(self, line: int) -> Touch | None:
+    def _lengths(self, name: str) -> tuple[LengthError, ...]:
+        """The errors of the active length, and of the length of the tool that touched the offset."""
         if self.length_tool is None:
-            return None
-        tool = self.setup.tool(self.length_tool)
-        if tool is None or tool.set_by != "touch" or tool.touched_at_mm is None:
-            return None
-        tool_vector = tool.tool_vector_mm or self._tool_vector(line)
-        return tool.touched_at_mm, carried(tool_vector, self.setup.job.payload_kg)
+            return ()
+        name = self.located.get(name, name)
+        work = self._work_offset(name)
+        return length_errors_of(self.setup, self.length_tool, None if work is None else touch_tool_of(work))
 
     def _tool(self, number: int, line: int, what: str) -> Vector:
         if number == 0:
@@ -346,6 +346,7 @@ class AxisState(State):
                 self._capture(i, word, line, moves)
                 active = self.offsets.name
                 self.inherited[name] = self._touch(active, self._work_mm(active), line)
+                self.located[name] = self.located.get(active, active)
                 base[i] = self.offsets.work_at(i, self.position[i], value)
         self.offsets.written[name] = base
 
