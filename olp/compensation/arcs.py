@@ -18,7 +18,7 @@ from olp.compensation.lines import Cuts, no_cuts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.geometry import PLANES, arc_directions, arc_points, arms
-from olp.core.toolpath import Arcs, Flag, Toolpath
+from olp.core.toolpath import Arcs, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import steps_needed
 
@@ -59,20 +59,18 @@ def subdivide_arcs(
     path: Toolpath,
     model: ErrorModel,
     target: Array,
-    raw: Mask,
+    free: Mask,
     tolerance: float,
     turning: Mask | None,
     band: float,
 ) -> Cuts:
-    """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis
-    has backlash (`turning`), also where that axis turns round."""
+    """Cuts (move, share, target) of the arcs that are `free` to be split and that one arc does not fit within
+    `tolerance` mm; where an axis has backlash (`turning`), also where that axis turns round."""
     arcs = path.arcs
-    if not len(arcs):
+    arc = np.flatnonzero(free[arcs.move])
+    if not arc.size:
         return no_cuts()
-    untouched = np.uint8(Flag.PASS | Flag.WHOLE)
-    free = np.flatnonzero((path.flag[arcs.move] & untouched) == 0)
-    free = free[~raw[arcs.move[free]].any(axis=1)]
-    pieces = Pieces(free, np.zeros(len(free)), np.ones(len(free)))
+    pieces = Pieces(arc, np.zeros(len(arc)), np.ones(len(arc)))
     if turning is not None:
         pieces = _at_quadrants(path, pieces, turning, band)
     tools = path.tool_mm()

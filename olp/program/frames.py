@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import Frame, Touch, carried
+from olp.core.toolpath import CutterCompensation, Frame, Touch, carried
 
 Turn = tuple[Vector, Vector, Vector]
 
@@ -111,6 +111,7 @@ class FrameTable:
         tool_vector: Vector = ZERO,
         axis: Vector = UP,
         tool_touched: Touch | None = None,
+        compensation: CutterCompensation | None = None,
     ) -> int:
         """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
         machine from tip to gauge point. Raises ProgramError for a tilted tool with X or Y in its vector."""
@@ -120,7 +121,7 @@ class FrameTable:
         frame = Frame(
             unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=tool_vector, tool=tool,
             work_offset=work.name, touched=touch_of(self.setup, work, line), tool_touched=tool_touched,
-            turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg,
+            turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg, compensation=compensation,
         )  # fmt: skip
         return self._known(frame)
 

@@ -11,6 +11,11 @@ SPLINES = frozenset({50, 51, 52, 53})
 #: Motion that ends where its axis words say.
 LINEAR = frozenset({0, 10, 20, 30, 330})
 CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
+#: Cutter compensation to the left; the others are to the right.
+COMPENSATION_LEFT = frozenset({410, 411})
+#: Their D is the diameter of the cutter, not the number of a tool.
+COMPENSATION_BY_DIAMETER = frozenset({411, 421})
+COMPENSATION_OFF = 400
 
 INCH = 200
 METRIC = 210
@@ -32,6 +37,8 @@ GROUPS: dict[str, tuple[int, ...]] = {
     "retract": (RETRACT_TO_INITIAL, RETRACT_TO_R),
     "feed_mode": (940, 950, INVERSE_TIME),
 }
+#: Plane code to index into `geometry.PLANES`.
+PLANE_OF = {170: 0, 180: 1, 190: 2}
 UNITS = (INCH, METRIC)
 PATH_MODES = frozenset({610, 611, 640})
 
