@@ -1,14 +1,15 @@
 """Contours under cutter compensation (G41, G42): what a correction leaves whole, and which axes it holds.
 
-The control offsets the contour by the cutter radius, and looks at every block of it for corners. A step that
-takes up backlash is such a block, shorter than the cutter: the control refuses it. Before the first move along
-a contour and after the last one the tool stands beside it. A word that is inserted there for an axis that the
-program does not move would drive the cutter into the contour.
+The control offsets the contour by the cutter radius, and looks at the corners between its blocks. A step that
+takes up backlash is a block with corners, and shorter than the cutter: the control refuses it. Before the
+first move along a contour and after the last one the tool stands beside it. A word that is inserted there for
+an axis that the program does not move would drive the cutter into the contour.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Contour:
         moved = path.end_mm != path.starts_mm()
         whole, held = np.zeros(len(path), bool), np.zeros((len(path), 3), bool)
         edges = np.flatnonzero(on != np.concatenate(([False], on[:-1])))
-        for a, b in zip(edges.tolist(), [*edges[1:].tolist(), len(path)], strict=True):
+        for a, b in pairwise([*edges.tolist(), len(path)]):
             of = path.frames[int(path.frame[a if on[a] else a - 1])].compensation
             assert of is not None
             plane = PLANES[of.plane][:2]

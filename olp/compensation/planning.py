@@ -10,6 +10,7 @@ import numpy as np
 
 from olp.compensation.arcs import subdivide_arcs
 from olp.compensation.contour import Contour
+from olp.compensation.corners import away_from_corners
 from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
@@ -54,9 +55,10 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
     turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
     cuts_arc = subdivide_arcs(path, model, target, ~whole, chord_arc, turning, band)
-    rows = _expand(
-        path, target, command, raw, uncorrected, shift, [cuts_line, cuts_arc], model, reversal is not None
-    )
+    cuts = [cuts_line, cuts_arc]
+    if contour is not None:
+        cuts = [_pick(c, away_from_corners(path, c[0], c[1])) for c in cuts]
+    rows = _expand(path, target, command, raw, uncorrected, shift, cuts, model, reversal is not None)
     if contour is not None:
         rows = contour.hold(rows)
     if reversal is not None:
@@ -112,6 +114,11 @@ def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> Index:
                 held.append(j)
                 j += 1
     return np.array(sorted(set(held)), np.int64)
+
+
+def _pick(cuts: Cuts, which: Mask) -> Cuts:
+    move, share, target = cuts
+    return move[which], share[which], target[which]
 
 
 def _waypoints(path: Toolpath, model: ErrorModel, target: Array, raw: Mask) -> Array:

@@ -51,7 +51,13 @@ class Reversal:
 
 
 def carry_play(
-    path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, contour: Contour | None, *, insert: bool
+    path: Toolpath,
+    model: ErrorModel,
+    rows: Plan,
+    reversal: Reversal,
+    contour: Contour | None,
+    *,
+    insert: bool,
 ) -> Plan:
     """The plan with play: commands lead by half the backlash. Where an axis turns round in a feed move, a row
     that only takes it up comes first; without `insert` not before moves that are never split, and never along

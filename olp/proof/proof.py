@@ -14,6 +14,7 @@ from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
+from olp.proof.contour import check_contours
 from olp.proof.deviation import Deviation, cutting_moves, measure
 from olp.proof.matching import match
 
@@ -81,7 +82,7 @@ def prove(
 ) -> Proof:
     """Compare the corrected path with the nominal one. `uncorrected` are nominal moves that are left
     uncorrected. `parts` (n,) says how many corrected moves each nominal one became; without it the paths are
-    matched."""
+    matched. Raises ProgramError where the control would refuse the corrected program."""
     path, written = nominal.toolpath, corrected.toolpath
     target = targets(path, zero_shifts(path.frames, model))
     exempt = np.zeros(len(path), bool)
@@ -96,6 +97,7 @@ def prove(
             f"the corrected program has {len(written)} moves; expected {int(groups[-1]) + 1}; it was not "
             "written"
         )
+    check_contours(path, written, groups)
     after = measure(path, target, written, groups, model, tolerance_mm * _BEND_SHARE, exempt)
     before = measure(path, target, path, np.arange(len(path)), model, 1e-3, exempt)
     return Proof(path, written, groups, before, after, tolerance_mm, digit_mm, cutting_moves(path), loose)
