@@ -23,12 +23,16 @@ _SMOOTH = 0.05
 _AWAY = 2.0
 
 
-def gouging(path: Toolpath) -> Mask:
-    """(n,) moves under cutter compensation that the control refuses. Contours of unknown radius have none."""
+def gouging(path: Toolpath, *, seen: bool = False) -> Mask:
+    """(n,) moves under cutter compensation that cannot be cut; with `seen` only those where the path changes
+    direction behind the move, which the control looks at in any case. Contours of unknown radius have none.
+    """
     bad = np.zeros(len(path), bool)
     for elements in _contours(path):
         begin, end = elements.cut_off()
         wrong = begin + end > elements.length_mm
+        if seen:
+            wrong &= np.append(np.abs(elements.turn_rad()) > _SMOOTH, False)
         wrong[0] = elements.chord_mm[0] <= elements.radius_mm
         bad[elements.move[wrong | elements.inside]] = True
     return bad
@@ -95,10 +99,14 @@ class _Elements:
             length[pick], chord[pick], curved[pick], inside[pick],
         )  # fmt: skip
 
+    def turn_rad(self) -> Array:
+        """(k - 1,) changes of direction between moves."""
+        turn = self.begins[1:] - self.ends[:-1]
+        return np.asarray((turn + np.pi) % (2 * np.pi) - np.pi, float)
+
     def cut_off(self) -> tuple[Array, Array]:
         """(k,) mm that each move loses at its begin and at its end; at arcs as along their tangents."""
-        turn = self.begins[1:] - self.ends[:-1]
-        turn = (turn + np.pi) % (2 * np.pi) - np.pi
+        turn = self.turn_rad()
         inward = turn if self.left else -turn
         concave = (inward > _SMOOTH) & (inward < np.pi - _SMOOTH)
         end = np.where(concave, self.radius_mm * np.tan(np.where(concave, inward, 0.0) / 2), 0.0)

@@ -13,11 +13,9 @@ from olp.core.toolpath import Toolpath
 def check_contours(nominal: Toolpath, written: Toolpath, groups: Index) -> None:
     """Raise ProgramError with its line where the control would refuse a move of the `written` contour and not
     of the nominal one. `groups` (n,) is the last written move of each nominal one."""
-    refused = gouging(written)
-    if not refused.any():
+    if not gouging(written).any():
         return
-    mine = np.unique(np.searchsorted(groups, np.flatnonzero(refused)))
-    new = mine[~gouging(nominal)[mine]]
+    new = np.union1d(*(_new(nominal, written, groups, seen) for seen in (False, True)))
     if not new.size:
         return
     compensation = nominal.frames[int(nominal.frame[new[0]])].compensation
@@ -28,3 +26,9 @@ def check_contours(nominal: Toolpath, written: Toolpath, groups: Index) -> None:
         "cutter",
         line=int(nominal.line[new[0]]),
     )
+
+
+def _new(nominal: Toolpath, written: Toolpath, groups: Index, seen: bool) -> Index:
+    """Nominal moves that can be cut, but not as written."""
+    mine = np.unique(np.searchsorted(groups, np.flatnonzero(gouging(written, seen=seen))))
+    return np.asarray(mine[~gouging(nominal, seen=seen)[mine]], np.int64)
