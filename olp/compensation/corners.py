@@ -30,11 +30,11 @@ def gouging(path: Toolpath, *, seen: bool = False) -> Mask:
     bad = np.zeros(len(path), bool)
     for elements in _contours(path):
         begin, end = elements.cut_off()
-        wrong = begin + end > elements.length_mm
+        wrong = begin + end >= elements.length_mm
         if seen:
             wrong &= np.append(np.abs(elements.turn_rad()) > _SMOOTH, False)
         wrong[0] = elements.chord_mm[0] <= elements.radius_mm
-        bad[elements.move[wrong | elements.inside]] = True
+        bad[elements.move[wrong]] = True
     return bad
 
 
@@ -56,9 +56,9 @@ def away_from_corners(path: Toolpath, move: Index, share: Array) -> Mask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Elements:
-    """Moves of one contour that go across its plane: index, direction in rad at the begin and the end, length
-    of the move and of the path beside it, distance of both ends, whether it is an arc, and whether the
-    cutter does not fit into that."""
+    """Moves of one contour that go across its plane. (k,) `move` is their index, `begins` and `ends` their
+    directions in rad at both ends, `own_mm` their length, `chord_mm` the distance of their ends. `length_mm`
+    is the length of the path beside them, below 0 where the cutter does not fit into an arc (`curved`)."""
 
     left: bool
     radius_mm: float
@@ -69,7 +69,6 @@ class _Elements:
     length_mm: Array
     chord_mm: Array
     curved: Mask
-    inside: Mask
 
     @staticmethod
     def of(path: Toolpath, a: int, b: int, compensation: CutterCompensation) -> _Elements:
@@ -79,7 +78,7 @@ class _Elements:
         chord = np.hypot(along, across)
         direction = np.arctan2(across, along)
         begins, ends, own, length = direction.copy(), direction.copy(), chord.copy(), chord.copy()
-        inside, curved = np.zeros(b - a, bool), np.zeros(b - a, bool)
+        curved = np.zeros(b - a, bool)
         chosen = slice(*np.searchsorted(path.arcs.move, (a, b)))
         rows = path.arcs.move[chosen] - a
         if len(rows):
@@ -92,11 +91,11 @@ class _Elements:
             radius = np.hypot(x1, y1)
             beside = radius - np.where(within, 1.0, -1.0) * compensation.radius_mm
             own[rows], length[rows] = np.abs(sweep) * radius, np.abs(sweep) * beside
-            inside[rows], curved[rows] = within & (beside <= 0), True
+            curved[rows] = True
         pick = np.flatnonzero((chord > 0) | curved)
         return _Elements(
             compensation.left, compensation.radius_mm, pick + a, begins[pick], ends[pick], own[pick],
-            length[pick], chord[pick], curved[pick], inside[pick],
+            length[pick], chord[pick], curved[pick],
         )  # fmt: skip
 
     def turn_rad(self) -> Array:
