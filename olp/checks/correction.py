@@ -75,11 +75,23 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
             )
         )
     if contour:
-        findings.append(finding("OLP305", "contours under G41/G42 were taken as the path of the tool"))
+        findings.append(_contour_finding(path))
     if setup.machine.compensated_by_controller:
         names = ", ".join(sorted(setup.machine.compensated_by_controller))
         findings.append(finding("OLP404", f"the control corrects {names}, so the program does not"))
     return findings
+
+
+def _contour_finding(path: Toolpath) -> Finding:
+    text = "contours under G41/G42 were taken as the path of the tool"
+    unknown = [f.compensation is not None and not f.compensation.radius_mm for f in path.frames]
+    lines = lines_of(path, np.array(unknown, bool)[path.frame]) if any(unknown) else []
+    if lines:
+        text += (
+            "; a cutter radius is not known, so their corners were not checked: give radius_mm of the tool "
+            "in the machine or job file"
+        )
+    return finding("OLP305", text, lines)
 
 
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:

@@ -29,9 +29,11 @@ _LEAST_MM = 1e-3
 _FIXED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE | Flag.DELETED)
 
 
-def with_approaches(path: Toolpath, model: ErrorModel, rows: Plan, axes: Mask, limits: Limits) -> Plan:
+def with_approaches(
+    path: Toolpath, model: ErrorModel, rows: Plan, axes: Mask, limits: Limits, steady: Mask | None
+) -> Plan:
     """The plan with a row before the end of each rapid after which a cut would begin with an unknown side of
-    an axis of `axes` (3,)."""
+    an axis of `axes` (3,). `steady` (n,) moves take no further block, None: there are none."""
     width = model.backlash_at(rows.command_mm)
     if width is None or not limits.insert or not len(rows):
         return rows
@@ -39,6 +41,8 @@ def with_approaches(path: Toolpath, model: ErrorModel, rows: Plan, axes: Mask, l
     low, high = play_interval(rows.command_mm, width)
     unknown = (high - low > 1e-9) & (width > 0.0) & np.isfinite(rows.command_mm)
     where = _rapids(path, rows, unknown)
+    if steady is not None:
+        where = where[~steady[rows.move[where]]]
     if not where.size:
         return rows
     past = np.maximum(_DIGITS * limits.digit_mm, _LEAST_MM)

@@ -18,7 +18,7 @@ from olp.compensation.lines import Cuts, no_cuts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.geometry import PLANES, arc_directions, arc_points, arms
-from olp.core.toolpath import Arcs, Flag, Toolpath
+from olp.core.toolpath import Arcs, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import steps_needed
 
@@ -59,20 +59,18 @@ def subdivide_arcs(
     path: Toolpath,
     model: ErrorModel,
     target: Array,
-    raw: Mask,
+    free: Mask,
     tolerance: float,
     turning: Mask | None,
     band: float,
 ) -> Cuts:
-    """Cuts (move, share, target) of the arcs that one arc does not fit within `tolerance` mm; where an axis
-    has backlash (`turning`), also where that axis turns round."""
+    """Cuts (move, share, target) of the arcs that are `free` to be split and that one arc does not fit within
+    `tolerance` mm; where an axis has backlash (`turning`), also where that axis turns round."""
     arcs = path.arcs
-    if not len(arcs):
+    arc = np.flatnonzero(free[arcs.move])
+    if not arc.size:
         return no_cuts()
-    untouched = np.uint8(Flag.PASS | Flag.WHOLE)
-    free = np.flatnonzero((path.flag[arcs.move] & untouched) == 0)
-    free = free[~raw[arcs.move[free]].any(axis=1)]
-    pieces = Pieces(free, np.zeros(len(free)), np.ones(len(free)))
+    pieces = Pieces(arc, np.zeros(len(arc)), np.ones(len(arc)))
     if turning is not None:
         pieces = _at_quadrants(path, pieces, turning, band)
     tools = path.tool_mm()
@@ -258,14 +256,19 @@ def fit(
         y = y + (b1 * n00 - b0 * n01) / det
     x, y = np.where(bend.rigid[:, None], x_start, x), np.where(bend.rigid[:, None], y_start, y)
     rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
-    # the control counts the angle about the new centre
-    angle = np.arctan2(q1 - y, q0 - x) - np.arctan2(s1 - y, s0 - x)
-    turn = sweep[:, None]
-    reached = (angle + 2 * np.pi * np.rint((share * turn - angle) / (2 * np.pi))) / turn
+    # the control counts the angle about the new centre, and reaches the end with its own sweep
+    begin = np.arctan2(s1 - y, s0 - x)
+    turn = _near(np.arctan2(e1 - y, e0 - x) - begin, sweep[:, None])
+    reached = _near(np.arctan2(q1 - y, q0 - x) - begin, share * turn) / turn
     radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * reached)
     level = (q2 - (s2 + (e2 - s2) * reached)) * rs / np.hypot(rs, (e2 - s2) / turn)
     centre[rows, axes[:, 0]], centre[rows, axes[:, 1]] = x[:, 0], y[:, 0]
     return centre, np.hypot(radial, level).max(axis=1)
+
+
+def _near(angle: Array, guess: Array) -> Array:
+    """Angles with as many whole turns added as bring them near a guess."""
+    return np.asarray(angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi)), float)
 
 
 def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask, band: float) -> Pieces:

@@ -10,6 +10,8 @@ import numpy as np
 
 from olp.compensation.approach import with_approaches
 from olp.compensation.arcs import subdivide_arcs
+from olp.compensation.contour import Contour
+from olp.compensation.corners import away_from_corners
 from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
@@ -41,20 +43,29 @@ def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
     command = _waypoints(path, model, target, raw)
     reversal = Reversal.of(model, limits.tolerance_mm * DEAD_BAND_SHARE)
     chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
+    contour = Contour.of(path)
+    whole = ((path.flag & _UNSPLIT) != 0) | raw.any(axis=1)
+    if contour is not None:
+        whole |= contour.whole
+        uncorrected = np.union1d(uncorrected, contour.beside)
     kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
-    free = np.isin(path.kind, kinds) & ((path.flag & _UNSPLIT) == 0) & ~raw.any(axis=1)
+    free = np.isin(path.kind, kinds) & ~whole
     # behind a `/` block the start depends on the switch, so no cut can be right for both
     free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
     cuts_line = subdivide_lines(path, model, target, free, chord)
     chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
     turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
-    cuts_arc = subdivide_arcs(path, model, target, raw, chord_arc, turning, band)
-    rows = _expand(
-        path, target, command, raw, uncorrected, shift, [cuts_line, cuts_arc], model, reversal is not None
-    )
+    cuts_arc = subdivide_arcs(path, model, target, ~whole, chord_arc, turning, band)
+    cuts = [cuts_line, cuts_arc]
+    if contour is not None:
+        cuts = [_pick(c, away_from_corners(path, c[0], c[1])) for c in cuts]
+    rows = _expand(path, target, command, raw, uncorrected, shift, cuts, model, reversal is not None)
+    if contour is not None:
+        rows = contour.hold(rows)
     if reversal is not None:
-        rows = with_approaches(path, model, rows, reversal.axes, limits)
-        rows = carry_play(path, model, rows, reversal, insert=limits.insert)
+        steady = None if contour is None else contour.steady
+        rows = with_approaches(path, model, rows, reversal.axes, limits, steady)
+        rows = carry_play(path, model, rows, reversal, contour, insert=limits.insert)
     if limits.refuse_outside:
         _check_box(path, model, rows)
     return rows
@@ -106,6 +117,11 @@ def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> Index:
                 held.append(j)
                 j += 1
     return np.array(sorted(set(held)), np.int64)
+
+
+def _pick(cuts: Cuts, which: Mask) -> Cuts:
+    move, share, target = cuts
+    return move[which], share[which], target[which]
 
 
 def _waypoints(path: Toolpath, model: ErrorModel, target: Array, raw: Mask) -> Array:

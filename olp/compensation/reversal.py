@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.contour import Contour
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
 from olp.core.arrays import Array, Index, Mask
@@ -49,9 +50,18 @@ class Reversal:
         return Reversal(axes, band_mm) if axes.any() else None
 
 
-def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal, *, insert: bool) -> Plan:
+def carry_play(
+    path: Toolpath,
+    model: ErrorModel,
+    rows: Plan,
+    reversal: Reversal,
+    contour: Contour | None,
+    *,
+    insert: bool,
+) -> Plan:
     """The plan with play: commands lead by half the backlash. Where an axis turns round in a feed move, a row
-    that only takes it up comes first; without `insert` not before moves that are never split.
+    that only takes it up comes first; without `insert` not before moves that are never split, and never along
+    a `contour` under cutter compensation.
 
     Where one axis turns, the straightness of another may jump with it, so that one turns too. The states are
     iterated until they agree.
@@ -61,7 +71,8 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
     play = np.zeros((len(rows), 3))
     turns = np.zeros((len(rows), 3), bool)
     command, held = rows.command_mm, np.zeros((len(rows), 3))
-    still = _still(path, rows)
+    source = None if contour is None else contour.source(rows)
+    still = _still(path, rows, source)
     for _ in range(_PASSES):
         backlash = model.backlash_at(command)
         assert backlash is not None
@@ -79,24 +90,32 @@ def carry_play(path: Toolpath, model: ErrorModel, rows: Plan, reversal: Reversal
             held[:, axis] = np.nan_to_num(load - wanted[:, axis])
         command = invert(model, rows.target_mm + held, tool, play)
         command[rows.raw] = rows.command_mm[rows.raw]
+        if source is not None:
+            command = np.take_along_axis(command, source, axis=0)
         if np.abs(play - before).max(initial=0.0) < 1e-3:
             break
     rows = replace(rows, command_mm=command, play=play)
-    turns &= _may_turn(path, rows, insert=insert)[:, None]
+    may = _may_turn(path, rows, insert=insert)
+    if contour is not None:
+        may &= ~contour.steady[rows.move]
+    turns &= may[:, None]
     return _take_up(model, rows, tool, held, turns) if turns.any() else rows
 
 
-def _still(path: Toolpath, rows: Plan) -> Index | None:
+def _still(path: Toolpath, rows: Plan, source: Index | None) -> Index | None:
     """(r, 3) the row at which each axis reached its present position. The strokes of one hole move no axis
-    across them, though the error there would ask for it. None without canned cycles."""
+    across them, though the error there would ask for it. Without canned cycles it is the `source` of each
+    command, where axes are held."""
     cycle = (path.flag[rows.move] & np.uint8(Flag.CYCLE)) != 0
     if not cycle.any():
-        return None
+        return source
     end = path.end_mm[rows.move]
     stays = np.zeros((len(rows), 3), bool)
     line = path.line[rows.move]
     stays[1:] = (cycle[1:] & (line[1:] == line[:-1]))[:, None] & (end[1:] == end[:-1])
     order = np.broadcast_to(np.arange(len(rows))[:, None], stays.shape)
+    if source is not None:
+        stays |= source != order
     return np.asarray(np.maximum.accumulate(np.where(stays, 0, order), axis=0), np.int64)
 
 

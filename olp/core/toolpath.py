@@ -9,7 +9,7 @@ from enum import IntEnum, IntFlag
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_points, quarter_shares
 from olp.core.machine import ZERO, Vector
 
@@ -57,6 +57,16 @@ class Flag(IntFlag):
     CONTROL = 128  #: made by the control itself, without words: axes become unknown (M6, G28, after a probe)
 
 
+@dataclass(frozen=True, slots=True)
+class CutterCompensation:
+    """G41 or G42: the control offsets the contour to the `left` or to the right, in a plane (0..2). The
+    `radius_mm` is 0 where neither the program nor the tool table states it."""
+
+    plane: int
+    left: bool
+    radius_mm: float = 0.0
+
+
 def carried(tool_mm: Vector, payload_kg: float) -> Tool:
     """A tool row for error models: the tool vector, and the payload as a fourth number where there is one."""
     return (*tool_mm, payload_kg) if payload_kg else tool_mm
@@ -72,7 +82,8 @@ class Frame:
     uncompensated machine, None where it was located by other means. `lengths` are errors of the lengths of
     tools that are not common to touch-off and cut. In a rotated frame the words are turned first, by the rows
     of `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is
-    the part of the offset by which the tip keeps off the programmed point, as over a hole.
+    the part of the offset by which the tip keeps off the programmed point, as over a hole. `compensation` is
+    that of the cutter, where the contour was taken as the path of the tool.
     """
 
     unit_mm: float = 1.0
@@ -86,6 +97,7 @@ class Frame:
     payload_kg: float = 0.0
     turn: tuple[Vector, Vector, Vector] | None = None
     lift_mm: Vector = ZERO
+    compensation: CutterCompensation | None = None
 
     def origin_mm(self) -> Vector:
         """The axis position of the program's origin, no tool length active."""
@@ -148,6 +160,10 @@ class Toolpath:
             starts[1:] = self.end_mm[first : last - 1]
             starts[0] = self.end_mm[first - 1] if first else self.start_mm
         return starts
+
+    def compensated(self) -> Mask:
+        """(n,) moves along a contour that the control offsets by the cutter radius."""
+        return np.array([f.compensation is not None for f in self.frames], bool)[self.frame]
 
     def reach_mm(self) -> tuple[Array, Array]:
         """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, along it; NaN where

@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import Frame, LengthError, Touch, carried
+from olp.core.toolpath import CutterCompensation, Frame, LengthError, Touch, carried
 from olp.core.units import UM_PER_MM
 
 Turn = tuple[Vector, Vector, Vector]
@@ -206,6 +206,7 @@ class FrameTable:
         tool_vector: Vector = ZERO,
         axis: Vector = UP,
         length_active: bool = False,
+        compensation: CutterCompensation | None = None,
     ) -> int:
         """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
         machine from tip to gauge point. Raises ProgramError for a tilted tool with X or Y in its vector, and
@@ -219,7 +220,7 @@ class FrameTable:
         frame = Frame(
             unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=tool_vector, tool=tool,
             work_offset=work.name, touched=touch_of(self.setup, work, line), lengths=lengths,
-            turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg,
+            turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg, compensation=compensation,
         )  # fmt: skip
         return self._known(frame)
 

@@ -171,8 +171,9 @@ class Program:
     def eol(self, line: int) -> bytes:
         """The line end that a block after this line takes: this line's, or the first one of the text."""
         end = int(self.line_end[line - 1])
-        if self.data[end : end + 2] == b"\r\n":
-            return b"\r\n"
+        for mark in (b"\r\n", b"\r\r\n"):
+            if self.data[end : end + len(mark)] == mark:
+                return mark
         if self.data[end : end + 1] in (b"\n", b"\r"):
             return self.data[end : end + 1]
         return b"\r\n" if b"\r\n" in self.data[:4096] else b"\n"

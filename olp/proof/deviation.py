@@ -28,6 +28,8 @@ _BLOCK = 1 << 15
 _PROBES = 9
 #: samples of an arc move at the least
 _ARC_STEPS = 8
+#: no take-up of backlash in any part
+_NO_SHARES = np.zeros((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,6 +136,7 @@ class Tracer:
         self.model, self.bend = model, bend
         self.play: Array | None = None
         self.last: Array | None = None
+        self.heading = np.zeros(3)
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.nominal_arc = _arc_index(nominal)
@@ -197,7 +200,8 @@ class Tracer:
         steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
         if arc.max(initial=-1) >= 0:
             self._arc_steps(arc, known, steps, start, tool)
-        reached, inner = self._samples(start, end, arc, steps, known, tool)
+        take_ups = self._take_ups(start, delta, cut & (arc < 0)) if self.has_play else _NO_SHARES
+        reached, inner = self._samples(start, end, arc, steps, known, tool, take_ups)
         # ends of parts inside a nominal move lie along it, too
         ends = self.groups[a:b] - first
         last_part = np.zeros(last - first, bool)
@@ -211,13 +215,36 @@ class Tracer:
             self._bend(reached, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
 
+    def _take_ups(self, start: Array, delta: Array, straight: Mask) -> Array:
+        """(m, 3) the share of each `straight` move at which an axis that turned round has taken up its
+        backlash, where the tip is farthest off; NaN where an axis does not turn. Keeps the direction of each
+        axis from call to call."""
+        width = self.model.backlash_at(start)
+        assert width is not None
+        heading = np.vstack((self.heading, np.sign(np.nan_to_num(delta))))
+        last = np.maximum.accumulate(np.where(heading != 0, np.arange(len(heading))[:, None], 0), axis=0)
+        held = np.take_along_axis(heading, last, axis=0)
+        self.heading = held[-1]
+        turns = straight[:, None] & (heading[1:] != 0) & (heading[1:] != held[:-1])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = width / np.abs(delta)
+        return np.where(turns & (share > 0) & (share < 1), share, np.nan)
+
     def _samples(
-        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array
+        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array, take_ups: Array
     ) -> tuple[Array, _Inner]:
-        """Where the tip really is at the end of each part, and at samples inside parts."""
+        """Where the tip really is at the end of each part, and at samples inside parts: at equal steps, and
+        at the shares `take_ups` (m, 3) of parts."""
         long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
         point, part, share = self.points(start[long], end[long], arc[long], steps[long], known[long])
         part = long[part]
+        more, axis = np.nonzero(np.isfinite(take_ups))
+        if more.size:
+            extra = take_ups[more, axis]
+            point = np.concatenate((point, start[more] + extra[:, None] * (end - start)[more]))
+            part, share = np.concatenate((part, more)), np.concatenate((share, extra))
+            order = np.lexsort((share, part))
+            point, part, share = point[order], part[order], share[order]
         inside = share < 1.0
         if self.has_play:
             # play depends on all earlier moves, so the samples are taken in order

@@ -16,6 +16,7 @@ from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
+from olp.proof.contour import check_contours
 from olp.proof.deviation import Deviation, Single, cutting_moves, measure
 from olp.proof.matching import match
 from olp.proof.strokes import strokes_mm
@@ -126,13 +127,15 @@ def prove(
     uncorrected: Index,
 ) -> Proof:
     """Compare the corrected path with the nominal one, from the two programs alone. `uncorrected` are nominal
-    moves that are left uncorrected. Raises ProgramError where the second is not a correction of the first."""
+    moves that are left uncorrected. Raises ProgramError where the second is not a correction of the first, or
+    where the control would refuse it."""
     path, written = nominal.toolpath, corrected.toolpath
     target = targets(path, zero_shifts(path.frames, model))
     exempt = np.zeros(len(path), bool)
     exempt[uncorrected] = True
     near = _NEAR_DIGITS * digit_mm + _NEAR_SHARE * tolerance_mm
     groups = match(nominal, target, corrected, model, near)
+    check_contours(path, written, groups)
     bend = tolerance_mm * _BEND_SHARE
     counts = _counts(nominal, target, exempt)
     sides = []

@@ -75,8 +75,9 @@ RULES = (
         "contour taken as tool path",
         Severity.WARNING,
         "Under G41/G42 the control offsets the contour by the tool radius. The correction was computed on "
-        "the contour.",
-        "Program the tool path where the error changes noticeably over the tool radius.",
+        "the contour. No step takes up backlash there, because the control would refuse it.",
+        "Program the tool path where the error changes noticeably over the tool radius, or where an axis "
+        "with backlash turns round.",
         "`olp correct part.nc --contour` with `G41 D1` in the program.",
     ),
     _rule(

@@ -11,7 +11,7 @@ import numpy as np
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import CutterCompensation, Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.program.apt.arcs import ArcForm, circle, directed, movarc
 from olp.program.dialect import Dialect, Options
@@ -64,6 +64,7 @@ class Events:
         self.systems: list[tuple[object, object]] = []
         self.system: tuple[object, object] = (None, None)
         self.home: list[float] | None = None
+        self.compensation: CutterCompensation | None = None
         self.cycle: Cycle | None = None
         self.last_cycle: Cycle | None = None
         self.turns_s = 0.0
@@ -134,6 +135,7 @@ class Events:
         return self.table.index(
             work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=tool_vector,
             axis=self.up, length_active=self.length_active and bool(self.tool),
+            compensation=self.compensation,
         )  # fmt: skip
 
     def _feed(self, statement: Statement, row: int) -> None:
@@ -229,6 +231,11 @@ class Events:
                 "send the path of the tool's centre, or take the points as that path with --contour",
                 line=statement.line,
             )
+        self._resolve(row)
+        if b"OFF" in words:
+            self.compensation = None
+        elif words & {b"LEFT", b"RIGHT"}:
+            self.compensation = CutterCompensation(plane=0, left=b"LEFT" in words)
 
     def _tlaxis(self, statement: Statement, row: int) -> None:
         self._resolve(row)

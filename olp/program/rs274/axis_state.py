@@ -12,9 +12,13 @@ from dataclasses import dataclass, field, replace
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import Frame, LengthError, Touch
+from olp.core.toolpath import CutterCompensation, Frame, LengthError, Touch
 from olp.program.frames import length_errors_of, tool_vector_of, touch_of, touch_tool_of
 from olp.program.rs274.codes import (
+    COMPENSATION_BY_DIAMETER,
+    COMPENSATION_LEFT,
+    COMPENSATION_OFF,
+    CUTTER_COMPENSATION,
     DWELL,
     FURTHER_OFFSETS,
     HOMES,
@@ -23,6 +27,7 @@ from olp.program.rs274.codes import (
     LOCAL_OFFSET,
     MACHINE,
     PATH_MODES,
+    PLANE_OF,
     SHIFTS,
     UNITS,
     WORK_OFFSETS,
@@ -77,6 +82,7 @@ class AxisState(State):
     selected: int | None = None
     spindle: int | None = None
     payload_kg: float = 0.0
+    compensation: CutterCompensation | None = None
     frames: list[Frame] = field(default_factory=list)
     captures: list[Capture] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
@@ -126,6 +132,7 @@ class AxisState(State):
             touched=self._touch(name, base, line),
             lengths=self._lengths(name),
             payload_kg=self.payload_kg,
+            compensation=self.compensation,
         )
         known = self._index.get(frame)
         if known is None:
@@ -245,6 +252,10 @@ class AxisState(State):
             self._select_offset(code, line, by_letter)
         elif code in PATH_MODES:
             self._path_mode(code, line, by_letter)
+        elif code == COMPENSATION_OFF:
+            self.compensation = None
+        elif code in CUTTER_COMPENSATION:
+            self._cutter_compensation(code, line, by_letter)
         elif code in HOMES:
             if not axis_words:
                 return replace(effect, consumed=True, home=(0, 1, 2))
@@ -294,6 +305,21 @@ class AxisState(State):
         if code == 432:
             vector = self._sum(self.offsets.length, vector)
         self.offsets.length, self.length_tool = vector, number or None
+
+    def _cutter_compensation(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
+        """G41 and G42: D is the number of a tool, or a diameter; without it the tool in the spindle counts on
+        controls that take its length too."""
+        radius_mm = 0.0
+        if code in COMPENSATION_BY_DIAMETER:
+            radius_mm = self.length_mm(by_letter["D"]) / 2 if "D" in by_letter else 0.0
+        else:
+            number = self._integer(by_letter["D"], line) if "D" in by_letter else 0
+            if not number and self.profile.length_of_spindle_tool:
+                number = self.spindle or 0
+            tool = self.setup.tool(number)
+            radius_mm = 0.0 if tool is None else tool.radius_mm
+        left = (code in COMPENSATION_LEFT) == (radius_mm >= 0)
+        self.compensation = CutterCompensation(PLANE_OF[self.plane], left, abs(radius_mm))
 
     def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code in (541, 1540):

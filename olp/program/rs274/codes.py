@@ -15,6 +15,11 @@ SPLINES = frozenset({50, 51, 52, 53})
 LINEAR = frozenset({0, 10, 20, 30, 330})
 #: Cutter compensation: G41, G41.1, G42, G42.1.
 CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
+#: Cutter compensation to the left; the others are to the right.
+COMPENSATION_LEFT = frozenset({410, 411})
+#: Their D is the diameter of the cutter, not the number of a tool.
+COMPENSATION_BY_DIAMETER = frozenset({411, 421})
+COMPENSATION_OFF = 400
 
 #: G20, lengths in inches.
 INCH = 200
@@ -42,6 +47,8 @@ GROUPS: dict[str, tuple[int, ...]] = {
     "retract": (RETRACT_TO_INITIAL, RETRACT_TO_R),
     "feed_mode": (940, 950, INVERSE_TIME),
 }
+#: Plane code to index into `geometry.PLANES`.
+PLANE_OF = {170: 0, 180: 1, 190: 2}
 #: Units of length.
 UNITS = (INCH, METRIC)
 #: How the control moves from block to block: G61, G61.1, G64.

@@ -17,6 +17,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import (
+    COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
     GROUPS,
@@ -29,9 +30,6 @@ from olp.program.rs274.motion import modal, values
 from olp.program.rs274.profiles.base import Act
 
 Modal = npt.NDArray[np.int16]
-
-#: plane code to index into `geometry.PLANES`
-PLANE_OF = {170: 0, 180: 1, 190: 2}
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
 #: Events whose axis words are not motion: G10 G52 G92 G43.1
@@ -90,7 +88,7 @@ class Modes:
         for code, act in profile.codes.items():
             self._act[code] = act
         if contour:
-            self._act[list(CUTTER_COMPENSATION)] = Act.UNCHANGED
+            self._act[[COMPENSATION_OFF, *CUTTER_COMPENSATION]] = Act.EVENT
         self._m_event = np.ones(10_001, bool)
         self._m_event[[m * 10 for m in profile.harmless_m]] = False
         self._linear_motion = state.motion

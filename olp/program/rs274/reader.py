@@ -27,13 +27,14 @@ from olp.program.rs274.codes import (
     INCREMENTAL,
     INVERSE_TIME,
     MACHINE,
+    PLANE_OF,
     PRESET,
     PROBES,
     WRITE_OFFSET,
 )
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.lexer import WordChunk, chunks
-from olp.program.rs274.modes import PLANE_OF, Context, Modes, check_odd, scaled
+from olp.program.rs274.modes import Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.special_blocks import SpecialBlocks, event_block
@@ -136,7 +137,7 @@ class _Reader:
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
             if moved or any(c in _POSITION for c in codes):
                 self._resolve(context, rows, upto)
-            state.distance = int(context.distance[line])
+            state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
             effect = state.run(number, words, codes, self.collector.moves)
             if moved:

@@ -25,11 +25,12 @@ from olp.program.rs274.codes import (
     HOMES,
     INCREMENTAL,
     MACHINE,
+    PLANE_OF,
     RETRACT_TO_R,
 )
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycles import Stroke, hole_moves, levels
-from olp.program.rs274.modes import PLANE_OF, Context, scaled
+from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import NAN
@@ -57,7 +58,7 @@ def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Wor
     )
     if chunk.deleted[line] and changes:
         raise ProgramError(
-            "a block under block delete changes offsets, units, path mode or the tool, "
+            "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
             "so later blocks depend on the switch; remove the `/`",
             line=number,
         )
