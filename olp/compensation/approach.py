@@ -47,7 +47,8 @@ def with_approaches(
         return rows
     past = np.maximum(_DIGITS * limits.digit_mm, _LEAST_MM)
     side = _sides(path, rows, where)
-    step = np.where(unknown[where], side * (width[where] + past), 0.0)
+    # the drive leads by half of the backlash afterwards: together it moves by all of it
+    step = np.where(unknown[where], side * (width[where] / 2 + past), 0.0)
     beyond = rows.command_mm[where] - step
     box = model.box_mm
     step = np.where((beyond < box[:, 0]) | (beyond > box[:, 1]), -step, step)

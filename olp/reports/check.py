@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
@@ -14,7 +15,7 @@ from xml.etree import ElementTree
 from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
-from olp.reports.report import Report, findings_text, number, pairs, printable, table, to_json
+from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, table, to_json
 
 #: Level of SARIF by severity.
 _LEVEL = {Severity.INFO: "note", Severity.WARNING: "warning", Severity.ERROR: "error"}
@@ -60,6 +61,8 @@ def _clearance(report: Report) -> Iterator[str]:
 
 
 def _verdict(report: Report, fail_on: str) -> Iterator[str]:
+    for sentence in (report.get("verdict") or {}).get("sentences") or ():
+        yield from textwrap.wrap(sentence, WIDTH)
     failing = failures(report, fail_on)
     if failing:
         yield f"NO GO: {len(failing)} of {len(report['findings'])} findings are at or above {fail_on}."
@@ -80,7 +83,7 @@ def to_sarif(report: Report, fail_on: str) -> str:
     program as a whole; further lines are related locations."""
     rules = [RULES[code] for code in report["rules"]]
     uri = _uri(report["program"]["path"])
-    run = {
+    run: dict[str, Any] = {
         "tool": {
             "driver": {
                 "name": "olp",
@@ -92,6 +95,8 @@ def to_sarif(report: Report, fail_on: str) -> str:
         "results": [_sarif_result(f, report["rules"], uri) for f in report["findings"]],
         "invocations": [{"executionSuccessful": True, "exitCode": int(bool(failures(report, fail_on)))}],
     }
+    if report["verdict"] is not None:
+        run["properties"] = {"verdict": report["verdict"]}
     return json.dumps({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2) + "\n"
 
 
@@ -139,7 +144,9 @@ def to_junit(report: Report, fail_on: str) -> str:
         timestamp=f"{report['date'] or '1970-01-01'}T00:00:00", tests=str(len(report["rules"])),
         failures=str(len(failed)), errors="0", time="0",
     )  # fmt: skip
-    ElementTree.SubElement(suite, "properties")
+    properties = ElementTree.SubElement(suite, "properties")
+    for number_of, sentence in enumerate((report["verdict"] or {}).get("sentences", ()), 1):
+        ElementTree.SubElement(properties, "property", name=f"verdict {number_of}", value=sentence)
     mild = []
     for code in report["rules"]:
         case = ElementTree.SubElement(

@@ -221,7 +221,7 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
         if run is not None and proof is not None:
             findings += checks.proof_findings(proof, run.uncorrected)
             findings += checks.between_findings(run.nominal, proof, loaded.model)
-            findings += _confidence(run)
+            findings += _in_lines_of_corrected(run)
     findings += state.tool_findings(path, loaded.calibration, sanity)
     lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD
     findings += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
@@ -243,10 +243,16 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     return findings
 
 
-def _confidence(run: Run) -> list[Finding]:
-    """Findings of a verification on uncertainties, with the lines of the corrected program."""
+def _lines(run: Run) -> dict[int, int]:
+    """The line of the corrected program for each line of the nominal one that moves."""
     proof = run.proof
-    there = dict(zip(proof.nominal.line.tolist(), proof.written.line[proof.groups].tolist(), strict=True))
+    return dict(zip(proof.nominal.line.tolist(), proof.written.line[proof.groups].tolist(), strict=True))
+
+
+def _in_lines_of_corrected(run: Run) -> list[Finding]:
+    """Findings of a verification on the part and on uncertainties, with the lines of the corrected
+    program."""
+    there = _lines(run)
     return [
         replace(
             finding,
@@ -254,7 +260,7 @@ def _confidence(run: Run) -> list[Finding]:
             lines=tuple(there[line] for line in finding.lines),
         )
         for finding in run.findings
-        if RULES[finding.code].topic == "uncertainty"
+        if RULES[finding.code].topic == "uncertainty" or finding.code == "OLP108"
     ]
 
 
@@ -293,6 +299,17 @@ def _line(data: bytes, offset: int) -> int:
     return data.count(b"\n", 0, offset) + 1
 
 
+def _verdict(case: _Case) -> dict[str, Any] | None:
+    """The verdict of the proof, with lines of the given program; None where no nominal program is known."""
+    if case.run is None:
+        return None
+    verdict = dict(case.run.report["verdict"])
+    line = verdict["numerical"]["line"]
+    if not case.corrected_here and line is not None:
+        verdict["numerical"] = verdict["numerical"] | {"line": _lines(case.run)[line]}
+    return verdict
+
+
 def _report(
     case: _Case, findings: tuple[Finding, ...], codes: list[str], options: CheckOptions
 ) -> dict[str, Any]:
@@ -314,5 +331,6 @@ def _report(
         "date": options.date,
         "tolerance_um": options.tolerance_um,
         "rules": codes,
+        "verdict": _verdict(case),
         "findings": [f.as_dict() for f in findings],
     }

@@ -139,7 +139,7 @@ def corrected(
     _prove_without_deleted(done, loaded, options.contour)
     pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
-    run = proved(pair, loaded, options, outside=held, tell=tell)
+    run = proved(pair, loaded.held(), options, outside=held, tell=tell)
     return replace(run, report=run.report | _written_report(done))
 
 

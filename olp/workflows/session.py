@@ -48,6 +48,12 @@ class Loaded:
             return self.model
         return build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=self.skip)
 
+    def held(self) -> Loaded:
+        """The same with the error at the face of the calibrated box outside of it, as a proof takes it."""
+        skip = self.skip | self.left_out
+        model = build(self.calibration, self.setup.machine.chain, outside="hold", skip_components=skip)
+        return replace(self, model=model)
+
     def part_tolerance_um(self, given: float | None) -> float | None:
         """The tolerance of the part: what a call gives, else what the job states."""
         return self.setup.job.part_tolerance_um if given is None else given

@@ -34,8 +34,9 @@ RULES = (
         "side of the backlash unknown",
         Severity.INFO,
         "An axis rests on a known side of its backlash only after it has moved by that amount in one "
-        "direction. At these lines the side is still unknown.",
-        "Approach the first point from a known side. The deviation is at most half the backlash.",
+        "direction. At these lines the side is still unknown. What it may change is part of the deviation.",
+        "Begin with a rapid that commands all axes. The correction then takes the backlash up before the "
+        "cut.",
         "`[backlash] X_um = 4.0` and a program that begins with `G1 X10`.",
     ),
     _rule(
@@ -52,7 +53,7 @@ RULES = (
         "canned cycle corrected per hole",
         Severity.WARNING,
         "A canned cycle moves straight along the tool axis, so it can be exact at one depth only. The rest "
-        "of this stroke deviates from the nominal path by more than the tolerance.",
+        "of its feed strokes deviates from the axis of the hole by more than the numerical tolerance.",
         "Write the cycles out as plain moves with olp correct --expand-cycles.",
         "`G81 Z-80 R2` where the column leans by 3 um over 80 mm.",
     ),
