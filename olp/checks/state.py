@@ -94,20 +94,6 @@ def temperature_findings(job: Job, calibration: Calibration, sanity: Sanity) -> 
     return [finding("OLP407", f"{what}; {sanity.temperature_within_K:g} K are allowed")]
 
 
-def sanity_findings(path: Toolpath, correction_mm: Array, sanity: Sanity) -> list[Finding]:
-    """Waypoints with a correction above the sanity limit: `correction_mm` (n, 3), by move of `path`."""
-    size = np.sqrt(np.einsum("ij,ij->i", correction_mm, correction_mm))
-    size[(path.flag & np.uint8(Flag.CONTROL | Flag.MACHINE)) != 0] = 0.0
-    wild = size > sanity.largest_correction_mm
-    if not wild.any():
-        return []
-    what = (
-        f"{int(wild.sum())} waypoints are moved by up to {np.nanmax(size) * 1e3:.0f} um; "
-        f"the sanity limit is {sanity.largest_correction_mm * 1e3:g} um"
-    )
-    return [finding("OLP409", what, lines_of(path, wild))]
-
-
 def digit_findings(digit_mm: float, tolerance_mm: float) -> list[Finding]:
     """Does rounding to the last digit alone exceed the numerical tolerance?"""
     rounding = ROUNDING_SHARE * digit_mm

@@ -28,6 +28,7 @@ from olp.program.program import Program
 from olp.proof.proof import ROUNDING_SHARE, Proof, prove
 from olp.uncertainty.spread import Confidence
 from olp.workflows.confidence import Assessment, assess
+from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.session import Loaded
 
 _PROVES = (
@@ -43,13 +44,14 @@ _DOES_NOT_PROVE = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProofOptions:
     """Options of every verb that proves a correction: the numerical tolerance, the part tolerance
-    (`part_tolerance_um`, default `tolerance_um`), and the day of the run."""
+    (`part_tolerance_um`, default `tolerance_um`), the day of the run, and the codes of doubts to accept."""
 
     tolerance_um: float = 1.0
     contour: bool = False
     part_tolerance_um: float | None = None
     only_sure_components: bool = False
     date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
     def proof(self) -> dict[str, Any]:
         """These values alone, as the keywords of another verb's options."""
@@ -73,11 +75,13 @@ class Run:
 
 
 def verify_programs(
-    nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions
-) -> Run:
+    nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions,
+    *, refuse_doubts: bool = True,
+) -> Run:  # fmt: skip
     """Prove a corrected program from any source; programs come with their names. Raises ProgramError where
-    the second is not a correction of the first."""
+    the second is not a correction of the first, Doubtful with `refuse_doubts`."""
     (first, name), (second, other) = nominal, corrected
+    doubts = doubted(first, loaded, options.accept, options.date, stamped=second.data, refuse=refuse_doubts)
     limits = Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
     with naming(name or "<nominal>"):
         rows = plan(first.toolpath, loaded.model, limits)
@@ -91,7 +95,7 @@ def verify_programs(
         raise error.in_file(other or "<corrected>") from None
     assessment = confidence_of(loaded, first, second, proof, rows.uncorrected, options, silent)
     findings = (
-        *calibration_findings(loaded, options.date),
+        *doubts,
         *checks.proof_findings(proof, rows.uncorrected),
         *checks.between_findings(first, proof, loaded.model),
         *checks.program_findings(first, loaded.setup, contour=options.contour),
@@ -125,11 +129,6 @@ def position_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list
     if outside is not None:
         findings = [*findings, *state.box_findings(path, loaded.model.box_mm, outside)]
     return findings
-
-
-def calibration_findings(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
-    days = loaded.setup.machine.sanity.calibration_days
-    return state.calibration_findings(loaded.calibration, date, days)
 
 
 def findings_of_model(path: Toolpath, loaded: Loaded, tolerance_mm: float) -> list[Finding]:
@@ -173,6 +172,7 @@ def report_of(
         "orientation": checks.orientation(program.toolpath, loaded.model),
         "sources": checks.sources(program.toolpath, loaded.model),
         "worst": checks.worst_blocks(program, proof),
+        "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],
         "proves": list(_PROVES),
         "does_not_prove": list(_DOES_NOT_PROVE),

@@ -184,7 +184,7 @@ class AxisState(State):
     @property
     def bare_increments(self) -> bool:
         """Whether a length without a decimal point counts least increments."""
-        return self.profile.increments_without_point and self.setup.machine.decimal_point == "increment"
+        return self.profile.increments_without_point and self.setup.machine.decimal_point != "calculator"
 
     def increment(self, letter: str) -> float:
         """Least increment in program units: 0.001 mm goes with 0.0001 inch (IS-B), 0.0001 mm with 0.00001
