@@ -20,30 +20,40 @@ _SQUARE_RAD = 10e-3
 _ANGLE_RAD = 5e-3
 #: mm; backlash that a person sees. Hobby routers have 0.3 mm.
 _BACKLASH_MM = 1.0
-#: Share of the travel that backlash may be, where that is more than this many mm.
-_BACKLASH_SHARE, _BACKLASH_LEAST_MM = 5e-3, 0.1
-#: Peaks of cyclic errors, mm and rad: those of a bent ball screw are 0.02 mm.
-_CYCLIC_MM, _CYCLIC_RAD = 0.1, 1e-3
+#: Share of the travel that backlash may be: 0.5 mm on 100 mm.
+_BACKLASH_SHARE = 5e-3
+#: mm; backlash that the shortest axis may have.
+_BACKLASH_LEAST_MM = 0.1
+#: mm; peak of a cyclic error: that of a bent ball screw is 0.02 mm.
+_CYCLIC_MM = 0.1
+#: rad; peak of a cyclic angle: ten times that of a bent ball screw.
+_CYCLIC_RAD = 1e-3
 #: Error per way of a cyclic term: interpolation errors of encoders are 3 % of their period, so 0.2.
 _CYCLIC_SLOPE = 0.2
 #: A value stands out where it is so many times all others of its column ...
 _STANDS_OUT = 8.0
 #: ... or off its neighbours by so many times what any other value is.
 _OFF = 25.0
-#: mm and rad; a value that stands out by less is below what instruments resolve.
-_NOTICED_MM, _NOTICED_RAD = 2e-3, 10e-6
-#: Values of a column below which none can stand out.
-_FEW = 5
+#: mm; a length that stands out by less may be noise.
+_NOTICED_MM = 2e-3
+#: rad; an angle that stands out by less may be noise.
+_NOTICED_RAD = 10e-6
+#: Values of a column below which none can stand out: one of five is a sag.
+_FEW = 7
 #: Columns of one axis in another unit are smaller than those of both other axes by so much: 1000 less a span.
 _OTHER_UNIT = 300.0
-#: mm and rad; a column of another unit has no value above this.
-_TINY_MM, _TINY_RAD = 0.5e-3, 0.5e-6
+#: mm; a column of lengths in another unit has no value above this.
+_TINY_MM = 0.5e-3
+#: rad; a column of angles in another unit has no value above this.
+_TINY_RAD = 0.5e-6
 #: How much of the travel calibrated boxes cover: 40 % at least in a wrong unit, so that the factor shows.
 _COVERED = (0.4, 1.02)
 #: Factors between units of lengths: inches, metres, micrometres.
 _UNITS = {"inches": 25.4, "metres": 1000.0, "micrometres": 1e-3}
-#: The box may reach beyond the travel by this share of it, and by this many mm: rounded limits, overtravel.
-_BOX_BEYOND, _BOX_BEYOND_MM = 0.05, 10.0
+#: The box may reach beyond the travel by this share of it: rounded limits, overtravel.
+_BOX_BEYOND = 0.05
+#: mm; and by this much, for short axes.
+_BOX_BEYOND_MM = 10.0
 #: Positions of a curve may span so many times the larger of box and travel.
 _CURVE_BEYOND = 3.0
 #: A line or datum may lie outside box and travel by so many times the travel: other zeros of the axes.

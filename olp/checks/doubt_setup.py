@@ -19,8 +19,10 @@ _METRES_MM = 1.0
 _LONG = 2.0
 #: ... and than this, in mm: spindle noses and heads of five axes reach 600 mm.
 _LONG_MM = 700.0
-#: How many mm make an inch, and how near to it two lengths of one tool are (lengths are rounded).
-_INCH_MM, _NEAR = 25.4, 0.02
+#: mm per inch.
+_INCH_MM = 25.4
+#: Share by which two lengths of one tool differ at most: it is set again, or rounded.
+_NEAR = 0.02
 #: A tool is grossly unlike those of the calibration at so many times tool_within_mm.
 _GROSS = 8.0
 #: A work offset may lie outside the travel by this share of it, beside the longest tool: other zeros.

@@ -204,8 +204,12 @@ POINTS = {"no decimal point": ("OLP461", BARE)}
 
 def run(verb: str, folder: Path, *args: object, program: bytes = TEXT) -> tuple[int, str]:
     (folder / "part.nc").write_bytes(program)
-    outputs = {"correct": ["-o", folder / "out.nc"], "simulate": ["-o", folder / "out.csv"],
-               "view": ["-o", folder / "out.html", "--no-time"], "retime": ["-o", folder / "out.csv"]}  # fmt: skip
+    outputs = {
+        "correct": ["-o", folder / "out.nc"],
+        "simulate": ["-o", folder / "out.csv"],
+        "view": ["-o", folder / "out.html", "--no-time"],
+        "retime": ["-o", folder / "out.csv"],
+    }
     texts = [folder / "part.nc"] * (1 + (verb == "verify"))
     call = [verb, *texts, "-m", folder / M, "-j", folder / J, "--date", DAY, *outputs.get(verb, []), *args]
     result = CliRunner().invoke(main, [str(part) for part in call])
@@ -339,7 +343,7 @@ def doubts_of(findings: tuple[olp.Finding, ...]) -> list[str]:
     return [f"{f.code} {f.message}" for f in findings if f.code in DOUBTS and f.severity > Severity.INFO]
 
 
-@pytest.mark.parametrize("job", sorted(PROGRAMS.glob("*/job*.toml")), ids=lambda p: f"{p.parent.name}-{p.stem}")
+@pytest.mark.parametrize("job", sorted(PROGRAMS.glob("*/job*.toml")), ids=lambda p: p.parent.name + p.stem)
 def test_shipped_jobs_raise_no_doubt(job: Path) -> None:
     program = olp.load_setup(None, job).job.program
     assert program is not None
