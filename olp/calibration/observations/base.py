@@ -159,8 +159,8 @@ S = TypeVar("S", bound=State)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result(Generic[S]):
-    """An observation after the fit: residuals in the order of its rows (mm or rad), the sum of squares of
-    the standardised ones, and its degrees of freedom: its rows less what the unknowns used up of them."""
+    """An observation after the fit: residuals in the order of its rows (mm or rad), and the sum of squares of
+    the standardised ones. `freedom` are its degrees of freedom: its rows less what the unknowns used up."""
 
     state: S
     residual: Array
