@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import datetime
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,8 +14,11 @@ from click.testing import CliRunner
 from judge.machines import CHAINS, Recipe, random_machine, zero_machine
 
 import olp
+from olp.calibration.diagnosis.refinement import with_run
 from olp.cli import main
 from olp.core.errors import Doubtful, UsageError
+from olp.errormodel.quality import Fitted, Quality
+from olp.files.calibration.reader import load_calibration
 from olp.files.starter import starter_machine, write_starter
 from olp.findings.catalogue import DOUBTS, RULES
 from olp.findings.rule import Severity
@@ -331,6 +335,44 @@ def test_a_fit_fails_by_probability_and_size(
     codes = {f.code for f in olp.check(TEXT, folder / M, select=["OLP44"]).findings}
     assert ("OLP443" in codes) == fails
     assert "OLP444" not in codes
+
+
+def test_a_fit_states_its_quality(tmp_path: Path) -> None:
+    folder = PROGRAMS / "gantry-lines"
+    fitted = olp.fit_calibration(folder, folder / M)
+    for path, data in fitted.files(tmp_path / C).items():
+        path.write_bytes(data)
+    read, made = load_calibration(tmp_path / C).quality, fitted.calibration.quality
+    assert read is not None and made is not None
+    assert read.total.chi_square == pytest.approx(fitted.fit.chi_square, abs=1e-3)
+    assert read.total.freedom == pytest.approx(fitted.fit.freedom, abs=1e-3)
+    assert {fitted.source for fitted in read.sources} >= {"laser-x.txt", "eax.csv"}
+    assert sum(fitted.chi_square for fitted in read.sources) == pytest.approx(read.total.chi_square, rel=0.01)
+    assert sum(fitted.freedom for fitted in read.sources) == pytest.approx(read.total.freedom, rel=0.01)
+    assert read.failed() == ()
+
+
+@pytest.mark.parametrize("factor", [25.4, -1.0])
+def test_a_fit_with_a_line_in_another_unit_or_sign_is_refused(factor: float, tmp_path: Path) -> None:
+    folder = tmp_path / "lines"
+    shutil.copytree(PROGRAMS / "gantry-lines", folder)
+    head, *rows = (folder / "eyz-left.csv").read_text().splitlines()
+    scaled = [row.rsplit(",", 1) for row in rows]
+    lines = [f"{before},{float(value) * factor!r}" for before, value in scaled]
+    (folder / "eyz-left.csv").write_text("\n".join([head, *lines]) + "\n")
+    for path, content in olp.fit_calibration(folder, folder / M).files(folder / C).items():
+        path.write_bytes(content)
+    with pytest.raises(Doubtful, match=r"OLP443.*eyz"):
+        olp.correct(b"G21 G90\nG53 G0 Z-100\nM2\n", folder / M)
+
+
+def test_a_run_joins_the_quality_of_what_it_refines() -> None:
+    run = Fitted("run.csv", 30.0, 20.0)
+    alone = with_run(None, run)
+    assert alone.total.reduced == 1.5 and alone.sources == (run,)
+    both = with_run(Quality(Fitted("all readings", 100.0, 100.0), (Fitted("a.csv", 100.0, 100.0),)), run)
+    assert (both.total.chi_square, both.total.freedom) == (130.0, 120.0)
+    assert [fitted.source for fitted in both.sources] == ["a.csv", "run.csv"]
 
 
 def test_a_machine_without_errors_is_a_warning(tmp_path: Path) -> None:

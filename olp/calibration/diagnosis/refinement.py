@@ -101,7 +101,7 @@ def refine(
     change = _changes(uncertainty, parts, solved.theta)
     new = dataclasses.replace(
         _applied(calibration, change),
-        quality=_with_run(calibration.quality, Fitted(points.source or "run", chi, freedom)),
+        quality=with_run(calibration.quality, Fitted(points.source or "run", chi, freedom)),
     )
     expected = float((_across(rows, blind)[use] ** 2).sum() + (sigma[use] ** 2).sum())
     return Refinement(
@@ -118,7 +118,7 @@ def refine(
     )
 
 
-def _with_run(quality: Quality | None, run: Fitted) -> Quality:
+def with_run(quality: Quality | None, run: Fitted) -> Quality:
     """The quality of a calibration with that of a run, whose residuals are those from the old calibration."""
     if quality is None:
         return Quality(Fitted("all readings", run.chi_square, run.freedom), (run,))
