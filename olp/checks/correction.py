@@ -38,14 +38,6 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
             findings.append(finding("OLP412", text, [line]))
         elif name == "arcs":
             findings.append(finding("OLP413", text, [line]))
-        elif name == "increments":
-            findings.append(
-                finding(
-                    "OLP302",
-                    "lengths without a decimal point count least increments of the control",
-                    [line],
-                )
-            )
     findings += remark_findings(program)
     whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
     if whole.any() and not (program.statements and program.statements.decimal):

@@ -16,6 +16,9 @@ from olp.proof.proof import ROUNDING_SHARE
 
 #: mm; how far rounding may put a position beyond a limit
 _ON_LIMIT_MM = 1e-6
+#: times tool_within_mm, from the gauge point: a calibration that states no tool holds there, and every tool
+#: is farther than that from it
+_AT_GAUGE_POINT = 2.0
 #: moves that are not corrected
 _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 
@@ -68,18 +71,21 @@ def tool_findings(path: Toolpath, calibration: Calibration, sanity: Sanity) -> l
     findings: list[Finding] = []
     if not len(known) or not len(path):
         return findings
+    allowed = np.where(known.any(axis=1), 1.0, _AT_GAUGE_POINT) * sanity.tool_within_mm
     seen: set[tuple[int | None, tuple[float, float, float]]] = set()
     for number in np.unique(path.frame).tolist():
         frame = path.frames[number]
-        away = float(np.abs(known - np.array(frame.tool_mm)).max(axis=1).min())
+        distance = np.abs(known - np.array(frame.tool_mm)).max(axis=1)
         key = (frame.tool, frame.tool_mm)
-        if away <= sanity.tool_within_mm or key in seen:
+        if bool((distance <= allowed).any()) or key in seen:
             continue
+        away = float(distance.min())
         seen.add(key)
         lines = lines_of(path, path.frame == number)
         name = "no tool" if frame.tool is None else f"tool {frame.tool}"
         what = f"the tip of {name} is {away:g} mm from that of every tool of the calibration"
-        findings.append(finding("OLP406", f"{what}; {sanity.tool_within_mm:g} mm are allowed", lines[:1]))
+        text = f"{what}; expected at most {float(allowed[distance.argmin()]):g} mm"
+        findings.append(finding("OLP406", text, lines[:1]))
     return findings
 
 
@@ -92,20 +98,6 @@ def temperature_findings(job: Job, calibration: Calibration, sanity: Sanity) -> 
     stated = ", ".join(f"{name} {value:g} degC" for name, value in sorted(far.items()))
     what = f"{stated}, and the calibration was made at {reference:g} degC"
     return [finding("OLP407", f"{what}; {sanity.temperature_within_K:g} K are allowed")]
-
-
-def sanity_findings(path: Toolpath, correction_mm: Array, sanity: Sanity) -> list[Finding]:
-    """Waypoints with a correction above the sanity limit: `correction_mm` (n, 3), by move of `path`."""
-    size = np.sqrt(np.einsum("ij,ij->i", correction_mm, correction_mm))
-    size[(path.flag & np.uint8(Flag.CONTROL | Flag.MACHINE)) != 0] = 0.0
-    wild = size > sanity.largest_correction_mm
-    if not wild.any():
-        return []
-    what = (
-        f"{int(wild.sum())} waypoints are moved by up to {np.nanmax(size) * 1e3:.0f} um; "
-        f"largest_correction_um of [check] is {sanity.largest_correction_mm * 1e3:g}"
-    )
-    return [finding("OLP409", what, lines_of(path, wild))]
 
 
 def digit_findings(digit_mm: float, tolerance_mm: float) -> list[Finding]:

@@ -20,9 +20,10 @@ from olp.cli.common import (
     source,
 )
 from olp.cli.options import (
+    codes,
     confidence_options,
     contour_option,
-    date_option,
+    doubt_options,
     fail_on_option,
     force_option,
     json_option,
@@ -36,18 +37,14 @@ from olp.cli.progress import progress
 from olp.core.errors import UsageError, naming
 
 
-def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(code.strip() for value in values for code in value.split(",") if code.strip())
-
-
 @click.command("check")
 @click.argument("program", required=False)
 @setup_options
 @click.option("--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is a corrected one.")
 @click.option(
-    "--select", multiple=True, callback=_codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
+    "--select", multiple=True, callback=codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
 )
-@click.option("--ignore", multiple=True, callback=_codes, metavar="CODES", help="All codes but these.")
+@click.option("--ignore", multiple=True, callback=codes, metavar="CODES", help="All codes but these.")
 @fail_on_option
 @click.option(
     "--format",
@@ -59,7 +56,7 @@ def _codes(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 )
 @json_option("The same as --format json.")
 @output_option("OUT", "Default: stdout.", default=STREAM)
-@date_option()
+@doubt_options
 @tolerance_option
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options

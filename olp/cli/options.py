@@ -106,6 +106,18 @@ def _keep_dialect(context: click.Context, _: click.Parameter, value: str | None)
     context.meta[DIALECT] = value
 
 
+class Day(click.DateTime):
+    """A day such as 2026-05-14, or `today`: nothing else reads the system clock."""
+
+    def __init__(self) -> None:
+        super().__init__(["%Y-%m-%d"])
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> datetime.datetime:
+        return datetime.datetime.now() if value == "today" else super().convert(value, param, ctx)
+
+
 def _day(
     ctx: click.Context, parameter: click.Parameter, value: datetime.datetime | None
 ) -> datetime.date | None:
@@ -114,14 +126,37 @@ def _day(
 
 def date_option(of: str = "run") -> Callable[[F], F]:
     """--date, which is compared with the validity of the calibration."""
-    return day_option(f"The day of the {of}; it is compared with valid_until of the calibration.")
+    return day_option(f"The day of the {of}, or today; it is compared with valid_until of the calibration.")
 
 
 def day_option(help: str, name: str = "--date") -> Callable[[F], F]:
     """--date and other days."""
-    return click.option(
-        name, type=click.DateTime(["%Y-%m-%d"]), callback=_day, metavar="YYYY-MM-DD", help=help
-    )
+    return click.option(name, type=Day(), callback=_day, metavar="YYYY-MM-DD", help=help)
+
+
+def codes(_: click.Context, __: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    """Codes of an option that may be repeated, and may hold several separated by commas."""
+    return tuple(code.strip() for value in values for code in value.split(",") if code.strip())
+
+
+def _acceptable(
+    context: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> tuple[str, ...]:
+    accepted = codes(context, parameter, values)
+    if accepted:
+        from olp.workflows.doubt import acceptable
+
+        acceptable(accepted)
+    return accepted
+
+
+def doubt_options(function: F) -> F:
+    """--date and --accept, of every verb that doubts its inputs."""
+    function = click.option(
+        "--accept", multiple=True, callback=_acceptable, metavar="CODES",
+        help="Go on in spite of these doubts about the inputs, such as OLP409; may be repeated.",
+    )(function)  # fmt: skip
+    return date_option()(function)
 
 
 def output_option(metavar: str, help: str | None = None, **settings: Any) -> Callable[[F], F]:
@@ -257,6 +292,6 @@ def confidence_options(function: F) -> F:
 
 def proof_options(function: F) -> F:
     """Options of `correct` and `verify`."""
-    for option in (fail_on_option, json_option(), date_option(), contour_option, tolerance_option):
+    for option in (fail_on_option, json_option(), doubt_options, contour_option, tolerance_option):
         function = option(function)
     return function

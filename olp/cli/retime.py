@@ -29,6 +29,7 @@ from olp.cli.options import (
     Count,
     Length,
     contour_option,
+    doubt_options,
     fail_on_option,
     flatten_option,
     force_option,
@@ -90,6 +91,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     show_default=True,
     help="Value of an F word for several blocks: the mean (same total time) or the least planned feed.",
 )
+@doubt_options
 @contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
 @flatten_option

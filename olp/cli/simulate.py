@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
-from olp.cli.common import STREAM, diagnostic, files_of, given, put, refuse_early
-from olp.cli.options import Length, contour_option, force_option, output_option, quiet_option, setup_options
+from olp.cli.common import STREAM, diagnostic, files_of, given, options_of, put, refuse_early
+from olp.cli.options import (
+    Length,
+    contour_option,
+    doubt_options,
+    force_option,
+    output_option,
+    quiet_option,
+    setup_options,
+)
+from olp.findings.rule import Severity
 
 
 @click.command("simulate")
@@ -15,6 +26,7 @@ from olp.cli.options import Length, contour_option, force_option, output_option,
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
+@doubt_options
 @contour_option
 @quiet_option("No messages.")
 @force_option("the output file")
@@ -23,10 +35,9 @@ def command(
     machine: str | None,
     job: str | None,
     output: str,
-    step_mm: float,
-    contour: bool,
     quiet: bool,
     force: bool,
+    **words: Any,
 ) -> None:
     """Write the path that the machine would take with its errors, as CSV.
 
@@ -38,9 +49,13 @@ def command(
     from olp.files.write import write_bytes
     from olp.workflows import simulate
 
-    options = simulate.SimulateOptions(step_mm=step_mm, contour=contour)
+    options = options_of(simulate.SimulateOptions, words)
     result = simulate.run(call.session, call.source, options)
     data = result.to_csv()
+    if not quiet:
+        for finding in result.findings:
+            if finding.severity > Severity.INFO:
+                diagnostic(f"olp: warning: {finding.code}: {finding.message}")
     if output == STREAM:
         put(data)
         return

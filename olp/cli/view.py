@@ -14,6 +14,7 @@ from olp.cli.options import (
     Length,
     confidence_options,
     contour_option,
+    doubt_options,
     force_option,
     output_option,
     outside_box_option,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 @click.option("--port", type=Count(0, 65535), default=0, help="Port of --live. Default: a free one.")
 @tolerance_option
 @outside_box_option("refuse the program", "take the error at the box's face")
+@doubt_options
 @contour_option
 @unroll_options
 @confidence_options

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from olp.core.version import __version__
 
 #: The stamp with the first digits of the hash of the calibration.
 _STAMP = re.compile(rb"olp-corrected [0-9a-f]{12}")
+#: What stands behind it: the version, and the codes of the doubts that were accepted.
+_ACCEPTED = re.compile(rb"olp-corrected [0-9a-f]{12} olp \S+ accepted((?: OLP[0-9]{3})+)")
 
 
 def find_stamp(text: bytes) -> re.Match[bytes] | None:
@@ -15,10 +18,18 @@ def find_stamp(text: bytes) -> re.Match[bytes] | None:
     return _STAMP.search(text)
 
 
-def stamp_line(digest: str, comment: tuple[bytes, bytes]) -> bytes:
-    """The stamp for the calibration with this hash, between the marks of a comment."""
+def accepted_in(text: bytes) -> frozenset[str]:
+    """The codes of doubts that the stamp of a corrected text accepts."""
+    found = _ACCEPTED.search(text)
+    return frozenset() if found is None else frozenset(found.group(1).decode().split())
+
+
+def stamp_line(digest: str, comment: tuple[bytes, bytes], accepted: Sequence[str] = ()) -> bytes:
+    """The stamp for the calibration with this hash and the codes of `accepted` doubts, between the marks of a
+    comment."""
     before, after = comment
-    return before + f"olp-corrected {digest[:12]} olp {__version__}".encode() + after
+    words = ["olp-corrected", digest[:12], "olp", __version__, *(["accepted", *accepted] if accepted else [])]
+    return before + " ".join(words).encode() + after
 
 
 def stamped(text: bytes, stamp: bytes, eol: bytes, first: tuple[bytes, ...]) -> bytes:

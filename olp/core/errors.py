@@ -6,7 +6,8 @@
     │   ├── ConfigError        machine, calibration or job file
     │   ├── ProgramError       a program, with its line
     │   │   └── AlreadyCorrected
-    │   └── OutsideBox         a command leaves the calibrated volume
+    │   ├── OutsideBox         a command leaves the calibrated volume
+    │   └── Doubtful           inputs that are not plausible, and are not accepted
     └── CannotCompute          good input, no answer                           exit 4
         └── NotInvertible
 
@@ -83,6 +84,20 @@ class AlreadyCorrected(ProgramError):
 
 class OutsideBox(InputError):
     """A corrected command leaves the calibrated box."""
+
+
+class Doubtful(InputError):
+    """Inputs are not plausible; `problems` has one sentence of each doubt, `codes` the codes that accept
+    them."""
+
+    def __init__(self, problems: tuple[str, ...], codes: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+        self.codes = codes
+
+    def __str__(self) -> str:
+        prefix = f"{self.file}: " if self.file else ""
+        return "\n".join(prefix + problem for problem in self.problems)
 
 
 class CannotCompute(OlpError):

@@ -71,11 +71,11 @@ class HolderPart:
 
 @dataclass(frozen=True, slots=True)
 class Sanity:
-    """Limits of a check before deployment: the largest correction, how far a tool may differ from those
-    measured with and temperatures from that of the calibration. Also the age of a calibration that states no
-    end of its validity, and the clearance of tool and holder."""
+    """Limits of plausible inputs: the largest correction (None: from the travel), how far a tool may differ
+    from those measured with and temperatures from that of the calibration. Also the age of a calibration that
+    states no end of its validity, and the clearance of tool and holder."""
 
-    largest_correction_mm: float = 1.0
+    largest_correction_mm: float | None = None
     tool_within_mm: float = 100.0
     temperature_within_K: float = 5.0
     calibration_days: int = 365
@@ -121,7 +121,8 @@ class Machine:
     """A machine file: chain, limits, offsets, tools and what its control already corrects.
 
     `decimal_point` says what a length without a decimal point means to a control that makes a difference
-    (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator.
+    (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator. None is not stated, and
+    read as increments.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
     (None: not stated).
@@ -139,7 +140,7 @@ class Machine:
     default_tool: int | None = None
     default_work_offset: str = "G54"
     length_active: bool = False
-    decimal_point: Literal["increment", "calculator"] = "increment"
+    decimal_point: Literal["increment", "calculator"] | None = None
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
     sanity: Sanity = Sanity()

@@ -18,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
 from olp.errormodel.gridded import COVER_MM, ComponentTable, cover_problems, frozen, refuse
+from olp.errormodel.quality import Quality
 from olp.errormodel.sources.base import ErrorSource, Frame
 from olp.errormodel.sources.beams import Beam
 from olp.errormodel.sources.curves import Curve, Reference
@@ -30,16 +31,19 @@ from olp.errormodel.sources.structure import Structure
 __all__ = ["Calibration", "Curve", "Cyclic", "Model", "Reference", "Thermal"]
 
 Model = Literal["rigid-body", "huddersfield"]
+#: The date of measuring in files that are still to be filled in; no calibration has it.
+PLACEHOLDER_DATE = datetime.date(2000, 1, 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y, B0Z,
-    A0Z in rad, `backlash_mm` the constant backlash per axis. Several curves of one axis hold different
-    components. `repeatability_mm` is the standard deviation of each axis at one position, None where it is
-    not stated. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`, which was on the
-    machine while measuring. `more` holds key and values of each source that has no field here. Raises
-    ConfigError with every problem."""
+    """All that a calibration states. `box_mm` (3, 2) holds calibrated axis positions, `squareness` C0Y,
+    B0Z, A0Z in rad, `backlash_mm` the constant backlash per axis. Several curves of one axis hold
+    different components. `repeatability_mm` is the standard deviation of each axis at one position, None
+    where it is not stated. `compliance` tables and `beams` act per kg of payload beyond `payload_kg`,
+    which was on the machine while measuring. `quality` is that of the adjustment, None where it is not
+    stated. `more` holds key and values of each source that has no field here. Raises ConfigError with
+    every problem."""
 
     machine: str
     box_mm: Array
@@ -60,6 +64,7 @@ class Calibration:
     measured: datetime.date | None = None
     valid_until: datetime.date | None = None
     active_during_measurement: frozenset[str] = frozenset()
+    quality: Quality | None = None
     more: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:

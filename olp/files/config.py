@@ -99,7 +99,9 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         path_mode=file.path.mode,
         blend_mm=file.path.blend_mm,
         sanity=Sanity(
-            largest_correction_mm=file.check.largest_correction_um * MM_PER_UM,
+            largest_correction_mm=None
+            if file.check.largest_correction_um is None
+            else file.check.largest_correction_um * MM_PER_UM,
             tool_within_mm=file.check.tool_within_mm,
             temperature_within_K=file.check.temperature_within_K,
             calibration_days=file.check.calibration_days,

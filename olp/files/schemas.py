@@ -182,8 +182,10 @@ class PathTable(Table):
 
 
 class CheckTable(Table):
-    largest_correction_um: Positive = Field(
-        default=1000.0, description="the largest plausible correction, in um; 1000 if left out"
+    largest_correction_um: Positive | None = Field(
+        default=None,
+        description="the largest plausible error of this machine, in um; 1000 per metre of the diagonal of "
+        "its travel, and at least 500, if left out",
     )
     tool_within_mm: Positive = Field(
         default=100.0,
@@ -232,10 +234,10 @@ class MachineFile(Table):
     chain: Chain = Field(
         description='the order of axes from workpiece to tool with F for the frame, such as "FXYZ"'
     )
-    decimal_point: Literal["increment", "calculator"] = Field(
-        default="increment",
+    decimal_point: Literal["increment", "calculator"] | None = Field(
+        default=None,
         description="what a length without a decimal point means to a Fanuc or Haas control: X100 is 100 "
-        "least increments, or 100 units as on a pocket calculator",
+        "least increments, or 100 units as on a pocket calculator; increments, with a doubt, if left out",
     )
     controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
     calibration: Text | None = Field(

@@ -11,6 +11,7 @@ import numpy as np
 from olp.core.errors import UsageError
 from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
 from olp.core.units import AXES, in_unit
+from olp.errormodel.calibration import PLACEHOLDER_DATE
 from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
 from olp.files.linuxcnc import Imported, from_linuxcnc
 from olp.files.toml_text import comment, toml_key, toml_lines, toml_value
@@ -18,8 +19,6 @@ from olp.files.write import PathLike, write_files
 
 __all__ = ["Imported", "from_linuxcnc", "machine_toml", "starter_machine", "starter_set", "write_starter"]
 
-#: A date that no calibration has: an untouched starter set counts as expired.
-PLACEHOLDER_DATE = datetime.date(2000, 1, 1)
 Travel = Mapping[str, tuple[float, float]]
 
 #: Rows of each curve file.

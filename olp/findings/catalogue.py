@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 from olp.findings import codes
@@ -17,20 +17,27 @@ from olp.findings.rule import Rule, Severity
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding; `line` counts from 1 in the program, `lines` are the first few of all lines concerned."""
+    """One finding; `line` counts from 1 in the program, `lines` are the first few of all lines concerned.
+    A doubt that is `accepted` is one step less severe."""
 
     code: str
     message: str
     line: int | None = None
     lines: tuple[int, ...] = ()
     count: int = 1
+    accepted: bool = False
 
     @property
     def severity(self) -> Severity:
-        return RULES[self.code].severity
+        severity = RULES[self.code].severity
+        return Severity(max(severity - 1, Severity.INFO)) if self.accepted else severity
+
+    def accept(self) -> Finding:
+        """The same finding, accepted."""
+        return replace(self, accepted=True)
 
     def as_dict(self) -> dict[str, object]:
-        return {
+        stated: dict[str, object] = {
             "code": self.code,
             "severity": self.severity.name.lower(),
             "message": self.message,
@@ -38,6 +45,7 @@ class Finding:
             "lines": list(self.lines),
             "count": self.count,
         }
+        return stated | ({"accepted": True} if self.accepted else {})
 
 
 def rows() -> Iterator[Rule]:
@@ -51,6 +59,9 @@ RULES: dict[str, Rule] = {rule.code: rule for rule in sorted(rows(), key=lambda 
 
 #: The codes that `olp check` looks for.
 GATE_CODES = tuple(code for code, rule in RULES.items() if rule.gate)
+
+#: The codes that --accept takes.
+DOUBTS = frozenset(code for code, rule in RULES.items() if rule.doubt)
 
 
 def worst(findings: Iterable[Finding]) -> Severity | None:

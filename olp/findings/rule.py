@@ -19,7 +19,8 @@ class Rule:
     """A code with its title, its severity, why it matters, what to do, and an example.
 
     `topic` is the module of the code. `gate` says whether `olp check` looks for it in a program. It does not
-    look for findings of measured paths, of results, and of measurements of a machine.
+    look for findings of measured paths, of results, and of measurements of a machine. A `doubt` says that an
+    input is not plausible: as an error it stops a run before anything is written, unless it is accepted.
     """
 
     code: str
@@ -30,3 +31,4 @@ class Rule:
     example: str
     topic: str
     gate: bool = True
+    doubt: bool = False

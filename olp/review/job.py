@@ -101,6 +101,7 @@ def view(
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     time: bool = True,
     step_mm: float | None = None,
     progress: Progress | None = None,
@@ -112,14 +113,15 @@ def view(
     files of tip positions, read and placed on the path as in `olp.compare`; the findings of that are added
     to the others. Without `time` the motion is not planned: times are those of the
     programmed feed. `step_mm` is the distance between samples. `part_tolerance_um`,
-    `only_sure_components` and `date` are those of `correct`. Raises InputError (ProgramError with its line,
-    ConfigError) and CannotCompute.
+    `only_sure_components`, `date` and `accept` are those of `correct`. Raises InputError (ProgramError with
+    its line, ConfigError, Doubtful) and CannotCompute.
     """
     session, source = opened(program, machine, job)
     options = ViewOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, part_tolerance_um=part_tolerance_um,
-        only_sure_components=only_sure_components, date=date, time=time, step_mm=step_mm,
+        only_sure_components=only_sure_components, date=date, accept=tuple(accept), time=time,
+        step_mm=step_mm,
     )  # fmt: skip
     second = None if corrected is None else session.sources.source(corrected)
     return run(
@@ -226,7 +228,7 @@ def _shown(
     plan = None
     if options.time:
         other = session.sources.source(texts.corrected)
-        timing = RetimeOptions(contour=options.contour)
+        timing = RetimeOptions(contour=options.contour, date=options.date, accept=options.accept)
         plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
     return _Shown(samples, plan)
 

@@ -27,6 +27,7 @@ from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.proof import Proof, corrections_mm
 from olp.workflows.correct import CorrectOptions, corrected
+from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
 
@@ -92,6 +93,7 @@ def check(
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     select: Sequence[str] = (),
     ignore: Sequence[str] = (),
     progress: Progress | None = None,
@@ -102,7 +104,8 @@ def check(
     without the stamp of a correction it is the nominal program: it is corrected here, and the result is
     checked. Alone and with a stamp it is checked unchanged, without the checks that need the nominal one.
     Lines are those of `program`. `select` and `ignore` are codes or their beginnings (OLP4). A path outside
-    the calibrated box is not refused: that is finding OLP405, or OLP403 with `outside_box` "hold".
+    the calibrated box is not refused: that is finding OLP405, or OLP403 with `outside_box` "hold". Doubts
+    about the inputs are findings too; those that `accept` or the stamp names are one step less severe.
 
     Raises UsageError for a code that does not exist, InputError for input that cannot be read or corrected
     (ProgramError with its line), and CannotCompute.
@@ -110,7 +113,7 @@ def check(
     options = CheckOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components,
-        date=date, select=tuple(select), ignore=tuple(ignore),
+        date=date, accept=tuple(accept), select=tuple(select), ignore=tuple(ignore),
     )  # fmt: skip
     chosen(options)
     session = Session.start(machine, job)
@@ -176,7 +179,7 @@ def _case(
     name, data = program.name, program.data
     if nominal is None and find_stamp(data) is None:
         correcting = CorrectOptions(**options.proof(), outside_box="hold")
-        run = corrected(sources, program, loaded, correcting, tell, options.outside_code)
+        run = corrected(sources, program, loaded, correcting, tell, options.outside_code, refuse_doubts=False)
         what = "the result of olp correct on the program"
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
@@ -188,7 +191,7 @@ def _case(
     nominal.load()
     with nominal.errors("<nominal>"):
         first = read(nominal.data, loaded.setup, loaded.dialect, reading)
-    run = verify_programs((first, nominal.name), (written, name), loaded, options)
+    run = verify_programs((first, nominal.name), (written, name), loaded, options, refuse_doubts=False)
     what = f"the corrected program against the nominal one ({nominal.short or 'stdin'})"
     proof = replace(
         run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
@@ -215,14 +218,14 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     else:
         findings += state.travel_findings(path, machine)
         findings += state.box_findings(path, loaded.model.box_mm, options.outside_code)
-        findings += state.calibration_findings(loaded.calibration, date, sanity.calibration_days)
+        read_here = case.written if run is None else run.nominal
+        findings += doubted(read_here, loaded, options.accept, date, stamped=case.data, refuse=False)
         findings += checks.program_findings(case.written, loaded.setup, contour=options.contour)
         findings += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             findings += checks.proof_findings(proof, run.uncorrected)
             findings += checks.between_findings(run.nominal, proof, loaded.model)
             findings += _in_lines_of_corrected(run)
-    findings += state.tool_findings(path, loaded.calibration, sanity)
     lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD
     findings += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
     findings += motion.reversal_findings(path, loaded.model)
@@ -233,7 +236,6 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
         findings += motion.demand_findings(path, speeds.mm_s, machine)
     if run is not None and proof is not None and before is not None:
         correction = corrections_mm(run.nominal, case.written, proof)
-        findings += state.sanity_findings(proof.nominal, correction, sanity)
         findings += motion.low_findings(proof, loaded.model)
         if speeds.mm_s is not None and before.mm_s is not None:
             findings += motion.changed_findings(proof, before.mm_s, speeds.mm_s)
@@ -330,6 +332,7 @@ def _report(
         },
         "date": options.date,
         "tolerance_um": options.tolerance_um,
+        "accepted": accepted_of(findings),
         "rules": codes,
         "verdict": _verdict(case),
         "findings": [f.as_dict() for f in findings],

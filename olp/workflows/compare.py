@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from olp.checks.state import calibration_findings
 from olp.comparison import figures, runs
 from olp.comparison.nominal import Nominal, nominal_of
 from olp.comparison.pairing import Order
@@ -29,7 +30,6 @@ from olp.program.registry import Options, read
 from olp.workflows import compare_report as parts
 from olp.workflows.compare_poses import part_frame as poses_frame
 from olp.workflows.compare_poses import poses_report
-from olp.workflows.proof import calibration_findings
 from olp.workflows.session import Loaded, PathLike, Session
 
 
@@ -208,7 +208,8 @@ def _paths(
     findings += parts.verdict(report, options.part_tolerance_um)
     findings += parts.cycles(groups)
     if side.loaded is not None:
-        findings += calibration_findings(side.loaded, options.date)
+        days = side.loaded.setup.machine.sanity.calibration_days
+        findings += calibration_findings(side.loaded.calibration, options.date, days)
     after, before = groups["after"], groups["before"]
     return Comparison(_with(report, findings), tuple(findings), sets[0][0].profile, path, after, before)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -28,6 +29,7 @@ from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.proof.proof import prove
 from olp.uncertainty.spread import Confidence
+from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import unrolled
 from olp.workflows.proof import (
     Pair,
@@ -84,6 +86,7 @@ def correct(
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Correction:
     """Correct a program for a machine, and prove it.
@@ -95,15 +98,17 @@ def correct(
     parameter.
 
     Where the calibration states uncertainties, the report gives the probability that the tip is within
-    `part_tolerance_um` (default: the job's, else `tolerance_um`). With `only_sure_components` components
-    within their own uncertainty are not corrected. Raises InputError (ProgramError with its line,
-    ConfigError, OutsideBox) and CannotCompute.
+    `part_tolerance_um` (default: the job's; without any there is no probability). With
+    `only_sure_components` components within their own uncertainty are not corrected. `accept` are codes of
+    doubts about the inputs that are no error here; the stamp states them. Raises InputError (ProgramError
+    with its line, ConfigError, OutsideBox, Doubtful) and CannotCompute.
     """
     session, source = opened(program, machine, job)
     options = CorrectOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten, expand_cycles=expand_cycles,
         peck_clearance_mm=peck_clearance_mm, contour=contour, split_rapids=split_rapids,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
+        accept=tuple(accept),
     )  # fmt: skip
     return run(session, source, options, progress)
 
@@ -120,10 +125,10 @@ def run(
 
 def corrected(
     sources: Sources, program: Source, loaded: Loaded, options: CorrectOptions, tell: Progress,
-    outside: str = "OLP403",
+    outside: str = "OLP403", refuse_doubts: bool = True,
 ) -> Run:  # fmt: skip
     """Correct a program and prove it; `outside` is the code of findings outside the box, whose error is that
-    at its face. Raises as `correct`."""
+    at its face. Without `refuse_doubts` they are findings alone. Raises as `correct`."""
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
     data = program.data
@@ -132,14 +137,14 @@ def corrected(
             sources, program, loaded.setup, loaded.dialect, expand_cycles=options.expand_cycles,
             peck_clearance_mm=options.peck_clearance_mm,
         )  # fmt: skip
-    done = _rewritten(data, loaded, options, tell)
+    done = _rewritten(data, loaded, options, refuse_doubts, tell)
     tell("prove", 0.7)
     reading = Options(contour=options.contour)
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
     _prove_without_deleted(done, loaded, options.contour)
     pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
-    run = proved(pair, loaded.held(), options, outside=held, tell=tell)
+    run = proved(pair, loaded.held(), options, done.doubts, outside=held, tell=tell)
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -165,9 +170,12 @@ class _Rewritten:
     uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
+    doubts: tuple[Finding, ...]
 
 
-def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progress) -> _Rewritten:
+def _rewritten(
+    data: bytes, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool, tell: Progress
+) -> _Rewritten:
     """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.dialect, Options(contour=options.contour))
@@ -177,6 +185,7 @@ def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progr
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
             'set joined = "lines" and insert = true in the profile'
         )
+    doubts = doubted(program, loaded, options.accept, options.date, refuse=refuse_doubts)
     tell("correct", 0.2)
     digit = last_digit_mm(program, loaded.setup)
     limits = Limits(
@@ -185,14 +194,15 @@ def _rewritten(data: bytes, loaded: Loaded, options: CorrectOptions, tell: Progr
     )  # fmt: skip
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
+    marked = loaded.dialect.marks
     written = write(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.dialect.comment) if loaded.dialect.marks else b"",
+        stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted_of(doubts)) if marked else b"",
     )  # fmt: skip
     nominal = replace(program, words=None, slot=program.slot[:0])
     text = written.text if written.changed else data
-    return _Rewritten(nominal, text, limits, digit, rows.uncorrected, written.parts, written.tally)
+    return _Rewritten(nominal, text, limits, digit, rows.uncorrected, written.parts, written.tally, doubts)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

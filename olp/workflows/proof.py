@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from olp.proof.judgement import Judgements, verdict
 from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, largest_correction_mm, prove
 from olp.uncertainty.spread import Confidence
 from olp.workflows.confidence import assess
+from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.session import Loaded
 
 _PROVES = (
@@ -44,13 +46,14 @@ _DOES_NOT_PROVE = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProofOptions:
     """Options of every verb that proves a correction: the numerical tolerance, the part tolerance
-    (`part_tolerance_um`, default: the job's, else `tolerance_um`), and the day of the run."""
+    (`part_tolerance_um`, default: the job's), the day of the run, and the codes of doubts to accept."""
 
     tolerance_um: float = 1.0
     contour: bool = False
     part_tolerance_um: float | None = None
     only_sure_components: bool = False
     date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
     def proof(self) -> dict[str, Any]:
         """These values alone, as the keywords of another verb's options."""
@@ -89,28 +92,31 @@ class Pair:
 
 
 def verify_programs(
-    nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions
-) -> Run:
+    nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions,
+    *, refuse_doubts: bool = True,
+) -> Run:  # fmt: skip
     """Prove a corrected program from any source; programs come with their names. Raises ProgramError where
-    the second is not a correction of the first."""
+    the second is not a correction of the first, Doubtful with `refuse_doubts`."""
     (first, name), (second, other) = nominal, corrected
+    doubts = doubted(first, loaded, options.accept, options.date, stamped=second.data, refuse=refuse_doubts)
     with naming(name or "<nominal>"):
         rows = plan(
             first.toolpath, loaded.model, Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
         )
     pair = Pair(first, first.data, name, second, second.data, other, rows.uncorrected)
     try:
-        return proved(pair, loaded, options)
+        return proved(pair, loaded, options, doubts)
     except OlpError as error:
         raise error.in_file(other or "<corrected>") from None
 
 
 def proved(
-    pair: Pair, loaded: Loaded, options: ProofOptions, *, outside: str | None = None, tell: Progress = silent
-) -> Run:
+    pair: Pair, loaded: Loaded, options: ProofOptions, doubts: Iterable[Finding], *,
+    outside: str | None = None, tell: Progress = silent,
+) -> Run:  # fmt: skip
     """The proof of a pair of programs with all that is said of it; `correct` and `verify` are the same here.
-    `outside` is the code of findings outside the calibrated box, None where nothing is outside. Raises
-    ProgramError where the second is not a correction of the first."""
+    `doubts` are those about the inputs. `outside` is the code of findings outside the calibrated box, None
+    where nothing is outside. Raises ProgramError where the second is not a correction of the first."""
     tolerance_mm = options.tolerance_um * MM_PER_UM
     first = pair.nominal
     proof = prove(
@@ -126,7 +132,7 @@ def proved(
         )
     largest_mm = largest_correction_mm(first, pair.corrected, proof)
     findings = (
-        *calibration_findings(loaded, options.date),
+        *doubts,
         *checks.proof_findings(proof, pair.uncorrected),
         *checks.part_findings(table, part_um),
         *checks.between_findings(first, proof, loaded.model),
@@ -155,11 +161,6 @@ def position_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list
     if outside is not None:
         findings = [*findings, *state.box_findings(path, loaded.model.box_mm, outside)]
     return findings
-
-
-def calibration_findings(loaded: Loaded, date: datetime.date | None) -> list[Finding]:
-    days = loaded.setup.machine.sanity.calibration_days
-    return state.calibration_findings(loaded.calibration, date, days)
 
 
 def findings_of_model(path: Toolpath, loaded: Loaded, tolerance_mm: float) -> list[Finding]:
@@ -200,6 +201,7 @@ def report_of(
         "orientation": checks.orientation(program.toolpath, loaded.model),
         "sources": checks.sources(program.toolpath, loaded.model),
         "worst": checks.worst_blocks(program, proof),
+        "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],
         "proves": list(_PROVES),
         "does_not_prove": list(_DOES_NOT_PROVE),

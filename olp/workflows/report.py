@@ -81,7 +81,7 @@ def correction(
         return to_json(report)
     plots: dict[str, bytes] = {}
     if FilePath(name).suffix.lower() == ".html":
-        plots = _predicted_plots(result, nominal, session, options.contour)
+        plots = _predicted_plots(result, nominal, session, options)
         if result.confidence is not None and len(result.confidence):
             from olp.reports.plots import path as plots_path
 
@@ -123,21 +123,23 @@ def _path_plots(
 
 
 def _predicted_plots(
-    result: Correction, nominal: Source, session: Session, contour: bool
+    result: Correction, nominal: Source, session: Session, options: CorrectOptions
 ) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
     loaded = session.loaded("hold").reading(nominal)
-    program = read(nominal.data, loaded.setup, loaded.dialect, Options(contour=contour), words=False)
+    program = read(nominal.data, loaded.setup, loaded.dialect, Options(contour=options.contour), words=False)
     try:
         path = nominal_of(program.toolpath, loaded.model, "tip").path
     except CannotCompute:
         return {}
     step = max(_STEP_MM, path.length_mm / _POINTS)
     runs: dict[str, Sequence[Run]] = {}
-    options = SimulateOptions(step_mm=step, contour=contour)
+    simulating = SimulateOptions(
+        step_mm=step, contour=options.contour, date=options.date, accept=options.accept
+    )
     corrected = session.sources.source(result.data)
     for side, text in (("before", session.sources.source(nominal.data)), ("after", corrected)):
-        points = simulated(text, loaded, options).points_mm
+        points = simulated(text, loaded, simulating).points_mm
         # points farther away are no part of the path, such as those of a tool change
         reach = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
         runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)

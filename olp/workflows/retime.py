@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import datetime
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -26,6 +27,7 @@ from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
+from olp.workflows.doubt import accepted_of, doubted_motion
 from olp.workflows.flatten import unrolled
 from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
@@ -53,12 +55,15 @@ class RetimeOptions:
     contour: bool = False
     block_delete: bool = False
     flatten: bool = False
+    date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retiming:
     """A trajectory for each stretch of the program between moves of the control itself, as `plan`; the report
-    ("olp-retime-1"), and the findings: axes commanded beyond their travel."""
+    ("olp-retime-1"), and the findings: doubts about the inputs, and axes
+    commanded beyond their travel."""
 
     plan: Plan
     report: dict[str, Any]
@@ -217,6 +222,8 @@ def retime(
     contour: bool = False,
     block_delete: bool = False,
     flatten: bool = False,
+    date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Retiming:
     """The fastest motion found along a program that keeps every axis inside its limits of velocity,
@@ -229,13 +236,14 @@ def retime(
     times the path tolerances in use. `max_inertial_um` limits the deviation by accelerations and the
     machine's compliance. `block_delete` leaves `/` blocks out. `flatten` unrolls loops, subprograms and
     expressions first: lines are then those of the unrolled text. Axes commanded beyond their travel are
-    findings (OLP402), and planned all the same. Raises InputError (ProgramError with its line,
-    ConfigError), UsageError and CannotCompute.
+    findings (OLP402), and planned all the same. `date` and `accept` are those of `correct`, for doubts about
+    the inputs. Raises InputError (ProgramError with its line, ConfigError, Doubtful), UsageError and
+    CannotCompute.
     """
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um, contour=contour,
-        block_delete=block_delete, flatten=flatten,
+        block_delete=block_delete, flatten=flatten, date=date, accept=tuple(accept),
     )  # fmt: skip
     other = None if nominal is None else session.sources.source(nominal)
     source = session.sources.source(program)
@@ -257,6 +265,9 @@ def run(
     tell = progress or silent
     tell("read", 0.0)
     case = _case(session, program, options)
+    doubts = doubted_motion(
+        case.program, session.of(case.setup), options.accept, options.date, case.program.data
+    )
     other = None if nominal is None else _case(session, nominal, options)
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
@@ -273,7 +284,8 @@ def run(
     if options.study_blend:
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
     # the motion is inside the box of its waypoints, so commands within travel are motion within travel
-    findings = tuple(travel_findings(case.program.toolpath, setup.machine))
+    findings = (*doubts, *travel_findings(case.program.toolpath, setup.machine))
+    report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(plan, report, findings)
 

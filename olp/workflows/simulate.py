@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import datetime
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +13,9 @@ from olp.compensation.plan import zero_shifts
 from olp.core.arrays import Array
 from olp.core.machine import Setup
 from olp.files.sources import Source
+from olp.findings.catalogue import Finding
 from olp.program.registry import Options, read
+from olp.workflows.doubt import doubted
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 
@@ -22,16 +26,19 @@ class SimulateOptions:
     step_mm: float = 1.0
     outside_box: Outside = "hold"
     contour: bool = False
+    date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
     """(n, 3) tip positions of the machine with its errors, in the program's first work frame, and the line of
-    each."""
+    each; the findings are doubts about the inputs."""
 
     points_mm: Array
     line: Array
     frame: str
+    findings: tuple[Finding, ...] = ()
 
     def to_csv(self) -> bytes:
         """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment."""
@@ -51,10 +58,17 @@ def simulate(
     step_mm: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
+    date: datetime.date | None = None,
+    accept: Sequence[str] = (),
 ) -> Simulation:
-    """The path of the tip that the uncompensated machine would take, in the program's first work frame."""
+    """The path of the tip that the uncompensated machine would take, in the program's first work frame.
+
+    Raises Doubtful where the inputs are not plausible, except for the codes of `accept` and of the stamp.
+    """
     session, source = opened(program, machine, job, "<program>")
-    options = SimulateOptions(step_mm=step_mm, outside_box=outside_box, contour=contour)
+    options = SimulateOptions(
+        step_mm=step_mm, outside_box=outside_box, contour=contour, date=date, accept=tuple(accept)
+    )
     return run(session, source, options)
 
 
@@ -71,14 +85,17 @@ def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simu
 
     with program.errors("<program>"):
         reading = Options(contour=options.contour)
-        path = read(program.data, loaded.setup, loaded.dialect, reading, words=False).toolpath
+        parsed = read(program.data, loaded.setup, loaded.dialect, reading, words=False)
+        doubts = doubted(parsed, loaded, options.accept, options.date, stamped=program.data)
+        path = parsed.toolpath
         shift = zero_shifts(path.frames, loaded.model)
     if not len(path):
-        return Simulation(np.zeros((0, 3)), np.zeros(0), "")
+        return Simulation(np.zeros((0, 3)), np.zeros(0), "", doubts)
     actual, move = Tracer.trace(path, loaded.model, options.step_mm)
     home = path.frames[int(path.frame[0])]
     lengths = path.per_frame([f.length_mm for f in path.frames])
     tip = actual - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
     actual = home.tip_mm(tip)
     known = np.isfinite(actual).all(axis=1)
-    return Simulation(actual[known], path.line[move[known]].astype(np.float64), home.work_offset)
+    line = path.line[move[known]].astype(np.float64)
+    return Simulation(actual[known], line, home.work_offset, doubts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -47,16 +48,19 @@ def verify(
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Verification:
     """Compare a corrected program with the nominal one, from the two texts and the machine's files alone.
 
-    Raises ProgramError where the second is not a correction of the first.
+    Doubts about the inputs that `accept` or the stamp of the corrected program names are no error. Raises
+    ProgramError where the second is not a correction of the first, Doubtful where a doubt is not accepted.
     """
     session = Session.start(machine, job)
     options = VerifyOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
+        accept=tuple(accept),
     )  # fmt: skip
     texts = session.sources.source(nominal), session.sources.source(corrected)
     return run(session, *texts, options, progress)

@@ -30,6 +30,10 @@ _AXIS += "acceleration_mm_s2 = 2000.0\njerk_mm_s3 = 20000.0\n"
 _STAMP = re.compile(rb"(?m)^.*olp-corrected [0-9a-f]{12}.*\n")
 
 
+#: of an adjustment that fits
+QUALITY = "\n[quality]\nchi_square = 99.0\ndegrees_of_freedom = 100.0\n"
+
+
 def machine(
     folder: Path,
     calibration: str = "",
@@ -49,6 +53,8 @@ def machine(
         f'schema = "olp-machine-1"\nname = "m"\nchain = "{chain}"\ncontroller = "{controller}"\n'
         f'calibration = "calibration.toml"\n{keys}\n{axes}{tables}\n'
     )
+    if "[quality]" not in calibration:
+        calibration += QUALITY
     if "datum_mm" not in calibration:
         calibration = "datum_mm = [0.0, 0.0, 0.0]\n" + calibration
     box = "[[-1000.0, 2000.0], [-1000.0, 2000.0], [-1000.0, 2000.0]]"

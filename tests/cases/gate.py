@@ -99,6 +99,36 @@ def scaled(um: float) -> dict[str, Any]:
     }
 
 
+def limited(um: float) -> dict[str, Any]:
+    """The same on a machine that states 1010 um as its largest error."""
+    return {**scaled(um), "swap": {"[axes.X]": "[check]\nlargest_correction_um = 1010.0\n[axes.X]"}}
+
+
+def valued(*um: float) -> dict[str, Any]:
+    """Values of EXX from -1000 to 2000 mm."""
+    step = 3000.0 / (len(um) - 1)
+    rows = "".join(f"{-1000.0 + k * step},{value}\n" for k, value in enumerate(um))
+    table = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
+    return {"calibration": table, "curves": {"x.csv": f"X_mm,EXX_um\n{rows}"}}
+
+
+def per_axis(x_um: float, others_um: float) -> dict[str, Any]:
+    """An error of each axis along itself."""
+    curves = {
+        f"{a.lower()}.csv": f"{a}_mm,E{a}{a}_um\n-1000,0\n2000,{x_um if a == 'X' else others_um}\n"
+        for a in "XYZ"
+    }
+    return {"calibration": "".join(f'[[curves]]\nfile = "{name}"\n' for name in curves), "curves": curves}
+
+
+def quality(chi_square: float) -> dict[str, Any]:
+    return {"calibration": f"[quality]\nchi_square = {chi_square}\ndegrees_of_freedom = 100.0\n"}
+
+
+def stated(calibration: str) -> dict[str, Any]:
+    return {"calibration": calibration}
+
+
 def known(sigma_um: float, more: str = "") -> dict[str, Any]:
     """An error of X of 10 um everywhere, known to so much."""
     table = f'[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n{more}'
@@ -263,7 +293,7 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(job="[temperatures_degC]\nX_scale = 25.0\n"),
     ),
     "OLP408": (Call(options={"date": None}), Call()),
-    "OLP409": (Call(**scaled(1011.0)), Call(**scaled(1009.0))),
+    "OLP409": (Call(**limited(1011.0)), Call(**limited(1009.0))),
     "OLP410": (
         Call(keys='compensated_by_controller = "all"\n'),
         Call(keys="compensated_by_controller = []\n"),
@@ -324,6 +354,65 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     # 310 days after measuring
     "OLP437": (Call(**growing(1.19)), Call(**growing(1.16))),
+    "OLP440": (Call(**valued(0.0, 0.0)), Call(**valued(0.0, 0.1))),
+    "OLP441": (Call(), Call(**valued(0.0, 0.1))),
+    "OLP442": (
+        Call(swap={"measured = 2026-01-15": "measured = 2000-01-01"}),
+        Call(swap={"measured = 2026-01-15": "measured = 2000-01-02"}),
+    ),
+    # reduced chi-square of 4, at 100 degrees of freedom 14 standard deviations
+    "OLP443": (Call(**quality(401.0)), Call(**quality(399.0))),
+    "OLP444": (Call(swap={"[quality]\nchi_square = 99.0\ndegrees_of_freedom = 100.0\n": ""}), Call()),
+    # the limit is 1 mm per metre of a diagonal of 5.196 m
+    "OLP445": (Call(**valued(0.0, 5198.0)), Call(**valued(0.0, 5194.0))),
+    "OLP446": (
+        Call(**stated("[squareness]\nC0Y_urad = 10001.0\n")),
+        Call(**stated("[squareness]\nC0Y_urad = 9999.0\n")),
+    ),
+    "OLP447": (
+        Call(**stated("[backlash]\nX_um = 1001.0\n")),
+        Call(**stated("[backlash]\nX_um = -999.0\n")),
+    ),
+    "OLP448": (
+        Call(**stated('[[cyclic]]\ncomponent = "EXX"\nperiod_mm = 20.0\namplitude_um = 101.0\n')),
+        Call(**stated('[[cyclic]]\ncomponent = "EXX"\nperiod_mm = 20.0\namplitude_um = 99.0\n')),
+    ),
+    "OLP449": (
+        Call(**valued(10, -9, 10, -8, 81, -9, 9, -10)),
+        Call(**valued(10, -9, 10, -8, 79, -9, 9, -10)),
+    ),
+    "OLP450": (Call(**per_axis(0.4, 121.0)), Call(**per_axis(0.4, 119.0))),
+    # 0.1 um per metre of the same diagonal
+    "OLP451": (Call(**valued(0.0, 0.51)), Call(**valued(0.0, 0.53))),
+    # 5 % of 3 m
+    "OLP452": (Call(swap=travel(1856.0)), Call(swap=travel(1860.0))),
+    "OLP453": (
+        Call(**stated("datum_mm = [5001.0, 0.0, 0.0]\n")),
+        Call(**stated("datum_mm = [4999.0, 0.0, 0.0]\n")),
+    ),
+    "OLP454": (Call(tables=tool(0.99)), Call(tables=tool(1.01))),
+    "OLP455": (Call(tables=tool(851.0), **curve(-50.0)), Call(tables=tool(849.0), **curve(-50.0))),
+    "OLP456": (
+        Call(start="X = 3501.0, Y = 0.0, Z = 0.0"),
+        Call(start="X = 3499.0, Y = 0.0, Z = 0.0"),
+    ),
+    "OLP457": (
+        Call(job="[temperatures_degC]\nworkpiece = 50.1\n"),
+        Call(job="[temperatures_degC]\nworkpiece = 49.9\n"),
+    ),
+    "OLP458": (
+        Call(**stated("[thermal]\nX_scale_um_m_K = 40.1\n")),
+        Call(**stated("[thermal]\nX_scale_um_m_K = 39.9\n")),
+    ),
+    "OLP459": (Call(job="payload_kg = 20001.0\n"), Call(job="payload_kg = 19999.0\n")),
+    "OLP460": (
+        Call(options={"date": datetime.date(2026, 1, 14)}),
+        Call(options={"date": datetime.date(2026, 1, 15)}),
+    ),
+    "OLP461": (
+        Call(b"G1 X1000\n", head=FANUC.replace(b".", b""), controller="fanuc"),
+        Call(b"G1 X1000\n", head=FANUC, controller="fanuc"),
+    ),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),
         Call(OVER, tables=tool(50.0), **clamp(9.999)),

@@ -97,13 +97,14 @@ def test_options_reach_the_library(mill: Path, library: Fake) -> None:
     flags = ["--flatten", "--expand-cycles", "--contour", "--split-rapids"]
     flags += ["--only-sure-components", "--part-tolerance-um", "7.5"]
     options = ["--tolerance-um", "2.5", "--outside-box", "hold", "--date", "2027-01-31"]
+    options += ["--accept", "OLP409,OLP401", "--accept", "OLP440"]
     assert run("correct", "-j", mill / "job.toml", *flags, *options).exit_code == 0
     passed = dict(library.calls[0][1])
     assert passed.pop("date").isoformat() == "2027-01-31"
     assert passed == {
         "tolerance_um": 2.5, "outside_box": "hold", "flatten": True, "expand_cycles": True, "contour": True,
         "split_rapids": True, "peck_clearance_mm": None, "progress": None, "part_tolerance_um": 7.5,
-        "only_sure_components": True,
+        "only_sure_components": True, "accept": ("OLP409", "OLP401", "OLP440"),
     }  # fmt: skip
     run("correct", "-j", mill / "job.toml", "--force")
     assert library.calls[1][1]["date"] is None, "no run reads the clock"
@@ -263,12 +264,16 @@ def test_stdin_gives_the_bytes_that_the_file_gives(tmp_path: Path) -> None:
     assert piped.stdout_bytes == (tmp_path / "out.ngc").read_bytes()
 
 
-def test_an_expired_calibration_fails_only_where_warnings_do(tmp_path: Path) -> None:
-    args = ["correct", "-j", JOB, "-o", tmp_path / "out.ngc", "--force", "--date", "2099-01-01"]
-    result = run(*args)
-    assert result.exit_code == 0
-    assert "OLP401" in result.stdout
-    assert run(*args, "--fail-on", "warning").exit_code == 1
+def test_an_expired_calibration_is_refused_unless_it_is_accepted(tmp_path: Path) -> None:
+    args = ["correct", "-j", JOB, "-o", tmp_path / "out.ngc", "--date", "2099-01-01"]
+    refused = run(*args)
+    assert refused.exit_code == 3
+    assert "OLP401" in refused.stderr
+    assert not (tmp_path / "out.ngc").exists()
+    accepted = run(*args, "--accept", "OLP401")
+    assert accepted.exit_code == 0
+    assert "OLP401  warning" in accepted.stdout
+    assert run(*args, "--accept", "OLP401", "--force", "--fail-on", "warning").exit_code == 1
 
 
 def test_simulate_writes_a_path_with_its_frame(tmp_path: Path) -> None:

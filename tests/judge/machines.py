@@ -23,6 +23,8 @@ TOOLS: dict[int, dict[str, Any]] = {
     1: {"Z_mm": 120.0, "radius_mm": 5.0},
     2: {"Z_mm": 85.5, "radius_mm": 3.0, "gauge_to_tip_mm": [40.0, -60.0, -85.5]},  # else no E_CZ is ever seen
 }
+#: Controls on which a decimal point decides.
+POINTED = ("fanuc", "haas")
 Curve = tuple[int, np.ndarray, dict[str, np.ndarray], np.ndarray | None]
 
 
@@ -74,6 +76,7 @@ def _machine_text(recipe: Recipe, name: str) -> str:
                 "name": name,
                 "chain": recipe.chain,
                 "controller": recipe.controller,
+                **({"decimal_point": "increment"} if recipe.controller in POINTED else {}),
                 "calibration": "calibration.toml",
                 "compensated_by_controller": [],
             },
@@ -206,5 +209,5 @@ def shift_machine(
 
 
 def zero_machine(folder: Path, recipe: Recipe | None = None) -> Path:
-    """A machine without any error."""
-    return _constant(folder, recipe or Recipe(), (0.0, 0.0, 0.0))
+    """A machine without any error: its calibration has no curves, as curves of zeros are doubted."""
+    return _write(folder, recipe or Recipe(), (0.0, 0.0, 0.0), [], {})

@@ -196,7 +196,7 @@ class JudgeModel:
         cal: dict[str, Any] = tomllib.loads(cal_path.read_text())
         described = {"schema", "machine", "measured", "valid_until", "temperature_degC", "sign", "box_mm"}
         # how well it is known changes nothing of what it says
-        described |= {"covariance", "repeatability"}
+        described |= {"covariance", "repeatability", "quality"}
         modelled = {"model", "datum_mm", "curves", "squareness", "backlash", "cyclic"}
         _only(
             cal,

@@ -52,7 +52,7 @@ def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Pa
         if folder == "gcode_fanuc":
             # these were written for calculator input: `X0Y50` is beside `X50.Y0`
             text = machine.read_text()
-            machine.write_text(text.replace("controller =", 'decimal_point = "calculator"\ncontroller =', 1))
+            machine.write_text(text.replace('decimal_point = "increment"', 'decimal_point = "calculator"'))
         job = machine.with_name("job.toml")
         start = "start_mm = { X = 0.0, Y = 0.0, Z = 100.0 }\n"
         job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}')

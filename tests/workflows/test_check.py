@@ -43,9 +43,9 @@ def test_a_good_job_has_no_finding(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("select", "ignore", "expected"), [
-    ((), (), {"OLP405", "OLP408"}),
+    ((), (), {"OLP405", "OLP408", "OLP441"}),
     (("OLP405",), (), {"OLP405"}),
-    (("olp4",), ("OLP405",), {"OLP408"}),
+    (("olp4",), ("OLP405",), {"OLP408", "OLP441"}),
     ((), ("OLP",), set()),
     (("OLP1", "OLP408"), (), {"OLP408"}),
 ])  # fmt: skip

@@ -80,7 +80,8 @@ def test_the_deflection_that_a_payload_adds_is_removed(tmp_path: Path, support: 
     blocks = [f"G0 X0 Y{y} Z{z}" for y, z in places]
     body = [[f"(OLP PAYLOAD {mass} kg)", *blocks] for mass in (0, 30, 60)]
     source = "\n".join(["G21 G90 G54 G64 P0.001 Q0", "G0 X0 Y0 Z0", *itertools.chain(*body), "M2", ""])
-    result = olp.correct(source.encode(), path)
+    # the axis moves less than its beam was measured
+    result = olp.correct(source.encode(), path, accept=["OLP452"])
     command = points(result.data)[1:]
     nominal = points(source.encode())[1:]
     masses = np.repeat([0.0, 30.0, 60.0], len(places))

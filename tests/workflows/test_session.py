@@ -172,6 +172,7 @@ def test_every_keyword_reaches_the_options(
         texts.append([])  # type: ignore[arg-type]
     setup = olp.load_setup(FOLDER / "machine.toml")
     marks: dict[str, Any] = {"select": ("OLP4",), "ignore": ("OLP4",), "before": ("mark",)}
+    marks |= {"accept": ("OLP401",)}
     for field in dataclasses.fields(options):
         mark = marks.get(field.name, "mark")
         function(*texts, setup, **{field.name: mark})

@@ -22,6 +22,7 @@ from olp.core.units import AXES
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
 from olp.errormodel.entry import Entry
+from olp.errormodel.quality import Fitted, Quality
 from olp.errormodel.sensitivity import Sensitivity, value_rows
 from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
@@ -98,7 +99,10 @@ def refine(
     freedom = float(max(normal.count - int(blind[use].any(axis=1).sum()) - normal.free, 1))
     covariance = solved.covariance * max(1.0, chi / freedom)
     change = _changes(uncertainty, parts, solved.theta)
-    new = _applied(calibration, change)
+    new = dataclasses.replace(
+        _applied(calibration, change),
+        quality=with_run(calibration.quality, Fitted(points.source or "run", chi, freedom)),
+    )
     expected = float((_across(rows, blind)[use] ** 2).sum() + (sigma[use] ** 2).sum())
     return Refinement(
         new,
@@ -111,6 +115,17 @@ def refine(
         freedom,
         _sizes(change),
         tuple(outliers),
+    )
+
+
+def with_run(quality: Quality | None, run: Fitted) -> Quality:
+    """The quality of a calibration with that of a run, whose residuals are those from the old calibration."""
+    if quality is None:
+        return Quality(Fitted("all readings", run.chi_square, run.freedom), (run,))
+    total = quality.total
+    return Quality(
+        Fitted(total.source, total.chi_square + run.chi_square, total.freedom + run.freedom),
+        (*quality.sources, run),
     )
 
 

@@ -143,7 +143,10 @@ def _iterate(start: _Start, tell: Progress) -> _Settled:
 def _finish(start: _Start, end: _Settled) -> Fit:
     """The results of every observation, and the covariance of all unknowns."""
     model, theta, normal = start.model, end.solved.theta, end.normal
-    results = [Result.of(state, block, theta) for state, block in zip(end.states, end.blocks, strict=True)]
+    results = [
+        Result.of(state, block, theta, end.solved.covariance)
+        for state, block in zip(end.states, end.blocks, strict=True)
+    ]
     chi_square = sum((result.chi_square for result in results), 0.0)
     # readings less what the fit used up of their freedom
     used = float(np.trace(end.solved.covariance @ normal.H))

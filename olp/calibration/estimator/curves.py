@@ -56,6 +56,7 @@ def calibration_of(fit: Fit, valid_until: datetime.date | None = None) -> Calibr
         measured=m.measured,
         valid_until=valid_until,
         active_during_measurement=m.active_during_measurement,
+        quality=fit.quality,
     )
 
 

@@ -15,6 +15,7 @@ from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
 from olp.calibration.observations.measurements import Measurements
 from olp.core.arrays import Array
 from olp.core.units import AXES
+from olp.errormodel.quality import Fitted, Quality
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +52,18 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """By how many standard deviations chi-square is above what noise gives: by its cube root, which is
-        nearly normal (E. B. Wilson and M. M. Hilferty, 1931)."""
-        part = 2.0 / (9.0 * self.freedom)
-        ratio = self.chi_square / self.freedom
-        return float((ratio ** (1.0 / 3.0) - (1.0 - part)) / np.sqrt(part))
+        """By how many standard deviations chi-square is above what noise gives."""
+        return self.quality.total.deviations
+
+    @property
+    def quality(self) -> Quality:
+        """How well the readings fit, in all and by file or instrument."""
+        sums: dict[str, tuple[float, float]] = {}
+        for result in self.results:
+            chi_square, freedom = sums.get(result.state.label, (0.0, 0.0))
+            sums[result.state.label] = (chi_square + result.chi_square, freedom + result.freedom)
+        sources = (Fitted(label, *figures) for label, figures in sums.items() if label)
+        return Quality(Fitted("all readings", self.chi_square, self.freedom), tuple(sources))
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         """(n, 3, size) dependence of the error on theta. It is in the frame of the machine where some points

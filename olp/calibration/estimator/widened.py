@@ -185,8 +185,9 @@ class Adjustment:
         results, chi_square = [], 0.0
         for result in self.fit.results:
             if isinstance(result.state, ScatteredState):
-                result = Result.of(result.state, next(blocks), x)
-                chi_square += result.chi_square
+                residual, square = residual_and_chi_square(next(blocks), x)
+                result = Result(result.state, residual, square, result.freedom)
+                chi_square += square
             results.append(result)
         for block in self._other_blocks():
             chi_square += residual_and_chi_square(block, x)[1]

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from olp.calibration.estimator.normal import Block, residuals_of
+from olp.calibration.estimator.normal import Block, Normal, residuals_of
 from olp.calibration.estimator.parameters import Parameters, Unknowns
 from olp.core.arrays import Array, Index
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
@@ -160,15 +160,21 @@ S = TypeVar("S", bound=State)
 @dataclass(frozen=True, slots=True, eq=False)
 class Result(Generic[S]):
     """An observation after the fit: residuals in the order of its rows (mm or rad), and the sum of squares of
-    the standardised ones."""
+    the standardised ones. `freedom` are its degrees of freedom: its rows less what the unknowns used up."""
 
     state: S
     residual: Array
     chi_square: float
+    freedom: float
 
     @classmethod
-    def of(cls, state: S, block: Block, theta: Array) -> Result[S]:
-        return cls(state, *residual_and_chi_square(block, theta))
+    def of(cls, state: S, block: Block, theta: Array, covariance: Array) -> Result[S]:
+        """At the solution theta (size,) with its covariance."""
+        residual, chi_square = residual_and_chi_square(block, theta)
+        alone = Normal.of(len(theta))
+        alone.add(block)
+        used = float(np.einsum("ij,ji->", covariance, alone.H))
+        return cls(state, residual, chi_square, max(alone.count - used - alone.free, 0.0))
 
     def row(self) -> dict[str, Any]:
         return self.state.row(self.residual, self.chi_square)

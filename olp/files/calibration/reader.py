@@ -16,7 +16,7 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.sources.base import NamesFile
 from olp.errormodel.sources.registry import SOURCES
 from olp.files.calibration.grids import GridTable, read_component_grid, read_map
-from olp.files.calibration.schema import CalibrationFile, CalibrationHead
+from olp.files.calibration.schema import CalibrationFile, CalibrationHead, quality_of
 from olp.files.calibration.structure import read_document
 from olp.files.problems import Problem, config_error, validate
 from olp.files.tables import CurveTable, read_curves
@@ -71,6 +71,7 @@ def load_calibration(
             measured=file.measured,
             valid_until=file.valid_until,
             active_during_measurement=file.active_during_measurement,
+            quality=quality_of(file),
             more=tuple((source.key, value) for source, value in values.items() if not source.field and value),
             **{source.field: value for source, value in values.items() if source.field},
         )

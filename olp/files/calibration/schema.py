@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, create_model, field_validator
 
 from olp.core.schema import Interval, NotNegative, Table, Text, Triple, refusal
+from olp.errormodel.quality import Fitted, Quality
 from olp.errormodel.sources.registry import SOURCES
 from olp.files.fields import SIGN, IsoNames, Sign
 
@@ -26,6 +27,24 @@ class CovarianceTable(Table):
     temperature_K: NotNegative = Field(
         default=0.0,
         description="the standard uncertainty of the temperatures of scales and workpiece, in K",
+    )
+
+
+class FittedTable(Table):
+    source: Text = Field(description="the name of the file of readings, or of the instrument")
+    chi_square: NotNegative = Field(description="the sum of squares of its standardised residuals")
+    degrees_of_freedom: NotNegative = Field(
+        description="the number of its readings less what the unknowns used up"
+    )
+
+
+class QualityTable(Table):
+    chi_square: NotNegative = Field(description="the sum of squares of all standardised residuals")
+    degrees_of_freedom: NotNegative = Field(
+        description="the number of all readings less what the unknowns used up"
+    )
+    sources: list[FittedTable] = Field(
+        default=[], description="tables [[quality.sources]], the same by source of readings"
     )
 
 
@@ -69,6 +88,13 @@ _TABLES["covariance"] = (
     CovarianceTable | None,
     Field(default=None, description="the table [covariance]: the uncertainty of the calibration"),
 )
+_TABLES["quality"] = (
+    QualityTable | None,
+    Field(
+        default=None,
+        description="the table [quality]: how well the readings fit, as olp calibrate fit writes it",
+    ),
+)
 
 #: A calibration file: its head, and a key of every registered source.
 CalibrationFile: type[CalibrationHead] = create_model(
@@ -84,3 +110,12 @@ def covariance_of(file: CalibrationHead) -> CovarianceTable:
     """The table [covariance], with its defaults where the file has none."""
     stated: CovarianceTable | None = vars(file)["covariance"]
     return stated or CovarianceTable()
+
+
+def quality_of(file: CalibrationHead) -> Quality | None:
+    """The table [quality] as a value, None where the file has none."""
+    stated: QualityTable | None = vars(file)["quality"]
+    if stated is None:
+        return None
+    sources = (Fitted(one.source, one.chi_square, one.degrees_of_freedom) for one in stated.sources)
+    return Quality(Fitted("all readings", stated.chi_square, stated.degrees_of_freedom), tuple(sources))

@@ -9,10 +9,14 @@ from pathlib import Path
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.errormodel.calibration import Calibration
+from olp.errormodel.quality import Fitted
 from olp.errormodel.uncertainty import Uncertainty
 from olp.files.calibration.covariance import covariance_bytes
 from olp.files.fields import SIGN
 from olp.files.toml_text import comment, toml_document, toml_lines
+
+#: Decimals of chi-square and degrees of freedom: more say nothing.
+_QUALITY_DIGITS = 3
 
 
 def calibration_files(
@@ -42,6 +46,8 @@ def calibration_files(
         archive = target.with_name(f"{target.stem}-covariance.npz")
         writing.files[archive] = covariance_bytes(covariance)
         writing.table("[covariance]", {"file": archive.name})
+    for header, values in _quality(calibration):
+        writing.table(header, values)
     above = [*(line for note in notes for line in comment(note)), *_head(calibration)]
     text = "\n".join(above) + "\n" + toml_document(writing.tables)
     return {target: text.encode(), **writing.files}
@@ -109,3 +115,18 @@ def _head(calibration: Calibration) -> Iterator[str]:
             "active_during_measurement": "all" if active == ["all"] else active,
         }
     )
+
+
+def _quality(calibration: Calibration) -> Iterator[tuple[str, dict[str, object]]]:
+    if calibration.quality is None:
+        return
+    yield "[quality]", _figures(calibration.quality.total)
+    for fitted in calibration.quality.sources:
+        yield "[[quality.sources]]", {"source": Path(fitted.source).name, **_figures(fitted)}
+
+
+def _figures(fitted: Fitted) -> dict[str, object]:
+    return {
+        "chi_square": round(fitted.chi_square, _QUALITY_DIGITS),
+        "degrees_of_freedom": round(fitted.freedom, _QUALITY_DIGITS),
+    }

@@ -14,8 +14,8 @@ from olp.calibration.observations.base import State
 from olp.core.arrays import Array, Index
 from olp.core.machine import Machine
 from olp.core.units import AXES, RAD_PER_URAD
+from olp.errormodel.calibration import PLACEHOLDER_DATE
 from olp.files.measurements.instruments.registry import planner_of
-from olp.files.starter import PLACEHOLDER_DATE
 from olp.files.toml_text import comment, toml_lines
 
 PLAN = "measurements.toml"

@@ -87,11 +87,12 @@ RULES = (
     _rule(
         "OLP401",
         "calibration expired",
-        Severity.WARNING,
+        Severity.ERROR,
         "The date given is later than valid_until of the calibration. Without valid_until, the calibration "
         "is older than calibration_days of [check].",
         "Measure the machine again.",
         "`--date 2027-06-01`, and `valid_until = 2027-05-14`.",
+        doubt=True,
     ),
     _rule(
         "OLP402",

@@ -108,6 +108,7 @@ RULES = (
         "[check], in at least one direction. Angular errors act over a lever arm that was not measured.",
         "Measure with a tool of such length too, or raise tool_within_mm with a reason.",
         "Curves with tool_mm = [0, 0, -120], and a tool of 300 mm.",
+        doubt=True,
     ),
     _rule(
         "OLP407",
@@ -137,6 +138,7 @@ RULES = (
         "Look at the error with `olp inspect machine.toml --at` that position. Raise the limit where the "
         "error is real.",
         "EXX in nm, written into the column EXX_um.",
+        doubt=True,
     ),
     _rule(
         "OLP410",

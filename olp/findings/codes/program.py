@@ -47,11 +47,12 @@ RULES = (
     _rule(
         "OLP302",
         "numbers without decimal point",
-        Severity.INFO,
+        Severity.WARNING,
         "On this control a length without a decimal point counts least increments: X100 is 0.1 mm.",
         'If the control is set to calculator-type input, state decimal_point = "calculator" in the machine '
         "file.",
         "`X100` on a Fanuc control.",
+        doubt=True,
     ),
     _rule(
         "OLP303",

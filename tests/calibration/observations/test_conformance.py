@@ -159,7 +159,7 @@ def test_a_blunder_is_left_out_or_stands_out(key: str) -> None:
 def test_the_report_names_it(key: str) -> None:
     for taken in EXAMPLES[key](machine(theta_of(5))):
         state = settled(taken, NONE)
-        result = Result.of(state, state.block(P, NONE), NONE)
+        result = Result.of(state, state.block(P, NONE), NONE, np.zeros((P.size, P.size)))
         assert result.chi_square > 0.0 and state.count > 0
         assert state.tally in ("", *TALLIES)
         assert bool(state.section) == bool(state.noun) == bool(result.row())

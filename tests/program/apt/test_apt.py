@@ -174,7 +174,7 @@ def test_the_shipped_programs_are_those_of_their_script_and_are_corrected(flavou
     result = olp.correct(path, setup)
     assert result.report["deviation"]["holds"]
     assert olp.verify(path, result.data, setup).report["deviation"]["holds"]
-    assert {f.code for f in result.findings} <= {"OLP103", "OLP105", "OLP303", "OLP413"}
+    assert {f.code for f in result.findings} <= {"OLP103", "OLP105", "OLP303", "OLP413", "OLP444"}
 
 
 # -- statements ----------------------------------------------------------------------------------------

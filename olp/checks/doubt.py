@@ -1,0 +1,43 @@
+"""What makes the inputs of a run implausible: a wrong unit, file, sign or decimal point, before anything is
+computed from them. A doubt is a finding; as an error it stops the run unless it is accepted."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass
+
+from olp.checks.doubt_calibration import calibration_doubts
+from olp.checks.doubt_program import program_doubts
+from olp.checks.doubt_setup import setup_doubts
+from olp.checks.doubt_size import size_doubts
+from olp.checks.state import calibration_findings
+from olp.core.machine import Setup
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.calibration import Calibration
+from olp.findings.catalogue import Finding
+from olp.program.program import Program
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inputs:
+    """What a run is given: machine and job, the program as read, and the day of the run. Calibration and
+    model are None for a run without them."""
+
+    setup: Setup
+    program: Program
+    calibration: Calibration | None
+    model: ErrorModel | None
+    date: datetime.date | None
+
+
+def doubts(inputs: Inputs) -> tuple[Finding, ...]:
+    """Every doubt about the inputs of a run."""
+    setup, path = inputs.setup, inputs.program.toolpath
+    findings = [*program_doubts(inputs.program, setup), *setup_doubts(path, setup, inputs.calibration)]
+    if inputs.calibration is not None:
+        days = setup.machine.sanity.calibration_days
+        findings += calibration_findings(inputs.calibration, inputs.date, days)
+        findings += calibration_doubts(inputs.calibration, setup.machine, inputs.date)
+    if inputs.calibration is not None and inputs.model is not None:
+        findings += size_doubts(path, inputs.model, inputs.calibration, setup.machine)
+    return tuple(findings)

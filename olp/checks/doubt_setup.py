@@ -1,0 +1,141 @@
+"""Doubts about machine and job: tools, work offsets, temperatures, payloads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from olp.checks.base import finding, lines_of
+from olp.checks.state import tool_findings
+from olp.core.machine import Machine, Setup
+from olp.core.toolpath import Frame, Toolpath
+from olp.errormodel.calibration import Calibration
+from olp.findings.catalogue import Finding
+
+#: mm; a tool vector below this is a length in metres. The shortest real ones are tips at the gauge point.
+_METRES_MM = 1.0
+#: A tool longer than so many times the travel of Z ...
+_LONG = 2.0
+#: ... and than this, in mm: spindle noses and heads of five axes reach 600 mm.
+_LONG_MM = 700.0
+#: mm per inch.
+_INCH_MM = 25.4
+#: Share by which two lengths of one tool differ at most: it is set again, or rounded.
+_NEAR = 0.02
+#: A tool is grossly unlike those of the calibration at so many times tool_within_mm.
+_GROSS = 8.0
+#: A work offset may lie outside the travel by this share of it, beside the longest tool: other zeros.
+_BEYOND = 0.5
+#: degC; scales and workpieces of a workshop. 68 degF is 20 degC, and so is 293 K.
+_WORKSHOP_DEGC = (0.0, 50.0)
+#: degC; sensors of a structure may sit on a motor.
+_SENSOR_DEGC = (-20.0, 120.0)
+#: kg; the heaviest payloads of large gantries. 30 kg in grams are more.
+_HEAVY_KG = 20_000.0
+
+
+def setup_doubts(path: Toolpath, setup: Setup, calibration: Calibration | None) -> list[Finding]:
+    """Doubts about the tools and offsets that a path uses, and about what the job states."""
+    used = np.unique(path.frame).tolist() if len(path) else []
+    frames = {number: path.frames[number] for number in used}
+    findings = [*_temperatures(setup, calibration), *_payloads(frames, calibration), *_start(setup)]
+    findings += _tools(path, frames, setup.machine, calibration)
+    findings += _offsets(path, frames, setup)
+    return findings
+
+
+def _name(frame: Frame) -> str:
+    return "the tool in use" if frame.tool is None else f"tools.{frame.tool}"
+
+
+def _tools(
+    path: Toolpath, frames: dict[int, Frame], machine: Machine, calibration: Calibration | None
+) -> Iterator[Finding]:
+    known = [] if calibration is None else [c.tool_mm for c in calibration.curves]
+    travel = float(np.ptp(machine.axes["Z"].travel_mm))
+    most = max(_LONG * travel, _LONG_MM)
+    gross = _GROSS * machine.sanity.tool_within_mm
+    seen: set[tuple[float, ...]] = set()
+    far = False
+    for number, frame in frames.items():
+        if frame.tool_mm in seen:
+            continue
+        seen.add(frame.tool_mm)
+        size = float(np.linalg.norm(frame.tool_mm))
+        lines = lines_of(path, path.frame == number)[:1]
+        what = f"{_name(frame)}: its tip is {size:g} mm from the gauge point"
+        inches = [tool for tool in known if _in_inches(frame.tool_mm, tool)]
+        if inches:
+            own = float(np.linalg.norm(inches[0]))
+            text = f"{what}, and {own:g} mm is the tool of the calibration: the same number in inches"
+            yield finding("OLP454", text, lines)
+        elif 0.0 < size < _METRES_MM or size > most:
+            yield finding("OLP454", f"{what}; expected 0, or {_METRES_MM:g} to {most:g} mm", lines)
+        elif known and min(_away(frame.tool_mm, tool) for tool in known) > gross:
+            away = min(_away(frame.tool_mm, tool) for tool in known)
+            text = f"{what}, {away:g} mm from that of every tool of the calibration; expected {gross:g} mm"
+            far = True
+            yield finding("OLP455", f"{text} at most", lines)
+    if calibration is not None and not far:
+        yield from tool_findings(path, calibration, machine.sanity)
+
+
+def _away(one: tuple[float, ...], other: tuple[float, ...]) -> float:
+    return float(np.abs(np.subtract(one, other)).max())
+
+
+def _in_inches(tool: tuple[float, ...], known: tuple[float, ...]) -> bool:
+    """Whether a tool is a known one in inches, or the other way round."""
+    size, own = float(np.linalg.norm(tool)), float(np.linalg.norm(known))
+    return own > 0.0 and any(abs(size - own * f) <= _NEAR * own * f for f in (_INCH_MM, 1.0 / _INCH_MM))
+
+
+def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator[Finding]:
+    longest = max((float(np.abs(f.tool_mm).max()) for f in frames.values()), default=0.0)
+    seen: set[str] = set()
+    for number, frame in frames.items():
+        offset = setup.work_offset(frame.work_offset)
+        if offset is None or frame.work_offset in seen:
+            continue
+        seen.add(frame.work_offset)
+        for axis, place in zip("XYZ", offset.offset_mm, strict=True):
+            low, high = setup.machine.axes[axis].travel_mm
+            slack = _BEYOND * (high - low) + longest
+            if not low - slack <= place <= high + slack:
+                what = f"work_offsets.{frame.work_offset}.{axis}_mm = {place:g} is outside the travel"
+                lines = lines_of(path, path.frame == number)[:1]
+                yield finding("OLP456", f"{what}; expected {low:g} to {high:g} mm", lines)
+
+
+def _start(setup: Setup) -> Iterator[Finding]:
+    for axis, place in zip("XYZ", setup.job.start_mm, strict=True):
+        low, high = setup.machine.axes[axis].travel_mm
+        slack = _BEYOND * (high - low)
+        if place is not None and not low - slack <= place <= high + slack:
+            what = f"job file: start_mm.{axis} = {place:g} is outside the travel"
+            yield finding("OLP456", f"{what}; expected {low:g} to {high:g} mm")
+
+
+def _temperatures(setup: Setup, calibration: Calibration | None) -> Iterator[Finding]:
+    stated = {f"job file: temperatures_degC.{key}": v for key, v in setup.job.temperatures_degC.items()}
+    if calibration is not None:
+        stated["calibration: temperature_degC"] = calibration.temperature_degC
+    sensors = setup.job.sensors_degC or {}
+    for values, (low, high) in (
+        (stated, _WORKSHOP_DEGC),
+        ({f"job file: temperatures_degC.sensors.{k}": v for k, v in sensors.items()}, _SENSOR_DEGC),
+    ):
+        for key, value in values.items():
+            if not low <= value <= high:
+                yield finding("OLP457", f"{key} = {value:g}; expected {low:g} to {high:g} degC")
+
+
+def _payloads(frames: dict[int, Frame], calibration: Calibration | None) -> Iterator[Finding]:
+    heaviest = max((frame.payload_kg for frame in frames.values()), default=0.0)
+    for what, value in (
+        ("the payload of the job", heaviest),
+        ("calibration: payload_kg", 0.0 if calibration is None else calibration.payload_kg),
+    ):
+        if value > _HEAVY_KG:
+            yield finding("OLP459", f"{what} is {value:g} kg; expected at most {_HEAVY_KG:g} kg")

@@ -1,0 +1,93 @@
+"""Doubts about the size of the error: at the waypoints of a program, and anywhere in the calibrated box."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from olp.checks.base import finding, lines_of
+from olp.core.arrays import Array
+from olp.core.machine import Machine
+from olp.core.toolpath import Flag, Toolpath
+from olp.core.units import UM_PER_MM
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.calibration import Calibration
+from olp.findings.catalogue import Finding
+
+#: Sane errors per length: 1 mm/m is five times a poor machine tool, and 667 urad of a hobby router pass.
+_SHARE = 1e-3
+#: mm; sane errors of a small machine, whose assembly is no better than that of a larger one.
+_FLOOR_MM = 0.5
+#: Errors per length that no instrument measures: 0.1 um/m.
+_UNMEASURABLE = 1e-7
+#: mm; below this diagonal of the box even sane errors are that small.
+_SHORT_MM = 50.0
+#: Moves that are not corrected.
+_UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: Positions along each axis of the box at which the error is computed.
+_NODES = 5
+#: Waypoints that are evaluated at once.
+_CHUNK = 1 << 16
+
+
+def largest_mm(machine: Machine) -> float:
+    """The largest plausible error: what the machine file states, else from the diagonal of the travel."""
+    stated = machine.sanity.largest_correction_mm
+    return max(_SHARE * diagonal_mm(machine), _FLOOR_MM) if stated is None else stated
+
+
+def diagonal_mm(machine: Machine) -> float:
+    """The diagonal of the travel."""
+    return float(np.linalg.norm([np.ptp(machine.axes[axis].travel_mm) for axis in "XYZ"]))
+
+
+def size_doubts(
+    path: Toolpath, model: ErrorModel, calibration: Calibration, machine: Machine
+) -> list[Finding]:
+    """Errors too large for this machine at waypoints, else in the box, or too small to be measured."""
+    limit = largest_mm(machine)
+    size = _at_waypoints(path, model)
+    wild = size > limit
+    expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
+    if wild.any():
+        largest = float(size.max()) * UM_PER_MM
+        what = f"the error is up to {largest:.0f} um at {int(wild.sum())} waypoints; {expected}"
+        return [finding("OLP409", what, lines_of(path, wild))]
+    points = _box_points(model.box_mm)
+    error = np.nan_to_num(np.stack([model.error(points, tool) for tool in path.tools_mm()]))
+    in_box = np.linalg.norm(error, axis=2).max(axis=0)
+    worst, largest = int(in_box.argmax()), float(in_box.max())
+    if largest > limit:
+        place = ", ".join(f"{v:g}" for v in points[worst].tolist())
+        what = f"calibration: the error is {largest * UM_PER_MM:.0f} um at ({place}) in the box; {expected}"
+        return [finding("OLP445", what)]
+    span = float(np.linalg.norm(np.ptp(model.box_mm, axis=1)))
+    largest = max(largest, float(size.max(initial=0.0)))
+    if 0.0 < largest < _UNMEASURABLE * span and span > _SHORT_MM and not calibration.thermal:
+        what = f"calibration: the error is at most {largest * UM_PER_MM:.2g} um anywhere in the box"
+        return [finding("OLP451", f"{what}; expected more than {_UNMEASURABLE * span * UM_PER_MM:.2g} um")]
+    return []
+
+
+def _at_waypoints(path: Toolpath, model: ErrorModel) -> Array:
+    """(n,) size of the error at the end of each move, at the face of the box for those outside, 0 where it is
+    not known or the move is not corrected. Half of the backlash is part of it."""
+    size = np.zeros(len(path))
+    low, high = model.box_mm.T
+    for first in range(0, len(path), _CHUNK):
+        last = min(first + _CHUNK, len(path))
+        place = np.clip(path.end_mm[first:last], low, high)
+        error = np.nan_to_num(model.error(place, path.tool_mm(first, last)))
+        backlash = model.backlash_at(place)
+        if backlash is not None:
+            error = np.abs(error) + 0.5 * np.abs(np.nan_to_num(backlash))
+        size[first:last] = np.sqrt(np.einsum("ij,ij->i", error, error))
+    size[(path.flag & _UNTOUCHED) != 0] = 0.0
+    return size
+
+
+def _box_points(box_mm: Array) -> Array:
+    """(m, 3) positions all over the box, with its corners."""
+    lines = (np.linspace(low, high, _NODES) for low, high in box_mm)
+    return np.array(list(itertools.product(*lines)))

@@ -1,0 +1,81 @@
+"""The hook of every verb that reads a program: doubts about its inputs, refused unless they are accepted."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+
+from olp.checks.doubt import Inputs, doubts
+from olp.compensation.stamp import accepted_in
+from olp.core.errors import Doubtful, InputError, UsageError
+from olp.findings.catalogue import DOUBTS, RULES, Finding
+from olp.findings.rule import Severity
+from olp.program.program import Program
+from olp.workflows.session import Loaded, Session
+
+
+def acceptable(codes: Sequence[str]) -> frozenset[str]:
+    """The codes of --accept. Raises UsageError for a code that is no doubt."""
+    accepted = frozenset(code.upper() for code in codes)
+    for code in sorted(accepted - DOUBTS):
+        what = "is no code of a finding" if code not in RULES else "is no doubt about the inputs"
+        raise UsageError(f"--accept {code}: it {what}; expected one of {', '.join(sorted(DOUBTS))}")
+    return accepted
+
+
+def doubted(
+    program: Program,
+    loaded: Loaded,
+    accept: Sequence[str],
+    date: datetime.date | None,
+    *,
+    stamped: bytes = b"",
+    refuse: bool = True,
+) -> tuple[Finding, ...]:
+    """The doubts of a run; those that the call or the stamp of the text `stamped` accepts are less severe.
+    With `refuse`, one that is an error and not accepted raises Doubtful; UsageError as `acceptable`."""
+    inputs = Inputs(loaded.setup, program, loaded.calibration, loaded.model, date)
+    return _judged(inputs, accept, stamped, refuse)
+
+
+def doubted_motion(
+    program: Program, session: Session, accept: Sequence[str], date: datetime.date | None, stamped: bytes
+) -> tuple[Finding, ...]:
+    """The same for a verb that needs no calibration: one that the machine names and that can be opened is
+    doubted too."""
+    if _calibrated(session):
+        return doubted(program, session.loaded("hold"), accept, date, stamped=stamped)
+    return _judged(Inputs(session.setup, program, None, None, date), accept, stamped, True)
+
+
+def accepted_of(findings: Sequence[Finding]) -> list[str]:
+    """The codes of doubts that were found and accepted, as reports and stamps state them."""
+    return sorted({finding.code for finding in findings if finding.accepted})
+
+
+def _calibrated(session: Session) -> bool:
+    machine = session.setup.machine
+    if machine.calibration is None or "all" in machine.compensated_by_controller:
+        return False
+    try:
+        session.sources.read(machine.calibration)
+    except InputError:
+        return False
+    return True
+
+
+def _judged(inputs: Inputs, accept: Sequence[str], stamped: bytes, refuse: bool) -> tuple[Finding, ...]:
+    accepted = acceptable(accept) | accepted_in(stamped)
+    findings = tuple(f.accept() if f.code in accepted else f for f in doubts(inputs))
+    errors = [finding for finding in findings if finding.severity == Severity.ERROR]
+    if refuse and errors:
+        codes = tuple(dict.fromkeys(finding.code for finding in errors))
+        raise Doubtful(tuple(_sentence(finding) for finding in errors), codes)
+    return findings
+
+
+def _sentence(finding: Finding) -> str:
+    """What is wrong, where, what was expected, what to do, and how to go on all the same."""
+    line = f"line {finding.line}: " if finding.line is not None else ""
+    remedy = RULES[finding.code].remedy
+    return f"{finding.code}: {line}{finding.message}. {remedy} --accept {finding.code} goes on all the same."
