@@ -74,8 +74,8 @@ class Scene:
         return max(min(queue[0][0], best), 0.0) if queue else best, best
 
     def sampled(self, k: int) -> float:
-        """The least distance of points all over the triangles from the shape at steps of path k, at least the
-        true one. Its own arithmetic decides where coal's iteration ends too early, as it does now and then."""
+        """The least distance of points all over the triangles from the shape at steps of path k: at least the
+        true one. It decides where coal's iteration ends too early, as it does now and then."""
         u, v = (axis.ravel() for axis in np.meshgrid(np.linspace(0.0, 1.0, 60), np.linspace(0.0, 1.0, 60)))
         u, v = u[u + v <= 1.0], v[u + v <= 1.0]
         a, b, c = (self.triangle[:, None, i] for i in range(3))
