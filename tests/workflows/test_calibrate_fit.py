@@ -225,7 +225,7 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_table_says_what_was_found(example: Path) -> None:
     shown = (example / "told.txt").read_text()
-    for words in ("EXX", "Squareness", "Lost motion um", "ezx.csv: row 42", "wrote"):
+    for words in ("EXX", "Squareness", "Backlash um", "ezx.csv: row 42", "wrote"):
         assert words in shown
 
 
