@@ -280,7 +280,7 @@ def _scene(
         measured=tuple(runs),
         report=report,
         table=texts.proved.table,
-        tolerance_um=options.tolerance_um,
+        tolerance_um=report["verdict"]["numerical"]["allowed_um"],
         tool_radius_mm=_radius(setup, nominal),
         uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),
     )

@@ -145,4 +145,4 @@ def _predicted_plots(
         runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)
     if not all(run.counted.any() for group in runs.values() for run in group):
         return {}
-    return _path_plots(path, runs, float(result.report["tolerance_um"]), SIDES)
+    return _path_plots(path, runs, float(result.report["verdict"]["numerical"]["allowed_um"]), SIDES)

@@ -124,7 +124,7 @@ def along(path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str
 
 def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
     if tolerance_um is not None:
-        plot.axhline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
+        plot.axhline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="allowed")
 
 
 def histogram(runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
@@ -144,7 +144,7 @@ def histogram(runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) 
             plot.stairs(count / len(size) * 100, edges, fill=True, alpha=0.35, color=COLOURS[name])
             plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=sides[name])
         if tolerance_um is not None:
-            plot.axvline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="tolerance")
+            plot.axvline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="allowed")
         plot.set_xscale("log")
         plot.set(xlabel="distance from the nominal path in um", ylabel="share of points in %")
         plot.grid(color="0.92", linewidth=0.5)
