@@ -134,6 +134,9 @@ class Tracer:
         self.model, self.bend = model, bend
         self.play: Array | None = None
         self.last: Array | None = None
+        #: where the tip is, and how far off, at the end of the moves before
+        self.before = self._start()
+        self.away = np.float32(np.nan)
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.nominal_arc = _arc_index(nominal)
@@ -210,6 +213,7 @@ class Tracer:
         if len(inner.part) or len(cuts):
             self._bend(reached, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
+        self._starts(a, b, first, owner, reached, waypoint, worst)
 
     def _samples(
         self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array
@@ -226,6 +230,28 @@ class Tracer:
         part, share, point = part[inside], share[inside], point[inside]
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
+
+    def _start(self) -> Array:
+        """(3,) where the tip is before the first move."""
+        start = np.array(self.path.start_mm)[None]
+        tool = self.path.tool_mm(0, 1) if len(self.path) else np.zeros(3)
+        return np.asarray(start + self.model.error(start, tool), float)[0]
+
+    def _starts(
+        self, a: int, b: int, first: int, owner: Index, reached: Array, waypoint: Single, worst: Single
+    ) -> None:
+        """A cut starts where the moves before it ended, which may be farther off than any of its samples."""
+        tips = np.concatenate((self.before[None], reached))
+        away = np.concatenate(([self.away], waypoint[:-1]))
+        self.before, self.away = tips[-1], waypoint[-1]
+        begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))
+        farther = (np.nan_to_num(away, nan=np.inf) > worst) & (self.nominal.kind[a:b] != Kind.RAPID)
+        farther &= (begin < len(reached)) & np.isfinite(tips[begin]).all(axis=1)
+        rows = np.flatnonzero(farther)
+        rows = rows[owner[begin[rows]] == rows]
+        if rows.size:
+            starts = _Inner(begin[rows], np.zeros(len(rows)), tips[begin[rows]])
+            self._along(a, b, first, owner, starts, worst)
 
     def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, tool: Array) -> None:
         rows = np.flatnonzero((arc >= 0) & known)
