@@ -83,6 +83,16 @@ def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tup
     point = start[of] + share[:, None] * (end - start)[of]
     play = plays(model, path.end_mm)
     if play is not None:
-        # along a stroke the axis of the hole is on the side of its motion, as at its end
-        play = play[rows][of]
+        # a stroke begins on the side on which the move before it ended, and then takes up the backlash
+        before = np.concatenate((play[:1], play[:-1]))[rows][of]
+        play = _moved_on(before, point - start[of], model.backlash_at(point))
     return point + model.error(point, tool if tool.ndim == 1 else tool[of], play), of
+
+
+def _moved_on(play: Array, moved_mm: Array, backlash_mm: Array | None) -> Array:
+    """(m, 3) the play after motions in one direction."""
+    width = np.zeros(play.shape) if backlash_mm is None else np.nan_to_num(backlash_mm)
+    slack = width > 0.0
+    gain = 2.0 * moved_mm / np.where(slack, width, 1.0)
+    turned = np.where(moved_mm != 0.0, np.sign(moved_mm), play)
+    return np.where(slack, np.clip(play + gain, -1.0, 1.0), turned)
