@@ -14,7 +14,7 @@ from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES, segment_distance
 from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import plays
+from olp.errormodel.reversal import play_after, plays
 from olp.errormodel.sampling import steps_needed
 from olp.program.program import Hole, Program
 
@@ -85,14 +85,5 @@ def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tup
     if play is not None:
         # a stroke begins on the side on which the move before it ended, and then takes up the backlash
         before = np.concatenate((play[:1], play[:-1]))[rows][of]
-        play = _moved_on(before, point - start[of], model.backlash_at(point))
+        play = play_after(before, point - start[of], model.backlash_at(point))
     return point + model.error(point, tool if tool.ndim == 1 else tool[of], play), of
-
-
-def _moved_on(play: Array, moved_mm: Array, backlash_mm: Array | None) -> Array:
-    """(m, 3) the play after motions in one direction."""
-    width = np.zeros(play.shape) if backlash_mm is None else np.nan_to_num(backlash_mm)
-    slack = width > 0.0
-    gain = 2.0 * moved_mm / np.where(slack, width, 1.0)
-    turned = np.where(moved_mm != 0.0, np.sign(moved_mm), play)
-    return np.where(slack, np.clip(play + gain, -1.0, 1.0), turned)
