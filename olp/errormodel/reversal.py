@@ -26,6 +26,15 @@ def plays(model: ErrorModel, axis_mm: Array) -> Array | None:
     return None if width is None else play_states(axis_mm, width)
 
 
+def play_after(play: Array, moved_mm: Array, backlash_mm: Array | None) -> Array:
+    """(n, 3) play after motions in one direction each, from `play` before them; all are (n, 3)."""
+    width = np.zeros(play.shape) if backlash_mm is None else np.nan_to_num(backlash_mm)
+    slack = width > 0.0
+    gain = 2.0 * moved_mm / np.where(slack, width, 1.0)
+    turned = np.where(moved_mm != 0.0, np.sign(moved_mm), play)
+    return np.where(slack, np.clip(play + gain, -1.0, 1.0), turned)
+
+
 def play_states(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> Array:
     """(n, 3) play in [-1, 1] at each of successive commands axis_mm (n, 3) with backlash (n, 3) or (3,).
 

@@ -16,7 +16,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_distance, arc_points, segment_distance
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import play_interval, play_states
+from olp.errormodel.reversal import play_after, play_interval, play_states
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 
 #: enough for deviations, which are small, and half the memory
@@ -28,8 +28,6 @@ _BLOCK = 1 << 15
 _PROBES = 9
 #: samples of an arc move at the least
 _ARC_STEPS = 8
-#: no take-up of backlash in any part
-_NO_SHARES = np.zeros((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +134,10 @@ class Tracer:
         self.model, self.bend = model, bend
         self.play: Array | None = None
         self.last: Array | None = None
-        self.heading = np.zeros(3)
+        self.plays = np.zeros((0, 3))
+        #: where the tip is, and how far off, at the end of the moves before
+        self.before = self._start()
+        self.away = np.float32(np.nan)
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.nominal_arc = _arc_index(nominal)
@@ -200,8 +201,7 @@ class Tracer:
         steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
         if arc.max(initial=-1) >= 0:
             self._arc_steps(arc, known, steps, start, tool)
-        take_ups = self._take_ups(start, delta, cut & (arc < 0)) if self.has_play else _NO_SHARES
-        reached, inner = self._samples(start, end, arc, steps, known, tool, take_ups)
+        reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
         ends = self.groups[a:b] - first
         last_part = np.zeros(last - first, bool)
@@ -214,45 +214,95 @@ class Tracer:
         if len(inner.part) or len(cuts):
             self._bend(reached, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
-
-    def _take_ups(self, start: Array, delta: Array, straight: Mask) -> Array:
-        """(m, 3) the share of each `straight` move at which an axis that turned round has taken up its
-        backlash, where the tip is farthest off; NaN where an axis does not turn. Keeps the direction of each
-        axis from call to call."""
-        width = self.model.backlash_at(start)
-        assert width is not None
-        heading = np.vstack((self.heading, np.sign(np.nan_to_num(delta))))
-        last = np.maximum.accumulate(np.where(heading != 0, np.arange(len(heading))[:, None], 0), axis=0)
-        held = np.take_along_axis(heading, last, axis=0)
-        self.heading = held[-1]
-        turns = straight[:, None] & (heading[1:] != 0) & (heading[1:] != held[:-1])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = width / np.abs(delta)
-        return np.where(turns & (share > 0) & (share < 1), share, np.nan)
+        self._starts(a, b, first, owner, reached, waypoint, worst)
 
     def _samples(
-        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array, take_ups: Array
-    ) -> tuple[Array, _Inner]:
-        """Where the tip really is at the end of each part, and at samples inside parts: at equal steps, and
-        at the shares `take_ups` (m, 3) of parts."""
+        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array,
+        kind: npt.NDArray[np.uint8],
+    ) -> tuple[Array, _Inner]:  # fmt: skip
+        """Where the tip really is at the end of each part, and at samples inside parts."""
         long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
         point, part, share = self.points(start[long], end[long], arc[long], steps[long], known[long])
         part = long[part]
-        more, axis = np.nonzero(np.isfinite(take_ups))
-        if more.size:
-            extra = take_ups[more, axis]
-            point = np.concatenate((point, start[more] + extra[:, None] * (end - start)[more]))
-            part, share = np.concatenate((part, more)), np.concatenate((share, extra))
-            order = np.lexsort((share, part))
-            point, part, share = point[order], part[order], share[order]
         inside = share < 1.0
         if self.has_play:
             # play depends on all earlier moves, so the samples are taken in order
+            before = self.play
             actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
-            return actual[~inside], _Inner(part[inside], share[inside], actual[inside])
+            plays = self.plays
+            if before is None:
+                before = plays[0] if len(plays) else np.zeros(3)
+            samples = _Inner(part[inside], share[inside], actual[inside])
+            turns = self._turns(start, end, arc, steps, part, share, np.vstack((before, plays)), tool, kind)
+            return actual[~inside], samples.with_more(turns)
         part, share, point = part[inside], share[inside], point[inside]
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
+
+    def _turns(
+        self, start: Array, end: Array, arc: Index, steps: Index, part: Index, share: Array, plays: Array,
+        tool: Array, kind: npt.NDArray[np.uint8],
+    ) -> _Inner:  # fmt: skip
+        """Samples where an axis that turned round has taken up its backlash: from there on the tip is off by
+        all of it. `plays` are those before and at each of the samples `share` of `part`."""
+        turned = np.flatnonzero((plays[1:] != plays[:-1]).any(axis=1) & (kind[part] != Kind.RAPID))
+        part, early = part[turned], share[turned] - 1.0 / steps[part[turned]]
+        span = share[turned] - early
+        old, new = plays[:-1][turned], plays[1:][turned]
+        begin = self._at(start, end, arc, part, early)
+        stop = self._at(start, end, arc, part, share[turned])
+        moved = stop - begin
+        width = self.model.backlash_at(begin)
+        assert width is not None
+        needed = np.abs(new - old) / 2 * np.maximum(np.nan_to_num(width), 0.0)
+        found = _Inner(part[:0], early[:0], begin[:0])
+        for axis in range(3):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                of_span = needed[:, axis] / np.abs(moved[:, axis])
+            rows = np.flatnonzero((new[:, axis] != old[:, axis]) & (of_span < 1.0))
+            if not rows.size:
+                continue
+            where = early[rows] + of_span[rows] * span[rows]
+            point = self._at(start, end, arc, part[rows], where)
+            play = play_after(old[rows], point - begin[rows], width[rows])
+            play[:, axis] = new[rows, axis]
+            error = self.model.error(point, tool if tool.ndim == 1 else tool[part[rows]], play)
+            found = found.with_more(_Inner(part[rows], where, point + error))
+        return found
+
+    def _at(self, start: Array, end: Array, arc: Index, part: Index, share: Array) -> Array:
+        """(m, 3) positions on moves at shares of them."""
+        point = start[part] + share[:, None] * (end - start)[part]
+        curved = np.flatnonzero(arc[part] >= 0)
+        if curved.size:
+            arcs, which = self.path.arcs, arc[part[curved]]
+            point[curved] = arc_points(
+                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
+                arcs.sweep_rad[which], share[curved],
+            )  # fmt: skip
+        return np.asarray(point)
+
+    def _start(self) -> Array:
+        """(3,) where the tip is before the first move."""
+        start = np.array(self.path.start_mm)[None]
+        tool = self.path.tool_mm(0, 1) if len(self.path) else np.zeros(3)
+        return np.asarray(start + self.model.error(start, tool), float)[0]
+
+    def _starts(
+        self, a: int, b: int, first: int, owner: Index, reached: Array, waypoint: Single, worst: Single
+    ) -> None:
+        """A cut starts where the moves before it ended, which may be farther off than any of its samples."""
+        tips = np.concatenate((self.before[None], reached))
+        away = np.concatenate(([self.away], waypoint[:-1]))
+        self.before, self.away = tips[-1], waypoint[-1]
+        begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))
+        farther = (np.nan_to_num(away, nan=np.inf) > worst) & (self.nominal.kind[a:b] != Kind.RAPID)
+        farther &= (begin < len(reached)) & np.isfinite(tips[begin]).all(axis=1)
+        rows = np.flatnonzero(farther)
+        rows = rows[owner[begin[rows]] == rows]
+        if rows.size:
+            starts = _Inner(begin[rows], np.zeros(len(rows)), tips[begin[rows]])
+            self._along(a, b, first, owner, starts, worst)
 
     def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, tool: Array) -> None:
         rows = np.flatnonzero((arc >= 0) & known)
@@ -275,7 +325,7 @@ class Tracer:
             width = self.model.backlash_at(chain)
             assert width is not None
             play = play_states(chain, width, self.play)[len(chain) - len(point) :]
-            self.last, self.play = point[-1:], play[-1]
+            self.last, self.play, self.plays = point[-1:], play[-1], play
         return point + self.model.error(point, tool, play)
 
     def _along(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
@@ -328,13 +378,17 @@ class _Inner:
     share: Array
     actual: Array
 
+    def with_more(self, other: _Inner) -> _Inner:
+        """These and others."""
+        return _Inner(
+            np.concatenate((self.part, other.part)),
+            np.concatenate((self.share, other.share)),
+            np.concatenate((self.actual, other.actual)),
+        )
+
     def with_ends(self, cuts: Index, reached: Array) -> _Inner:
         """These, and the ends of the parts `cuts`."""
-        return _Inner(
-            np.concatenate((self.part, cuts)),
-            np.concatenate((self.share, np.ones(len(cuts)))),
-            np.concatenate((self.actual, reached[cuts])),
-        )
+        return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
 
 
 def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:

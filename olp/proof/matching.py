@@ -36,6 +36,10 @@ _KEPT = 6
 _WHOLE = 1e-3
 #: Inserted moves that a window allows at first; more where the alignment needs them.
 _SPARE = 64
+#: Inserted moves that a window allows at most while some waypoint is far off.
+_MOST_SPARE = 1 << 12
+#: How often a window is widened in vain before waypoints count as far off indeed.
+_MOST_TRIES = 64
 #: Kind of a whole hole.
 _HOLE = 255
 #: Moves that are as the control makes them: their ends may be anywhere.
@@ -112,6 +116,7 @@ class _Alignment:
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
         self.arc = index[mine.last]
         self.arcs = nominal.arcs
+        self.tries = 0
 
     def ends(self) -> Index:
         """(u,) the unit of the corrected program at which each nominal unit ends."""
@@ -201,15 +206,27 @@ class _Alignment:
         return np.asarray(np.sqrt(across**2 + beyond**2 + level**2), float)
 
     def _window(self, i: int, j: int) -> Index:
-        """The ends of the next units, by the least squares of all distances."""
+        """The ends of the next units, by the least squares of all distances.
+
+        Where the units have more parts than the window allows, some end far off or the last at its edge.
+        """
         rows = min(_WINDOW, len(self.mine) - i)
-        spare = _SPARE
+        kept = rows if i + rows == len(self.mine) else _KEPT
+        spare, room = _SPARE, self._room(i, j)
         while True:
-            width = rows + min(self._room(i, j), spare)
+            width = rows + min(room, spare)
             ends = self._aligned(i, j, rows, width)
-            if ends[-1] - j < width - 1 or width == rows + self._room(i, j):
-                return ends if i + rows == len(self.mine) else ends[:_KEPT]
+            far = self._far(i + np.arange(kept), ends[:kept])
+            more = far and spare < _MOST_SPARE and self.tries < _MOST_TRIES
+            if spare >= room or (ends[-1] - j < width - 1 and not more):
+                self.tries += far
+                return ends[:kept]
             spare *= 4
+
+    def _far(self, i: Index, j: Index) -> bool:
+        """Whether some nominal unit would end far from its waypoint."""
+        away = np.abs(self.tip[j] - self.target[i]).max(axis=1, initial=0.0)
+        return bool(((np.nan_to_num(away, nan=_FAR_MM) >= _FAR_MM) & ~self.loose[i]).any())
 
     def _aligned(self, i: int, j: int, rows: int, width: int) -> Index:
         """Dynamic programming over `rows` nominal units and `width` units of the corrected program."""

@@ -14,7 +14,7 @@ from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES, segment_distance
 from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import plays
+from olp.errormodel.reversal import play_after, plays
 from olp.errormodel.sampling import steps_needed
 from olp.program.program import Hole, Program
 
@@ -83,6 +83,7 @@ def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tup
     point = start[of] + share[:, None] * (end - start)[of]
     play = plays(model, path.end_mm)
     if play is not None:
-        # along a stroke the axis of the hole is on the side of its motion, as at its end
-        play = play[rows][of]
+        # a stroke begins on the side on which the move before it ended, and then takes up the backlash
+        before = np.concatenate((play[:1], play[:-1]))[rows][of]
+        play = play_after(before, point - start[of], model.backlash_at(point))
     return point + model.error(point, tool if tool.ndim == 1 else tool[of], play), of

@@ -141,10 +141,10 @@ def corrected(
     tell("prove", 0.7)
     reading = Options(contour=options.contour)
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
-    _prove_without_deleted(done, loaded, options.contour)
     pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
     run = proved(pair, loaded.held(), options, done.doubts, outside=held, tell=tell)
+    _prove_without_deleted(done, loaded, options.contour, run.table)
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -218,8 +218,9 @@ def _written_report(done: _Rewritten) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool) -> None:
-    """Raise ProgramError where the corrected program is wrong with the block-delete switch on."""
+def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool, table: Judgements) -> None:
+    """Raise ProgramError where the corrected program is wrong with the block-delete switch on, on lines that
+    are right with the switch off, as `table` says."""
     path = done.nominal.toolpath
     deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
     if not deleted.any():
@@ -234,7 +235,9 @@ def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool) -> N
             nominal, other, loaded.model, tolerance_mm=done.limits.tolerance_mm, digit_mm=done.digit_mm,
             uncorrected=rows.uncorrected,
         )  # fmt: skip
-        good = proof.holds
+        other_table = Judgements.of(proof)
+        wrong = other_table.line[other_table.over]
+        good = bool(np.isin(wrong, table.line[table.over]).all())
     except ProgramError:
         good = False
     if not good:

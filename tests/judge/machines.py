@@ -191,6 +191,31 @@ def random_machine(folder: Path, seed: int, recipe: Recipe | None = None) -> Pat
     return _write(folder, recipe, datum, scaled, {"squareness": square, **extra})
 
 
+def add_map_and_load(machine: Path, rng: np.random.Generator) -> None:
+    """Give a random machine a residual map, loads of all axes over one and two arguments, and a payload."""
+    folder = machine.parent
+    levels = [np.linspace(low, high, int(rng.integers(2, 6))) for low, high in TRAVEL]
+
+    def rows(header: str, axes: list[int], count: int, size: float) -> str:
+        lines = [header]
+        for place in itertools.product(*(levels[a].tolist() for a in axes)):
+            values = rng.normal(0.0, size, count)
+            lines.append(",".join([*(f"{v:.6f}" for v in place), *(f"{v:.6f}" for v in values)]))
+        return "\n".join(lines) + "\n"
+
+    (folder / "map.csv").write_text(rows("X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um", [0, 1, 2], 3, 12.0))
+    text = '[[maps]]\nfile = "map.csv"\nkind = "residual"\n'
+    for number, (axis, axes) in enumerate((("X", [0]), ("Y", [1, 2]), ("Z", [2]))):
+        header = ",".join([*(f"{AXES[a]}_mm" for a in axes), f"EX{axis}_um_kg,EZ{axis}_um_kg"])
+        header += f",EA{axis}_urad_kg,EB{axis}_urad_kg"
+        (folder / f"load{number}.csv").write_text(rows(header, axes, 4, 0.3))
+        text += f'[[compliance]]\nfile = "load{number}.csv"\ninterpolation = "linear"\n'
+        text += "tool_mm = [0.0, 0.0, -120.0]\nline_mm = { X = 300.0, Y = 100.0 }\n"
+    calibration = folder / "calibration.toml"
+    calibration.write_text(f"payload_kg = 5.0\n{calibration.read_text()}\n{text}")
+    (folder / "job.toml").write_text('schema = "olp-job-1"\npayload_kg = 30.0\n')
+
+
 def _constant(folder: Path, recipe: Recipe, shift_um: Sequence[float]) -> Path:
     curves: list[tuple[dict[str, Any], Curve]] = []
     for axis, letter in enumerate(AXES):

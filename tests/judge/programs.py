@@ -16,6 +16,8 @@ FEATURES = (
     "lines", "short", "rapid", "arcs", "planes", "helix", "circle", "radius", "incremental", "frames",
     "cycles", "g92", "g52", "g10", "tools", "modal", "style", "comments", "numbers", "dwell",
 )  # fmt: skip
+#: Sections after which a cut begins where the tool was left uncorrected, or with an unknown play.
+LOOSE = ("blind", "machine", "home", "off", "deleted", "series", "joint")
 RANGE = ((-60.0, 60.0), (-50.0, 50.0), (-20.0, 40.0))
 
 
@@ -102,7 +104,7 @@ def random_program(
     """
     rng = np.random.default_rng(seed)
     on = set(features)
-    unknown = on - set(FEATURES)
+    unknown = on - {*FEATURES, *LOOSE}
     if unknown:
         raise ValueError(f"no such feature: {sorted(unknown)}")
     inch = bool(rng.random() < 0.3) if inch is None else inch
@@ -128,10 +130,13 @@ def random_program(
     start = [w.round(float(v)) for v in rng.uniform(low, high)]
     w.position = [math.nan] * 3
     modal, w.modal = w.modal, False
-    w.go("G0", start)
+    if "blind" in on:
+        _in_two(w, start)
+    else:
+        w.go("G0", start)
     w.modal = modal
     w.line(f"F{speed}")
-    kinds = [kind for kind in FEATURES if kind in on and kind in _SECTIONS]
+    kinds = [kind for kind in (*FEATURES, *LOOSE) if kind in on and kind in _SECTIONS]
     for _ in range(blocks if kinds else 0):
         if "comments" in on and rng.random() < 0.2:
             w.blocks.append(str(rng.choice(["(G1 X9 Y9)", "; a remark, X1", "", "(MSG, part)"])))
@@ -323,6 +328,132 @@ def _g52(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
     w.offset = [0.0] * 3
 
 
+def _whole_point(w: _Writer, low: np.ndarray, high: np.ndarray) -> list[float]:
+    return [w.round(float(v)) for v in w.rng.uniform(low, high)]
+
+
+def _in_two(w: _Writer, target: list[float]) -> None:
+    """To a point where nothing is known: two axes as a rapid, then the third as a rapid or as a feed."""
+    third = int(w.rng.integers(3))
+    w.line("G0", *("XYZ"[i] + w.value(target[i] - w.offset[i]) for i in range(3) if i != third))
+    code = str(w.rng.choice(["G0", "G1"]))
+    w.line(code, "XYZ"[third] + w.value(target[third] - w.offset[third]), f"F{w.value(w.round(1200.0))}")
+    w.motion = code
+    w.position = list(target)
+
+
+def _blind(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """A tool change, after which the axes are commanded one after the other, and a cut."""
+    number = int(w.rng.integers(1, 3))
+    w.line(f"T{number}", "M6")
+    w.line("G43", f"H{number}")
+    w.motion = ""
+    _in_two(w, _whole_point(w, low, high))
+    w.go("G1", _point(w, low, high))
+
+
+def _feeds_on(w: _Writer, low: np.ndarray, high: np.ndarray, moved: str) -> None:
+    """A cut from where a machine position left the axes of `moved`: at once, or after rapids of others."""
+    start = list(w.position)
+    for letter in moved:
+        w.position["XYZ".index(letter)] = math.nan
+    w.motion = ""
+    how = w.rng.random()
+    if how < 0.4:
+        target = _whole_point(w, low, high)
+        rest = [i for i in range(3) if "XYZ"[i] not in moved]
+        w.line("G0", *("XYZ"[i] + w.value(target[i] - w.offset[i]) for i in rest))
+        start = [target[i] if i in rest else start[i] for i in range(3)]
+        w.position = [target[i] if i in rest else math.nan for i in range(3)]
+        w.motion = "G0"
+    modal, w.modal = w.modal, False
+    target = _whole_point(w, low, high)
+    if how > 0.8:
+        w.go("G0", target)
+    else:
+        w.position = [math.nan] * 3
+        w.go("G1", target)
+    w.modal = modal
+    _lines(w, low, high)
+
+
+def _machine(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """G53: to a position of the machine."""
+    axis = str(w.rng.choice(["Z", "Z", "X", "Y"]))
+    place = {"X": (200.0, 500.0), "Y": (150.0, 400.0), "Z": (-120.0, -40.0)}[axis]
+    w.line("G53", "G0", axis + w.value(w.round(float(w.rng.uniform(*place)))))
+    _feeds_on(w, low, high, axis)
+
+
+def _home(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """G28: to the reference point, and back by all axes."""
+    w.line("G91", "G28", "Z0")
+    w.line("G90")
+    w.motion = ""
+    _in_two(w, _whole_point(w, low, high))
+    _lines(w, low, high)
+
+
+def _off(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """A section that is left uncorrected, and a cut from where it ends."""
+    w.blocks.append("(olp off)")
+    modal, w.modal = w.modal, False
+    for _ in range(int(w.rng.integers(1, 4))):
+        w.go(str(w.rng.choice(["G0", "G1"])), _whole_point(w, low, high))
+    w.blocks.append("(olp on)")
+    w.go("G1", _whole_point(w, low, high))
+    w.modal = modal
+    w.go("G1", _point(w, low, high))
+
+
+def _deleted(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """A block that the switch deletes, and one with all axes."""
+    modal, w.modal = w.modal, False
+    numbers, w.numbers = w.numbers, False
+    w.go("G1", _whole_point(w, low, high))
+    w.blocks[-1] = "/" + w.blocks[-1]
+    w.go(str(w.rng.choice(["G0", "G1"], p=[0.9, 0.1])), _whole_point(w, low, high))
+    w.modal, w.numbers = modal, numbers
+
+
+def _series(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """Canned cycles of several kinds, each series followed at once by a cut."""
+    for _ in range(int(w.rng.integers(1, 3))):
+        top, bottom = w.round(high[2] - 5.0), w.round(float(w.rng.uniform(low[2], low[2] + 8.0)))
+        clear = w.round(high[2])
+        if w.rng.random() < 0.7:
+            w.go("G0", [w.position[0], w.position[1], clear])
+        initial = w.position[2]
+        if initial < top:
+            w.go("G0", [w.position[0], w.position[1], clear])
+            initial = clear
+        back = str(w.rng.choice(["G98", "G99"]))
+        code = str(w.rng.choice(["G81", "G82", "G83", "G73", "G85", "G89"]))
+        extra = {"G82": ["P0.1"], "G89": ["P0.1"]}.get(code, [])
+        if code in ("G83", "G73"):
+            extra = [f"Q{w.value(w.round(float(w.rng.uniform(6.0, 15.0))))}"]
+        place = [w.position[0], w.position[1]]
+        for hole in range(int(w.rng.integers(1, 4))):
+            if hole or w.rng.random() < 0.7:
+                place = [w.round(float(v)) for v in w.rng.uniform(low[:2], high[:2])]
+            words = [f"X{w.value(place[0] - w.offset[0])}", f"Y{w.value(place[1] - w.offset[1])}"]
+            if not hole:
+                words = [back, code, *words, f"Z{w.value(bottom - w.offset[2])}"]
+                words += [f"R{w.value(top - w.offset[2])}", *extra]
+            w.line(*words)
+        w.line("G80")
+        w.motion = ""
+        w.position = [*place, initial if back == "G98" else top]
+        w.go("G1", _point(w, low, high))
+
+
+def _joint(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
+    """Single feeds and rapids by turns."""
+    for _ in range(3):
+        w.go("G0", _point(w, low, high))
+        w.go("G1", _point(w, low, high))
+
+
 def _dwell(w: _Writer, low: np.ndarray, high: np.ndarray) -> None:
     w.line("G4", "P0.1")
 
@@ -343,6 +474,13 @@ _SECTIONS = {
     "g92": _g92,
     "g52": _g52,
     "dwell": _dwell,
+    "blind": _blind,
+    "machine": _machine,
+    "home": _home,
+    "off": _off,
+    "deleted": _deleted,
+    "series": _series,
+    "joint": _joint,
 }
 
 

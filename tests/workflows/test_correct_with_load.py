@@ -10,7 +10,7 @@ import pytest
 from cases.acceptance import TRUE_ZERO, allowed_um, judged, machine, points
 from judge import machines, programs
 from judge.beam import under_the_load
-from judge.machines import TRAVEL, Recipe
+from judge.machines import Recipe
 
 import olp
 
@@ -104,29 +104,9 @@ def test_the_deflection_that_a_payload_adds_is_removed(tmp_path: Path, support: 
 
 
 def with_map_and_load(folder: Path, seed: int) -> Path:
-    """A random machine with a residual map, loads of all axes over one and two arguments, and a payload."""
     rng = np.random.default_rng(seed)
     path = machines.random_machine(folder, seed, Recipe(chain=str(rng.choice(machines.CHAINS))))
-    levels = [np.linspace(low, high, int(rng.integers(2, 6))) for low, high in TRAVEL]
-
-    def rows(header: str, axes: list[int], count: int, size: float) -> str:
-        lines = [header]
-        for place in itertools.product(*(levels[a].tolist() for a in axes)):
-            values = rng.normal(0.0, size, count)
-            lines.append(",".join([*(f"{v:.6f}" for v in place), *(f"{v:.6f}" for v in values)]))
-        return "\n".join(lines) + "\n"
-
-    (folder / "map.csv").write_text(rows("X_mm,Y_mm,Z_mm,DX_um,DY_um,DZ_um", [0, 1, 2], 3, 12.0))
-    text = '[[maps]]\nfile = "map.csv"\nkind = "residual"\n'
-    for number, (axis, axes) in enumerate((("X", [0]), ("Y", [1, 2]), ("Z", [2]))):
-        header = ",".join([*(f"{'XYZ'[a]}_mm" for a in axes), f"EX{axis}_um_kg,EZ{axis}_um_kg"])
-        header += f",EA{axis}_urad_kg,EB{axis}_urad_kg"
-        (folder / f"load{number}.csv").write_text(rows(header, axes, 4, 0.3))
-        text += f'[[compliance]]\nfile = "load{number}.csv"\ninterpolation = "linear"\n'
-        text += "tool_mm = [0.0, 0.0, -120.0]\nline_mm = { X = 300.0, Y = 100.0 }\n"
-    calibration = folder / "calibration.toml"
-    calibration.write_text(f"payload_kg = 5.0\n{calibration.read_text()}\n{text}")
-    (folder / "job.toml").write_text('schema = "olp-job-1"\npayload_kg = 30.0\n')
+    machines.add_map_and_load(path, rng)
     return path
 
 
