@@ -286,7 +286,7 @@ class Tracer:
         """(3,) where the tip is before the first move."""
         start = np.array(self.path.start_mm)[None]
         tool = self.path.tool_mm(0, 1) if len(self.path) else np.zeros(3)
-        return np.asarray(start + self.model.error(start, tool), float)[0]
+        return np.asarray((start + self.model.error(start, tool))[0], float)
 
     def _starts(
         self, a: int, b: int, first: int, owner: Index, reached: Array, waypoint: Single, worst: Single
