@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases.acceptance import TRUE_ZERO
+from cases.acceptance import machine as small_machine
 from cases.whole_cut import Whole, judge_whole, marks
 from judge import linuxcnc, machines, programs
 from judge.linuxcnc import DWELL, FEED, RAPID, CanonMoves
@@ -155,6 +157,18 @@ def test_the_stated_maximum_at_length(tmp_path: Path, block: int) -> None:
             wrong.append((seed, str(error).splitlines()[0]))
     assert not wrong
     assert without <= 6
+
+
+@pytest.mark.oracle
+def test_an_unknown_side_of_the_backlash_is_in_the_stated_maximum(tmp_path: Path) -> None:
+    """The rapid is left uncorrected, so nothing takes the backlash up; the cut moves Z alone."""
+    path = small_machine(tmp_path, "[backlash]\nX_um = 15.0\nY_um = 15.0\n", tables=TRUE_ZERO)
+    text = b"G21 G90 G54\n(olp off)\nG0 X10 Y20 Z30\n(olp on)\nG1 Z5 F500\nM2\n"
+    result = olp.correct(text, path)
+    whole = judge_whole(text, result.data, tmp_path)
+    assert whole.open
+    assert whole.possible_um == pytest.approx(15.0 / np.sqrt(2.0), abs=0.01)
+    compare(result.report["deviation"]["path_max_um"], whole)
 
 
 # -- one coordinate changed -------------------------------------------------------------------------------
