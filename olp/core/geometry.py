@@ -69,7 +69,8 @@ def segment_distance(point: Array, start: Array, end: Array) -> Array:
 def arc_distance(
     point: Array, start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, near: Array
 ) -> Array:
-    """(n,) distances of points from arcs, across the path, for points that lie near share `near` of it."""
+    """(n,) distances of points from arcs, across the path and beyond its ends, for points that lie near share
+    `near` of it."""
     rows = np.arange(len(point))
     first, second, third = (_AXES[plane][:, i] for i in range(3))
     c0, c1 = centre[rows, first], centre[rows, second]
@@ -85,7 +86,11 @@ def arc_distance(
     lead = (end[rows, third] - start[rows, third]) / sweep
     level = point[rows, third] - start[rows, third] - share * lead * sweep
     # a helix rises by `lead` per radian; across it a difference in level counts by the cosine of its pitch
-    return np.asarray(np.hypot(np.hypot(p0, p1) - radius, level * radius / np.hypot(radius, lead)), float)
+    across = np.hypot(np.hypot(p0, p1) - radius, level * radius / np.hypot(radius, lead))
+    # beyond the end that is nearer, whatever the turn
+    turned = np.mod(angle * np.sign(sweep), 2 * np.pi)
+    beyond = np.minimum(turned - np.abs(sweep), 2 * np.pi - turned)
+    return np.asarray(np.hypot(across, np.maximum(beyond, 0.0) * radius), float)
 
 
 def arc_directions(

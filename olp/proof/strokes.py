@@ -21,6 +21,8 @@ from olp.program.program import Hole, Program
 Single = npt.NDArray[np.float32]
 #: Most steps of a stroke: an error that bends more often than that along a hole is no error of an axis.
 _MOST_STEPS = 1 << 8
+#: mm beyond the backlash at which it is taken up, whatever the rounding
+_PAST_MM = 1e-6
 
 
 def strokes_mm(
@@ -80,10 +82,26 @@ def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tup
     of = np.repeat(np.arange(len(rows)), steps + 1)
     first = np.cumsum(steps + 1) - steps - 1
     share = (np.arange(len(of)) - first[of]) / steps[of]
-    point = start[of] + share[:, None] * (end - start)[of]
     play = plays(model, path.end_mm)
-    if play is not None:
-        # a stroke begins on the side on which the move before it ended, and then takes up the backlash
-        before = np.concatenate((play[:1], play[:-1]))[rows][of]
-        play = play_after(before, point - start[of], model.backlash_at(point))
+    if play is None:
+        point = start[of] + share[:, None] * (end - start)[of]
+        return point + model.error(point, tool if tool.ndim == 1 else tool[of], None), of
+    # a stroke begins on the side on which the move before it ended, and then takes up the backlash
+    before = np.concatenate((play[:1], play[:-1]))[rows]
+    width = model.backlash_at(end)
+    more, of_more = _turns(start, end, before, play[rows], width)
+    of, share = np.concatenate((of, of_more)), np.concatenate((share, more))
+    point = start[of] + share[:, None] * (end - start)[of]
+    play = play_after(before[of], point - start[of], model.backlash_at(point))
     return point + model.error(point, tool if tool.ndim == 1 else tool[of], play), of
+
+
+def _turns(
+    start: Array, end: Array, before: Array, after: Array, width: Array | None
+) -> tuple[Array, Index]:
+    """(k,) shares of strokes at which an axis has taken up its backlash, and (k,) the stroke of each."""
+    size = np.zeros(start.shape) if width is None else np.maximum(np.nan_to_num(width), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (np.abs(after - before) / 2 * size + _PAST_MM) / np.abs(end - start)
+    stroke, axis = np.nonzero((after != before) & (share < 1.0))
+    return share[stroke, axis], stroke
