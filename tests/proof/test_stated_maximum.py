@@ -147,10 +147,10 @@ def test_the_stated_maximum_is_what_the_whole_cut_is_off(tmp_path: Path, seed: i
 
 @pytest.mark.oracle
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(10))
+@pytest.mark.parametrize("block", range(6))
 def test_the_stated_maximum_at_length(tmp_path: Path, block: int) -> None:
     wrong, without = [], 0
-    for seed in range(1000 + 20 * block, 1020 + 20 * block):
+    for seed in range(400 + 20 * block, 420 + 20 * block):
         try:
             without += refused(seed, tmp_path / str(seed))
         except AssertionError as error:
