@@ -8,6 +8,7 @@ the program belong to which nominal move.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -74,8 +75,10 @@ def _from_unknown(
     nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, worst: Single
 ) -> None:
     """Where a feed move starts at a position of which an axis is unknown, how far the tip may be off there in
-    the others: the largest over the box of the unknown axis."""
+    the others: the largest over the box of the unknown axis, whatever the play."""
     start = nominal.starts_mm()
+    has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
+    sides = [np.array(side) for side in product((-1.0, 1.0), repeat=3)] if has_play else [None]
     first = np.concatenate(([0], groups[:-1] + 1)) if len(groups) else groups
     some = np.isnan(start).any(axis=1) & np.isfinite(start).any(axis=1)
     some &= (nominal.kind != Kind.RAPID) & np.isfinite(target).all(axis=1)
@@ -84,17 +87,14 @@ def _from_unknown(
         known, at = np.isfinite(start[i]), int(first[i])
         if at >= len(path) or not np.isfinite(command[at][known]).all():
             continue
-        ranges = [
-            command[at][axis : axis + 1]
-            if known[axis]
-            else np.linspace(model.box_mm[axis, 0], model.box_mm[axis, 1], _PROBES)
-            for axis in range(3)
-        ]
+        box = np.linspace(model.box_mm[:, 0], model.box_mm[:, 1], _PROBES).T
+        ranges = [command[at][axis : axis + 1] if known[axis] else box[axis] for axis in range(3)]
         point = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
-        tip = point + model.error(point, path.tool_mm(at, at + 1))
         meant = start[i] + target[i] - nominal.end_mm[i]
-        away = float(np.sqrt((((tip - meant)[:, known]) ** 2).sum(axis=1)).max())
-        worst[i] = max(away, float(np.nan_to_num(worst[i])))
+        for side in sides:
+            play = None if side is None else np.broadcast_to(side, point.shape)
+            away = point + model.error(point, path.tool_mm(at, at + 1), play) - meant
+            worst[i] = np.fmax(worst[i], np.sqrt((away[:, known] ** 2).sum(axis=1)).max())
 
 
 def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from cases.acceptance import _lift
 from judge import linuxcnc
 from judge.linuxcnc import ARC, DWELL, FEED, RAPID, CanonMoves
 from judge.model import JudgeModel
 from judge.path import DensePath, _Curves, densify, match, shifts, tool_vectors
-
-from cases.acceptance import _lift
 
 #: mm by which moves of different kinds are moved apart in the matching
 _APART_MM = 100.0
@@ -68,8 +67,8 @@ def marks(text: bytes) -> Marks:
 @dataclass(frozen=True, slots=True)
 class Whole:
     """Figures in um. `certain_um` is the largest where the state of the machine is known, `possible_um` the
-    largest with every side of the backlash that is possible. By nominal line, the same. `open` counts points of
-    cuts with an unknown play, `left_out` those with an unknown position, `loose` cuts that start where an
+    largest with every side of the backlash that is possible. By nominal line, the same. `open` counts points
+    of cuts with an unknown play, `left_out` those with an unknown position, `loose` cuts that start where an
     uncorrected move ended."""
 
     certain_um: float
@@ -145,7 +144,7 @@ def _first_after(moves: CanonMoves, lines: frozenset[int]) -> list[int]:
 
 
 def _forget_changes(moves: CanonMoves, changes: frozenset[int]) -> CanonMoves:
-    """All axes are unknown after a tool change until the program moves them, also where the tool is the same."""
+    """All axes are unknown after a tool change until the program moves them, even where the tool stays."""
     known = moves.known.copy()
     for change in _first_after(moves, changes):
         if change:
@@ -335,7 +334,7 @@ def _hole(
     result: _Sum, real: _Tips, moves: CanonMoves, shift: np.ndarray, mine: tuple[int, int],
     theirs: tuple[int, int],
 ) -> None:  # fmt: skip
-    """Distances of the feed strokes of a hole from its axis, along Z, and of the deepest one from the bottom."""
+    """Distances of the feed strokes of a hole from its axis, along Z, and of the deepest from the bottom."""
     dense = real.dense
     strokes = np.arange(*mine)[moves.kind[mine[0] : mine[1]] == FEED]
     if not len(strokes):
@@ -343,7 +342,7 @@ def _hole(
     level = np.concatenate([moves.axis[strokes, 2], moves.begin[strokes, 2]])
     deepest = int(strokes[np.argmin(moves.axis[strokes, 2])])
     bottom = moves.axis[deepest] + shift[deepest]
-    top = bottom + [0.0, 0.0, float(np.ptp(level))]
+    top = bottom + np.array([0.0, 0.0, float(np.ptp(level))])
     feeds = dense.moves.kind[dense.move] == FEED
     rows = np.flatnonzero((dense.move >= theirs[0]) & (dense.move < theirs[1]) & feeds & real.settled)
     if not len(rows):

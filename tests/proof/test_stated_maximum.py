@@ -23,7 +23,7 @@ from olp.core.errors import ProgramError
 
 #: what the judge's arcs may be off
 ARCS_UM = 0.27
-#: Without an unknown play the stated maximum is at most this factor above what the judge finds, and this much.
+#: Without an unknown play the stated maximum is at most this factor above the judge's, and this much.
 FACTOR = 1.5
 MORE_UM = 0.5
 #: programs of every kind: with holes, sections that are off, machine positions, tool changes, unknown starts
@@ -242,7 +242,8 @@ def check_change(seed: int, folder: Path) -> dict[str, Any]:
         assert numerical["line"] in touched or numerical["line"] in already
         rest = ~np.isin(lines["line"], list(touched))
         np.testing.assert_allclose(
-            lines["corrected_um"][rest], base["corrected_um"][rest], rtol=0, atol=1e-3, err_msg=f"{step} {line}"
+            lines["corrected_um"][rest], base["corrected_um"][rest], rtol=0, atol=1e-3,
+            err_msg=f"{step} {line}",
         )
         if step < 1.0:  # the judge's own matching may go astray beyond
             compare(numerical["largest_um"], judge_whole(nominal, other, folder))
