@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def best(question: str, sections: Sequence[Section], most: int = 6) -> list[Sect
     asked = Question.of(question)
     titles = [set(stems(section.title)) for section in sections]
     page_titles = _page_titles(sections)
-    texts = [Counter(stems(section.text)) for section in sections]
+    texts = [_counted(section.text) for section in sections]
     mean = sum(text.total() for text in texts) / max(len(texts), 1)
     counted = asked.stems | asked.added
     both = list(zip(titles, texts, strict=True))
@@ -157,6 +158,11 @@ def stems(text: str, *, keep: bool = False) -> list[str]:
     words = re.findall(r"[\w.+-]*\w", text.lower())
     held = (word for word in words if keep or not (word in EMPTY or re.fullmatch(r"\d{1,2}", word)))
     return [re.sub(r"(?<=\w{3})s$", "", word)[:STEM] for word in held]
+
+
+@lru_cache(maxsize=4096)
+def _counted(text: str) -> Counter[str]:
+    return Counter(stems(text))
 
 
 def page_weight(page: str) -> float:

@@ -33,7 +33,7 @@ def test_equation_1_of_a_machine_that_it_describes_leaves_its_noise() -> None:
 
 @pytest.mark.slow
 def test_the_conclusions_hold_on_a_machine() -> None:
-    rows_by_method = {row.method: row.left for row in bench.compared("smooth", 2)}
+    rows_by_method = {row.method: row.residual for row in bench.compared("smooth", 2)}
     median = {
         name: {tool: float(np.median(v)) for tool, v in residuals.items()}
         for name, residuals in rows_by_method.items()

@@ -153,6 +153,7 @@ def test_no_contact_between_waypoints_is_missed(seed: int) -> None:
     assert best.distance_mm.max() <= CONTACT_MM
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(SEEDS, st.sampled_from(["cylinder", "cone"]))
 @example(228, "cylinder")

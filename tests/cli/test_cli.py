@@ -303,6 +303,7 @@ def test_inspect_of_a_machine_states_the_size_of_its_errors() -> None:
         assert words in text
 
 
+@pytest.mark.slow
 def test_inspect_draws_the_curves_and_never_over_a_file(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     plot = tmp_path / "curves.svg"

@@ -60,6 +60,7 @@ def test_a_clean_run_has_no_findings(nominal: Path) -> None:
     assert report["after"]["iso_9283"]["RT_um"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", (".txt", ".md", ".html"))
 def test_one_set_of_runs_is_measured_and_not_said_to_be_corrected(nominal: Path, ending: str) -> None:
     once, again = (nominal.with_name(f"{name}.csv") for name in ("once", "again"))
@@ -89,6 +90,7 @@ def test_wrong_pairing(nominal: Path) -> None:
     assert "across_um" not in report["after"]
 
 
+@pytest.mark.slow
 def test_points_left_out(nominal: Path) -> None:
     points = bent(2000)
     points[500] += 5.0

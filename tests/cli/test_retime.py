@@ -395,6 +395,7 @@ def test_a_wider_tolerance_saves_time_and_costs_path(job: Path, tmp_path: Path) 
     assert "at other path" not in run("retime", named, "-j", job).stdout
 
 
+@pytest.mark.slow
 def test_the_machine_says_how_its_control_passes_corners(tmp_path: Path) -> None:
     text = "G1 X40. F3000.\nY40.\nX0.\nY0.\n"
     seconds: dict[str, float] = {}

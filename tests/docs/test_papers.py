@@ -347,6 +347,7 @@ class Links(HTMLParser):
                 self.names.add(value)
 
 
+@pytest.mark.slow
 def test_the_html_is_linked_and_needs_no_network() -> None:
     files = site(handbook.pages(), handbook.pictures())
     seen = {name: Links() for name in files if name.endswith(".html")}
@@ -368,6 +369,7 @@ def test_the_html_is_linked_and_needs_no_network() -> None:
     assert b"http://" not in scripts.replace(b"http://localhost", b"")
 
 
+@pytest.mark.slow
 def test_the_html_is_written_and_not_overwritten(tmp_path: Path) -> None:
     target = tmp_path / "pages"
     asked("help", "--html", str(target))

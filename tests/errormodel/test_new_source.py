@@ -35,7 +35,7 @@ def test_a_new_source_is_one_file_and_one_line(tmp_path: Path) -> None:
     registry = sources / "registry.py"
     text = registry.read_text()
     assert text.count(ONE) == 1
-    where = "from olp.errormodel.sources.sag import Sags\n\nSOURCES"
+    where = "\nfrom olp.errormodel.sources.sag import Sags\n\nSOURCES"
     registry.write_text(text.replace(ONE, f"{ONE}    Sags(),\n").replace("\nSOURCES", where, 1))
     done = run(tmp_path, "sag")
     assert done.stdout.count(".") > 20 and done.returncode == 0, done.stdout

@@ -272,6 +272,7 @@ machines = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(machine=machines, note=st.text())
 def test_a_written_machine_loads_as_it_was(
     machine: Machine, note: str, tmp_path_factory: pytest.TempPathFactory

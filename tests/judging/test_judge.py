@@ -379,6 +379,7 @@ def arc(
     return replace(moves, kind=ARC * ints, centre=centre[None], turns=turns * ints, plane=plane * ints)
 
 
+@pytest.mark.slow
 @given(
     st.integers(0, 2),
     st.sampled_from([-2, -1, 1, 3]),

@@ -177,6 +177,7 @@ def test_an_outline_shows_every_value_and_the_findings() -> None:
         assert words in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "magic"), [("svg", b"<?xml"), ("png", b"\x89PNG")])
 def test_curves_are_drawn_the_same_every_time(kind: Any, magic: bytes) -> None:
     pytest.importorskip("matplotlib")

@@ -92,6 +92,7 @@ def test_a_program_without_feed_has_times_all_the_same(tmp_path: Path) -> None:
         olp.view(b"G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100\nM2\n", machine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_thinned_table_keeps_the_peaks(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     _, timing = viewed(name)

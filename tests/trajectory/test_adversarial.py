@@ -389,6 +389,7 @@ def test_a_broken_ruckig_makes_nothing_wrong_or_much_slower(
 # -- no network --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_no_socket_is_opened_from_python(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*args: object, **names: object) -> None:
         raise AssertionError("the network was asked for")
@@ -429,6 +430,7 @@ ruckig.Ruckig(1, 0.01, 1).calculate(ask, result)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     not sys.platform.startswith("linux") or not shutil.which("cc"), reason="needs Linux and cc"
 )

@@ -61,6 +61,7 @@ def test_a_move_ends_at_its_target_inside_its_limits(case):
     check(case, *solve(*case))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(moves())
 def test_the_closed_form_is_as_fast_as_ruckig(case):

@@ -43,6 +43,7 @@ def laws_hold(given_route: Route, path: SmoothPath) -> None:
         assert far_from(point, path.at(arc_mm)[0], np.repeat(path.source, 5)).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_adversarial_routes_are_smoothed_within_tolerance(name: str) -> None:
     given_route, limits = CASES[name]()

@@ -77,6 +77,7 @@ def test_moves_of_one_line_have_their_own_feeds() -> None:
     assert lines.feed_seconds == pytest.approx([np.diff(trajectory.motion.start_s)[down].sum()])
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(st.integers(0, 10_000))
 def test_lines_and_places_share_out_the_whole(seed: int) -> None:

@@ -191,6 +191,7 @@ def call(shop: Path, calibration: str, *more: str):
     )
 
 
+@pytest.mark.slow
 def test_the_command_on_a_good_calibration(shop: Path) -> None:
     done = call(shop, "calibration.toml", "--json")
     assert done.exit_code == 0, done.output

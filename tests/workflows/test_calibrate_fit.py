@@ -247,6 +247,7 @@ def test_the_calibration_corrects_a_program(example: Path) -> None:
     assert result.data != program.read_bytes()
 
 
+@pytest.mark.slow
 def test_the_python_way_gives_the_same(example: Path) -> None:
     fitted = olp.fit_calibration(example, example / "machine.toml")
     assert fitted.files(example / "calibration.toml") == {

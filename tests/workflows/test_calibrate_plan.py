@@ -168,6 +168,7 @@ def filled(folder: Path, values: object) -> None:
         file.write_text("\n".join(",".join(r) for r in rows) + "\n", "utf-8")
 
 
+@pytest.mark.slow
 def test_a_plan_of_points_can_be_filled_in(tmp_path: Path) -> None:
     plan = plan_measurements(MACHINE, instrument="tracker", uncertainty_um=8.0)
     assert plan.chosen.prediction.rms_mm <= 8e-3

@@ -145,6 +145,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_command_and_a_second_turn_from_its_files(shop: Path, tmp_path: Path) -> None:
     files = [str(shop / "calibration.toml"), str(shop / "tracker.csv"), "-m", str(shop / "machine.toml")]
     one, two = tmp_path / "one.toml", tmp_path / "two.toml"

@@ -84,6 +84,7 @@ def test_view_shows_the_tolerance_of_the_job_unless_the_call_gives_one(uncertain
         assert scene.uncertainty.within_mm == pytest.approx(shown_um * MM_PER_UM)
 
 
+@pytest.mark.slow
 def test_compare_judges_by_the_job_where_the_call_gives_none(job: Path, tmp_path: Path) -> None:
     machine = job.with_name("machine.toml")
     measured = tmp_path / "measured.csv"

@@ -120,6 +120,7 @@ def test_each_of_several_texts_is_opened_once(folder: Path, words: tuple[str, ..
     assert {name: count for name, count in counts.items() if count > 1} == {}
 
 
+@pytest.mark.slow
 def test_the_count_sees_a_second_opening(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     planted = COUNT.replace("from olp.cli import main", "open('x.csv'); from olp.cli import main")
     monkeypatch.setattr(sys.modules[__name__], "COUNT", planted)

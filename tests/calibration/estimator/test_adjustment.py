@@ -192,6 +192,7 @@ def test_a_point_that_slipped_is_left_out_and_named() -> None:
     assert "points.csv: row 18" in findings_with(fitted, "OLP802")[0].message
 
 
+@pytest.mark.slow
 def test_a_forgotten_scale_is_caught_by_chi_square() -> None:
     """A tracker that is off by 50 um/m beside a laser's lines; stated as unknown it fits."""
     machine, measurements = case(0, "smooth", "FXYZ")
@@ -246,6 +247,7 @@ def test_lengths_of_points_in_a_plane_are_refused() -> None:
 # -- directions from pods --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_residuals_with_two_pods() -> None:
     """Poses unknown, one distance known: 10 urad at 4 m; the pods are estimated too."""
     rows = []
@@ -259,6 +261,7 @@ def test_residuals_with_two_pods() -> None:
     assert np.median(rows) <= 25.0
 
 
+@pytest.mark.slow
 def test_without_a_distance_the_scale_is_not_observable() -> None:
     """With one offset of the reflector the mean of the three scales is not observable then, but their
     differences are."""

@@ -265,6 +265,7 @@ def test_a_drift_that_swings_within_a_run_makes_no_reversal_along_the_axis() -> 
     assert flagged <= 4
 
 
+@pytest.mark.slow
 def test_a_recording_of_many_targets_needs_no_large_system() -> None:
     """20,000 targets in each direction: as one dense system this would be 6 GB."""
     random = np.random.default_rng(1)

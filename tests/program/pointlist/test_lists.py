@@ -238,6 +238,7 @@ def test_any_bytes_are_read_or_refused(perfect: Path, data: bytes) -> None:
 VALUES = st.tuples(*[st.integers(-90_000, 150_000)] * 3)
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25, deadline=None)
 @given(rows=st.lists(VALUES, min_size=1, max_size=6), places=st.integers(3, 6), mark=st.sampled_from(",;\t "),
        width=st.sampled_from([0, 14]))  # fmt: skip

@@ -67,6 +67,7 @@ def test_a_span_cuts_the_motion() -> None:
             motion_plot(trajectory, way, "", from_s=span[0], to_s=span[1])
 
 
+@pytest.mark.slow
 def test_on_the_command_line(job: Path, tmp_path: Path) -> None:
     part, plot = program(tmp_path, CHANGES), tmp_path / "motion.png"
     result = run("retime", part, "-j", job, "--plot", plot)
