@@ -25,6 +25,8 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 _DIGITS = 2.0
 #: mm; the same where the last digit is not known.
 _LEAST_MM = 1e-3
+#: Moves in which the next motion of an axis is looked for; behind them any side is as good.
+_AHEAD = 1000
 #: Moves that take no further block.
 _FIXED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE | Flag.DELETED)
 
@@ -90,8 +92,9 @@ def _sides(path: Toolpath, rows: Plan, where: Index) -> Array:
     side = np.ones((len(where), 3))
     for i, k in enumerate(where.tolist()):
         for axis in range(3):
-            ahead = path.end_mm[rows.move[k] + 1 :, axis] - path.end_mm[rows.move[k], axis]
-            moved = np.flatnonzero(np.nan_to_num(ahead[:1000]) != 0.0)
+            begin = int(rows.move[k])
+            ahead = path.end_mm[begin + 1 : begin + 1 + _AHEAD, axis] - path.end_mm[begin, axis]
+            moved = np.flatnonzero(np.nan_to_num(ahead) != 0.0)
             if moved.size:
                 side[i, axis] = np.sign(ahead[moved[0]])
     return side
