@@ -21,13 +21,11 @@ from olp.program.program import Hole, Program
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HolePlan:
-    """(h, 3) commands at the R level and at the bottom of each hole, and how far its stroke leans, (h,);
-    all in mm."""
+    """(h, 3) commands at the R level and at the bottom of each hole, in mm."""
 
     holes: tuple[Hole, ...]
     level_mm: Array
     bottom_mm: Array
-    lean_mm: Array
 
     @staticmethod
     def of(program: Program, plan: Plan, model: ErrorModel) -> HolePlan:
@@ -43,18 +41,14 @@ class HolePlan:
             frame = int(path.frame[hole.first])
             tool[i], shift[i] = tools[frame], plan.shift_mm[frame]
         if not count:
-            return HolePlan(holes, level, bottom, np.zeros(0))
+            return HolePlan(holes, level, bottom)
         level_play, bottom_play = _play(program, plan)
         c_level = invert(model, level + shift, tool, level_play)
         c_bottom = invert(model, bottom + shift, tool, bottom_play)
-        # the stroke does not turn the axes of the plane, so its lean is that of the error alone
-        lean = np.abs(invert(model, level + shift, tool) - invert(model, bottom + shift, tool)) / 2
         for i, hole in enumerate(holes):
-            lean[i, PLANES[hole.plane][2]] = 0.0
-            off = np.array([bool(path.flag[hole.first] & np.uint8(Flag.PASS))])
-            if off[0]:
+            if path.flag[hole.first] & np.uint8(Flag.PASS):
                 c_level[i], c_bottom[i] = level[i], bottom[i]
-        return HolePlan(holes, c_level, c_bottom, np.sqrt((lean * lean).sum(axis=1)))
+        return HolePlan(holes, c_level, c_bottom)
 
 
 def _play(program: Program, plan: Plan) -> tuple[Array | None, Array | None]:

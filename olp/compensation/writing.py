@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from olp.compensation.block_writer import BlockWriter
 from olp.compensation.digits import INT10
-from olp.compensation.hole_plan import HolePlan
 from olp.compensation.plan import Plan
 from olp.compensation.statement_writer import StatementWriter
 from olp.compensation.tally import Tally
@@ -25,13 +24,12 @@ from olp.program.text.numbers import Placing
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
     """The corrected bytes, and whether anything of the path is `changed`; (n,) `parts`, how many moves
-    they have for each nominal one; what was changed, and the holes of canned cycles."""
+    they have for each nominal one; and what was changed."""
 
     text: bytes
     changed: bool
     parts: npt.NDArray[np.int32]
     tally: Tally
-    holes: HolePlan
 
 
 def write(
@@ -48,7 +46,7 @@ def write(
     task = Task(program, plan, model, tolerance_mm, increments_mm, stamp)
     writer = _writer(program, plan)(task)
     text = writer.text()
-    return Written(text, text is not program.data, writer.parts, writer.tally, writer.holes)
+    return Written(text, text is not program.data, writer.parts, writer.tally)
 
 
 def _writer(program: Program, plan: Plan) -> type[Writer]:
