@@ -369,6 +369,25 @@ def test_the_html_is_linked_and_needs_no_network() -> None:
     assert b"http://" not in scripts.replace(b"http://localhost", b"")
 
 
+@pytest.mark.parametrize(
+    ("folder", "words"),
+    [
+        ("mine", "exists already"),
+        ("file", "is a file; name a folder"),
+        ("file/sub", "is a file; name a folder"),
+    ],
+)
+def test_pages_that_cannot_be_written_leave_nothing(tmp_path: Path, folder: str, words: str) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "index.html").write_text("mine")
+    (tmp_path / "file").write_text("mine")
+    refused = CliRunner().invoke(main, ["help", "--html", str(tmp_path / folder)])
+    assert refused.exit_code == 2
+    assert f"{tmp_path / folder}" in refused.stderr
+    assert words in refused.stderr
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "index.html", "mine"]
+
+
 @pytest.mark.slow
 def test_the_html_is_written_and_not_overwritten(tmp_path: Path) -> None:
     target = tmp_path / "pages"
