@@ -8,6 +8,7 @@ import statistics
 import tomllib
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from docs import write_reference
 from docs.blocks import DOCS, README, ROOT
 from docs.prose import LONGEST, MEAN, Sentence, modules, of_module, of_paper
 from docs.words import PATTERN, instead
+from markdown_it import MarkdownIt
 
 from olp.cli import main
 from olp.files import handbook
@@ -250,6 +252,14 @@ def test_no_question_leads_to_the_plan_of_the_code_first() -> None:
 def test_pages_about_a_subject_exist() -> None:
     named = {page for subject in handbook_search.SUBJECTS for page in subject.pages}
     assert named <= handbook.pages().keys()
+
+
+def test_sections_are_the_headings_of_a_page() -> None:
+    """By another reader of Markdown; a comment in a block of code is no heading."""
+    for page in handbook.pages().values():
+        tokens = MarkdownIt("commonmark").parse(page.text)
+        headings = [b.content for a, b in pairwise(tokens) if a.type == "heading_open"]
+        assert [section.title for section in page.sections] == headings
 
 
 def test_help_shows_a_page_by_its_name() -> None:
