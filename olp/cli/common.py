@@ -98,16 +98,9 @@ def default_output(program: str) -> str:
 
 def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) -> None:
     """Raise the writer's errors before the work is done."""
-    sources = [Path(name) for name in inputs if Path(name).exists()]
-    for name in targets:
-        path = Path(name)
-        if not path.parent.is_dir():
-            raise UsageError(f"there is no folder {str(path.parent)!r}; create it first", file=name)
-        if any(path.exists() and path.samefile(origin) for origin in sources):
-            what = "is an input of this call and is never overwritten; name another output"
-            raise UsageError(what, file=name)
-        if path.is_file() and not force:
-            raise UsageError("exists already; name another file, or overwrite it with --force", file=name)
+    from olp.files.write import check_targets
+
+    check_targets(map(Path, targets), inputs, force=force)
 
 
 def refuse_twice(names: Iterable[str]) -> None:

@@ -23,6 +23,7 @@ from olp.cli.common import (
     refuse_twice,
     source,
 )
+from olp.cli.layouts import layout_options
 from olp.cli.options import (
     Length,
     contour_option,
@@ -57,12 +58,10 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @setup_options
 @click.option("--before", multiple=True, metavar="FILE", help="A run without correction; may be repeated.")
 @click.option("--poses", is_flag=True, help="Rows are poses, not points along a path.")
-@click.option("--profile", metavar="NAME|FILE", help="How the files are laid out; see --save-profile.")
-@click.option(
-    "--column", "columns", multiple=True, metavar="X=NAME",
-    help="Name or number of the column of X, Y, Z, t, name or line.",
+@layout_options(
+    "How the files are laid out; see --save-profile.", "Unit of X, Y and Z.",
+    "Name or number of the column of X, Y, Z, t, name or line.",
 )  # fmt: skip
-@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z.")
 @click.option(
     "--delimiter", type=click.Choice(["comma", "semicolon", "tab", "space"]), help="Separator of columns."
 )

@@ -24,7 +24,7 @@ from olp.cli.common import (
     refuse_early,
     refuse_twice,
 )
-from olp.cli.layouts import with_layout_of
+from olp.cli.layouts import layout_options, with_layout_of
 from olp.cli.options import (
     confidence_options,
     force_option,
@@ -60,9 +60,7 @@ LAST_DIGITS_UM = 10.0
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")
-@click.option("--profile", metavar="NAME|FILE", help="Layout of the columns of a list of positions.")
-@click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
-@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a list.")
+@layout_options("Layout of the columns of a list of positions.", "Unit of X, Y and Z in a list.")
 @renamed_option("--results", "the verb olp results", flag=True)
 @renamed_option("--frame", "an option of olp results")
 @renamed_option("--tool", "an option of olp results")

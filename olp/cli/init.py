@@ -8,7 +8,7 @@ import click
 
 from olp.cli.common import diagnostic
 from olp.cli.options import NUMBER, force_option
-from olp.core.errors import OlpError, UsageError
+from olp.core.errors import UsageError
 
 #: Travel of a small machine in mm, to be replaced by that of the real one.
 TRAVEL_MM = {"X": (0.0, 500.0), "Y": (0.0, 400.0), "Z": (-300.0, 0.0)}
@@ -43,7 +43,7 @@ def command(
     from dataclasses import replace
 
     from olp.files import starter
-    from olp.files.write import write_files
+    from olp.files.write import make_folder, write_files
 
     notes: tuple[str, ...] = ()
     if ini is not None:
@@ -62,19 +62,10 @@ def command(
     texts = starter.starter_set(machine)
     if notes:
         texts["machine.toml"] = starter.machine_toml(machine, notes)
-    _make_folder(Path(folder))
+    make_folder(Path(folder))
     files = {Path(folder) / file: text.encode() for file, text in texts.items()}
     write_files(files, force=force)
     for path in files:
         diagnostic(f"wrote {path}")
     for note in notes:
         diagnostic(f"note: {note}")
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise UsageError("is a file; name a folder", file=str(folder)) from None
-    except OSError as error:
-        raise OlpError(f"cannot be created ({error.strerror})", file=str(folder)) from error

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
 
 from olp.cli.common import STREAM, Given, files_of
 from olp.core.errors import InputError, UsageError
@@ -11,6 +14,24 @@ from olp.core.errors import InputError, UsageError
 if TYPE_CHECKING:
     from olp.files.sources import Source, Sources
     from olp.program.text.delimited import Layout
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def layout_options(
+    profile: str, unit: str, columns: str = "Column of X, Y, Z, I, J, K, ..."
+) -> Callable[[F], F]:
+    """--profile, --column and --unit, with their helps: the layout of a table."""
+
+    def add(function: F) -> F:
+        units = click.Choice(["mm", "um", "m", "inch"])
+        function = click.option("--unit", type=units, help=unit)(function)
+        function = click.option("--column", "columns", multiple=True, metavar="X=NAME", help=columns)(
+            function
+        )
+        return click.option("--profile", metavar="NAME|FILE", help=profile)(function)
+
+    return add
 
 
 def layout_of(

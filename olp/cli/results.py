@@ -21,7 +21,7 @@ from olp.cli.common import (
     refuse_early,
     refuse_twice,
 )
-from olp.cli.layouts import layout_of
+from olp.cli.layouts import layout_of, layout_options
 from olp.cli.options import (
     Count,
     Range,
@@ -66,9 +66,7 @@ class _Asked:
 @click.argument("results")
 @setup_options
 @output_option("OUT", "Default: RESULTS.corrected.SUFFIX beside RESULTS.")
-@click.option("--profile", metavar="NAME|FILE", help="Layout of a table of points.")
-@click.option("--column", "columns", multiple=True, metavar="X=NAME", help="Column of X, Y, Z, I, J, K, ...")
-@click.option("--unit", type=click.Choice(["mm", "um", "m", "inch"]), help="Unit of X, Y and Z in a table.")
+@layout_options("Layout of a table of points.", "Unit of X, Y and Z in a table.")
 @click.option(
     "--frame", "frames", multiple=True, metavar="[NAME=]FRAME",
     help="Work offset that the results are stated in, or machine; may be repeated.",

@@ -34,6 +34,11 @@ class Page:
 
     name: str
     text: str
+    sections: tuple[Section, ...]
+
+    @staticmethod
+    def of(name: str, text: str) -> Page:
+        return Page(name, text, tuple(_sections(name, text)))
 
     @property
     def title(self) -> str:
@@ -45,15 +50,11 @@ class Page:
         paragraph = " ".join(self.sections[0].text.strip().split("\n\n")[0].split())
         return re.split(r"(?<=[.!?])\s", paragraph)[0]
 
-    @property
-    def sections(self) -> tuple[Section, ...]:
-        return tuple(_sections(self))
-
 
 @functools.cache
 def pages() -> dict[str, Page]:
     """All pages by name, in reading order: the index first, then as it links them, then what it links not."""
-    pages_by_name = {name: Page(name, text) for name, text in _texts(resources.files("olp") / "docs", "")}
+    pages_by_name = {name: Page.of(name, text) for name, text in _texts(resources.files("olp") / "docs", "")}
     order = [INDEX, *_LINK.findall(pages_by_name[INDEX].text), *sorted(pages_by_name)]
     return {name: pages_by_name[name] for name in dict.fromkeys(order) if name in pages_by_name}
 
@@ -83,15 +84,15 @@ def _texts(folder: Traversable, prefix: str) -> Iterator[tuple[str, str]]:
             yield prefix + entry.name.removesuffix(".md"), _COMMENT.sub("", entry.read_text("utf-8"))
 
 
-def _sections(page: Page) -> Iterator[Section]:
-    title, lines, fenced = page.name, list[str](), False
-    for line in page.text.splitlines():
+def _sections(page: str, text: str) -> Iterator[Section]:
+    title, lines, fenced = page, list[str](), False
+    for line in text.splitlines():
         if line.startswith(_FENCE):
             fenced = not fenced
         if not fenced and line.startswith("#"):
-            if lines or title != page.name:
-                yield Section(page.name, title, "\n".join(lines).strip("\n"))
+            if lines or title != page:
+                yield Section(page, title, "\n".join(lines).strip("\n"))
             title, lines = line.lstrip("# "), []
         else:
             lines.append(line)
-    yield Section(page.name, title, "\n".join(lines).strip("\n"))
+    yield Section(page, title, "\n".join(lines).strip("\n"))

@@ -52,9 +52,7 @@ def write_files(
     of `inputs` (also with `force`), exists without `force`, or has no folder. Raises OlpError where the
     system refuses to write.
     """
-    sources = [Path(source) for source in inputs]
-    for target in files:
-        _check(target, force, sources)
+    check_targets(files, inputs, force=force)
     waiting: list[tuple[Path, Path]] = []
     current = Path()
     try:
@@ -81,8 +79,27 @@ def write_files(
             temporary.unlink(missing_ok=True)
 
 
-def _check(target: Path, force: bool, sources: Iterable[Path]) -> None:
-    if not target.parent.is_dir():
+def check_targets(
+    targets: Iterable[Path], inputs: Iterable[PathLike] = (), *, force: bool, new_folders: bool = False
+) -> None:
+    """Raise UsageError as `write_files` does. With `new_folders` those of the targets need not exist."""
+    sources = [Path(source) for source in inputs]
+    for target in targets:
+        _check(target, force, sources, new_folders)
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder and those above it, where they do not exist. Raises UsageError, OlpError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise UsageError("is a file; name a folder", file=str(folder)) from None
+    except OSError as error:
+        raise OlpError(f"cannot be created ({error.strerror})", file=str(folder)) from error
+
+
+def _check(target: Path, force: bool, sources: Iterable[Path], new_folders: bool) -> None:
+    if not (new_folders or target.parent.is_dir()):
         raise UsageError(f"there is no folder {str(target.parent)!r}; create it first", file=str(target))
     if target.is_dir():
         raise UsageError("is a folder; name a file to write", file=str(target))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from olp.core.errors import UsageError
 from olp.files import handbook
-from olp.files.write import write_files
+from olp.files.write import check_targets, make_folder, write_files
 from olp.findings.catalogue import RULES
 from olp.reports import handbook as shown
 from olp.reports.handbook_search import best, subject
@@ -87,7 +87,9 @@ def write_site(folder: str, *, force: bool) -> Path:
     """Write the papers as linked pages into a folder; what to open first. Raises UsageError, InputError."""
     target = Path(folder)
     files = {target / name: data for name, data in site(handbook.pages(), handbook.pictures()).items()}
-    for parent in {path.parent for path in files}:
-        parent.mkdir(parents=True, exist_ok=True)
+    check_targets(files, force=force, new_folders=True)
+    # the folder itself first: an error names what was asked for
+    for parent in [target, *sorted({path.parent for path in files})]:
+        make_folder(parent)
     write_files(files, force=force)
     return target / f"{handbook.INDEX}.html"

@@ -8,6 +8,7 @@ import statistics
 import tomllib
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from docs import write_reference
 from docs.blocks import DOCS, README, ROOT
 from docs.prose import LONGEST, MEAN, Sentence, modules, of_module, of_paper
 from docs.words import PATTERN, instead
+from markdown_it import MarkdownIt
 
 from olp.cli import main
 from olp.files import handbook
@@ -252,6 +254,14 @@ def test_pages_about_a_subject_exist() -> None:
     assert named <= handbook.pages().keys()
 
 
+def test_sections_are_the_headings_of_a_page() -> None:
+    """By another reader of Markdown; a comment in a block of code is no heading."""
+    for page in handbook.pages().values():
+        tokens = MarkdownIt("commonmark").parse(page.text)
+        headings = [b.content for a, b in pairwise(tokens) if a.type == "heading_open"]
+        assert [section.title for section in page.sections] == headings
+
+
 def test_help_shows_a_page_by_its_name() -> None:
     for name, page in handbook.pages().items():
         assert asked("help", name) == for_terminal(page.text, name)
@@ -367,6 +377,25 @@ def test_the_html_is_linked_and_needs_no_network() -> None:
             assert not part or part in seen[file].names, (name, link)
     scripts = b"".join(data for file, data in files.items() if not file.endswith(".png"))
     assert b"http://" not in scripts.replace(b"http://localhost", b"")
+
+
+@pytest.mark.parametrize(
+    ("folder", "words"),
+    [
+        ("mine", "exists already"),
+        ("file", "is a file; name a folder"),
+        ("file/sub", "is a file; name a folder"),
+    ],
+)
+def test_pages_that_cannot_be_written_leave_nothing(tmp_path: Path, folder: str, words: str) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "index.html").write_text("mine")
+    (tmp_path / "file").write_text("mine")
+    refused = CliRunner().invoke(main, ["help", "--html", str(tmp_path / folder)])
+    assert refused.exit_code == 2
+    assert f"{tmp_path / folder}" in refused.stderr
+    assert words in refused.stderr
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "index.html", "mine"]
 
 
 @pytest.mark.slow
