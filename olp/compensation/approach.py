@@ -45,12 +45,14 @@ def with_approaches(
     where = _rapids(path, rows, unknown)
     if steady is not None:
         where = where[~steady[rows.move[where]]]
+    wanted = unknown[where] & _first(rows.command_mm, where, unknown)
+    where, wanted = where[wanted.any(axis=1)], wanted[wanted.any(axis=1)]
     if not where.size:
         return rows
     past = np.maximum(_DIGITS * limits.digit_mm, _LEAST_MM)
     side = _sides(path, rows, where)
     # the drive leads by half of the backlash afterwards: together it moves by all of it
-    step = np.where(unknown[where], side * (width[where] / 2 + past), 0.0)
+    step = np.where(wanted, side * (width[where] / 2 + past), 0.0)
     beyond = rows.command_mm[where] - step
     box = model.box_mm
     step = np.where((beyond < box[:, 0]) | (beyond > box[:, 1]), -step, step)
@@ -68,6 +70,17 @@ def with_approaches(
         reach=insert(rows.reach, share),
         take_up=insert(rows.take_up, np.zeros(len(where), bool)),
     )
+
+
+def _first(command: Array, where: Index, unknown: Mask) -> Mask:
+    """(m, 3) where an axis has not taken up its backlash at one of the rows `where` before: that holds until
+    its position is unknown."""
+    first = np.zeros((len(where), 3), bool)
+    for axis in range(3):
+        rows = np.flatnonzero(unknown[where, axis])
+        passage = np.cumsum(np.isnan(command[:, axis]))[where[rows]]
+        first[rows[np.unique(passage, return_index=True)[1]], axis] = True
+    return first
 
 
 def _rapids(path: Toolpath, rows: Plan, unknown: Mask) -> Index:

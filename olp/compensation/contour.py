@@ -15,6 +15,7 @@ import numpy as np
 
 from olp.compensation.plan import Plan
 from olp.core.arrays import Index, Mask
+from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Kind, Toolpath
 
@@ -31,10 +32,11 @@ class Contour:
 
     @staticmethod
     def of(path: Toolpath) -> Contour | None:
-        """None without cutter compensation."""
+        """None without cutter compensation. Raises ProgramError where a contour changes its side."""
         on = path.compensated()
         if not on.any():
             return None
+        _refuse_change(path, on)
         moved = path.end_mm != path.starts_mm()
         whole, held = np.zeros(len(path), bool), np.zeros((len(path), 3), bool)
         edges = np.flatnonzero(on != np.concatenate(([False], on[:-1])))
@@ -64,6 +66,21 @@ class Contour:
     def hold(self, rows: Plan) -> Plan:
         """The plan with its held axes at their last commands."""
         return replace(rows, command_mm=np.take_along_axis(rows.command_mm, self.source(rows), axis=0))
+
+
+def _refuse_change(path: Toolpath, on: Mask) -> None:
+    """Raise ProgramError where the side, plane or radius of the compensation changes within a contour: where
+    the control crosses over to the other one is not known."""
+    frames = path.frames
+    kinds = list(dict.fromkeys(f.compensation for f in frames))
+    which = np.array([kinds.index(f.compensation) for f in frames])[path.frame]
+    change = np.flatnonzero(on[1:] & on[:-1] & (which[1:] != which[:-1])) + 1
+    if change.size:
+        raise ProgramError(
+            "the side, plane or radius of the cutter compensation changes here without G40 before it, and how "
+            "the control goes over is not known; program G40 between the two contours",
+            line=int(path.line[change[0]]),
+        )
 
 
 def _first(mask: Mask) -> int:

@@ -80,8 +80,8 @@ def _from_unknown(
     has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
     sides = [np.array(side) for side in product((-1.0, 1.0), repeat=3)] if has_play else [None]
     first = np.concatenate(([0], groups[:-1] + 1)) if len(groups) else groups
-    some = np.isnan(start).any(axis=1) & np.isfinite(start).any(axis=1)
-    some &= (nominal.kind != Kind.RAPID) & np.isfinite(target).all(axis=1)
+    some = (np.isnan(start) & ~np.isnan(target)).any(axis=1) & np.isfinite(start).any(axis=1)
+    some &= nominal.kind != Kind.RAPID
     command = path.starts_mm()
     for i in np.flatnonzero(some).tolist():
         known, at = np.isfinite(start[i]), int(first[i])
@@ -94,7 +94,7 @@ def _from_unknown(
         for side in sides:
             play = None if side is None else np.broadcast_to(side, point.shape)
             away = point + model.error(point, path.tool_mm(at, at + 1), play) - meant
-            worst[i] = np.fmax(worst[i], np.sqrt((away[:, known] ** 2).sum(axis=1)).max())
+            worst[i] = np.fmax(worst[i], np.sqrt(np.nansum(away[:, known] ** 2, axis=1)).max())
 
 
 def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
@@ -117,7 +117,7 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
             change = model.error(path.end_mm[rows], tool, ahead) - model.error(
                 path.end_mm[rows], tool, -ahead
             )
-            unknown[rows] += np.nan_to_num(np.linalg.norm(change, axis=1)) / 2
+            unknown[rows] += np.linalg.norm(np.nan_to_num(change), axis=1) / 2
     largest = np.maximum(unknown, np.concatenate((unknown[:1], unknown[:-1])))
     first = np.concatenate(([0], groups[:-1] + 1))
     result = np.maximum(largest[groups], largest[np.minimum(first, len(path) - 1)])
@@ -140,6 +140,9 @@ class Tracer:
         self.away = np.float32(np.nan)
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
+        #: (n, 3) axes that are unknown at the end of a nominal move, None where there are none
+        blind = np.isnan(target)
+        self.blind = blind if blind.any() else None
         self.nominal_arc = _arc_index(nominal)
         self.path_arc = _arc_index(path)
 
@@ -152,7 +155,7 @@ class Tracer:
         arc = tracer.path_arc if tracer.path_arc is not None else np.full(len(path), -1)
         rows = np.flatnonzero(arc >= 0)
         if rows.size:
-            radius = np.sqrt(((start[rows] - path.arcs.centre_mm) ** 2).sum(axis=1))
+            radius = np.sqrt(np.nansum((start[rows] - path.arcs.centre_mm) ** 2, axis=1))
             length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
         steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
         point, part, _ = tracer.points(start, end, arc, steps, np.isfinite(length))
@@ -183,11 +186,16 @@ class Tracer:
         """Fill the columns of nominal moves a..b."""
         first = int(self.groups[a - 1]) + 1 if a else 0
         last = int(self.groups[b - 1]) + 1
+        ends = self.groups[a:b] - first
+        if last == first:
+            self._ends(a, b, self.before[None], ends, waypoint)
+            worst[:], self.away = waypoint, waypoint[-1]
+            return
         path = self.path
         start, end = path.starts_mm(first, last), path.end_mm[first:last]
         owner = np.searchsorted(self.groups[a:b], np.arange(first, last))
         tool = path.tool_mm(first, last)
-        delta = end - start
+        delta = np.where(np.isnan(end), 0.0, end - start)
         steps = np.ones(last - first, np.int64)
         known = np.asarray(np.isfinite(delta).all(axis=1))
         cut = known & (path.kind[first:last] != Kind.RAPID)
@@ -203,18 +211,22 @@ class Tracer:
             self._arc_steps(arc, known, steps, start, tool)
         reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
-        ends = self.groups[a:b] - first
         last_part = np.zeros(last - first, bool)
         last_part[ends[ends >= 0]] = True
         cuts = np.flatnonzero(~last_part)
-        # a hole with fewer pecks than the nominal one has strokes that end with the move before them
-        away = reached[np.maximum(ends, 0)] - self.target[a:b]
-        waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        tips = np.concatenate((self.before[None], reached))
+        self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
         if len(inner.part) or len(cuts):
-            self._bend(reached, inner, owner, arc >= 0, bend)
+            self._bend(a, reached, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
-        self._starts(a, b, first, owner, reached, waypoint, worst)
+        self._starts(a, b, first, owner, tips, waypoint, worst)
+
+    def _ends(self, a: int, b: int, tips: Array, ends: Index, waypoint: Single) -> None:
+        """How far the tip is off at the ends of nominal moves a..b, behind `ends` of the moves that reach
+        `tips` [1:]. A hole with fewer pecks than the nominal one has strokes that end before them, at -1."""
+        away = self._known(a + np.arange(b - a), tips[ends + 1] - self.target[a:b])
+        waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
 
     def _samples(
         self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array,
@@ -289,15 +301,15 @@ class Tracer:
         return np.asarray((start + self.model.error(start, tool))[0], float)
 
     def _starts(
-        self, a: int, b: int, first: int, owner: Index, reached: Array, waypoint: Single, worst: Single
+        self, a: int, b: int, first: int, owner: Index, tips: Array, waypoint: Single, worst: Single
     ) -> None:
         """A cut starts where the moves before it ended, which may be farther off than any of its samples."""
-        tips = np.concatenate((self.before[None], reached))
         away = np.concatenate(([self.away], waypoint[:-1]))
         self.before, self.away = tips[-1], waypoint[-1]
         begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))
         farther = (np.nan_to_num(away, nan=np.inf) > worst) & (self.nominal.kind[a:b] != Kind.RAPID)
-        farther &= (begin < len(reached)) & np.isfinite(tips[begin]).all(axis=1)
+        known = np.isfinite(self._known(a + np.arange(b - a), tips[begin])).all(axis=1)
+        farther &= (begin < len(tips) - 1) & known
         rows = np.flatnonzero(farther)
         rows = rows[owner[begin[rows]] == rows]
         if rows.size:
@@ -308,7 +320,7 @@ class Tracer:
         rows = np.flatnonzero((arc >= 0) & known)
         arcs = self.path.arcs
         centre = arcs.centre_mm[arc[rows]]
-        radius = np.sqrt(((start[rows] - centre) ** 2).sum(axis=1))
+        radius = np.sqrt(np.nansum((start[rows] - centre) ** 2, axis=1))
         reach = np.minimum(radius * np.abs(arcs.sweep_rad[arc[rows]]), 2 * radius)
         delta = np.repeat(reach[:, None], 3, axis=1)
         part = tool if tool.ndim == 1 else tool[rows]
@@ -328,6 +340,10 @@ class Tracer:
             self.last, self.play, self.plays = point[-1:], play[-1], play
         return point + self.model.error(point, tool, play)
 
+    def _known(self, move: Index, point: Array) -> Array:
+        """(m, 3) points without the axes that are unknown at the ends of their nominal moves (m,)."""
+        return point if self.blind is None else np.where(self.blind[move], 0.0, point)
+
     def _along(self, a: int, b: int, first: int, owner: Index, inner: _Inner, worst: Single) -> None:
         """Distances of samples from their nominal move, the largest per move."""
         nominal = self.nominal
@@ -336,7 +352,8 @@ class Tracer:
         begin[1:] = goal[:-1]
         begin[0] = self.target[a - 1] if a else np.array(nominal.start_mm)
         of = owner[inner.part]
-        distance = segment_distance(inner.actual, begin[of], goal[of])
+        actual = self._known(a + of, inner.actual)
+        distance = segment_distance(actual, self._known(a + of, begin[of]), self._known(a + of, goal[of]))
         arc = self.nominal_arc[a:b] if self.nominal_arc is not None else None
         if arc is not None and arc.max(initial=-1) >= 0:
             rows = np.flatnonzero(arc[of] >= 0)
@@ -344,8 +361,10 @@ class Tracer:
             arcs = nominal.arcs
             shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
             distance[rows] = arc_distance(
-                inner.actual[rows], nominal.starts_mm(a, b)[of[rows]] + shift, goal[of[rows]],
-                arcs.centre_mm[which] + shift, arcs.plane[which], arcs.sweep_rad[which],
+                actual[rows], self._known(a + of[rows], nominal.starts_mm(a, b)[of[rows]] + shift),
+                self._known(a + of[rows], goal[of[rows]]),
+                self._known(a + of[rows], arcs.centre_mm[which] + shift), arcs.plane[which],
+                arcs.sweep_rad[which],
                 self._near(owner, first, inner.part[rows], inner.share[rows], of[rows]),
             )  # fmt: skip
         np.fmax.at(worst, of, distance)
@@ -362,11 +381,16 @@ class Tracer:
         place = before[part] - begin[of] + share * turn[part]
         return np.asarray(place / np.maximum(total[of], 1e-12), float)
 
-    def _bend(self, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
+    def _bend(
+        self, a: int, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single
+    ) -> None:
         """How far the samples of straight parts leave the chord between the actual ends of their part."""
         straight = (inner.part > 0) & ~curved[inner.part]
         part, actual = inner.part[straight], inner.actual[straight]
-        departure = segment_distance(actual, reached[part - 1], reached[part])
+        of = a + owner[part]
+        departure = segment_distance(
+            *(self._known(of, some) for some in (actual, reached[part - 1], reached[part]))
+        )
         np.fmax.at(bend, owner[part], departure)
 
 

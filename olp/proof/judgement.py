@@ -27,7 +27,7 @@ ENOUGH = 0.95
 #: What the reasons of rows are called.
 REASONS = {
     Counts.FEED: "feed", Counts.POINT: "point", Counts.HOLE: "hole", Counts.RAPID: "rapid",
-    Counts.UNCORRECTED: "uncorrected", Counts.UNKNOWN: "unknown position",
+    Counts.LEFT: "left uncorrected", Counts.UNCORRECTED: "uncorrected rapid", Counts.UNKNOWN: "unknown position",
 }  # fmt: skip
 
 
@@ -70,7 +70,7 @@ class Judgements:
     @property
     def judged(self) -> Mask:
         """(n,) moves that count."""
-        return np.asarray(self.counts <= Counts.HOLE, bool)
+        return np.asarray(self.counts <= Counts.LEFT, bool)
 
     @property
     def over(self) -> Mask:
@@ -99,24 +99,33 @@ class Judgements:
         return result | {"state": state}
 
     def groups(self, of: Index) -> list[dict[str, Any]]:
-        """Largest deviations and verdict of the moves of each value of `of` (n,), in order of appearance."""
-        values, first = np.unique(of, return_index=True)
-        rows = []
-        for value in values[np.argsort(first)].tolist():
-            mine = (of == value) & self.judged
-            if not mine.any():
-                continue
-            worst = int(np.flatnonzero(mine)[np.nan_to_num(self.corrected[mine]).argmax()])
-            rows.append({
-                "first_line": int(self.line[mine].min()),
-                "last_line": int(self.line[mine].max()),
-                "tool": int(self.tool[worst]) if self.tool[worst] >= 0 else None,
-                "uncorrected_um": float(np.nan_to_num(self.uncorrected[mine]).max()) * UM_PER_MM,
-                "corrected_um": float(np.nan_to_num(self.corrected[mine]).max()) * UM_PER_MM,
-                "worst_line": int(self.line[worst]),
-                "holds": not bool(self.over[mine].any()),
-            })  # fmt: skip
-        return rows
+        """Largest deviations and verdict of the moves that count of each value of `of` (n,), in order of
+        appearance."""
+        rows = np.flatnonzero(self.judged)
+        values, begin, group = np.unique(of[rows], return_index=True, return_inverse=True)
+        worst = np.zeros(len(values), np.int64)
+        # the last of each group is the one with the largest deviation, the first of them where several are
+        ranked = np.lexsort((-rows, np.nan_to_num(self.corrected[rows]), group))
+        worst[group[ranked]] = rows[ranked]
+        line = self.line[rows]
+        first, last = np.full(len(values), line.max(initial=0)), np.zeros(len(values), np.int64)
+        np.minimum.at(first, group, line)
+        np.maximum.at(last, group, line)
+        uncorrected = np.zeros(len(values))
+        np.fmax.at(uncorrected, group, self.uncorrected[rows])
+        over = np.bincount(group, self.over[rows], len(values)) > 0
+        return [
+            {
+                "first_line": int(first[k]),
+                "last_line": int(last[k]),
+                "tool": int(self.tool[worst[k]]) if self.tool[worst[k]] >= 0 else None,
+                "uncorrected_um": float(uncorrected[k]) * UM_PER_MM,
+                "corrected_um": float(np.nan_to_num(self.corrected[worst[k]])) * UM_PER_MM,
+                "worst_line": int(self.line[worst[k]]),
+                "holds": not over[k],
+            }
+            for k in np.argsort(begin).tolist()
+        ]
 
     def report(self) -> dict[str, Any]:
         """The table by groups, as plain data."""
@@ -140,17 +149,25 @@ def verdict(
 ) -> dict[str, Any]:  # fmt: skip
     """The verdict on a proved program: does the written program do what the model asks (`numerical`), is the
     part good as far as that is known (`part`, None where no part tolerance is stated), and both in sentences.
-    `ok` is False where either fails, or another finding is an error."""
+    `ok` is False where either fails, or another finding is an error, and None where nothing could be judged,
+    a feed move could not, or the part is good with a probability that is too low."""
     numerical = _numerical(table)
     part = None if part_tolerance_um is None else _part(table, part_tolerance_um, uncertainty)
     errors = sorted({f.code for f in findings if f.severity >= Severity.ERROR} - _OWN)
     sentences = [_numerical_sentence(numerical)]
+    if numerical["unknown"]:
+        sentences.append(f"{numerical['unknown']} feed moves to unknown positions are not judged.")
     if part is not None:
         sentences.append(_part_sentence(part))
     if errors:
         sentences.append(f"Not to be run as it is: {', '.join(errors)}.")
-    ok = numerical["holds"] and (part is None or part["holds"]) and not errors
-    return {"ok": bool(ok), "numerical": numerical, "part": part, "errors": errors, "sentences": sentences}
+    answers = [numerical["holds"], not errors]
+    if numerical["unknown"]:
+        answers.append(None)
+    if part is not None:
+        answers += [part["holds"], part["probable"] or (None if part["probability"] is not None else True)]
+    ok = False if False in answers else None if None in answers else True
+    return {"ok": ok, "numerical": numerical, "part": part, "errors": errors, "sentences": sentences}
 
 
 def measured(largest_um: float | None, tolerance_um: float | None) -> dict[str, Any]:
@@ -187,16 +204,18 @@ _OWN = {"OLP101", "OLP108"}
 
 
 def _numerical(table: Judgements) -> dict[str, Any]:
-    largest = table.largest_mm()
+    judged = bool(table.judged.any())
     values = np.where(table.judged, np.nan_to_num(table.corrected), -1.0)
-    worst = int(values.argmax()) if len(values) and table.judged.any() else None
+    worst = int(values.argmax()) if judged else None
     return {
-        "largest_um": largest * UM_PER_MM,
+        "largest_um": table.largest_mm() * UM_PER_MM if judged else None,
         "tolerance_um": table.tolerance_mm * UM_PER_MM,
         "rounding_um": (table.allowed_mm - table.tolerance_mm) * UM_PER_MM,
         "allowed_um": table.allowed_mm * UM_PER_MM,
         "line": None if worst is None else int(table.line[worst]),
-        "holds": largest <= table.allowed_mm,
+        "left": bool(worst is not None and table.counts[worst] == Counts.LEFT),
+        "unknown": int((table.counts == Counts.UNKNOWN).sum()),
+        "holds": not bool(table.over.any()) if judged else None,
     }
 
 
@@ -217,9 +236,12 @@ def _um(value: float) -> str:
 
 
 def _numerical_sentence(numerical: dict[str, Any]) -> str:
+    if numerical["holds"] is None:
+        return "Not judged: the program has no feed move, hole or point at a known position."
     word = "Within tolerance" if numerical["holds"] else "ABOVE TOLERANCE"
+    left = f", where line {numerical['line']} is left uncorrected" if numerical["left"] else ""
     return (
-        f"{word}: the corrected path is at most {_um(numerical['largest_um'])} um from the nominal one; "
+        f"{word}: the corrected path is at most {_um(numerical['largest_um'])} um from the nominal one{left}; "
         f"{_um(numerical['allowed_um'])} um are allowed (numerical tolerance "
         f"{numerical['tolerance_um']:g} um, rounding {_um(numerical['rounding_um'])} um)."
     )

@@ -26,7 +26,8 @@ _FAR_MM = 1.0
 _OTHER_KIND_MM2 = 4.0
 #: Share of waypoints that may be far off before the programs count as different jobs.
 _MOST_FAR = 0.5
-#: Units that are compared at once where both sequences agree.
+#: Nominal units that are compared at once where both sequences agree: at first, and twice as many each time.
+_FIRST_BLOCK = 16
 _BLOCK = 4096
 #: Nominal units that are aligned at once.
 _WINDOW = 12
@@ -55,9 +56,10 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
     """
     holes = len(program.holes) == len(corrected.holes)
     mine, theirs = _units(program, holes), _units(corrected, holes)
-    if len(theirs) < len(mine):
+    if len(theirs) < len(mine) or (len(theirs) and not len(mine)):
+        word = "fewer than" if len(mine) else "not"
         raise ProgramError(
-            f"the corrected program has {len(theirs)} moves and holes, fewer than the {len(mine)} of the "
+            f"the corrected program has {len(theirs)} moves and holes, {word} the {len(mine)} of the "
             "nominal one, so it is not a correction of it; give the two programs of one job"
         )
     if not len(mine):
@@ -108,10 +110,9 @@ class _Alignment:
         self.begin = np.empty_like(self.target)
         self.begin[1:], self.begin[0] = self.target[:-1], np.array(nominal.start_mm)
         free = (nominal.flag[mine.last] & _FREE) != 0
-        self.unknown = np.asarray(~np.isfinite(self.target).all(axis=1), bool)
+        self.unknown = np.asarray(np.isnan(self.target).all(axis=1), bool)
         self.loose = np.asarray(free | self.unknown, bool)
-        self.lost = np.asarray(~np.isfinite(self.tip).all(axis=1), bool)
-        self.arc = np.full(len(mine), -1, np.int64)
+        self.lost = np.asarray(np.isnan(self.tip).all(axis=1), bool)
         index = np.full(len(nominal), -1, np.int64)
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
         self.arc = index[mine.last]
@@ -145,21 +146,21 @@ class _Alignment:
 
     def _near(self, i: Index, j: Index) -> Mask:
         """Whether nominal units end at units of the corrected program, beyond doubt."""
-        away = np.abs(self.tip[j] - self.target[i]).max(axis=1, initial=0.0)
+        away = _apart(self.tip[j], self.target[i]).max(axis=1, initial=0.0)
         unknown = self.loose[i] & (self.lost[j] | self.unknown[i])
         good = np.asarray((away < self.near) | unknown, bool)
         return np.asarray(good & (self.mine.kind[i] == self.theirs.kind[j]), bool)
 
     def _run(self, i: int, j: int) -> int:
         """How many units from here agree one by one."""
-        done = 0
+        done, block = 0, _FIRST_BLOCK
         while i + done < len(self.mine):
-            span = min(_BLOCK, len(self.mine) - i - done, len(self.theirs) - j - done)
+            span = min(block, len(self.mine) - i - done, len(self.theirs) - j - done)
             step = np.arange(span)
             near = self._near(i + done + step, j + done + step)
             if not near.all():
                 return done + int(np.argmin(near))
-            done += span
+            done, block = done + span, min(2 * block, _BLOCK)
             if not span:
                 break
         return done
@@ -177,22 +178,21 @@ class _Alignment:
 
     def _along(self, i: int, j: Index) -> Array:
         """(m,) distances of the ends of units j from the nominal unit i as a line or an arc, in mm."""
-        point = self.tip[j]
+        known = ~np.isnan(self.target[i])
+        begin, end = np.where(known, self.begin[i], 0.0), np.where(known, self.target[i], 0.0)
+        point = np.where(known, self.tip[j], 0.0)
         arc = int(self.arc[i])
         if arc < 0:
-            begin, end = self.begin[i : i + 1], self.target[i : i + 1]
-            if not np.isfinite(begin).all():
-                begin = end
-            away = segment_distance(point, np.repeat(begin, len(j), 0), np.repeat(end, len(j), 0))
+            begin = end if np.isnan(begin).any() else begin
+            away = segment_distance(point, np.repeat(begin[None], len(j), 0), np.repeat(end[None], len(j), 0))
         else:
-            away = self._from_arc(i, arc, point)
+            away = self._from_arc(arc, begin, end, point)
         return np.asarray(np.nan_to_num(away, nan=_FAR_MM), float)
 
-    def _from_arc(self, i: int, arc: int, point: Array) -> Array:
-        """(m,) distances of points from the nominal arc of unit i: across it, and beyond its ends."""
+    def _from_arc(self, arc: int, begin: Array, end: Array, point: Array) -> Array:
+        """(m,) distances of points from a nominal arc: across it, and beyond its ends."""
         first, second, third = PLANES[int(self.arcs.plane[arc])]
         centre, sweep = self.arcs.centre_mm[arc], float(self.arcs.sweep_rad[arc])
-        begin, end = self.begin[i], self.target[i]
         radius = float(np.hypot(*(end - centre)[[first, second]]))
         arm = point - centre
         across = np.hypot(arm[:, first], arm[:, second]) - radius
@@ -225,8 +225,8 @@ class _Alignment:
 
     def _far(self, i: Index, j: Index) -> bool:
         """Whether some nominal unit would end far from its waypoint."""
-        away = np.abs(self.tip[j] - self.target[i]).max(axis=1, initial=0.0)
-        return bool(((np.nan_to_num(away, nan=_FAR_MM) >= _FAR_MM) & ~self.loose[i]).any())
+        away = _apart(self.tip[j], self.target[i]).max(axis=1, initial=0.0)
+        return bool(((away >= _FAR_MM) & ~self.loose[i]).any())
 
     def _aligned(self, i: int, j: int, rows: int, width: int) -> Index:
         """Dynamic programming over `rows` nominal units and `width` units of the corrected program."""
@@ -255,23 +255,27 @@ class _Alignment:
 
     def _costs(self, i: int, j: Index) -> tuple[Array, Array]:
         """mm2: what it costs that unit i ends at each of units j, and that each of them is a part of it."""
-        away = np.minimum(((self.tip[j] - self.target[i]) ** 2).sum(axis=1), _FAR_MM**2)
+        away = np.minimum((_apart(self.tip[j], self.target[i : i + 1]) ** 2).sum(axis=1), _FAR_MM**2)
         if self.loose[i]:
             away = np.where(self.lost[j] == self.unknown[i], 0.0, _FAR_MM**2)
-        end = np.nan_to_num(away, nan=_FAR_MM**2) + np.where(
-            self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2
-        )
+        end = away + np.where(self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2)
         # a part of a feed move is a feed move, and a part of a rapid a rapid
         other = (self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID)
         part = np.minimum(self._along(i, j), _FAR_MM) ** 2 + np.where(other, _OTHER_KIND_MM2, 0.0)
         return np.asarray(end, float), part
 
 
+def _apart(tip: Array, target: Array) -> Array:
+    """(m, 3) mm: how far tips are from targets along each axis. An axis that is unknown in both is as meant,
+    one that is unknown in one of them is far off."""
+    away = np.abs(tip - target)
+    return np.where(np.isnan(tip) & np.isnan(target), 0.0, np.nan_to_num(away, nan=_FAR_MM))
+
+
 def _refuse_others(nominal: Toolpath, target: Array, mine: _Units, tip: Array) -> None:
     """Raise ProgramError where most waypoints are far off: this is another job."""
-    counted = ((nominal.flag[mine.last] & _FREE) == 0) & np.isfinite(target[mine.last]).all(axis=1)
-    with np.errstate(invalid="ignore"):
-        near = np.asarray(np.abs(tip - target[mine.last]).max(axis=1) < _FAR_MM, bool)
+    counted = ((nominal.flag[mine.last] & _FREE) == 0) & ~np.isnan(target[mine.last]).all(axis=1)
+    near = np.asarray(_apart(tip, target[mine.last]).max(axis=1, initial=0.0) < _FAR_MM, bool)
     far = np.asarray(counted & ~near, bool)
     if counted.any() and far.sum() > _MOST_FAR * counted.sum():
         first = int(mine.last[np.argmax(far)])

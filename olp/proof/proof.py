@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from olp.compensation.plan import targets, zero_shifts
 from olp.core.arrays import Array, Index, Mask
+from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
@@ -18,6 +19,7 @@ from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.proof.contour import check_contours
 from olp.proof.deviation import Deviation, Single, cutting_moves, measure
+from olp.proof.kinds import check_kinds
 from olp.proof.matching import match
 from olp.proof.strokes import strokes_mm
 
@@ -35,14 +37,16 @@ _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 
 class Counts(IntEnum):
     """How a move counts in the verdict. What cuts counts: along feed moves and strokes of holes, or at the
-    points of a program of points. Rapids and what is left uncorrected are shown."""
+    points of a program of points, also where it is left uncorrected (LEFT). Rapids are shown, and so are
+    UNCORRECTED ones."""
 
     FEED = 0
     POINT = 1
     HOLE = 2
-    RAPID = 3
-    UNCORRECTED = 4
-    UNKNOWN = 5
+    LEFT = 3
+    RAPID = 4
+    UNCORRECTED = 5
+    UNKNOWN = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +78,7 @@ class Proof:
     @property
     def judged(self) -> Mask:
         """(n,) moves that count."""
-        return np.asarray(self.counts <= Counts.HOLE, bool)
+        return np.asarray(self.counts <= Counts.LEFT, bool)
 
     def size_mm(self) -> Array:
         """(n,) the deviation per nominal move, 0 where the move does not count."""
@@ -97,7 +101,7 @@ class Proof:
         "after"."""
         part: Deviation = getattr(self, side)
         whole: Single = getattr(self, f"{side}_mm")
-        at_end = self.counts <= Counts.POINT
+        at_end = (self.counts <= Counts.POINT) | (self.counts == Counts.LEFT)
         waypoints = part.waypoint[at_end & np.isfinite(part.waypoint)]
         along = whole[self.judged & (self.counts != Counts.POINT) & np.isfinite(whole)]
         return {"waypoints": _figures(waypoints), "between": _figures(along)}
@@ -135,15 +139,22 @@ def prove(
     exempt[uncorrected] = True
     near = _NEAR_DIGITS * digit_mm + _NEAR_SHARE * tolerance_mm
     groups = match(nominal, target, corrected, model, near)
+    check_kinds(nominal, corrected, groups, digit_mm)
     check_contours(path, written, groups)
     bend = tolerance_mm * _BEND_SHARE
-    counts = _counts(nominal, target, exempt)
+    how = _how(nominal, target)
+    counts = _counts(path, how, exempt)
     sides = []
     for program, ends in ((nominal, np.arange(len(path))), (corrected, groups)):
         deviation = measure(path, target, program.toolpath, ends, model, bend)
-        bottom, stroke = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
-        sides.append((deviation, _sizes(deviation, counts, bottom, stroke)))
+        strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
+        size = np.where(counts <= Counts.LEFT, _sizes(deviation, how, *strokes), np.float32(np.nan))
+        sides.append((deviation, size))
     (before, before_mm), (after, after_mm) = sides
+    blind = np.isnan(after_mm) & (counts <= Counts.LEFT)
+    counts[blind & (counts == Counts.LEFT)] = Counts.UNKNOWN
+    # strokes of a hole above its bottom have no figure of their own
+    _refuse_blind(path, blind & ((counts <= Counts.POINT) | ((counts == Counts.HOLE) & ~np.isnan(before_mm))))
     lean = uncorrected_starts(path, exempt) & (counts == Counts.FEED)
     return Proof(
         path, written, groups, before, after, tolerance_mm, digit_mm, counts, before_mm, after_mm, lean
@@ -167,33 +178,51 @@ def largest_correction_mm(nominal: Program, corrected: Program, proof: Proof) ->
     return float(np.sqrt(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
 
 
-def _counts(program: Program, target: Array, exempt: Mask) -> npt.NDArray[np.uint8]:
-    """(n,) how each nominal move counts."""
+def _how(program: Program, target: Array) -> npt.NDArray[np.uint8]:
+    """(n,) how each nominal move would count if it were corrected."""
     path = program.toolpath
     cutting = cutting_moves(path)
-    counts = np.full(len(path), Counts.RAPID, np.uint8)
+    how = np.full(len(path), Counts.RAPID, np.uint8)
     points = program.dialect.points or not (path.kind != Kind.RAPID).any()
-    counts[cutting] = Counts.FEED
-    counts[~cutting & (points | (path.kind != Kind.RAPID))] = Counts.POINT
+    how[cutting] = Counts.FEED
+    how[~cutting & (points | (path.kind != Kind.RAPID))] = Counts.POINT
     cycle = (path.flag & np.uint8(Flag.CYCLE)) != 0
-    counts[cycle] = np.where(path.kind[cycle] == Kind.RAPID, Counts.RAPID, Counts.HOLE)
-    counts[(counts <= Counts.HOLE) & ~np.isfinite(target).all(axis=1)] = Counts.UNKNOWN
-    counts[((path.flag & _AWAY) != 0) | exempt] = Counts.UNCORRECTED
-    return counts
+    how[cycle] = np.where(path.kind[cycle] == Kind.RAPID, Counts.RAPID, Counts.HOLE)
+    unknown = np.isnan(target)
+    how[unknown.all(axis=1) & (how <= Counts.HOLE)] = Counts.UNKNOWN
+    how[unknown.any(axis=1) & (how == Counts.HOLE)] = Counts.UNKNOWN
+    return how
 
 
-def _sizes(deviation: Deviation, counts: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
+def _counts(path: Toolpath, how: npt.NDArray[np.uint8], exempt: Mask) -> npt.NDArray[np.uint8]:
+    """(n,) how each nominal move counts, `how` (n,) if it were corrected."""
+    away = ((path.flag & _AWAY) != 0) | exempt
+    own = (path.flag & np.uint8(Flag.CONTROL)) != 0
+    left = (how <= Counts.HOLE) & (path.kind != Kind.RAPID) & ~own
+    return np.where(away, np.where(left, Counts.LEFT, Counts.UNCORRECTED), how).astype(np.uint8)
+
+
+def _refuse_blind(path: Toolpath, blind: Mask) -> None:
+    if blind.any():
+        raise ProgramError(
+            "the deviation of this move cannot be computed: where the corrected program commands it, the "
+            "error is not known; correct the nominal program again, or give start_mm in the job file",
+            line=int(path.line[np.argmax(blind)]),
+        )
+
+
+def _sizes(deviation: Deviation, how: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
     """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom."""
     side = deviation.side.astype(np.float32)
-    size = np.full(len(counts), np.nan, np.float32)
-    along, end = counts == Counts.FEED, counts == Counts.POINT
+    size = np.full(len(how), np.nan, np.float32)
+    along, end = how == Counts.FEED, how == Counts.POINT
     size[along] = np.fmax(deviation.waypoint, deviation.path)[along] + side[along]
     size[end] = deviation.waypoint[end] + side[end]
     if len(bottom):
-        hole = counts[bottom] == Counts.HOLE
+        hole = how[bottom] == Counts.HOLE
         size[bottom[hole]] = stroke[hole] + side[bottom[hole]]
     else:
         # holes without a partner are compared stroke by stroke
-        hole_moves = counts == Counts.HOLE
+        hole_moves = how == Counts.HOLE
         size[hole_moves] = np.fmax(deviation.waypoint, deviation.path)[hole_moves] + side[hole_moves]
     return size
