@@ -221,7 +221,8 @@ def _numerical(table: Judgements) -> dict[str, Any]:
 
 def _part(table: Judgements, tolerance_um: float, uncertainty: dict[str, Any] | None) -> dict[str, Any]:
     largest_um = table.largest_mm() * UM_PER_MM
-    probability = None if uncertainty is None else float(uncertainty["within"]["after"]["program"])
+    within = None if uncertainty is None else uncertainty["within"]
+    probability = None if within is None else float(within["after"]["program"])
     return {
         "tolerance_um": tolerance_um,
         "largest_um": largest_um,

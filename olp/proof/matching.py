@@ -66,7 +66,8 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         return np.zeros(0, np.int64)
     path = corrected.toolpath
     play = plays(model, path.end_mm)
-    tip = path.end_mm + model.error(path.end_mm, path.tool_mm(), play)
+    # where an axis is unknown the error may be, too: then the command alone is compared
+    tip = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     aligned = _Alignment(program.toolpath, target_mm, mine, path, tip, theirs, near_mm)
     ends = aligned.ends()
     _refuse_others(program.toolpath, target_mm, mine, tip[theirs.last[ends]])
@@ -112,6 +113,9 @@ class _Alignment:
         free = (nominal.flag[mine.last] & _FREE) != 0
         self.unknown = np.asarray(np.isnan(self.target).all(axis=1), bool)
         self.loose = np.asarray(free | self.unknown, bool)
+        # a rapid with an unknown axis is left uncorrected
+        partly = np.isnan(self.target).any(axis=1) & (mine.kind == Kind.RAPID)
+        self.reach = np.where(partly, _FAR_MM / 2, near_mm)
         self.lost = np.asarray(np.isnan(self.tip).all(axis=1), bool)
         index = np.full(len(nominal), -1, np.int64)
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
@@ -148,7 +152,7 @@ class _Alignment:
         """Whether nominal units end at units of the corrected program, beyond doubt."""
         away = _apart(self.tip[j], self.target[i]).max(axis=1, initial=0.0)
         unknown = self.loose[i] & (self.lost[j] | self.unknown[i])
-        good = np.asarray((away < self.near) | unknown, bool)
+        good = np.asarray((away < self.reach[i]) | unknown, bool)
         return np.asarray(good & (self.mine.kind[i] == self.theirs.kind[j]), bool)
 
     def _run(self, i: int, j: int) -> int:

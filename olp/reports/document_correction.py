@@ -114,6 +114,17 @@ def _validation(report: Report, plots: Plots) -> Iterator[Block]:
         )
 
 
+def _within(within: Report | None) -> list[list[str]]:
+    if not within:
+        return []
+    before, after = within["before"], within["after"]
+    return [
+        [f"whole program within {within['tolerance_um']:g} um", percent(before["program"]),
+         percent(after["program"])],
+        ["waypoint with the least probability", percent(before["least"]), percent(after["least"])],
+    ]  # fmt: skip
+
+
 def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
     """Uncertainty in the form of the GUM: expanded uncertainties with their coverage factor."""
     part = report.get("uncertainty")
@@ -145,22 +156,20 @@ def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
             [
                 ["rms deviation expected, um", number(expected["before_rms_um"]),
                  number(expected["after_rms_um"])],
-                [f"whole program within {within['tolerance_um']:g} um", percent(within["before"]["program"]),
-                 percent(within["after"]["program"])],
-                ["waypoint with the least probability", percent(within["before"]["least"]),
-                 percent(within["after"]["least"])],
+                *_within(within),
             ],
         ),
-        Paragraph(
+    ]  # fmt: skip
+    if within:
+        blocks.append(Paragraph(
             f"The corrected program is better with a probability of "
             f"{percent(expected['probability_better'])}. Probabilities of the whole program and of lines are "
             f"from {within['draws']} draws of the calibration (seed {within['seed']})."
-        ),
-    ]  # fmt: skip
+        ))  # fmt: skip
     if "bands" in plots:
         blocks.append(Plot(
-            plots["bands"], "Expected distance from the nominal point with its band, and the probability of "
-            "being within the tolerance.",
+            plots["bands"], "Expected distance from the nominal point with its band"
+            + (", and the probability of being within the tolerance." if within else "."),
         ))  # fmt: skip
     if part["lines"]:
         blocks.append(Paragraph("Lines with the least probability of being within the tolerance:"))

@@ -297,8 +297,8 @@ def uncertainty_text(report: Report) -> Iterator[str]:
     part = _part(report, "uncertainty")
     if not part:
         return
-    band, within, expected = part["band_um"], part["within"], part["expected"]
-    before, after = within["before"], within["after"]
+    band, expected = part["band_um"], part["expected"]
+    better = expected["probability_better"]
     yield f"Uncertainty of the tip at {part['waypoints']} waypoints, from the calibration"
     yield from pairs(
         [
@@ -310,20 +310,27 @@ def uncertainty_text(report: Report) -> Iterator[str]:
             (
                 "  Deviation",
                 f"expected {number(expected['before_rms_um'])} um rms uncorrected, "
-                f"{number(expected['after_rms_um'])} um corrected; better with probability "
-                f"{percent(expected['probability_better'])}",
+                f"{number(expected['after_rms_um'])} um corrected"
+                + ("" if better is None else f"; better with probability {percent(better)}"),
             ),
-            (
-                f"  Within {within['tolerance_um']:g} um",
-                f"all of the program with probability {percent(before['program'])} uncorrected, "
-                f"{percent(after['program'])} corrected; the worst waypoint "
-                f"{percent(before['least'])} uncorrected, {percent(after['least'])} corrected",
-            ),
+            *_within(part["within"]),
             ("  From", str(part["source"])),
             ("  Zero", str(part["zero_setting"])),
             ("  Age", "" if part["growth_by_age"] == 1.0 else f"times {part['growth_by_age']:.3g}"),
         ]
     )
+
+
+def _within(within: Report | None) -> list[tuple[str, str]]:
+    if not within:
+        return []
+    before, after = within["before"], within["after"]
+    words = (
+        f"all of the program with probability {percent(before['program'])} uncorrected, "
+        f"{percent(after['program'])} corrected; the worst waypoint "
+        f"{percent(before['least'])} uncorrected, {percent(after['least'])} corrected"
+    )
+    return [(f"  Within {within['tolerance_um']:g} um", words)]
 
 
 def findings_text(findings: Sequence[Report]) -> Iterator[str]:

@@ -95,34 +95,40 @@ class Unknowns:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Confidence:
-    """The uncertainty of n waypoints in program order, in mm; see `Points`. `sigma_mm` (n, 3) are standard
-    uncertainties along X, Y, Z; `band_mm` (n,) is 2 sigma in the direction where it is longest. (n,)
-    `within_before` and `within_after` are probabilities that the tip is within `within_mm` of its nominal
-    position, and `nearer` that correction brings it nearer.
+class Chances:
+    """Probabilities of being within a part tolerance. (n,) `before` and `after`: that the tip is within
+    `limit_mm` of its nominal position at each waypoint. `lines` (l,) of the program have those that all their
+    waypoints are within, `program_before` and `program_after` are those of the whole program, from so many
+    `draws`."""
 
-    `lines` (l,) of the program have the probabilities that all their waypoints are within. `program_before`
-    and `program_after` are those of the whole program, from so many `draws`. `gain` is the probability that
-    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm` is
-    the largest standard uncertainty from temperatures.
-    """
-
-    points: Points
-    line: Index
-    within_mm: float
-    sigma_mm: Array
-    band_mm: Array
-    within_before: Array
-    within_after: Array
-    nearer: Array
+    limit_mm: float
+    before: Array
+    after: Array
     lines: Index
     line_before: Array
     line_after: Array
     program_before: float
     program_after: float
-    gain: float
     draws: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Confidence:
+    """The uncertainty of n waypoints in program order, in mm; see `Points`. `sigma_mm` (n, 3) are standard
+    uncertainties along X, Y, Z; `band_mm` (n,) is 2 sigma in the direction where it is longest. (n,)
+    `nearer` are probabilities that correction brings the tip nearer to its nominal position, and `gain` that
+    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm` is
+    the largest standard uncertainty from temperatures. `chances` are None without a part tolerance.
+    """
+
+    points: Points
+    line: Index
+    sigma_mm: Array
+    band_mm: Array
+    nearer: Array
+    gain: float
     expansion_mm: float
+    chances: Chances | None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -197,13 +203,14 @@ def confidence(
     unknowns: Unknowns,
     path: Toolpath,
     points: Points,
-    within_mm: float,
+    limit_mm: float | None,
     *,
     tell: Progress,
     seed: int = SEED,
 ) -> Confidence:
-    """Bands and probabilities at each waypoint, exact for normal errors to first order; those of lines and
-    of the whole by Monte-Carlo over the calibration's covariance, in memory of blocks."""
+    """Bands at each waypoint, and with a part tolerance `limit_mm` the probabilities of being within it,
+    exact for normal errors to first order; those of lines and of the whole by Monte-Carlo over the
+    calibration's covariance, in memory of blocks."""
     n = len(points)
     line = path.line[points.move].astype(np.int64)
     covariance = np.zeros((n, 3, 3))
@@ -211,7 +218,7 @@ def confidence(
     change = points.before_mm - points.after_mm
     share = np.zeros(unknowns.sensitivity.columns)
     expands, expansion = unknowns.sensitivity.expansion is not None, 0.0
-    joint = _Joint(unknowns, path, points, touch, count, within_mm, seed)
+    joint = None if limit_mm is None else _Joint(unknowns, path, points, touch, count, limit_mm, seed)
     order = np.argsort(line, kind="stable")
     for a in range(0, n, _BLOCK):
         which = order[a : a + _BLOCK]
@@ -221,7 +228,6 @@ def confidence(
             if expands:
                 expansion = max(expansion, float((rows[:, :, -4:] ** 2).sum(axis=(0, 2)).max(initial=0.0)))
             share += np.einsum("ink,ni->k", rows, change[part], optimize=True)
-    joint.end()
     covariance += _scatter(unknowns, count, path, points)
     mean = (points.before_mm**2).sum(axis=1) - (points.after_mm**2).sum(axis=1)
     spread = 2.0 * np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", change, covariance, change), 0.0))
@@ -230,20 +236,12 @@ def confidence(
     return Confidence(
         points=points,
         line=line,
-        within_mm=within_mm,
         sigma_mm=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
         band_mm=bands(covariance),
-        within_before=within(covariance, points.before_mm, within_mm),
-        within_after=within(covariance, points.after_mm, within_mm),
         nearer=_positive(mean, spread),
-        lines=np.array(joint.lines, np.int64),
-        line_before=np.array(joint.good[0]),
-        line_after=np.array(joint.good[1]),
-        program_before=float((joint.worst[0] <= within_mm**2).mean()),
-        program_after=float((joint.worst[1] <= within_mm**2).mean()),
         gain=float(_positive(np.array([mean.sum()]), np.array([total]))[0]),
-        draws=joint.draws,
         expansion_mm=expansion**0.5,
+        chances=None if joint is None else joint.chances(covariance),
     )
 
 
@@ -302,10 +300,10 @@ class _Joint:
 
     def __init__(
         self, unknowns: Unknowns, path: Toolpath, points: Points, touch: Rows, count: Array,
-        within_mm: float, seed: int,
+        limit_mm: float, seed: int,
     ) -> None:  # fmt: skip
         self.draws = int(np.clip(WORK / max(len(points), 1), FEWEST_DRAWS, DRAWS))
-        self.path, self.points, self.limit = path, points, within_mm**2
+        self.path, self.points, self.limit_mm, self.limit = path, points, limit_mm, limit_mm**2
         self.random = np.random.default_rng(seed)
         sensitivity = unknowns.sensitivity
         drawn = self.random.standard_normal((sensitivity.columns, self.draws), dtype=np.float32)
@@ -352,6 +350,22 @@ class _Joint:
         shares = (worst[:, :-1] <= self.limit).mean(axis=2).tolist()
         for good, share in zip(self.good, shares, strict=True):
             good.extend(share)
+
+    def chances(self, covariance: Array) -> Chances:
+        """The probabilities, with the (n, 3, 3) covariance of the waypoints."""
+        self.end()
+        points = self.points
+        return Chances(
+            limit_mm=self.limit_mm,
+            before=within(covariance, points.before_mm, self.limit_mm),
+            after=within(covariance, points.after_mm, self.limit_mm),
+            lines=np.array(self.lines, np.int64),
+            line_before=np.array(self.good[0]),
+            line_after=np.array(self.good[1]),
+            program_before=float((self.worst[0] <= self.limit).mean()),
+            program_after=float((self.worst[1] <= self.limit).mean()),
+            draws=self.draws,
+        )
 
     def end(self) -> None:
         """Counts the last line, which is complete."""

@@ -14,7 +14,7 @@ from olp.errormodel.sensitivity import Expansion
 from olp.errormodel.uncertainty import Uncertainty
 from olp.findings.catalogue import Finding
 from olp.uncertainty.components import Component
-from olp.uncertainty.spread import COVERAGE, PROBABLE_GAIN, SEED, Confidence
+from olp.uncertainty.spread import COVERAGE, PROBABLE_GAIN, SEED, Chances, Confidence
 
 #: Probabilities from here on are good enough: 2 sigma on both sides.
 GOOD = 0.95
@@ -39,8 +39,8 @@ def summary(
     expansion: Expansion | None,
     parts: Sequence[Component],
 ) -> dict[str, Any]:
-    """The part of the report."""
-    points = confidence.points
+    """The part of the report; probabilities only with a part tolerance."""
+    points, chances = confidence.points, confidence.chances
     band = confidence.band_mm * UM_PER_MM
     variance = (confidence.sigma_mm**2).sum(axis=1)
     frames = {int(k) for k in np.unique(path.frame[points.move])}
@@ -67,19 +67,18 @@ def summary(
         "expected": {
             "before_rms_um": _expected(points.before_mm, variance),
             "after_rms_um": _expected(points.after_mm, variance),
-            "probability_better": confidence.gain,
+            "probability_better": None if chances is None else confidence.gain,
         },
-        "within": {
-            "tolerance_um": confidence.within_mm * UM_PER_MM,
-            "asked": True,
-            "before": _probabilities(confidence.within_before, confidence.program_before),
-            "after": _probabilities(confidence.within_after, confidence.program_after),
-            "draws": confidence.draws,
+        "within": None if chances is None else {
+            "tolerance_um": chances.limit_mm * UM_PER_MM,
+            "before": _probabilities(chances.before, chances.program_before),
+            "after": _probabilities(chances.after, chances.program_after),
+            "draws": chances.draws,
             "seed": SEED,
         },
-        "lines": _lines(confidence),
+        "lines": [] if chances is None else _lines(confidence, chances),
         "components": [_component(part) for part in parts[:_LISTED]],
-    }
+    }  # fmt: skip
 
 
 def findings(
@@ -89,9 +88,24 @@ def findings(
     parts: Sequence[Component],
     left_out: frozenset[str],
 ) -> list[Finding]:
-    """Findings about waypoints and components whose gain is not probable, and about the uncertainty."""
+    """Findings about components whose gain is not probable and about the uncertainty; with a part tolerance
+    also about waypoints and the program."""
+    results = [] if confidence.chances is None else _of_chances(confidence, confidence.chances, expansion)
+    doubtful = [part.name for part in parts if not part.probable and part.name not in left_out]
+    if doubtful:
+        what = f"{', '.join(doubtful)}: smaller than their expanded uncertainty (k = {COVERAGE:g})"
+        results.append(_finding("OLP435", what))
+    if left_out:
+        results.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
+    if growth >= AGED:
+        what = f"standard uncertainties are {growth:.2g} times those on the day of measuring"
+        results.append(_finding("OLP437", what))
+    return results
+
+
+def _of_chances(confidence: Confidence, chances: Chances, expansion: Expansion | None) -> list[Finding]:
     results = []
-    weak = (confidence.nearer < PROBABLE_GAIN) & (confidence.within_before < GOOD)
+    weak = (confidence.nearer < PROBABLE_GAIN) & (chances.before < GOOD)
     if weak.any():
         lines = _numbers(confidence.line[weak])
         what = f"{int(weak.sum())} of {len(confidence)} waypoints: the correction is within its uncertainty"
@@ -106,32 +120,23 @@ def findings(
             f"rms deviation {before:.2f} um uncorrected, {after:.2f} um corrected"
         )
         results.append(_finding("OLP432", what))
-    if confidence.program_after < GOOD:
-        poor = confidence.lines[confidence.line_after < GOOD]
+    if chances.program_after < GOOD:
+        poor = chances.lines[chances.line_after < GOOD]
         what = (
-            f"all waypoints are within {confidence.within_mm * UM_PER_MM:g} um with a probability of "
-            f"{100 * confidence.program_after:.1f} %"
+            f"all waypoints are within {chances.limit_mm * UM_PER_MM:g} um with a probability of "
+            f"{100 * chances.program_after:.1f} %"
         )
         results.append(_finding("OLP433", what, _numbers(poor)))
     if (
         expansion is not None
         and expansion.unmodelled_K > 0.0
-        and confidence.expansion_mm > 0.5 * confidence.within_mm
+        and confidence.expansion_mm > 0.5 * chances.limit_mm
     ):
         what = (
             f"temperatures differ by up to {expansion.unmodelled_K:g} K without an expansion in the "
             f"calibration: about {confidence.expansion_mm * UM_PER_MM:.1f} um on this program"
         )
         results.append(_finding("OLP434", what))
-    doubtful = [part.name for part in parts if not part.probable and part.name not in left_out]
-    if doubtful:
-        what = f"{', '.join(doubtful)}: smaller than their expanded uncertainty (k = {COVERAGE:g})"
-        results.append(_finding("OLP435", what))
-    if left_out:
-        results.append(_finding("OLP436", f"{', '.join(sorted(left_out))}: not corrected"))
-    if growth >= AGED:
-        what = f"standard uncertainties are {growth:.2g} times those on the day of measuring"
-        results.append(_finding("OLP437", what))
     return results
 
 
@@ -170,21 +175,21 @@ def _probabilities(each: Array, program: float) -> dict[str, float]:
     }
 
 
-def _lines(confidence: Confidence) -> list[dict[str, Any]]:
+def _lines(confidence: Confidence, chances: Chances) -> list[dict[str, Any]]:
     """The lines that are most likely out of tolerance after correction."""
-    worst = np.argsort(confidence.line_after, kind="stable")[:_MOST_LINES]
+    worst = np.argsort(chances.line_after, kind="stable")[:_MOST_LINES]
     rows = []
     for k in worst.tolist():
-        own = confidence.line == confidence.lines[k]
+        own = confidence.line == chances.lines[k]
         rows.append(
             {
-                "line": int(confidence.lines[k]),
+                "line": int(chances.lines[k]),
                 "band_um": float(confidence.band_mm[own].max() * UM_PER_MM),
                 "before_um": float(
                     np.sqrt((confidence.points.before_mm[own] ** 2).sum(axis=1)).max() * UM_PER_MM
                 ),
-                "within_before": float(confidence.line_before[k]),
-                "within_after": float(confidence.line_after[k]),
+                "within_before": float(chances.line_before[k]),
+                "within_after": float(chances.line_after[k]),
                 "nearer": float(confidence.nearer[own].min()),
             }
         )

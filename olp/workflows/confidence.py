@@ -26,18 +26,19 @@ def assess(
     corrected: Program,
     groups: Index,
     uncorrected: Index,
-    part_tolerance_um: float,
+    part_tolerance_um: float | None,
     date: datetime.date | None,
     tell: Progress,
 ) -> Assessment | None:
-    """Bands and probabilities of a proved program, its part of the report, and its findings; None where the
-    calibration states no uncertainty."""
+    """Bands of a proved program, with a part tolerance its probabilities, its part of the report, and its
+    findings; None where the calibration states no uncertainty."""
     uncertainty = loaded.uncertainty
     if uncertainty is None:
         return None
     unknowns, growth, expansion = unknowns_of(loaded, uncertainty, date)
     points = waypoints(nominal, corrected, groups, uncorrected, loaded.full)
-    result = confidence(unknowns, nominal.toolpath, points, part_tolerance_um * MM_PER_UM, tell=tell)
+    limit = None if part_tolerance_um is None else part_tolerance_um * MM_PER_UM
+    result = confidence(unknowns, nominal.toolpath, points, limit, tell=tell)
     parts = [
         c for c in components(loaded.calibration, uncertainty.scaled(growth)) if c.name not in loaded.skip
     ]

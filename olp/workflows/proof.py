@@ -125,11 +125,9 @@ def proved(
     )  # fmt: skip
     table = Judgements.of(proof)
     part_um = loaded.part_tolerance_um(options.part_tolerance_um)
-    assessment = None
-    if part_um is not None:
-        assessment = assess(
-            loaded, first, pair.corrected, proof.groups, pair.uncorrected, part_um, options.date, tell
-        )
+    assessment = assess(
+        loaded, first, pair.corrected, proof.groups, pair.uncorrected, part_um, options.date, tell
+    )
     largest_mm = largest_correction_mm(first, pair.corrected, proof)
     findings = (
         *doubts,

@@ -100,7 +100,8 @@ def speed(count: int = 100_000) -> None:
     start = time.perf_counter()
     done = confidence(known, path, points, 0.010, tell=silent)
     took = time.perf_counter() - start
-    print(f"{count} waypoints, {known.sensitivity.columns} unknowns, {done.draws} draws: {took:.1f} s")
+    assert done.chances is not None
+    print(f"{count} waypoints, {known.sensitivity.columns} unknowns, {done.chances.draws} draws: {took:.1f} s")
 
 
 if __name__ == "__main__":

@@ -25,6 +25,11 @@ TOUCH = "[work_offsets.G54]\n"
 LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
 TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
 LISTED = 'dialect = "layout.toml"\n'
+#: a list without header words, whose rows are all that may be written
+LISTING = {"head": LIST, "controller": "list"}
+#: a part tolerance: probabilities are stated with one alone
+TOLD = {"options": {"part_tolerance_um": 50.0}}
+ONE_UM = {"options": {"part_tolerance_um": 1.0}}
 LAYOUT = {
     "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\n'
     b'unit = "mm"\nframe = "G54"\n[columns]\nX = "X_mm"\nY = "Y_mm"\nZ = "Z_mm"\n'
@@ -218,14 +223,19 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     "OLP102": (Call(b"G53 G0 Z0\n"), Call(b"G0 Z0\n")),
     "OLP103": (
-        Call(calibration="[backlash]\nX_um = 2.01\n"),
-        Call(calibration="[backlash]\nX_um = 2.0\n"),
+        Call(b"0,0,0\n100,0,0\n", calibration="[backlash]\nX_um = 2.01\n", **LISTING),
+        Call(b"0,0,0\n100,0,0\n", calibration="[backlash]\nX_um = 1.99\n", **LISTING),
     ),
     "OLP104": (Call(b"G1 X100 A90\n"), Call(b"G1 X100\n")),
     # the middle of the stroke is exact: its ends are off by 100 urad times half of it
     "OLP105": (
         Call(b"G81 X10 Y10 Z-21 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
-        Call(b"G81 X10 Y10 Z-19 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
+        Call(b"G81 X10 Y10 Z-5 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
+    ),
+    # 1.05 um at the ends of the stroke, with rounding
+    "OLP108": (
+        Call(b"G81 X10 Y10 Z-21 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n", **ONE_UM),
+        Call(b"G81 X10 Y10 Z-5 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n", **ONE_UM),
     ),
     "OLP106": (Call(tables=tool(100.0), **roll(201.0)), Call(tables=tool(100.0), **roll(199.0))),
     "OLP107": (Call(b"G53 G0 X0 Y0 Z0\n", head=b"G21 G90\n"), Call()),
@@ -334,8 +344,8 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
     ),
     # one waypoint: the gain of 10 um exceeds its uncertainty up to a sigma of 5 um
-    "OLP431": (Call(**known(5.1)), Call(**known(4.9))),
-    "OLP432": (Call(**known(5.1)), Call(**known(4.9))),
+    "OLP431": (Call(**known(5.1), **ONE_UM), Call(**known(4.9), **ONE_UM)),
+    "OLP432": (Call(**known(5.1), **TOLD), Call(**known(4.9), **TOLD)),
     # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer
     "OLP433": (
         Call(**known(11.2), options={"part_tolerance_um": 20.0}),
@@ -343,8 +353,8 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     # 11.5 um/(m K) at 100 mm, half a um
     "OLP434": (
-        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n"),
-        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n"),
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n", **ONE_UM),
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n", **ONE_UM),
     ),
     # the mean of a curve of two independent halves is known to sigma / sqrt(2)
     "OLP435": (Call(**known(7.2)), Call(**known(6.9))),

@@ -29,6 +29,13 @@ REPORT: dict[str, Any] = {
         "sha256": "cd" * 32,
     },
     "tolerance_um": 1.0,
+    "verdict": {
+        "ok": True,
+        "sentences": [
+            "Within tolerance: the corrected path is at most 0.87 um from the nominal one; 1.09 um are allowed "
+            "(numerical tolerance 1 um, rounding 0.09 um)."
+        ],
+    },
     "digits": {"mm": 4},
     "moves": {
         "total": 100,
@@ -82,8 +89,8 @@ def test_the_text_states_the_numbers_of_the_proof() -> None:
 
 
 def test_the_verdict_is_that_of_the_proof() -> None:
-    report = REPORT | {"deviation": REPORT["deviation"] | {"holds": False}}
-    assert "ABOVE TOLERANCE" in to_text(report)
+    report = REPORT | {"verdict": {"ok": False, "sentences": ["ABOVE TOLERANCE: by far."]}}
+    assert "ABOVE TOLERANCE: by far." in to_text(report)
     assert "Within tolerance" not in to_text(report)
 
 

@@ -202,17 +202,18 @@ def assessed(lines: np.ndarray, radius: float, repeat: float = 0.0) -> Confidenc
 @pytest.mark.parametrize("repeat", [0.0, 2e-3])
 def test_lines_and_programs_are_no_more_probable_than_their_waypoints(repeat: float) -> None:
     lines = np.array([3, 3, 1, 2, 2, 3, 1, 7])
-    result = assessed(lines, 0.012, repeat)
+    result = assessed(lines, 0.012, repeat).chances
+    assert result is not None
     assert result.lines.tolist() == [1, 2, 3, 7]
     slack = 4.0 * np.sqrt(0.25 / result.draws)
     for k, line in enumerate(result.lines.tolist()):
         own = lines == line
-        assert result.line_after[k] <= result.within_after[own].min() + slack
-        assert result.line_after[k] >= 1.0 - (1.0 - result.within_after[own]).sum() - slack
-        assert result.line_before[k] <= result.within_before[own].min() + slack
+        assert result.line_after[k] <= result.after[own].min() + slack
+        assert result.line_after[k] >= 1.0 - (1.0 - result.after[own]).sum() - slack
+        assert result.line_before[k] <= result.before[own].min() + slack
     assert result.program_after <= result.line_after.min()
-    assert result.line_after[3] == pytest.approx(result.within_after[7], abs=slack)
-    assert 0.02 < result.program_after < result.within_after.max()
+    assert result.line_after[3] == pytest.approx(result.after[7], abs=slack)
+    assert 0.02 < result.program_after < result.after.max()
 
 
 def test_lines_do_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,9 +221,12 @@ def test_lines_do_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = assessed(lines, 0.012)
     monkeypatch.setattr("olp.uncertainty.spread._BLOCK", 4)
     parts = assessed(lines, 0.012)
-    assert parts.lines.tolist() == whole.lines.tolist()
-    assert parts.line_after == pytest.approx(whole.line_after, abs=2e-3)
-    assert parts.program_after == pytest.approx(whole.program_after, abs=2e-3)
+    first, second = whole.chances, parts.chances
+    assert first is not None
+    assert second is not None
+    assert second.lines.tolist() == first.lines.tolist()
+    assert second.line_after == pytest.approx(first.line_after, abs=2e-3)
+    assert second.program_after == pytest.approx(first.program_after, abs=2e-3)
     assert parts.gain == pytest.approx(whole.gain)
 
 
@@ -481,7 +485,7 @@ def test_age_and_temperature_count(tmp_path: Path) -> None:
     (tmp_path / "job.toml").write_text(
         'schema = "olp-job-1"\nmachine = "machine.toml"\n[temperatures_degC]\nX_scale = 23.0\n'
     )
-    warm = olp.correct(PROGRAM, machine, tmp_path / "job.toml")
+    warm = olp.correct(PROGRAM, machine, tmp_path / "job.toml", part_tolerance_um=1.0)
     assert "OLP434" in codes(warm.findings)
     assert warm.confidence is not None
     assert warm.confidence.sigma_mm[1, 0] == pytest.approx(

@@ -154,20 +154,21 @@ def histogram(runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) 
 
 
 def bands(confidence: Confidence) -> bytes:
-    """Expected distance from the nominal point at waypoints with its band, and the probability of being
-    within the tolerance, uncorrected and corrected, along the program. Of many points the least probable ones
-    are shown."""
+    """Expected distance from the nominal point at waypoints with its band, uncorrected and corrected, along
+    the program; with a part tolerance the probability of being within it, too. Of many points the least
+    probable ones are shown."""
 
     def draw(figure: Figure) -> None:
-        plot, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        chances = confidence.chances
+        parts = np.atleast_1d(figure.subplots(2 if chances else 1, 1, sharex=True)).tolist()
+        plot, bottom = parts[0], parts[-1]
         step = np.sqrt((np.diff(confidence.points.axis_mm, axis=0) ** 2).sum(axis=1))
         arc_m = np.concatenate(([0.0], np.cumsum(step))) / 1e3
         column = np.unique(np.linspace(0, len(arc_m), _COLUMNS + 1).astype(int)[:-1])
         middle = arc_m[column]
-        for name, deviation, inside in (
-            ("before", confidence.points.before_mm, confidence.within_before),
-            ("after", confidence.points.after_mm, confidence.within_after),
-        ):
+        for name, deviation in (
+            ("before", confidence.points.before_mm), ("after", confidence.points.after_mm)
+        ):  # fmt: skip
             size = np.sqrt((deviation**2).sum(axis=1))
             high = np.maximum.reduceat(size + confidence.band_mm, column) * UM_PER_MM
             low = np.minimum.reduceat(np.maximum(size - confidence.band_mm, 0.0), column) * UM_PER_MM
@@ -175,14 +176,17 @@ def bands(confidence: Confidence) -> bytes:
             plot.fill_between(middle, low, high, color=colour, alpha=0.3, linewidth=0, step="mid")
             expected = np.maximum.reduceat(size, column) * UM_PER_MM
             plot.plot(middle, expected, color=colour, linewidth=0.8, label=SIDES[name])
-            least = 100.0 * np.minimum.reduceat(inside, column)
-            below.plot(middle, least, color=colour, linewidth=0.8, drawstyle="steps-mid")
-        _tolerance(plot, confidence.within_mm * UM_PER_MM)
+            if chances:
+                least = 100.0 * np.minimum.reduceat(getattr(chances, name), column)
+                bottom.plot(middle, least, color=colour, linewidth=0.8, drawstyle="steps-mid")
+        if chances:
+            _tolerance(plot, chances.limit_mm * UM_PER_MM)
+            bottom.set(ylabel="within, %", ylim=(-3, 103))
         plot.set(ylabel="distance in um")
         plot.set_ylim(bottom=0.0)
-        below.set(xlabel="along the waypoints in m", ylabel="within, %", ylim=(-3, 103))
-        below.set_xlim(0.0, max(float(arc_m[-1]), 1e-6))
-        for part in (plot, below):
+        bottom.set(xlabel="along the waypoints in m")
+        bottom.set_xlim(0.0, max(float(arc_m[-1]), 1e-6))
+        for part in parts:
             part.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
 
