@@ -77,8 +77,8 @@ def _refuse_change(path: Toolpath, on: Mask) -> None:
     change = np.flatnonzero(on[1:] & on[:-1] & (which[1:] != which[:-1])) + 1
     if change.size:
         raise ProgramError(
-            "the side, plane or radius of the cutter compensation changes here without G40 before it, and how "
-            "the control goes over is not known; program G40 between the two contours",
+            "the side, plane or radius of the cutter compensation changes here without G40 before it, and "
+            "how the control goes over is not known; program G40 between the two contours",
             line=int(path.line[change[0]]),
         )
 

@@ -27,7 +27,8 @@ ENOUGH = 0.95
 #: What the reasons of rows are called.
 REASONS = {
     Counts.FEED: "feed", Counts.POINT: "point", Counts.HOLE: "hole", Counts.RAPID: "rapid",
-    Counts.LEFT: "left uncorrected", Counts.UNCORRECTED: "uncorrected rapid", Counts.UNKNOWN: "unknown position",
+    Counts.LEFT: "left uncorrected", Counts.UNCORRECTED: "uncorrected rapid",
+    Counts.UNKNOWN: "unknown position",
 }  # fmt: skip
 
 
@@ -242,7 +243,8 @@ def _numerical_sentence(numerical: dict[str, Any]) -> str:
     word = "Within tolerance" if numerical["holds"] else "ABOVE TOLERANCE"
     left = f", where line {numerical['line']} is left uncorrected" if numerical["left"] else ""
     return (
-        f"{word}: the corrected path is at most {_um(numerical['largest_um'])} um from the nominal one{left}; "
+        f"{word}: the corrected path is at most {_um(numerical['largest_um'])} um from the nominal "
+        f"one{left}; "
         f"{_um(numerical['allowed_um'])} um are allowed (numerical tolerance "
         f"{numerical['tolerance_um']:g} um, rounding {_um(numerical['rounding_um'])} um)."
     )

@@ -1,5 +1,6 @@
-"""What a correction never changes: a feed move remains a feed move and a rapid a rapid, holes remain holes, an
-axis that is known remains known, and what is left uncorrected is commanded as the nominal program has it."""
+"""What a correction never changes: a feed move remains a feed move and a rapid a rapid, and holes remain holes.
+An axis that is known remains known, and what is left uncorrected is commanded as the nominal program has it.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +47,8 @@ def _changes(
     of_hole = _in_holes(nominal)[owner] if whole else in_hole
     yield in_hole & ~of_hole, "drills where the nominal program does not"
     rapid, was_rapid = written.kind == Kind.RAPID, path.kind[owner] == Kind.RAPID
-    yield ~rapid & ~in_hole & (was_rapid | of_hole), "cuts or touches where the nominal program moves rapidly"
+    feed = "cuts or touches where the nominal program moves rapidly"
+    yield ~rapid & ~in_hole & (was_rapid | of_hole), feed
     yield rapid & ~in_hole & ~was_rapid & ~of_hole, "moves rapidly where the nominal program cuts or touches"
     yield (written.kind == Kind.PROBE) & (path.kind[owner] != Kind.PROBE), "touches where nominally it cuts"
     last = np.zeros(len(written), bool)
@@ -71,7 +73,7 @@ def _moved(nominal: Program, corrected: Program, groups: Index, owner: Index, di
     """(m,) moves of the corrected program that command neither the end nor the distance that the nominal one
     has for an axis of a move that is never corrected."""
     path, written = nominal.toolpath, corrected.toolpath
-    away = (path.flag[owner] & _AWAY) != 0
+    away = np.asarray((path.flag[owner] & _AWAY) != 0, bool)
     if not away.any():
         return away
     end = np.abs(written.end_mm - path.end_mm[owner])

@@ -101,7 +101,8 @@ def speed(count: int = 100_000) -> None:
     done = confidence(known, path, points, 0.010, tell=silent)
     took = time.perf_counter() - start
     assert done.chances is not None
-    print(f"{count} waypoints, {known.sensitivity.columns} unknowns, {done.chances.draws} draws: {took:.1f} s")
+    size = f"{count} waypoints, {known.sensitivity.columns} unknowns, {done.chances.draws} draws"
+    print(f"{size}: {took:.1f} s")
 
 
 if __name__ == "__main__":

@@ -32,8 +32,8 @@ REPORT: dict[str, Any] = {
     "verdict": {
         "ok": True,
         "sentences": [
-            "Within tolerance: the corrected path is at most 0.87 um from the nominal one; 1.09 um are allowed "
-            "(numerical tolerance 1 um, rounding 0.09 um)."
+            "Within tolerance: the corrected path is at most 0.87 um from the nominal one; 1.09 um are "
+            "allowed (numerical tolerance 1 um, rounding 0.09 um)."
         ],
     },
     "digits": {"mm": 4},

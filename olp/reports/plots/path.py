@@ -160,7 +160,7 @@ def bands(confidence: Confidence) -> bytes:
 
     def draw(figure: Figure) -> None:
         chances = confidence.chances
-        parts = np.atleast_1d(figure.subplots(2 if chances else 1, 1, sharex=True)).tolist()
+        parts = figure.subplots(2 if chances else 1, 1, sharex=True, squeeze=False)[:, 0].tolist()
         plot, bottom = parts[0], parts[-1]
         step = np.sqrt((np.diff(confidence.points.axis_mm, axis=0) ** 2).sum(axis=1))
         arc_m = np.concatenate(([0.0], np.cumsum(step))) / 1e3
