@@ -1,4 +1,5 @@
-"""What a correction never changes: a feed move remains a feed move and a rapid a rapid, and holes remain holes.
+"""What a correction never changes: a feed move remains a feed move, a rapid a rapid, and a hole a hole.
+
 An axis that is known remains known, and what is left uncorrected is commanded as the nominal program has it.
 """
 
@@ -49,8 +50,10 @@ def _changes(
     rapid, was_rapid = written.kind == Kind.RAPID, path.kind[owner] == Kind.RAPID
     feed = "cuts or touches where the nominal program moves rapidly"
     yield ~rapid & ~in_hole & (was_rapid | of_hole), feed
-    yield rapid & ~in_hole & ~was_rapid & ~of_hole, "moves rapidly where the nominal program cuts or touches"
-    yield (written.kind == Kind.PROBE) & (path.kind[owner] != Kind.PROBE), "touches where nominally it cuts"
+    fast = "moves rapidly where the nominal program cuts or touches"
+    yield rapid & ~in_hole & ~was_rapid & ~of_hole, fast
+    touches = written.kind == Kind.PROBE
+    yield touches & (path.kind[owner] != Kind.PROBE), "touches where the nominal program does not"
     last = np.zeros(len(written), bool)
     last[groups] = True
     known, was_known = np.isfinite(written.end_mm), np.isfinite(path.end_mm[owner])
@@ -58,7 +61,8 @@ def _changes(
     own = (path.flag[owner] & np.uint8(Flag.CONTROL)) != 0
     unlike = (known != was_known).any(axis=1) & ~in_hole & ~own
     yield last & unlike, "ends where another axis is known than in the nominal program"
-    yield last & _moved(nominal, corrected, groups, owner, digit_mm), "changes a move that is left uncorrected"
+    moved = _moved(nominal, corrected, groups, owner, digit_mm)
+    yield last & moved, "changes a move that is left uncorrected"
 
 
 def _in_holes(program: Program) -> Mask:

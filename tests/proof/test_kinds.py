@@ -1,0 +1,181 @@
+"""What is no correction of a program is refused with its line; what cuts is never left out of the verdict."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.acceptance import TRUE_ZERO, machine
+from cases.gate import known
+
+import olp
+from olp.core.errors import ProgramError
+from olp.proof import deviation
+from olp.proof.judgement import Judgements
+from olp.proof.proof import Counts
+
+#: X is 10 um long in 100 mm
+CURVE = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
+SCALE = {"x.csv": "X_mm,EXX_um\n-1000,-100\n2000,200\n"}
+HEAD = b"G21 G90 G54 G64 P0.0001 Q0\n"
+PART = HEAD + b"G0 X0 Y0 Z10\nG1 Z-1 F100\nG1 X50\nG1 Y50\nG1 X0\nG1 Y0\nG0 Z50\nM2\n"
+HOLES = HEAD + b"G0 X0 Y0 Z5\nF600\nG81 X10 Y10 Z-6 R0\nX20\nX30\nX40\nG80\nG0 Z50\nM2\n"
+
+
+@pytest.fixture
+def scaled(tmp_path: Path) -> Path:
+    return machine(tmp_path / "m", CURVE, SCALE, tables=TRUE_ZERO)
+
+
+@pytest.mark.parametrize(("text", "old", "new", "line", "words"), [
+    (PART, b"M2", b"G1 X300 Y300 Z-50\nM2", 8, "line 10 of the corrected program cuts or touches"),
+    (PART, b"G0 Z50", b"G1 X100 Z-20\nG0 X0.0 Z50", 8, "line 9 of the corrected program cuts"),
+    (PART, b"G0 Z50", b"G1 Z50", 8, "line 9 of the corrected program cuts"),
+    (PART, b"G1 Y50", b"G0 Y50", 5, "line 6 of the corrected program moves rapidly"),
+    (PART, b"G0 X0 Y0 Z10", b"G0 Y0 Z10", 2, "another axis is known"),
+    (HOLES, b"G80\n", b"X300 Y300\nG80\n", 9, "cuts or touches"),
+    (HOLES, b"G80\n", b"G80\nG1 X300 Y300\n", 9, "cuts or touches"),
+])  # fmt: skip
+def test_a_move_of_another_kind_is_refused_with_its_line(
+    scaled: Path, text: bytes, old: bytes, new: bytes, line: int, words: str
+) -> None:
+    corrected = olp.correct(text, scaled).data
+    assert olp.verify(text, corrected, scaled).report["verdict"]["ok"]
+    assert corrected.count(old) == 1
+    with pytest.raises(ProgramError, match=words) as refused:
+        olp.verify(text, corrected.replace(old, new), scaled)
+    assert refused.value.line == line
+
+
+@pytest.mark.parametrize("left", (b"G53 G1 X300", b"(olp off)\nG1 X300\n(olp on)", b"G53 G0 X300"))
+def test_what_is_left_uncorrected_is_commanded_as_it_was(scaled: Path, left: bytes) -> None:
+    text = HEAD + b"G0 X0 Y0 Z0\nG1 X10 F100\n" + left + b"\nG0 Z50\nM2\n"
+    corrected = olp.correct(text, scaled).data
+    olp.verify(text, corrected, scaled)
+    with pytest.raises(ProgramError, match="left uncorrected"):
+        olp.verify(text, corrected.replace(b"X300", b"X300.5"), scaled)
+
+
+@pytest.mark.parametrize("left", (b"G53 G1 X300", b"(olp off)\nG1 X300\n(olp on)"))
+def test_what_cuts_uncorrected_counts(scaled: Path, left: bytes) -> None:
+    done = olp.correct(HEAD + b"G0 X0 Y0 Z0\nG1 X10 F100\n" + left + b"\nG0 Z50\nM2\n", scaled)
+    assert Counts.LEFT in done.table.counts
+    verdict = done.report["verdict"]
+    assert verdict["ok"] is False
+    assert verdict["numerical"]["largest_um"] == pytest.approx(30.0, abs=0.1)
+    assert "is left uncorrected" in verdict["sentences"][0]
+    rapid = olp.correct(HEAD + b"G0 X0 Y0 Z0\nG1 X10 F100\nG0 Z50\nG53 G0 X300\nM2\n", scaled)
+    assert rapid.report["verdict"]["ok"]
+
+
+# -- axes that are never known ---------------------------------------------------------------------------
+
+LASER = HEAD + b"G0 X0 Y0\nG1 X50 F100\nG1 Y50\nG1 X0\nM2\n"
+
+
+def test_a_program_of_two_axes_is_judged_along_them(scaled: Path) -> None:
+    done = olp.correct(LASER, scaled)
+    assert (done.table.counts[1:] == Counts.FEED).all()
+    assert done.report["deviation"]["before"]["between"]["max_um"] == pytest.approx(5.0, abs=0.01)
+    assert 0.0 < done.report["verdict"]["numerical"]["largest_um"] < 1.2
+    wrong = olp.verify(LASER, done.data.replace(b"Y50", b"Y51"), scaled)
+    assert wrong.report["verdict"]["numerical"]["largest_um"] == pytest.approx(1000.0, abs=2.0)
+    with pytest.raises(ProgramError, match="another axis is known"):
+        olp.verify(LASER, done.data.replace(b"Y50", b"Y50 Z-1"), scaled)
+
+
+def test_a_wrong_first_feed_from_a_partly_unknown_place_is_seen(scaled: Path) -> None:
+    text = HEAD + b"G1 X10 F100\nG1 X300\nG0 Y0 Z0\nG1 X50\nM2\n"
+    corrected = olp.correct(text, scaled).data
+    wrong = re.sub(rb"G1 X299\.9\d+", b"G1 X250", corrected)
+    assert wrong != corrected
+    assert olp.verify(text, wrong, scaled).report["verdict"]["ok"] is False
+
+
+# -- nothing that could be judged ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", (b"", b"G21 G90\nM2\n", HEAD + b"G53 G0 X0 Y0 Z0\nM2\n"))
+def test_nothing_judged_is_no_pass(scaled: Path, text: bytes) -> None:
+    done = olp.correct(text, scaled)
+    assert done.report["verdict"]["ok"] is None
+    assert done.report["verdict"]["sentences"][0].startswith("Not judged")
+
+
+def test_moves_where_the_nominal_program_has_none_are_refused(scaled: Path) -> None:
+    with pytest.raises(ProgramError, match="not the 0 of the nominal one"):
+        olp.verify(b"G21 G90\nM2\n", PART, scaled)
+
+
+def test_a_part_that_is_good_with_a_low_probability_is_no_pass(tmp_path: Path) -> None:
+    case = known(50.0)
+    path = machine(tmp_path, case["calibration"], case["curves"], tables=TRUE_ZERO)
+    doubtful = olp.correct(PART, path, part_tolerance_um=3.0).report["verdict"]
+    assert (doubtful["ok"], doubtful["part"]["holds"], doubtful["part"]["probable"]) == (None, True, False)
+    assert olp.correct(PART, path, part_tolerance_um=300.0).report["verdict"]["ok"] is True
+
+
+# -- blocks and groups -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("block", range(2, 14))
+def test_blocks_of_the_proof_do_not_matter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
+    """A corrected hole with a peck less: some strokes of the nominal one have no move of their own."""
+    deep = {"z.csv": "Z_mm,EZZ_um\n-1000,-1000\n2000,2000\n"}
+    path = machine(tmp_path, CURVE.replace("x.csv", "z.csv"), deep, tables=TRUE_ZERO)
+    text = HEAD + b"G0 X0 Y0 Z5\nF600\nG83 X10 Y10 Z-20.005 R0 Q5\nG80\nM2\n"
+    done = olp.correct(text, path)
+    assert (np.diff(done.groups) == 0).any()
+    monkeypatch.setattr(deviation, "_BLOCK", block)
+    again = olp.verify(text, done.data, path)
+    np.testing.assert_array_equal(again.table.corrected, done.table.corrected)
+
+
+def test_groups_are_those_of_a_loop() -> None:
+    rng = np.random.default_rng(5)
+    n = 400
+    counts = rng.choice([Counts.FEED, Counts.HOLE, Counts.RAPID, Counts.LEFT], n).astype(np.uint8)
+    sizes = rng.choice(np.linspace(0, 3e-3, 9), (2, n)).astype(np.float32)
+    sizes[0][rng.random(n) < 0.1] = np.nan
+    table = Judgements(
+        np.sort(rng.integers(1, 90, n)), rng.integers(-1, 3, n), np.sort(rng.integers(0, 12, n)), counts,
+        sizes[0], sizes[1], sizes[1], 1e-3, 1.87e-3,
+    )  # fmt: skip
+    for of in (table.operation, table.tool):
+        rows = table.groups(of)
+        judged = np.flatnonzero(table.judged)
+        values = list(dict.fromkeys(of[judged].tolist()))
+        assert len(rows) == len(values)
+        for row, value in zip(rows, values, strict=True):
+            mine = judged[of[judged] == value]
+            worst = mine[np.argmax(table.corrected[mine])]
+            assert row["worst_line"] == table.line[worst]
+            assert row["corrected_um"] == pytest.approx(table.corrected[worst] * 1e3)
+            assert row["uncorrected_um"] == pytest.approx(np.nanmax(table.uncorrected[mine]) * 1e3)
+            assert (row["first_line"], row["last_line"]) == (table.line[mine].min(), table.line[mine].max())
+            assert row["holds"] is bool((table.corrected[mine] <= table.allowed_mm).all())
+
+
+def test_the_side_of_an_axis_is_taken_up_once(tmp_path: Path) -> None:
+    path = machine(tmp_path, "[backlash]\nX_um = 10.0\nY_um = 8.0\nZ_um = 6.0\n", tables=TRUE_ZERO)
+    body = b"".join(b"G0 X%d\nG1 Z-1 F100\nG1 X%d\nG0 Z5\n" % (10 * k, 10 * k + 5) for k in range(6))
+    done = olp.correct(HEAD + b"G0 X0 Y0 Z5\n" + body + b"M2\n", path)
+    assert done.report["verdict"]["ok"]
+    # Y moves in the first approach alone, there and back, after its first position
+    assert len(re.findall(rb"Y-?\d", done.data)) == 3
+
+
+def test_a_contour_that_changes_its_side_is_refused(tmp_path: Path) -> None:
+    tables = TRUE_ZERO + "[tools.1]\nZ_mm = 0.0\nradius_mm = 5.0\n[job_defaults]\ntool = 1\n"
+    path = machine(
+        tmp_path, CURVE, SCALE, tables=tables, controller="fanuc", keys='decimal_point = "calculator"\n'
+    )
+    text = b"G21 G90 G54\nG0 X0 Y0 Z0\nG41 D1 G1 X20 Y20 F500\nX100\nY80\nG42 D1 X60\nY40\nG40 G0 X0 Y0\nM2\n"
+    with pytest.raises(ProgramError, match="without G40") as refused:
+        olp.correct(text, path, contour=True)
+    assert refused.value.line == 6
+    olp.correct(text.replace(b"G42 D1 X60", b"G40 X90\nG42 D1 X60"), path, contour=True)
