@@ -26,9 +26,11 @@ _FAR_MM = 1.0
 _OTHER_KIND_MM2 = 4.0
 #: Share of waypoints that may be far off before the programs count as different jobs.
 _MOST_FAR = 0.5
-#: Nominal units that are compared at once where both sequences agree: at first, and twice as many each time.
+#: Units that are aligned at once where nothing is in doubt: at first, and at most.
 _FIRST_BLOCK = 16
 _BLOCK = 4096
+#: Where a unit may end beside the place that the length of the path tells.
+_BESIDE = np.arange(-2, 4)
 #: Nominal units that are aligned at once.
 _WINDOW = 12
 #: How many of them are kept: the last ones depend on what comes behind them.
@@ -121,6 +123,10 @@ class _Alignment:
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
         self.arc = index[mine.last]
         self.arcs = nominal.arcs
+        #: the length of the path up to the end of each unit
+        self.length = _lengths(nominal, mine, self.begin, self.target)
+        start = np.vstack((path.starts_mm()[:1], self.tip[:-1]))
+        self.gone = _lengths(path, theirs, start, self.tip)
         self.tries = 0
 
     def ends(self) -> Index:
@@ -130,14 +136,13 @@ class _Alignment:
             return np.arange(count)
         ends = np.zeros(count, np.int64)
         i = j = 0
+        size = _FIRST_BLOCK
         while i < count:
-            run = self._run(i, j)
-            ends[i : i + run] = np.arange(j, j + run)
-            i, j = i + run, j + run
-            if i == count:
-                break
-            skipped = self._plain_split(i, j)
-            some = self._window(i, j) if skipped is None else np.array([j + skipped])
+            some = self._stretch(i, j, size)
+            size = min(2 * size, _BLOCK) if len(some) == size else max(_FIRST_BLOCK, 2 * len(some))
+            if not len(some):
+                skipped = self._plain_split(i, j)
+                some = self._window(i, j) if skipped is None else np.array([j + skipped])
             ends[i : i + len(some)] = some
             i, j = i + len(some), int(some[-1]) + 1
         # what comes behind the last move, such as the second half of a whole circle, belongs to it
@@ -155,57 +160,80 @@ class _Alignment:
         good = np.asarray((away < self.reach[i]) | unknown, bool)
         return np.asarray(good & (self.mine.kind[i] == self.theirs.kind[j]), bool)
 
-    def _run(self, i: int, j: int) -> int:
-        """How many units from here agree one by one."""
-        done, block = 0, _FIRST_BLOCK
-        while i + done < len(self.mine):
-            span = min(block, len(self.mine) - i - done, len(self.theirs) - j - done)
-            step = np.arange(span)
-            near = self._near(i + done + step, j + done + step)
-            if not near.all():
-                return done + int(np.argmin(near))
-            done, block = done + span, min(2 * block, _BLOCK)
-            if not span:
-                break
-        return done
+    def _stretch(self, i: int, j: int, size: int) -> Index:
+        """The ends of the next units, `size` at most, up to the first that is in any doubt.
+
+        Parts are as long together as the whole. So the length of the path tells about where each unit ends.
+        """
+        rows = np.arange(i, min(i + size, len(self.mine)))
+        length = self.length[rows] - (self.length[i - 1] if i else 0.0)
+        about = np.searchsorted(self.gone, length + (self.gone[j - 1] if j else 0.0))
+        choice = np.clip(about[:, None] + _BESIDE, j, len(self.theirs) - 1)
+        near = self._near(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
+        ends = choice[np.arange(len(rows)), near.argmax(axis=1)]
+        before = np.concatenate(([j - 1], ends[:-1]))
+        inserted = ends - before - 1
+        good = near.any(axis=1) & (inserted >= 0) & (inserted <= _SPARE)
+        good &= ends - rows <= len(self.theirs) - len(self.mine)
+        count = len(good) if good.all() else int(np.argmin(good))
+        inserted = inserted[:count]
+        if inserted.any():
+            owner = np.repeat(np.arange(count), inserted)
+            first = np.cumsum(inserted) - inserted
+            part = before[owner] + 1 + np.arange(len(owner)) - first[owner]
+            of = rows[owner]
+            # one that ends as the unit does leaves a choice
+            astray = self._unlike(of, part) | self._near(of, part)
+            astray |= np.asarray(self._along(of, part) >= self.near, bool)
+            count = int(owner[int(np.argmax(astray))]) if astray.any() else count
+        return np.asarray(ends[:count], np.int64)
 
     def _plain_split(self, i: int, j: int) -> int | None:
         """The number of moves inserted before the end of unit i where they all lie along it, None where that
         is not plain."""
         ahead = np.arange(j, j + min(self._room(i, j), _SPARE) + 1)
         end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead))
-        if not end.size or not end[0]:
+        if not end.size:
             return None
         count = int(end[0])
-        along = self._along(i, ahead[:count])
-        return count if (along < self.near).all() else None
+        of = np.full(count, i)
+        astray = (self._along(of, ahead[:count]) >= self.near) | self._unlike(of, ahead[:count])
+        return None if astray.any() else count
 
-    def _along(self, i: int, j: Index) -> Array:
-        """(m,) distances of the ends of units j from the nominal unit i as a line or an arc, in mm."""
+    def _unlike(self, i: Index, j: Index) -> Mask:
+        """Whether units j are no parts of nominal units i: a part of a rapid is a rapid, and of no other."""
+        return np.asarray((self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID), bool)
+
+    def _along(self, i: Index, j: Index) -> Array:
+        """(m,) mm, how far the ends of units j (m,) are from nominal units i (m,) as lines or arcs."""
         known = ~np.isnan(self.target[i])
-        begin, end = np.where(known, self.begin[i], 0.0), np.where(known, self.target[i], 0.0)
-        point = np.where(known, self.tip[j], 0.0)
-        arc = int(self.arc[i])
-        if arc < 0:
-            begin = end if np.isnan(begin).any() else begin
-            away = segment_distance(point, np.repeat(begin[None], len(j), 0), np.repeat(end[None], len(j), 0))
-        else:
-            away = self._from_arc(arc, begin, end, point)
+        begin, end, point = (
+            np.where(known, some, 0.0) for some in (self.begin[i], self.target[i], self.tip[j])
+        )
+        begin = np.where(np.isnan(begin).any(axis=1)[:, None], end, begin)
+        away = segment_distance(point, begin, end)
+        curved = np.flatnonzero(self.arc[i] >= 0)
+        for plane in np.unique(self.arcs.plane[self.arc[i[curved]]]).tolist():
+            some = curved[self.arcs.plane[self.arc[i[curved]]] == plane]
+            away[some] = self._from_arcs(self.arc[i[some]], begin[some], end[some], point[some], plane)
         return np.asarray(np.nan_to_num(away, nan=_FAR_MM), float)
 
-    def _from_arc(self, arc: int, begin: Array, end: Array, point: Array) -> Array:
-        """(m,) distances of points from a nominal arc: across it, and beyond its ends."""
-        first, second, third = PLANES[int(self.arcs.plane[arc])]
-        centre, sweep = self.arcs.centre_mm[arc], float(self.arcs.sweep_rad[arc])
-        radius = float(np.hypot(*(end - centre)[[first, second]]))
-        arm = point - centre
-        across = np.hypot(arm[:, first], arm[:, second]) - radius
-        start = float(np.arctan2(begin[second] - centre[second], begin[first] - centre[first]))
-        angle = np.sign(sweep) * (np.arctan2(arm[:, second], arm[:, first]) - start)
+    def _from_arcs(self, arc: Index, begin: Array, end: Array, point: Array, plane: int) -> Array:
+        """(m,) distances of points from nominal arcs of a plane: across them, and beyond their ends."""
+        first, second, third = PLANES[plane]
+        centre, sweep = self.arcs.centre_mm[arc], self.arcs.sweep_rad[arc]
+        (x0, y0), (x1, y1), (x, y) = (
+            (some[:, first] - centre[:, first], some[:, second] - centre[:, second])
+            for some in (begin, end, point)
+        )
+        radius = np.hypot(x1, y1)
+        across = np.hypot(x, y) - radius
+        angle = np.sign(sweep) * (np.arctan2(y, x) - np.arctan2(y0, x0))
         # a little before the start is at the start
         angle = np.mod(angle + 0.5 * _WHOLE, 2 * np.pi) - 0.5 * _WHOLE
-        beyond = np.maximum(angle - abs(sweep), 0.0) * radius
-        low, high = min(begin[third], end[third]), max(begin[third], end[third])
+        beyond = np.maximum(angle - np.abs(sweep), 0.0) * radius
+        low = np.minimum(begin[:, third], end[:, third])
+        high = np.maximum(begin[:, third], end[:, third])
         level = np.maximum(np.maximum(low - point[:, third], point[:, third] - high), 0.0)
         return np.asarray(np.sqrt(across**2 + beyond**2 + level**2), float)
 
@@ -263,10 +291,26 @@ class _Alignment:
         if self.loose[i]:
             away = np.where(self.lost[j] == self.unknown[i], 0.0, _FAR_MM**2)
         end = away + np.where(self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2)
-        # a part of a feed move is a feed move, and a part of a rapid a rapid
-        other = (self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID)
-        part = np.minimum(self._along(i, j), _FAR_MM) ** 2 + np.where(other, _OTHER_KIND_MM2, 0.0)
+        of = np.full(len(j), i)
+        part = np.minimum(self._along(of, j), _FAR_MM) ** 2
+        part += np.where(self._unlike(of, j), _OTHER_KIND_MM2, 0.0)
         return np.asarray(end, float), part
+
+
+def _lengths(path: Toolpath, units: _Units, begin: Array, end: Array) -> Array:
+    """(u,) mm, the length of the path up to the end of each unit; 0 for what is not known."""
+    own = np.nan_to_num(np.sqrt(((end - begin) ** 2).sum(axis=1)))
+    if len(path.arcs):
+        unit = np.searchsorted(units.last, path.arcs.move)
+        radius = np.empty(len(unit))
+        rise = np.empty(len(unit))
+        for plane, (first, second, third) in enumerate(PLANES):
+            some = path.arcs.plane == plane
+            arm = path.end_mm[path.arcs.move[some]] - path.arcs.centre_mm[some]
+            radius[some] = np.hypot(arm[:, first], arm[:, second])
+            rise[some] = (end - begin)[unit[some], third]
+        own[unit] = np.nan_to_num(np.hypot(radius * path.arcs.sweep_rad, rise))
+    return np.cumsum(own)
 
 
 def _apart(tip: Array, target: Array) -> Array:
