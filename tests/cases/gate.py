@@ -207,6 +207,8 @@ def clamp(high: float, role: str = "fixture", frame: str = "G54") -> dict[str, A
     }
 
 
+ENDLESS = {"valid_until = 2099-01-01\n": ""}
+UNTIL = {"2099-01-01": "2027-06-01"}
 OVER = b"G0 Z10\nG0 X100\n"
 
 #: code -> (a call that triggers it, one that just does not)
@@ -229,6 +231,10 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     "OLP106": (Call(tables=tool(100.0), **roll(201.0)), Call(tables=tool(100.0), **roll(199.0))),
     "OLP107": (Call(b"G53 G0 X0 Y0 Z0\n", head=b"G21 G90\n"), Call()),
+    "OLP108": (
+        Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 0.9}),
+        Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 1.1}),
+    ),
     "OLP201": (Call(b"G64\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
     "OLP202": (
         Call(b"G64 P0.0101 Q0\nG1 X100\n", **scaled(10.0)),
@@ -274,8 +280,13 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP311": (Call(b"G1 X1\n" + STAMP * 2), Call(b"G1 X1\n" + STAMP)),
     "OLP312": (Call(b"G1 X1\n" + STAMP), Call(b"G1 X1\n")),
     "OLP401": (
-        Call(swap={"valid_until = 2099-01-01\n": ""}, options={"date": datetime.date(2027, 1, 16)}),
-        Call(swap={"valid_until = 2099-01-01\n": ""}, options={"date": datetime.date(2027, 1, 15)}),
+        Call(swap=UNTIL, options={"date": datetime.date(2027, 6, 2)}),
+        Call(swap=UNTIL, options={"date": datetime.date(2027, 6, 1)}),
+    ),
+    "OLP462": (Call(swap=ENDLESS, options={"date": None}), Call(options={"date": None})),
+    "OLP463": (
+        Call(swap=ENDLESS, options={"date": datetime.date(2027, 1, 16)}),
+        Call(swap=ENDLESS, options={"date": datetime.date(2027, 1, 15)}),
     ),
     "OLP402": (Call(ARC, swap=travel(109.999)), Call(ARC, swap=travel(110.0))),
     "OLP403": (

@@ -210,4 +210,22 @@ RULES = (
         'State decimal_point = "increment" or "calculator" in the machine file.',
         "`G1 X100 Y200` alone on a Fanuc control.",
     ),
+    _rule(
+        "OLP462",
+        "validity of the calibration not stated",
+        Severity.INFO,
+        "The calibration states no last day, so no date can be later.",
+        "Write valid_until into the calibration file.",
+        "A calibration file without `valid_until`.",
+    ),
+    _rule(
+        "OLP463",
+        "calibration measured long ago",
+        Severity.WARNING,
+        "The calibration states no last day, and on the date given it is older than calibration_days of "
+        "[check] (365). Machines change.",
+        "Check the machine with a circle or some points, and write valid_until into the calibration file. Else "
+        "measure it again.",
+        "`--date 2027-06-01`, and `measured = 2026-05-14`.",
+    ),
 )
