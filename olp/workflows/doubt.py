@@ -38,7 +38,7 @@ def doubted(
     is that of the program."""
     inputs = Inputs(loaded.setup, program, loaded.calibration, loaded.model, date)
     accepted = acceptable(accept) | accepted_in(stamped, loaded.digest)
-    return judged(doubts(inputs), accepted, name=name, refuse=refuse)
+    return with_accepted(doubts(inputs), accepted, name=name, refuse=refuse)
 
 
 def doubted_motion(
@@ -49,10 +49,10 @@ def doubted_motion(
     if _calibrated(session):
         return doubted(program, session.loaded("hold"), accept, date, name=name, stamped=program.data)
     accepted = acceptable(accept) | accepted_in(program.data, None)
-    return judged(doubts(Inputs(session.setup, program, None, None, date)), accepted, name=name)
+    return with_accepted(doubts(Inputs(session.setup, program, None, None, date)), accepted, name=name)
 
 
-def judged(
+def with_accepted(
     findings: Iterable[Finding], accepted: frozenset[str], *, name: str = "", refuse: bool = True
 ) -> tuple[Finding, ...]:
     """Doubts with those that are `accepted` one step less severe. With `refuse`, another error raises

@@ -224,8 +224,8 @@ RULES = (
         Severity.WARNING,
         "The calibration states no last day, and on the date given it is older than calibration_days of "
         "[check] (365). Machines change.",
-        "Check the machine with a circle or some points, and write valid_until into the calibration file. Else "
-        "measure it again.",
+        "Check the machine with a circle or some points, and write valid_until into the calibration file. "
+        "Else measure it again.",
         "`--date 2027-06-01`, and `measured = 2026-05-14`.",
     ),
 )

@@ -89,7 +89,7 @@ class Profile(Dialect):
 
     def counts_increments(self, machine: Machine) -> bool:
         """Whether a length without a decimal point counts least increments."""
-        return self.increments_without_point and machine.decimal_point == "increment"
+        return self.increments_without_point and machine.decimal_point != "calculator"
 
     def bare_mm(self, machine: Machine, letter: str, unit_mm: float) -> float:
         """mm per unit of a length without a decimal point, as the control reads it."""
