@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from olp.checks.base import finding, lines_of
+from olp.checks.doubt_units import UNMEASURABLE
 from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.toolpath import Flag, Toolpath
@@ -19,8 +20,6 @@ from olp.findings.catalogue import Finding
 _SHARE = 1e-3
 #: mm; sane errors of a small machine, whose assembly is no better than that of a larger one.
 _FLOOR_MM = 0.5
-#: Errors per length that no instrument measures: 0.1 um/m.
-_UNMEASURABLE = 1e-7
 #: mm; below this diagonal of the box even sane errors are that small.
 _SHORT_MM = 50.0
 #: Moves that are not corrected.
@@ -76,9 +75,9 @@ def box_doubts(
         return [finding("OLP445", what)]
     span = float(np.linalg.norm(np.ptp(model.box_mm, axis=1)))
     largest = max(largest, known_mm)
-    if 0.0 < largest < _UNMEASURABLE * span and span > _SHORT_MM and not calibration.thermal:
+    if 0.0 < largest < UNMEASURABLE * span and span > _SHORT_MM and not calibration.thermal:
         what = f"calibration: the error is at most {largest * UM_PER_MM:.2g} um anywhere in the box"
-        return [finding("OLP451", f"{what}; expected more than {_UNMEASURABLE * span * UM_PER_MM:.2g} um")]
+        return [finding("OLP451", f"{what}; expected more than {UNMEASURABLE * span * UM_PER_MM:.2g} um")]
     return []
 
 

@@ -87,7 +87,7 @@ def test_quiet_is_the_exit_code_alone(tmp_path: Path) -> None:
     proved = run("verify", program, program, "-m", machine, "-j", job, "-q", "--tolerance-um", "1000")
     assert (proved.exit_code, proved.stdout, proved.stderr) == (0, "", "")
     moved = tmp_path / "moved.nc"
-    moved.write_bytes(program.read_bytes().replace(b"X", b"X1"))
+    moved.write_bytes(program.read_bytes().replace(b"X100", b"X101"))
     above = run("verify", program, moved, "-m", machine, "-j", job, "-q")
     assert (above.exit_code, above.stdout, above.stderr) == (1, "", "")
     assert run("verify", program, program, "-m", machine, "-j", job).stdout
