@@ -242,7 +242,7 @@ CASES: dict[str, tuple[Call, Call]] = {
     # the middle of the stroke is exact: its ends are off by 100 urad times half of it
     "OLP105": (
         Call(b"G81 X10 Y10 Z-21 R0\nG80\n", increment_mm=1e-4, **tilted()),
-        Call(b"G81 X10 Y10 Z-19 R0\nG80\n", increment_mm=1e-4, **tilted()),
+        Call(b"G81 X10 Y10 Z-18 R0\nG80\n", increment_mm=1e-4, **tilted()),
     ),
     "OLP106": (Call(tables=tool(100.0), **roll(201.0)), Call(tables=tool(100.0), **roll(199.0))),
     "OLP107": (Call(b"G53 G0 X0 Y0 Z0\n", head=b"G21 G90\n"), Call()),
