@@ -6,7 +6,7 @@ import datetime
 import json
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,10 +15,12 @@ from cases.gate import HEAD, scaled, valued
 from click.testing import CliRunner
 
 import olp
-from olp.checks import doubt_size
+from olp.checks.doubt_size import box_doubts
 from olp.cli import main
 from olp.core.errors import AlreadyCorrected, Doubtful, UsageError
+from olp.errormodel.base import ErrorModel
 from olp.findings.rule import Severity
+from olp.workflows.session import Session
 
 LATE = datetime.date(2100, 1, 1)
 TEXT = HEAD + b"G1 X100\nM2\n"
@@ -153,22 +155,19 @@ def test_without_an_end_a_calibration_is_an_info_and_once_old_a_warning(tmp_path
     assert doubts(datetime.date(2026, 1, 19)) == [("OLP463", Severity.WARNING)]
 
 
-def test_the_size_of_the_error_is_computed_once_per_tool(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Not once per tool change."""
-    tables = TRUE_ZERO + "".join(f"[tools.{n}]\nZ_mm = {20.0 * n}\nradius_mm = 5.0\n" for n in (1, 2, 3))
-    path = made(tmp_path, scaled(10.0), tables=tables)
-    body = b"".join(b"T%d M6\nG43 H%d\nG0 X0 Y0 Z5\nG1 X%d\n" % (1 + k % 3, 1 + k % 3, k) for k in range(60))
-    counts: list[int] = []
-    unique = np.unique
+def test_the_error_in_the_box_is_computed_once_per_tool(tmp_path: Path) -> None:
+    """Not once per tool change, nor per work offset."""
+    loaded = Session.start(made(tmp_path, scaled(10.0))).loaded("hold")
+    asked: list[Any] = []
 
-    def counted(values: Any, *more: Any, **words: Any) -> Any:
-        result = unique(values, *more, **words)
-        counts.append(len(result))
-        return result
+    class Counting:
+        box_mm = loaded.model.box_mm
 
-    monkeypatch.setattr(doubt_size.np, "unique", counted)
-    olp.simulate(HEAD + body + b"M2\n", path, step_mm=100.0)
-    monkeypatch.undo()
-    assert 4 in counts
+        def error(self, points: Any, tool: Any) -> Any:
+            asked.append(tool)
+            return loaded.model.error(points, tool)
+
+    tools = np.tile([[0.0, 0.0, -80.0], [0.0, 0.0, -120.0]], (5000, 1))
+    model = cast(ErrorModel, Counting())
+    assert box_doubts(model, tools, loaded.calibration, loaded.setup.machine) == []
+    assert len(asked) == 2
