@@ -244,7 +244,9 @@ def test_a_cut_below_the_zero_of_a_new_machine_is_corrected(tmp_path: Path) -> N
     assert run("init", tmp_path / "mill").exit_code == 0
     program = tmp_path / "part.nc"
     program.write_text("G21 G90 G54 G94\nG0 X0 Y0 Z5\nG1 Z-3 F200\nX20\nM2\n")
-    result = run("correct", program, "-m", tmp_path / "mill" / "machine.toml", "--fail-on", "never")
+    words = ("correct", program, "-m", tmp_path / "mill" / "machine.toml", "--fail-on", "never")
+    assert run(*words).exit_code == 3, "what init writes is to be filled in first"
+    result = run(*words, "--accept", "OLP440,OLP442")
     assert result.exit_code == 0, result.stderr
 
 
