@@ -40,7 +40,7 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
             findings.append(finding("OLP413", text, [line]))
     findings += remark_findings(program)
     whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
-    if whole.any() and not (program.statements and program.statements.decimal):
+    if whole.any() and not program.verbatim:
         lines = lines_of(path, whole)
         findings.append(
             finding(
@@ -136,7 +136,7 @@ def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
         findings.append(
             finding(
                 "OLP101",
-                f"{int(above.sum())} moves end above tolerance: {size[worst] * 1e3:.2f} um at line "
+                f"{int(above.sum())} moves are above tolerance: {size[worst] * 1e3:.2f} um at line "
                 f"{int(path.line[worst])}, allowed {proof.allowed_mm * 1e3:.2f} um",
                 lines_of(path, above),
             )
@@ -163,11 +163,11 @@ def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
         most_um = size[holes].max() * UM_PER_MM
         what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke"
         findings.append(finding("OLP105", what, lines_of(path, holes)))
-    if proof.lean.any():
-        lines = lines_of(path, proof.lean)
-        most = proof.size_mm()[proof.lean].max() * UM_PER_MM
-        what = f"{len(lines)} feed moves start where a move ended uncorrected; they are off by up to "
-        findings.append(finding("OLP306", f"{what}{most:.2f} um", lines))
+    lean = proof.lean & (size > proof.tolerance_mm)
+    if lean.any():
+        what = f"{int(lean.sum())} feed moves start where a canned cycle or an uncorrected move ended; they "
+        what += f"are off by up to {size[lean].max() * UM_PER_MM:.2f} um"
+        findings.append(finding("OLP306", what, lines_of(path, lean)))
     return findings
 
 

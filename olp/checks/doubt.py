@@ -11,7 +11,7 @@ from olp.checks.doubt_program import program_doubts
 from olp.checks.doubt_setup import setup_doubts
 from olp.checks.doubt_size import size_doubts
 from olp.checks.state import calibration_findings
-from olp.core.machine import Setup
+from olp.core.machine import Machine, Setup
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
@@ -35,9 +35,15 @@ def doubts(inputs: Inputs) -> tuple[Finding, ...]:
     setup, path = inputs.setup, inputs.program.toolpath
     findings = [*program_doubts(inputs.program, setup), *setup_doubts(path, setup, inputs.calibration)]
     if inputs.calibration is not None:
-        days = setup.machine.sanity.calibration_days
-        findings += calibration_findings(inputs.calibration, inputs.date, days)
-        findings += calibration_doubts(inputs.calibration, setup.machine, inputs.date)
+        findings += stated_doubts(inputs.calibration, setup.machine, inputs.date)
     if inputs.calibration is not None and inputs.model is not None:
         findings += size_doubts(path, inputs.model, inputs.calibration, setup.machine)
     return tuple(findings)
+
+
+def stated_doubts(calibration: Calibration, machine: Machine, date: datetime.date | None) -> list[Finding]:
+    """Doubts about what a calibration states, on the day of the run."""
+    days = machine.sanity.calibration_days
+    return [
+        *calibration_findings(calibration, date, days), *calibration_doubts(calibration, machine, date),
+    ]  # fmt: skip

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from olp.checks.base import finding
+from olp.checks.doubt_units import columns, stated, unit_doubts, zero_curves
 from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
-from olp.errormodel.calibration import PLACEHOLDER_DATE, Calibration, Curve
+from olp.errormodel.calibration import PLACEHOLDER_DATE, Calibration
 from olp.findings.catalogue import Finding
 
 #: rad; squareness of a machine that a person aligned with a try square. 667 urad of a hobby router pass.
@@ -30,6 +31,8 @@ _CYCLIC_MM = 0.1
 _CYCLIC_RAD = 1e-3
 #: Error per way of a cyclic term: interpolation errors of encoders are 3 % of their period, so 0.2.
 _CYCLIC_SLOPE = 0.2
+#: rad; phases are stated within a turn: 90 is one in degrees.
+_PHASE_RAD = 2.0 * np.pi
 #: A value stands out where it is so many times all others of its column ...
 _STANDS_OUT = 8.0
 #: ... or off its neighbours by so many times what any other value is.
@@ -40,12 +43,6 @@ _NOTICED_MM = 2e-3
 _NOTICED_RAD = 10e-6
 #: Values of a column below which none can stand out: one of five is a sag.
 _FEW = 7
-#: Columns of one axis in another unit are smaller than those of both other axes by so much: 1000 less a span.
-_OTHER_UNIT = 300.0
-#: mm; a column of lengths in another unit has no value above this.
-_TINY_MM = 0.5e-3
-#: rad; a column of angles in another unit has no value above this.
-_TINY_RAD = 0.5e-6
 #: How much of the travel calibrated boxes cover: 40 % at least in a wrong unit, so that the factor shows.
 _COVERED = (0.4, 1.02)
 #: Factors between units of lengths: inches, metres, micrometres.
@@ -68,14 +65,14 @@ def calibration_doubts(
     calibration: Calibration, machine: Machine, date: datetime.date | None
 ) -> Iterator[Finding]:
     """All doubts that a calibration and its machine raise, without a program."""
-    yield from _zeros(calibration)
+    yield from list(_zeros(calibration)) or zero_curves(calibration)
     yield from _dates(calibration, date)
     yield from _quality(calibration)
     yield from _angles(calibration)
     yield from _backlash(calibration, machine)
     yield from _cyclic(calibration, machine)
     yield from _columns(calibration)
-    yield from _units_of_axes(calibration)
+    yield from unit_doubts(calibration)
     yield from _box(calibration, machine)
     yield from _places(calibration, machine)
     yield from _expansion(calibration)
@@ -83,13 +80,13 @@ def calibration_doubts(
 
 def _zeros(calibration: Calibration) -> Iterator[Finding]:
     c, thermal = calibration, calibration.thermal
-    stated = (
+    numbers = (
         *c.squareness.values(), *c.backlash_mm, *(term.amplitude for term in c.cyclic),
         *(thermal.scale_per_K if thermal else ()), thermal.workpiece_per_K if thermal else 0.0,
     )  # fmt: skip
-    tables = (*(v for curve in c.curves for _, v in _values(curve)), *(one.values for one in c.maps))
+    tables = (*(v for curve in c.curves for _, v in columns(curve)), *(one.values for one in c.maps))
     others = (c.structure, c.compliance, c.beams, c.more)
-    if any(stated) or any(others) or any(values.any() for values in tables):
+    if any(numbers) or any(others) or any(values.any() for values in tables):
         return
     if tables or c.cyclic:
         yield finding("OLP440", "calibration: every value is zero, so nothing would be corrected")
@@ -124,7 +121,7 @@ def _angles(calibration: Calibration) -> Iterator[Finding]:
         if abs(angle) > _SQUARE_RAD:
             yield _angle(f"squareness.{name}_urad", angle, _SQUARE_RAD)
     for curve in calibration.curves:
-        for name, values in _values(curve):
+        for name, values in columns(curve):
             largest = float(np.abs(values).max())
             if name[1] not in AXES and largest > _ANGLE_RAD:
                 yield _angle(f"largest {name}_urad", largest, _ANGLE_RAD)
@@ -156,6 +153,8 @@ def _cyclic(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
             text = f"{what}: amplitude_{unit} = {size * scale:.6g}; expected at most {limit * scale:g}"
         elif term.period_mm > travel:
             text = f"{what}: period_mm = {term.period_mm:g}; expected less than the travel, {travel:g} mm"
+        elif abs(term.phase_rad) > _PHASE_RAD:
+            text = f"{what}: phase_rad = {term.phase_rad:g}; expected at most {_PHASE_RAD:.4g}, a whole turn"
         elif linear and size * 2.0 * np.pi > _CYCLIC_SLOPE * term.period_mm:
             text = f"{what}: {size * scale:g} um in a period of {term.period_mm:g} mm; expected a longer one"
         else:
@@ -165,12 +164,12 @@ def _cyclic(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
 
 def _columns(calibration: Calibration) -> Iterator[Finding]:
     for curve in calibration.curves:
-        for name, values in _values(curve):
+        for name, values in columns(curve):
             k = _standing_out(values, _NOTICED_MM if name[1] in AXES else _NOTICED_RAD)
             if k is not None:
-                unit, scale = ("um", UM_PER_MM) if name[1] in AXES else ("urad", 1.0 / RAD_PER_URAD)
+                scale = UM_PER_MM if name[1] in AXES else 1.0 / RAD_PER_URAD
                 place = f"{curve.axis} = {curve.position_mm[k]:g} mm"
-                what = f"calibration: {name}_{unit} = {values[k] * scale:.6g} at {place} stands out"
+                what = f"calibration: {stated(name, values[k])} at {place} stands out"
                 beside = ", ".join(f"{v * scale:.4g}" for v in _neighbours(values, k))
                 yield finding("OLP449", f"{what}; expected a value like its neighbours, {beside}")
 
@@ -197,22 +196,6 @@ def _standing_out(values: Array, noticed: float) -> int | None:
 
 def _neighbours(values: Array, k: int) -> list[float]:
     return [float(values[i]) for i in (k - 1, k + 1) if 0 <= i < len(values)]
-
-
-def _units_of_axes(calibration: Calibration) -> Iterator[Finding]:
-    """Columns of one axis that are a thousand times smaller than those of both other axes."""
-    for kinds, tiny in (("XYZ", _TINY_MM), ("ABC", _TINY_RAD)):
-        largest = dict.fromkeys(AXES, 0.0)
-        for curve in calibration.curves:
-            for name, values in _values(curve):
-                if name[1] in kinds:
-                    largest[curve.axis] = max(largest[curve.axis], float(np.abs(values).max()))
-        for axis, size in largest.items():
-            others = [value for other, value in largest.items() if other != axis]
-            if 0.0 < size < tiny and min(others) > _OTHER_UNIT * size:
-                what = f"calibration: the {'errors' if kinds == 'XYZ' else 'angles'} of axis {axis} are "
-                what += f"{min(others) / size:.0f} times smaller than those of the other axes"
-                yield finding("OLP450", f"{what}; expected columns in um and urad")
 
 
 def _box(calibration: Calibration, machine: Machine) -> Iterator[Finding]:
@@ -263,19 +246,12 @@ def _expansion(calibration: Calibration) -> Iterator[Finding]:
     thermal = calibration.thermal
     if thermal is None:
         return
-    stated = [(f"{a}_scale_um_m_K", v, _SCALE_PER_K) for a, v in zip(AXES, thermal.scale_per_K, strict=True)]
-    stated.append(("workpiece_um_m_K", thermal.workpiece_per_K, _WORKPIECE_PER_K))
-    for key, value, (least, most) in stated:
+    factors = [(f"{a}_scale_um_m_K", v, _SCALE_PER_K) for a, v in zip(AXES, thermal.scale_per_K, strict=True)]
+    factors.append(("workpiece_um_m_K", thermal.workpiece_per_K, _WORKPIECE_PER_K))
+    for key, value, (least, most) in factors:
         if value != 0.0 and not least <= abs(value) <= most:
             what = f"calibration: thermal.{key} = {value * 1e6:.6g}"
             yield finding("OLP458", f"{what}; expected 0, or {least * 1e6:g} to {most * 1e6:g} um/m/K")
-
-
-def _values(curve: Curve) -> Iterator[tuple[str, Array]]:
-    """Every column with its component, that of each direction on its own."""
-    parts: tuple[Mapping[str, Array], ...] = (curve.columns, curve.forward, curve.backward)
-    for part in parts:
-        yield from part.items()
 
 
 def _travel(machine: Machine, axis: str) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.checks.base import finding, lines_of
 from olp.checks.state import tool_findings
-from olp.core.machine import Machine, Setup
+from olp.core.machine import Machine, Setup, Vector
 from olp.core.toolpath import Frame, Toolpath
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
@@ -27,6 +27,12 @@ _NEAR = 0.02
 _GROSS = 8.0
 #: A work offset may lie outside the travel by this share of it, beside the longest tool: other zeros.
 _BEYOND = 0.5
+#: mm; the coarsest least increment: hobby controls and robots have 0.01.
+_INCREMENT_MM = 0.1
+#: mm/s; the fastest gantries have linear motors of 5 m/s. 6 m/min in mm/min are 6000.
+_FAST_MM_S = 5500.0
+#: s; an axis that needs longer for its whole travel at full speed has its speed in another unit.
+_ACROSS_S = 1200.0
 #: degC; scales and workpieces of a workshop. 68 degF is 20 degC, and so is 293 K.
 _WORKSHOP_DEGC = (0.0, 50.0)
 #: degC; sensors of a structure may sit on a motor.
@@ -39,8 +45,9 @@ def setup_doubts(path: Toolpath, setup: Setup, calibration: Calibration | None) 
     """Doubts about the tools and offsets that a path uses, and about what the job states."""
     used = np.unique(path.frame).tolist() if len(path) else []
     frames = {number: path.frames[number] for number in used}
-    findings = [*_temperatures(setup, calibration), *_payloads(frames, calibration), *_start(setup)]
-    findings += _tools(path, frames, setup.machine, calibration)
+    findings = [*_axes(setup.machine), *_temperatures(setup, calibration), *_start(setup)]
+    findings += _payloads(frames, calibration)
+    findings += _tools(path, frames, setup, calibration)
     findings += _offsets(path, frames, setup)
     return findings
 
@@ -50,8 +57,9 @@ def _name(frame: Frame) -> str:
 
 
 def _tools(
-    path: Toolpath, frames: dict[int, Frame], machine: Machine, calibration: Calibration | None
+    path: Toolpath, frames: dict[int, Frame], setup: Setup, calibration: Calibration | None
 ) -> Iterator[Finding]:
+    machine = setup.machine
     known = [] if calibration is None else [c.tool_mm for c in calibration.curves]
     travel = float(np.ptp(machine.axes["Z"].travel_mm))
     most = max(_LONG * travel, _LONG_MM)
@@ -65,11 +73,14 @@ def _tools(
         size = float(np.linalg.norm(frame.tool_mm))
         lines = lines_of(path, path.frame == number)[:1]
         what = f"{_name(frame)}: its tip is {size:g} mm from the gauge point"
+        mirrored = _mirrored(frame, known, setup)
         inches = [tool for tool in known if _in_inches(frame.tool_mm, tool)]
         if inches:
             own = float(np.linalg.norm(inches[0]))
             text = f"{what}, and {own:g} mm is the tool of the calibration: the same number in inches"
             yield finding("OLP454", text, lines)
+        elif mirrored is not None:
+            yield finding("OLP454", f"{what}, on the other side than {mirrored}: a wrong sign", lines)
         elif 0.0 < size < _METRES_MM or size > most:
             yield finding("OLP454", f"{what}; expected 0, or {_METRES_MM:g} to {most:g} mm", lines)
         elif known and min(_away(frame.tool_mm, tool) for tool in known) > gross:
@@ -89,6 +100,38 @@ def _in_inches(tool: tuple[float, ...], known: tuple[float, ...]) -> bool:
     """Whether a tool is a known one in inches, or the other way round."""
     size, own = float(np.linalg.norm(tool)), float(np.linalg.norm(known))
     return own > 0.0 and any(abs(size - own * f) <= _NEAR * own * f for f in (_INCH_MM, 1.0 / _INCH_MM))
+
+
+def _mirrored(frame: Frame, known: list[Vector], setup: Setup) -> str | None:
+    """What says that the tip is on the other side of the gauge point, None where nothing does."""
+    tool = None if frame.tool is None else setup.tool(frame.tool)
+    if tool is not None and _opposite(frame.tool_mm, _negative(tool.length_mm)):
+        return "its length says"
+    if known and all(_opposite(frame.tool_mm, other) for other in known):
+        return "the tool of the calibration"
+    return None
+
+
+def _opposite(tool: Vector, other: Vector) -> bool:
+    size = float(np.linalg.norm(other))
+    return size > _METRES_MM and _away(tool, _negative(other)) <= _NEAR * size
+
+
+def _negative(vector: Vector) -> Vector:
+    x, y, z = vector
+    return (0.0 - x, 0.0 - y, 0.0 - z)
+
+
+def _axes(machine: Machine) -> Iterator[Finding]:
+    """Least increments that are no increments, and speeds that no axis has."""
+    for name, axis in machine.axes.items():
+        if axis.least_increment_mm > _INCREMENT_MM:
+            what = f"axes.{name}.least_increment_mm = {axis.least_increment_mm:g}"
+            yield finding("OLP465", f"{what}; expected at most {_INCREMENT_MM:g} mm")
+        least = float(np.ptp(axis.travel_mm)) / _ACROSS_S
+        if not least <= axis.velocity_mm_s <= _FAST_MM_S:
+            what = f"axes.{name}.velocity_mm_s = {axis.velocity_mm_s:g}"
+            yield finding("OLP465", f"{what}; expected {least:.3g} to {_FAST_MM_S:g} mm/s")
 
 
 def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator[Finding]:

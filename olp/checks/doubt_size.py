@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from olp.checks.base import finding, lines_of
+from olp.checks.doubt_units import UNMEASURABLE
 from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.toolpath import Flag, Toolpath
@@ -19,8 +20,6 @@ from olp.findings.catalogue import Finding
 _SHARE = 1e-3
 #: mm; sane errors of a small machine, whose assembly is no better than that of a larger one.
 _FLOOR_MM = 0.5
-#: Errors per length that no instrument measures: 0.1 um/m.
-_UNMEASURABLE = 1e-7
 #: mm; below this diagonal of the box even sane errors are that small.
 _SHORT_MM = 50.0
 #: Moves that are not corrected.
@@ -54,8 +53,20 @@ def size_doubts(
         largest = float(size.max()) * UM_PER_MM
         what = f"the error is up to {largest:.0f} um at {int(wild.sum())} waypoints; {expected}"
         return [finding("OLP409", what, lines_of(path, wild))]
+    return box_doubts(model, path.tools_mm(), calibration, machine, float(size.max(initial=0.0)))
+
+
+def box_doubts(
+    model: ErrorModel, tools_mm: Array, calibration: Calibration, machine: Machine, known_mm: float = 0.0
+) -> list[Finding]:
+    """Errors too large anywhere in the box with one of the tool vectors (k, 3), or too small to be measured
+    where `known_mm`, an error outside of it, is that small too."""
+    limit = largest_mm(machine)
+    expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
     points = _box_points(model.box_mm)
-    error = np.nan_to_num(np.stack([model.error(points, tool) for tool in path.tools_mm()]))
+    # a program may change between few tools ten thousand times
+    tools = np.unique(tools_mm, axis=0)
+    error = np.nan_to_num(np.stack([model.error(points, tool) for tool in tools]))
     in_box = np.linalg.norm(error, axis=2).max(axis=0)
     worst, largest = int(in_box.argmax()), float(in_box.max())
     if largest > limit:
@@ -63,10 +74,10 @@ def size_doubts(
         what = f"calibration: the error is {largest * UM_PER_MM:.0f} um at ({place}) in the box; {expected}"
         return [finding("OLP445", what)]
     span = float(np.linalg.norm(np.ptp(model.box_mm, axis=1)))
-    largest = max(largest, float(size.max(initial=0.0)))
-    if 0.0 < largest < _UNMEASURABLE * span and span > _SHORT_MM and not calibration.thermal:
+    largest = max(largest, known_mm)
+    if 0.0 < largest < UNMEASURABLE * span and span > _SHORT_MM and not calibration.thermal:
         what = f"calibration: the error is at most {largest * UM_PER_MM:.2g} um anywhere in the box"
-        return [finding("OLP451", f"{what}; expected more than {_UNMEASURABLE * span * UM_PER_MM:.2g} um")]
+        return [finding("OLP451", f"{what}; expected more than {UNMEASURABLE * span * UM_PER_MM:.2g} um")]
     return []
 
 

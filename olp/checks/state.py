@@ -50,19 +50,18 @@ def box_findings(path: Toolpath, box_mm: Array, code: str) -> list[Finding]:
 
 
 def calibration_findings(calibration: Calibration, date: datetime.date | None, days: int) -> list[Finding]:
-    """Is the calibration still valid on the given day? Without `valid_until` it is valid for `days`."""
-    if date is None:
-        return []
-    until, why = calibration.valid_until, ""
-    if until is None and calibration.measured is not None:
-        until = calibration.measured + datetime.timedelta(days=days)
-        why = f" ({days} days after it was measured)"
-    if until is None or date <= until:
-        return []
-    what = (
-        f"the calibration was valid until {until.isoformat()}{why}; the date of the job is {date.isoformat()}"
-    )
-    return [finding("OLP401", what)]
+    """Is the calibration still valid on the given day? One without `valid_until` is old after `days`."""
+    until, measured = calibration.valid_until, calibration.measured
+    if until is not None:
+        if date is None or date <= until:
+            return []
+        what = f"the calibration was valid until {until}; the date of the job is {date}"
+        return [finding("OLP401", what)]
+    what = "calibration: it states no valid_until"
+    if date is None or measured is None or (date - measured).days <= days:
+        return [finding("OLP462", f"{what}, so when it expires is not known")]
+    age = f"was measured on {measured}, {(date - measured).days} days before {date}"
+    return [finding("OLP463", f"{what} and {age}; expected at most {days} days")]
 
 
 def tool_findings(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list[Finding]:

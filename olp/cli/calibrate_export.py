@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import datetime
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from olp.cli.calibrate_import import table_options
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, machine_given, put, refuse_early
-from olp.cli.options import Count, fail_on_option, json_option, output_option, setup_options
+from olp.cli.options import (
+    Count,
+    doubt_options,
+    fail_on_option,
+    json_option,
+    output_option,
+    setup_options,
+)
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,6 +32,7 @@ if TYPE_CHECKING:
 @click.option("--compare", is_flag=True, help="Write nothing; show the residual error of every format.")
 @click.option("--program", metavar="PROGRAM", help="Also show the residual error along this program.")
 @click.option("--most-rows", type=Count(min=2), help="Rows that the control takes in one table.")
+@doubt_options
 @json_option()
 @fail_on_option
 @table_options
@@ -36,6 +45,8 @@ def command(
     compare: bool,
     program: str | None,
     most_rows: int | None,
+    date: datetime.date | None,
+    accept: tuple[str, ...],
     as_json: bool,
     fail_on: str,
     sense: Sense | None,
@@ -58,7 +69,7 @@ def command(
     inputs = (*files_of(calibration, program), *described)
     common: dict[str, Any] = {
         "calibration": calibration, "program": program, "reference": reference, "most_rows": most_rows,
-        "chain": chain,
+        "chain": chain, "date": date, "accept": accept,
     }  # fmt: skip
     if kind is None:
         _put(compare_tables(machine, job, **common), as_json)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ from olp.cli.layouts import layout_options
 from olp.cli.options import (
     Length,
     contour_option,
-    date_option,
+    doubt_options,
     fail_on_option,
     force_option,
     json_option,
@@ -92,7 +93,7 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
 @report_option()
 @contour_option
-@date_option("measurement")
+@partial(doubt_options, of="measurement")
 @json_option()
 @fail_on_option
 @quiet_option("No report and no progress; only the exit code.")

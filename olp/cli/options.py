@@ -124,11 +124,6 @@ def _day(
     return None if value is None else value.date()
 
 
-def date_option(of: str = "run") -> Callable[[F], F]:
-    """--date, which is compared with the validity of the calibration."""
-    return day_option(f"The day of the {of}, or today; it is compared with valid_until of the calibration.")
-
-
 def day_option(help: str, name: str = "--date") -> Callable[[F], F]:
     """--date and other days."""
     return click.option(name, type=Day(), callback=_day, metavar="YYYY-MM-DD", help=help)
@@ -150,13 +145,15 @@ def _acceptable(
     return accepted
 
 
-def doubt_options(function: F) -> F:
-    """--date and --accept, of every verb that doubts its inputs."""
+def doubt_options(function: F, of: str = "run") -> F:
+    """--date and --accept, of every verb that doubts its inputs; the date is that `of` something."""
     function = click.option(
         "--accept", multiple=True, callback=_acceptable, metavar="CODES",
         help="Go on in spite of these doubts about the inputs, such as OLP409; may be repeated.",
     )(function)  # fmt: skip
-    return date_option()(function)
+    return day_option(
+        f"The day of the {of}, or today; it is compared with valid_until of the calibration."
+    )(function)
 
 
 def output_option(metavar: str, help: str | None = None, **settings: Any) -> Callable[[F], F]:
@@ -219,12 +216,12 @@ def report_option(endings: Sequence[str] = (".html", ".json", ".md")) -> Callabl
     )  # fmt: skip
 
 
-def outside_box_option(refused: str, held: str) -> Callable[[F], F]:
+def outside_box_option(refused: str, held: str, default: str = "refuse") -> Callable[[F], F]:
     """--outside-box; its help says what each choice does."""
     return click.option(
         "--outside-box",
         type=click.Choice(["refuse", "hold"]),
-        default="refuse",
+        default=default,
         show_default=True,
         help=f"Outside the calibrated box: {refused}, or {held}.",
     )

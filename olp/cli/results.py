@@ -25,7 +25,7 @@ from olp.cli.layouts import layout_of, layout_options
 from olp.cli.options import (
     Count,
     Range,
-    date_option,
+    doubt_options,
     fail_on_option,
     force_option,
     json_option,
@@ -54,6 +54,7 @@ class _Asked:
     decimals: int | None
     outside_box: Outside
     date: datetime.date | None
+    accept: tuple[str, ...]
     output: str | None
     report_file: str | None
     as_json: bool
@@ -75,7 +76,7 @@ class _Asked:
 @click.option("--tip-radius-mm", type=Range(min=0.0), help="Radius of the tip, 0 for centres.")
 @click.option("--decimals", type=Count(0, 12), help="Fewest decimals of corrected results.")
 @outside_box_option("refuse the results", "take the error at the box's face")
-@date_option()
+@doubt_options
 @report_option()
 @json_option()
 @fail_on_option
@@ -107,7 +108,7 @@ def command(results: str, machine: str | None, job: str | None, **words: Any) ->
     options = workflow.ResultOptions(
         profile=layout, frame=_names("--frame", asked.frames), tool=_numbers(asked.tools),
         tip_radius_mm=asked.tip_radius_mm, decimals=asked.decimals, outside_box=asked.outside_box,
-        date=asked.date,
+        date=asked.date, accept=asked.accept,
     )  # fmt: skip
     result = workflow.run(call.session, call.source, options)
     written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}

@@ -7,7 +7,13 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, exit_for, given, options_of, put, source
-from olp.cli.options import confidence_options, proof_options, quiet_option, setup_options
+from olp.cli.options import (
+    confidence_options,
+    outside_box_option,
+    proof_options,
+    quiet_option,
+    setup_options,
+)
 from olp.core.errors import UsageError
 
 
@@ -17,6 +23,7 @@ from olp.core.errors import UsageError
 @setup_options
 @proof_options
 @confidence_options
+@outside_box_option("refuse the program", "take the error at the box's face", default="hold")
 @quiet_option("No report; only the exit code.")
 def command(
     nominal: str, corrected: str, machine: str | None, job: str | None, as_json: bool, fail_on: str,

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from olp.core.version import __version__
 
 #: The stamp with the first digits of the hash of the calibration.
-_STAMP = re.compile(rb"olp-corrected [0-9a-f]{12}")
+_STAMP = re.compile(rb"olp-corrected ([0-9a-f]{12})")
 #: What stands behind it: the version, and the codes of the doubts that were accepted.
-_ACCEPTED = re.compile(rb"olp-corrected [0-9a-f]{12} olp \S+ accepted((?: OLP[0-9]{3})+)")
+_ACCEPTED = re.compile(_STAMP.pattern + rb" olp \S+ accepted((?: OLP[0-9]{3})+)")
 
 
 def find_stamp(text: bytes) -> re.Match[bytes] | None:
@@ -18,10 +18,18 @@ def find_stamp(text: bytes) -> re.Match[bytes] | None:
     return _STAMP.search(text)
 
 
-def accepted_in(text: bytes) -> frozenset[str]:
-    """The codes of doubts that the stamp of a corrected text accepts."""
-    found = _ACCEPTED.search(text)
-    return frozenset() if found is None else frozenset(found.group(1).decode().split())
+def is_of(stamp: re.Match[bytes], digest: str) -> bool:
+    """Whether a stamp is that of the calibration with this hash."""
+    return digest.startswith(stamp.group(1).decode())
+
+
+def accepted_in(text: bytes, digest: str | None) -> frozenset[str]:
+    """The codes of doubts that the stamp of a corrected text accepts for the calibration with this hash: they
+    were accepted for that one alone. Without a calibration (None) every stamp holds."""
+    stamp = _ACCEPTED.search(text)
+    if stamp is None or not (digest is None or is_of(stamp, digest)):
+        return frozenset()
+    return frozenset(stamp.group(2).decode().split())
 
 
 def stamp_line(digest: str, comment: tuple[bytes, bytes], accepted: Sequence[str] = ()) -> bytes:

@@ -31,7 +31,7 @@ from olp.program.text.edits import Edits, Prefixes, splice
 class Task:
     """What is to be written: the `plan` of a `program` that was read with its words, by a `model`. Also the
     numerical tolerance of the correction, the least increment of each axis, and the `stamp`, empty for
-    none."""
+    none; with `stamp_always` a text of which nothing changes bears it too."""
 
     program: Program
     plan: Plan
@@ -39,6 +39,7 @@ class Task:
     tolerance_mm: float
     increments_mm: Vector
     stamp: bytes
+    stamp_always: bool
 
 
 class Writer(ABC):
@@ -54,6 +55,7 @@ class Writer(ABC):
         self.program, self.plan, self.model = program, plan, model
         self.words = program.words
         self.tolerance_mm, self.stamp = task.tolerance_mm, task.stamp
+        self.stamp_always = task.stamp_always
         self.style = Style.of(program, task.increments_mm)
         self.prefixes = Prefixes()
         self.tally = Tally()
@@ -65,7 +67,7 @@ class Writer(ABC):
         self.frame_unit_mm = np.array([f.unit_mm for f in self.path.frames])
 
     def text(self) -> bytes:
-        """The corrected text; the program's own bytes where nothing changes. Raises ProgramError where the
+        """The corrected text; the program's own bytes where nothing is written. Raises ProgramError where the
         plan cannot be written in the dialect."""
         data, move = self.program.data, self.plan.move
         pieces: list[bytes] = []
@@ -80,7 +82,7 @@ class Writer(ABC):
             changed |= text is not None
             pieces.append(data[begin:end] if text is None else text)
             begin, entry = end, rows.emitted[-1].copy()
-        if not changed:
+        if not (changed or (self.stamp and self.stamp_always)):
             return data
         pieces.append(data[begin:])
         if self.stamp:

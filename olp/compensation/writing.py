@@ -23,7 +23,7 @@ from olp.program.text.numbers import Placing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """The corrected bytes, and whether anything of the path is `changed`; (n,) `parts`, how many moves
+    """The corrected bytes, and whether anything is `changed`; (n,) `parts`, how many moves
     they have for each nominal one; and what was changed."""
 
     text: bytes
@@ -40,10 +40,11 @@ def write(
     tolerance_mm: float,
     increments_mm: Vector,
     stamp: bytes,
+    stamp_always: bool = False,
 ) -> Written:
-    """Write a plan. The program is one that was read with its words. Raises ProgramError where the plan
-    cannot be written in the dialect."""
-    task = Task(program, plan, model, tolerance_mm, increments_mm, stamp)
+    """Write a plan. The program is one that was read with its words; with `stamp_always` it is stamped also
+    where nothing changes. Raises ProgramError where the plan cannot be written in the dialect."""
+    task = Task(program, plan, model, tolerance_mm, increments_mm, stamp, stamp_always)
     writer = _writer(program, plan)(task)
     text = writer.text()
     return Written(text, text is not program.data, writer.parts, writer.tally)

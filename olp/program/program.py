@@ -159,6 +159,11 @@ class Program:
         return len(self.line_start)
 
     @property
+    def verbatim(self) -> bool:
+        """Whether numbers keep their own form and column, and no row is inserted."""
+        return self.statements is not None and bool(self.statements.decimal)
+
+    @property
     def rs274(self) -> Profile:
         """The dialect of a program of blocks of words."""
         assert isinstance(self.dialect, Profile)

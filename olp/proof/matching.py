@@ -210,8 +210,9 @@ class _Alignment:
         begin, end, point = (
             np.where(known, some, 0.0) for some in (self.begin[i], self.target[i], self.tip[j])
         )
-        begin = np.where(np.isnan(begin).any(axis=1)[:, None], end, begin)
-        away = segment_distance(point, begin, end)
+        nowhere = np.asarray(np.isnan(begin).any(axis=1), bool)
+        begin = np.where(nowhere[:, None], end, begin)
+        away = np.asarray(segment_distance(point, begin, end), float)
         curved = np.flatnonzero(self.arc[i] >= 0)
         for plane in np.unique(self.arcs.plane[self.arc[i[curved]]]).tolist():
             some = curved[self.arcs.plane[self.arc[i[curved]]] == plane]

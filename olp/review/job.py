@@ -166,7 +166,8 @@ def run(
         if correction is not None:
             proved = _Proved(correction.report, correction.table, correction.groups)
         else:
-            run = verify_programs((nominal, name), (second, corrected_name), loaded, options)
+            texts_read = (nominal, name), (second, corrected_name)
+            run = verify_programs(*texts_read, loaded, options, outside="OLP403")
             proved = _Proved(run.report, run.table, run.proof.groups)
         texts = _Texts(program, data, corrected_name, other, nominal, second, proved)
         shown = _shown(session, texts, loaded, options, progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +34,7 @@ from olp.program.registry import read
 from olp.reports.report import number
 from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
+from olp.workflows.doubt import acceptable
 from olp.workflows.session import Loaded, PathLike, Session
 
 #: Number of random points over the box.
@@ -68,18 +70,21 @@ def export_table(
     reference: Reference | None = None,
     most_rows: int | None = None,
     chain: str | None = None,
+    date: datetime.date | None = None,
+    accept: Sequence[str] = (),
 ) -> TableExport:
     """Write the calibration of a machine, or a calibration file alone, as the table of a control.
 
     The report states the residual error over the calibrated box and, with `program`, along it. The figures
-    are those of the written table, read back. Raises UsageError, InputError.
+    are those of the written table, read back. `date` and `accept` are those of `correct`, for the program.
+    Raises UsageError, InputError.
     """
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
     form = format_named(kind)
     written = write_table(source.rest, kind, Path(target), given)
     control = _control(written, kind, given, source)
-    report = _report(source, {form.key: control}, program)
+    report = _report(source, {form.key: control}, program, _correcting(date, accept))
     corrects = sorted(written.corrects | source.compensated)
     report["compensated_by_controller"] = corrects
     findings = (*source.findings, *written.findings)
@@ -96,6 +101,8 @@ def compare_tables(
     reference: Reference | None = None,
     most_rows: int | None = None,
     chain: str | None = None,
+    date: datetime.date | None = None,
+    accept: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The residual error of each format of tables, next to a corrected program ("olp-tables-1"). Nothing is
     written. Where a format leaves sign convention or reference open, the figures are those of the right one.
@@ -111,7 +118,7 @@ def compare_tables(
         written = write_table(source.rest, key, _MAIN.with_suffix(form.ending), given)
         controls[key] = _control(written, key, given, source)
         findings[key] = [f.as_dict() for f in written.findings if f.code not in ("OLP874", "OLP875")]
-    report = _report(source, controls, program)
+    report = _report(source, controls, program, _correcting(date, accept))
     report["formats"] = {
         key: {"title": form.title, "status": form.status, "holds": form.holds, "findings": findings[key]}
         for key, form in FORMATS.items()
@@ -197,9 +204,15 @@ def _control(written: Exported, kind: str, given: Given, source: _Source) -> Con
     return format_named(kind).control(imported.calibration, source.chain)
 
 
+def _correcting(date: datetime.date | None, accept: Sequence[str]) -> CorrectOptions:
+    """How the program is corrected for comparison. Raises UsageError for a code that is no doubt."""
+    return CorrectOptions(outside_box="hold", date=date, accept=tuple(sorted(acceptable(accept))))
+
+
 def _report(
-    source: _Source, controls: Mapping[str, Control], program: PathLike | bytes | None
-) -> dict[str, Any]:
+    source: _Source, controls: Mapping[str, Control], program: PathLike | bytes | None,
+    options: CorrectOptions,
+) -> dict[str, Any]:  # fmt: skip
     box = np.asarray(source.model.box_mm, float)
     points = in_box(box, source.tools_mm, POINTS, SEED)
     report: dict[str, Any] = {
@@ -211,13 +224,14 @@ def _report(
         },
     }  # fmt: skip
     if program is not None:
-        report["program"] = _along(source, controls, program, box)
+        report["program"] = _along(source, controls, program, box, options)
     return report
 
 
 def _along(
-    source: _Source, controls: Mapping[str, Control], program: PathLike | bytes, box: np.ndarray
-) -> dict[str, Any]:
+    source: _Source, controls: Mapping[str, Control], program: PathLike | bytes, box: np.ndarray,
+    options: CorrectOptions,
+) -> dict[str, Any]:  # fmt: skip
     """Residual errors along a program; for correcting, the proof of a correction that is really done."""
     loaded = source.loaded
     if loaded is None:
@@ -237,7 +251,6 @@ def _along(
         "refused": None,
     }
     try:
-        options = CorrectOptions(outside_box="hold")
         run = corrected(source.sources, text, loaded, options, silent)
         after = run.report["deviation"]["after"]["between"]
         report["left"][CORRECT] = {**after, "rms_in_frame_um": None}

@@ -15,7 +15,7 @@ from olp.checks import motion, state
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
-from olp.compensation.stamp import find_stamp
+from olp.compensation.stamp import find_stamp, is_of
 from olp.core.errors import UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
@@ -23,8 +23,10 @@ from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.meshes import read_mesh
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import GATE_CODES, RULES, Finding
+from olp.findings.rule import Severity
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.proof.judgement import verdict
 from olp.proof.proof import Proof, corrections_mm
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import accepted_of, doubted
@@ -191,7 +193,10 @@ def _case(
     nominal.load()
     with nominal.errors("<nominal>"):
         first = read(nominal.data, loaded.setup, loaded.dialect, reading)
-    run = verify_programs((first, nominal.name), (written, name), loaded, options, refuse_doubts=False)
+    run = verify_programs(
+        (first, nominal.name), (written, name), loaded, options,
+        outside=options.outside_code, refuse_doubts=False,
+    )  # fmt: skip
     what = f"the corrected program against the nominal one ({nominal.short or 'stdin'})"
     proof = replace(
         run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
@@ -218,8 +223,8 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     else:
         findings += state.travel_findings(path, machine)
         findings += state.box_findings(path, loaded.model.box_mm, options.outside_code)
-        read_here = case.written if run is None else run.nominal
-        findings += doubted(read_here, loaded, options.accept, date, stamped=case.data, refuse=False)
+        if run is None:
+            findings += doubted(case.written, loaded, options.accept, date, stamped=case.data, refuse=False)
         findings += checks.program_findings(case.written, loaded.setup, contour=options.contour)
         findings += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
@@ -246,24 +251,22 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
 
 
 def _lines(run: Run) -> dict[int, int]:
-    """The line of the corrected program for each line of the nominal one that moves."""
+    """The line of the corrected program for each line of the nominal one that moves, as the last of them."""
     proof = run.proof
     return dict(zip(proof.nominal.line.tolist(), proof.written.line[proof.groups].tolist(), strict=True))
 
 
 def _in_lines_of_corrected(run: Run) -> list[Finding]:
-    """Findings of a verification on the part and on uncertainties, with the lines of the corrected
-    program."""
+    """Findings of a verification that are not made here: doubts about the inputs, the part, uncertainties.
+    Lines are those of the corrected program; that of a nominal line without a move is not known."""
     there = _lines(run)
-    return [
-        replace(
-            finding,
-            line=None if finding.line is None else there[finding.line],
-            lines=tuple(there[line] for line in finding.lines),
-        )
-        for finding in run.findings
-        if RULES[finding.code].topic == "uncertainty" or finding.code == "OLP108"
-    ]
+    result = []
+    for one in run.findings:
+        rule = RULES[one.code]
+        if rule.doubt or rule.topic == "uncertainty" or one.code == "OLP108":
+            lines = tuple(there[line] for line in one.lines if line in there)
+            result.append(replace(one, line=lines[0] if lines else None, lines=lines))
+    return result
 
 
 def _clearances(case: _Case, codes: list[str], sources: Sources, tell: Progress) -> Clearances | None:
@@ -290,9 +293,9 @@ def _stamps(case: _Case) -> list[Finding]:
         )
     if case.run is not None and not case.corrected_here and find_stamp(case.run.nominal.data) is not None:
         findings.append(finding("OLP311", "the program given as nominal has the stamp of a correction"))
-    own = case.loaded.digest[:12]
-    if first is not None and not first.group().endswith(own.encode()):
-        what = f"the program says `{first.group().decode()}`, the calibration in use is {own}"
+    if first is not None and not is_of(first, case.loaded.digest):
+        what = f"the program says `{first.group().decode()}`, the calibration in use is "
+        what += case.loaded.digest[:12]
         findings.append(finding("OLP312", what, [_line(case.data, first.start())]))
     return findings
 
@@ -301,15 +304,23 @@ def _line(data: bytes, offset: int) -> int:
     return data.count(b"\n", 0, offset) + 1
 
 
-def _verdict(case: _Case) -> dict[str, Any] | None:
-    """The verdict of the proof, with lines of the given program; None where no nominal program is known."""
-    if case.run is None:
+def _verdict(
+    case: _Case, kept: tuple[Finding, ...], codes: list[str], options: CheckOptions
+) -> dict[str, Any] | None:
+    """The verdict of the proof and of all findings that are kept, with lines of the given program; None where
+    no nominal program is known. What a code that is left out says does not count."""
+    run = case.run
+    if run is None:
         return None
-    verdict = dict(case.run.report["verdict"])
-    line = verdict["numerical"]["line"]
+    part_um = case.loaded.part_tolerance_um(options.part_tolerance_um)
+    result = verdict(run.table, part_um, run.report.get("uncertainty"), kept)
+    line = result["numerical"]["line"]
     if not case.corrected_here and line is not None:
-        verdict["numerical"] = verdict["numerical"] | {"line": _lines(case.run)[line]}
-    return verdict
+        result["numerical"]["line"] = _lines(run)[line]
+    for part, code in (("numerical", "OLP101"), ("part", "OLP108")):
+        if code not in codes and result[part] is not None and not result[part]["holds"]:
+            result["sentences"].append(f"{code} is left out, so that does not count here.")
+    return result | {"ok": not any(f.severity >= Severity.ERROR for f in kept)}
 
 
 def _report(
@@ -334,6 +345,6 @@ def _report(
         "tolerance_um": options.tolerance_um,
         "accepted": accepted_of(findings),
         "rules": codes,
-        "verdict": _verdict(case),
+        "verdict": _verdict(case, findings, codes, options),
         "findings": [f.as_dict() for f in findings],
     }

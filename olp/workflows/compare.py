@@ -30,6 +30,7 @@ from olp.program.registry import Options, read
 from olp.workflows import compare_report as parts
 from olp.workflows.compare_poses import part_frame as poses_frame
 from olp.workflows.compare_poses import poses_report
+from olp.workflows.doubt import acceptable, with_accepted
 from olp.workflows.session import Loaded, PathLike, Session
 
 
@@ -48,6 +49,7 @@ class CompareOptions:
     part_frame: str | None = None
     contour: bool = False
     date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,6 +119,7 @@ def compare(
     part_frame: str | None = None,
     contour: bool = False,
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Comparison:
     """Compare measured runs with a nominal path, or measured points with nominal poses.
@@ -133,7 +136,7 @@ def compare(
     options = CompareOptions(
         before=tuple(before), poses=poses, profile=profile, align=align, order=order, reach_mm=reach_mm,
         part_tolerance_um=part_tolerance_um, add_errors=add_errors, part_frame=part_frame,
-        contour=contour, date=date,
+        contour=contour, date=date, accept=tuple(accept),
     )  # fmt: skip
     return run(sources, session, sources.source(nominal), measured, options, progress)
 
@@ -209,7 +212,8 @@ def _paths(
     findings += parts.cycles(groups)
     if side.loaded is not None:
         days = side.loaded.setup.machine.sanity.calibration_days
-        findings += calibration_findings(side.loaded.calibration, options.date, days)
+        doubts = calibration_findings(side.loaded.calibration, options.date, days)
+        findings += with_accepted(doubts, acceptable(options.accept), refuse=False)
     after, before = groups["after"], groups["before"]
     return Comparison(_with(report, findings), tuple(findings), sets[0][0].profile, path, after, before)
 

@@ -11,33 +11,23 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks import correction as checks
-from olp.compensation.plan import Limits
 from olp.compensation.planning import plan
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.tally import Tally
 from olp.compensation.writing import write
 from olp.core.arrays import Index
-from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
+from olp.core.errors import AlreadyCorrected, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
-from olp.core.toolpath import Flag
-from olp.core.units import MM_PER_UM
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
-from olp.proof.proof import prove
 from olp.uncertainty.spread import Confidence
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import unrolled
-from olp.workflows.proof import (
-    Pair,
-    ProofOptions,
-    Run,
-    last_digit_mm,
-    proved,
-)
+from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 
@@ -137,14 +127,13 @@ def corrected(
             sources, program, loaded.setup, loaded.dialect, expand_cycles=options.expand_cycles,
             peck_clearance_mm=options.peck_clearance_mm,
         )  # fmt: skip
-    done = _rewritten(data, loaded, options, refuse_doubts, tell)
+    done = _rewritten(data, program.name, loaded, options, refuse_doubts, tell)
     tell("prove", 0.7)
     reading = Options(contour=options.contour)
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
     pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
     run = proved(pair, loaded.held(), options, done.doubts, outside=held, tell=tell)
-    _prove_without_deleted(done, loaded, options.contour, run.table)
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -165,8 +154,6 @@ class _Rewritten:
 
     nominal: Program
     text: bytes
-    limits: Limits
-    digit_mm: float
     uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
@@ -174,23 +161,22 @@ class _Rewritten:
 
 
 def _rewritten(
-    data: bytes, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool, tell: Progress
+    data: bytes, name: str, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool, tell: Progress
 ) -> _Rewritten:
     """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
     program = read(data, loaded.setup, loaded.dialect, Options(contour=options.contour))
-    decimal = program.statements is not None and bool(program.statements.decimal)
-    if options.split_rapids and decimal:
+    if options.split_rapids and program.verbatim:
         raise UsageError(
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
             'set joined = "lines" and insert = true in the profile'
         )
-    doubts = doubted(program, loaded, options.accept, options.date, refuse=refuse_doubts)
+    doubts = doubted(program, loaded, options.accept, options.date, name=name, refuse=refuse_doubts)
+    accepted = accepted_of(doubts)
     tell("correct", 0.2)
-    digit = last_digit_mm(program, loaded.setup)
-    limits = Limits(
-        options.tolerance_um * MM_PER_UM, digit_mm=digit, split_rapids=options.split_rapids,
-        refuse_outside=options.outside_box == "refuse", insert=not decimal,
+    limits = limits_of(
+        program, loaded, options, refuse_outside=options.outside_box == "refuse",
+        split_rapids=options.split_rapids,
     )  # fmt: skip
     rows = plan(program.toolpath, loaded.model, limits)
     tell("write", 0.5)
@@ -198,11 +184,12 @@ def _rewritten(
     written = write(
         program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
         increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted_of(doubts)) if marked else b"",
+        stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted) if marked else b"",
+        stamp_always=bool(accepted),
     )  # fmt: skip
     nominal = replace(program, words=None, slot=program.slot[:0])
     text = written.text if written.changed else data
-    return _Rewritten(nominal, text, limits, digit, rows.uncorrected, written.parts, written.tally, doubts)
+    return _Rewritten(nominal, text, rows.uncorrected, written.parts, written.tally, doubts)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:
@@ -216,33 +203,3 @@ def _written_report(done: _Rewritten) -> dict[str, Any]:
             "changed_words": tally.changed_words,
         },
     }  # fmt: skip
-
-
-def _prove_without_deleted(done: _Rewritten, loaded: Loaded, contour: bool, table: Judgements) -> None:
-    """Raise ProgramError where the corrected program is wrong with the block-delete switch on, on lines that
-    are right with the switch off, as `table` says."""
-    path = done.nominal.toolpath
-    deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
-    if not deleted.any():
-        return
-    options = Options(block_delete=True, contour=contour)
-    line = int(path.line[deleted][0])
-    nominal = read(done.nominal.data, loaded.setup, loaded.dialect, options, words=False)
-    other = read(done.text, loaded.setup, loaded.dialect, options, words=False)
-    try:
-        rows = plan(nominal.toolpath, loaded.model, replace(done.limits, refuse_outside=False))
-        proof = prove(
-            nominal, other, loaded.model, tolerance_mm=done.limits.tolerance_mm, digit_mm=done.digit_mm,
-            uncorrected=rows.uncorrected,
-        )  # fmt: skip
-        other_table = Judgements.of(proof)
-        wrong = other_table.line[other_table.over]
-        good = bool(np.isin(wrong, table.line[table.over]).all())
-    except ProgramError:
-        good = False
-    if not good:
-        raise ProgramError(
-            "later blocks depend on this block under block delete, so one correction cannot be right for "
-            "both switch positions; remove the `/`, or give every axis in the first block after it",
-            line=line,
-        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from olp.checks.doubt import Inputs, doubts
 from olp.compensation.stamp import accepted_in
@@ -29,23 +29,40 @@ def doubted(
     accept: Sequence[str],
     date: datetime.date | None,
     *,
+    name: str = "",
     stamped: bytes = b"",
     refuse: bool = True,
 ) -> tuple[Finding, ...]:
     """The doubts of a run; those that the call or the stamp of the text `stamped` accepts are less severe.
-    With `refuse`, one that is an error and not accepted raises Doubtful; UsageError as `acceptable`."""
+    With `refuse`, one that is an error and not accepted raises Doubtful; UsageError as `acceptable`. `name`
+    is that of the program."""
     inputs = Inputs(loaded.setup, program, loaded.calibration, loaded.model, date)
-    return _judged(inputs, accept, stamped, refuse)
+    accepted = acceptable(accept) | accepted_in(stamped, loaded.digest)
+    return with_accepted(doubts(inputs), accepted, name=name, refuse=refuse)
 
 
 def doubted_motion(
-    program: Program, session: Session, accept: Sequence[str], date: datetime.date | None, stamped: bytes
+    program: Program, session: Session, accept: Sequence[str], date: datetime.date | None, name: str
 ) -> tuple[Finding, ...]:
-    """The same for a verb that needs no calibration: one that the machine names and that can be opened is
-    doubted too."""
+    """The same for a verb that needs no calibration, of a program that may be corrected: a calibration that
+    the machine names and that can be opened is doubted too."""
     if _calibrated(session):
-        return doubted(program, session.loaded("hold"), accept, date, stamped=stamped)
-    return _judged(Inputs(session.setup, program, None, None, date), accept, stamped, True)
+        return doubted(program, session.loaded("hold"), accept, date, name=name, stamped=program.data)
+    accepted = acceptable(accept) | accepted_in(program.data, None)
+    return with_accepted(doubts(Inputs(session.setup, program, None, None, date)), accepted, name=name)
+
+
+def with_accepted(
+    findings: Iterable[Finding], accepted: frozenset[str], *, name: str = "", refuse: bool = True
+) -> tuple[Finding, ...]:
+    """Doubts with those that are `accepted` one step less severe. With `refuse`, another error raises
+    Doubtful."""
+    result = tuple(f.accept() if f.code in accepted else f for f in findings)
+    errors = [finding for finding in result if finding.severity == Severity.ERROR]
+    if refuse and errors:
+        codes = tuple(dict.fromkeys(finding.code for finding in errors))
+        raise Doubtful(tuple(_sentence(finding, name) for finding in errors), codes)
+    return result
 
 
 def accepted_of(findings: Sequence[Finding]) -> list[str]:
@@ -64,18 +81,9 @@ def _calibrated(session: Session) -> bool:
     return True
 
 
-def _judged(inputs: Inputs, accept: Sequence[str], stamped: bytes, refuse: bool) -> tuple[Finding, ...]:
-    accepted = acceptable(accept) | accepted_in(stamped)
-    findings = tuple(f.accept() if f.code in accepted else f for f in doubts(inputs))
-    errors = [finding for finding in findings if finding.severity == Severity.ERROR]
-    if refuse and errors:
-        codes = tuple(dict.fromkeys(finding.code for finding in errors))
-        raise Doubtful(tuple(_sentence(finding) for finding in errors), codes)
-    return findings
-
-
-def _sentence(finding: Finding) -> str:
+def _sentence(finding: Finding, name: str) -> str:
     """What is wrong, where, what was expected, what to do, and how to go on all the same."""
-    line = f"line {finding.line}: " if finding.line is not None else ""
+    place = f"line {finding.line}" + (f" of {name}" if name else "")
+    line = f"{place}: " if finding.line is not None else ""
     remedy = RULES[finding.code].remedy
     return f"{finding.code}: {line}{finding.message}. {remedy} --accept {finding.code} goes on all the same."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -13,19 +12,21 @@ import numpy as np
 
 from olp.checks import correction as checks
 from olp.checks import state
+from olp.checks.base import finding
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
 from olp.compensation.plan import Limits
 from olp.compensation.planning import plan
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Index
-from olp.core.errors import OlpError, naming
+from olp.core.errors import ProgramError, naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
-from olp.core.toolpath import Toolpath
+from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
+from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements, verdict
 from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, largest_correction_mm, prove
 from olp.uncertainty.spread import Confidence
@@ -93,30 +94,45 @@ class Pair:
 
 def verify_programs(
     nominal: tuple[Program, str], corrected: tuple[Program, str], loaded: Loaded, options: ProofOptions,
-    *, refuse_doubts: bool = True,
+    *, outside: str | None, refuse_doubts: bool = True,
 ) -> Run:  # fmt: skip
-    """Prove a corrected program from any source; programs come with their names. Raises ProgramError where
-    the second is not a correction of the first, Doubtful with `refuse_doubts`."""
+    """Prove a corrected program from any source; programs come with their names. `outside` is the code of
+    findings outside the calibrated box; with None such a path raises OutsideBox, as in `correct`. Raises
+    ProgramError where the second is not a correction of the first, Doubtful with `refuse_doubts`."""
     (first, name), (second, other) = nominal, corrected
-    doubts = doubted(first, loaded, options.accept, options.date, stamped=second.data, refuse=refuse_doubts)
-    with naming(name or "<nominal>"):
-        rows = plan(
-            first.toolpath, loaded.model, Limits(options.tolerance_um * MM_PER_UM, refuse_outside=False)
-        )
-    pair = Pair(first, first.data, name, second, second.data, other, rows.uncorrected)
+    doubts = doubted(
+        first, loaded, options.accept, options.date, name=name, stamped=second.data, refuse=refuse_doubts
+    )
     try:
-        return proved(pair, loaded, options, doubts)
-    except OlpError as error:
+        # lines of errors are those of the nominal text
+        with naming(name or "<nominal>"):
+            limits = limits_of(first, loaded, options, refuse_outside=outside is None)
+            rows = plan(first.toolpath, loaded.model, limits)
+            pair = Pair(first, first.data, name, second, second.data, other, rows.uncorrected)
+            return proved(pair, loaded.held(), options, doubts, outside=outside)
+    except ProgramError as error:
         raise error.in_file(other or "<corrected>") from None
 
 
+def limits_of(
+    program: Program, loaded: Loaded, options: ProofOptions, *, refuse_outside: bool,
+    split_rapids: bool = False,
+) -> Limits:  # fmt: skip
+    """The limits of the plan of a program."""
+    return Limits(
+        options.tolerance_um * MM_PER_UM, digit_mm=last_digit_mm(program, loaded.setup),
+        split_rapids=split_rapids, refuse_outside=refuse_outside, insert=not program.verbatim,
+    )  # fmt: skip
+
+
 def proved(
-    pair: Pair, loaded: Loaded, options: ProofOptions, doubts: Iterable[Finding], *,
+    pair: Pair, loaded: Loaded, options: ProofOptions, doubts: tuple[Finding, ...], *,
     outside: str | None = None, tell: Progress = silent,
 ) -> Run:  # fmt: skip
     """The proof of a pair of programs with all that is said of it; `correct` and `verify` are the same here.
     `doubts` are those about the inputs. `outside` is the code of findings outside the calibrated box, None
-    where nothing is outside. Raises ProgramError where the second is not a correction of the first."""
+    where nothing is outside. Raises ProgramError where the second is not a correction of the first, or not
+    with the block-delete switch on."""
     tolerance_mm = options.tolerance_um * MM_PER_UM
     first = pair.nominal
     proof = prove(
@@ -124,6 +140,7 @@ def proved(
         digit_mm=last_digit_mm(pair.corrected, loaded.setup), uncorrected=pair.uncorrected,
     )  # fmt: skip
     table = Judgements.of(proof)
+    _prove_without_deleted(pair, loaded, options, proof, table)
     part_um = loaded.part_tolerance_um(options.part_tolerance_um)
     assessment = assess(
         loaded, first, pair.corrected, proof.groups, pair.uncorrected, part_um, options.date, tell
@@ -131,6 +148,7 @@ def proved(
     largest_mm = largest_correction_mm(first, pair.corrected, proof)
     findings = (
         *doubts,
+        *_unstamped(doubts, loaded),
         *checks.proof_findings(proof, pair.uncorrected),
         *checks.part_findings(table, part_um),
         *checks.between_findings(first, proof, loaded.model),
@@ -149,6 +167,50 @@ def proved(
     report["verdict"] = verdict(table, part_um, report.get("uncertainty"), findings)
     confidence = assessment[0] if assessment else None
     return Run(pair.text, first, pair.corrected, proof, table, pair.uncorrected, report, findings, confidence)
+
+
+def _prove_without_deleted(
+    pair: Pair, loaded: Loaded, options: ProofOptions, proof: Proof, table: Judgements
+) -> None:
+    """Raise ProgramError where the corrected program is wrong with the block-delete switch on, on lines that
+    are right with the switch off, as `table` says."""
+    path = pair.nominal.toolpath
+    deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
+    if not deleted.any():
+        return
+    reading = Options(block_delete=True, contour=options.contour)
+    nominal = read(pair.data, loaded.setup, loaded.dialect, reading, words=False)
+    with naming(pair.other or "<corrected>"):
+        other = read(pair.text, loaded.setup, loaded.dialect, reading, words=False)
+    try:
+        rows = plan(
+            nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False)
+        )
+        without = Judgements.of(
+            prove(
+                nominal, other, loaded.model, tolerance_mm=proof.tolerance_mm, digit_mm=proof.digit_mm,
+                uncorrected=rows.uncorrected,
+            )
+        )  # fmt: skip
+        good = bool(np.isin(without.line[without.over], table.line[table.over]).all())
+    except ProgramError:
+        good = False
+    if not good:
+        raise ProgramError(
+            "later blocks depend on this block under block delete, so one correction cannot be right for "
+            "both switch positions; remove the `/`, or give every axis in the first block after it",
+            line=int(path.line[deleted][0]),
+        )
+
+
+def _unstamped(doubts: tuple[Finding, ...], loaded: Loaded) -> list[Finding]:
+    """Accepted doubts that no stamp states, because the text may have no comment."""
+    accepted = accepted_of(doubts)
+    if loaded.dialect.marks or not accepted:
+        return []
+    codes = ",".join(accepted)
+    what = f"no stamp states that {codes} was accepted; give --accept {codes} wherever this file is read"
+    return [finding("OLP626", what)]
 
 
 def position_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:

@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from olp.checks import state
+from olp.checks.doubt import stated_doubts
+from olp.checks.doubt_size import box_doubts
 from olp.compensation.stamp import find_stamp, stamp_line, stamped
 from olp.core.arrays import Array
 from olp.core.errors import AlreadyCorrected, InputError, UsageError
@@ -25,6 +26,7 @@ from olp.results.forward import Forward, forward
 from olp.results.frames import frame_of, stylus_of
 from olp.results.reported import Reported, Stated
 from olp.results.table import read_table
+from olp.workflows.doubt import acceptable, accepted_of, with_accepted
 from olp.workflows.results_report import report_of
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -52,6 +54,7 @@ class ResultOptions:
     decimals: int | None = None
     outside_box: Outside = "refuse"
     date: datetime.date | None = None
+    accept: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +78,7 @@ def correct_results(
     decimals: int | None = None,
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
+    accept: Sequence[str] = (),
 ) -> ResultCorrection:
     """Correct the points that a measuring machine reported: true = reported + error at the touch.
 
@@ -82,12 +86,13 @@ def correct_results(
     points ("machine": axis positions), `tool` the number of the stylus. Where a file names several, each is a
     mapping from the file's names to those of machine and job. `tip_radius_mm` replaces that of the stylus.
     `decimals` is the least number of decimals written. Only the numbers of points change.
-    Raises InputError with the line (AlreadyCorrected, OutsideBox, ConfigError).
+    `date` and `accept` are those of `correct`, for doubts about the calibration. Raises InputError with the
+    line (AlreadyCorrected, OutsideBox, ConfigError), and Doubtful.
     """
     session, source = opened(results, machine, job)
     options = ResultOptions(
         profile=profile, frame=frame, tool=tool, tip_radius_mm=tip_radius_mm, decimals=decimals,
-        outside_box=outside_box, date=date,
+        outside_box=outside_box, date=date, accept=tuple(accept),
     )  # fmt: skip
     return run(session, source, options)
 
@@ -137,20 +142,31 @@ def _corrected(
         findings.append(
             Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
         )
-    text, rounding = _write(reported, result.added_mm, loaded.digest, options.decimals)
+    doubts = _doubts(loaded, result, options)
+    mark = b""
+    if reported.comment is not None:
+        mark = stamp_line(loaded.digest, reported.comment, accepted_of(doubts))
+    text, rounding = _write(reported, result.added_mm, mark, options.decimals)
     turned = sorted(
         {f.name for f in frames if f.touched is not None and not np.allclose(f.rotation, np.eye(3))}
     )
-    findings += [
-        *_findings(reported, result, rounding, turned),
-        *state.calibration_findings(loaded.calibration, options.date, setup.machine.sanity.calibration_days),
-    ]
+    findings += [*_findings(reported, result, rounding, turned), *doubts]
     outside = ~loaded.model.inside(result.axis_mm).all(axis=1)
     if outside.any():
         lines = reported.line[outside].tolist()
         findings.append(_finding("OLP403", f"{len(lines)} touches lie outside the calibrated box", lines))
     report = report_of(reported, result, loaded, results.short, text, rounding, findings)
     return ResultCorrection(text, report, tuple(findings))
+
+
+def _doubts(loaded: Loaded, result: Forward, options: ResultOptions) -> tuple[Finding, ...]:
+    """Doubts about the calibration, with the styli of the results. Raises Doubtful."""
+    machine, tools = loaded.setup.machine, np.atleast_2d(result.tool_vector_mm)
+    findings = [
+        *stated_doubts(loaded.calibration, machine, options.date),
+        *box_doubts(loaded.held().model, tools, loaded.calibration, machine),
+    ]
+    return with_accepted(findings, acceptable(options.accept))
 
 
 def _axes(reported: Reported, loaded: Loaded) -> Literal["tip", "tool", "ram"]:
@@ -230,7 +246,7 @@ def _refuse_twice(statement: Stated, active: bool, thermal: bool) -> None:
         )
 
 
-def _write(reported: Reported, added_mm: Array, digest: str, decimals: int | None) -> tuple[bytes, float]:
+def _write(reported: Reported, added_mm: Array, stamp: bytes, decimals: int | None) -> tuple[bytes, float]:
     """The corrected text, and the largest rounding error, in mm."""
     placing = Placing(reported.data, reported.start, reported.end)
     edits: list[tuple[int, int, bytes]] = []
@@ -250,9 +266,9 @@ def _write(reported: Reported, added_mm: Array, digest: str, decimals: int | Non
                 edits.append(placing.place(start, end, text))
             rounding = max(rounding, abs(kept - value) * float(reported.unit_mm[i]))
     text = spliced(reported.data, edits)
-    if reported.comment is not None and edits:
+    if stamp and edits:
         eol = b"\r\n" if b"\r\n" in reported.data[:4096] else b"\n"
-        text = stamped(text, stamp_line(digest, reported.comment), eol, ())
+        text = stamped(text, stamp, eol, ())
     return text, rounding
 
 

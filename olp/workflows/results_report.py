@@ -13,6 +13,7 @@ from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.results.forward import Forward
 from olp.results.reported import Reported
+from olp.workflows.doubt import accepted_of
 from olp.workflows.session import Loaded
 
 #: Why corrected results are right.
@@ -73,6 +74,7 @@ def report_of(
             )
         ],
         "corrected": {"sha256": hashlib.sha256(text).hexdigest()},
+        "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],
         "why": list(WHY),
         "does_not_prove": list(DOES_NOT_PROVE),

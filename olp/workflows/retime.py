@@ -266,7 +266,7 @@ def run(
     tell("read", 0.0)
     case = _case(session, program, options)
     doubts = doubted_motion(
-        case.program, session.of(case.setup), options.accept, options.date, case.program.data
+        case.program, session.of(case.setup), options.accept, options.date, program.name
     )
     other = None if nominal is None else _case(session, nominal, options)
     compliance = compliance_of(setup.machine)

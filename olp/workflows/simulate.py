@@ -86,7 +86,9 @@ def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simu
     with program.errors("<program>"):
         reading = Options(contour=options.contour)
         parsed = read(program.data, loaded.setup, loaded.dialect, reading, words=False)
-        doubts = doubted(parsed, loaded, options.accept, options.date, stamped=program.data)
+        doubts = doubted(
+            parsed, loaded, options.accept, options.date, name=program.name, stamped=program.data
+        )
         path = parsed.toolpath
         shift = zero_shifts(path.frames, loaded.model)
     if not len(path):

@@ -53,7 +53,8 @@ def verify(
 ) -> Verification:
     """Compare a corrected program with the nominal one, from the two texts and the machine's files alone.
 
-    Doubts about the inputs that `accept` or the stamp of the corrected program names are no error. Raises
+    Doubts about the inputs that `accept` or the stamp of the corrected program names are no error.
+    `outside_box` is as in `correct`. Raises OutsideBox and ProgramError as that does, also
     ProgramError where the second is not a correction of the first, Doubtful where a doubt is not accepted.
     """
     session = Session.start(machine, job)
@@ -81,11 +82,14 @@ def run(
     with nominal.errors():
         loaded = loaded.reading(nominal)
     programs = []
-    for source in (nominal, corrected):
+    for source, role in ((nominal, "<nominal>"), (corrected, "<corrected>")):
         tell("read", 0.0)
-        with source.errors("<program>"):
+        with source.errors(role):
             programs.append(_read(source, loaded, options))
-    done = verify_programs((programs[0], nominal.name), (programs[1], corrected.name), loaded, options)
+    outside = "OLP403" if options.outside_box == "hold" else None
+    done = verify_programs(
+        (programs[0], nominal.name), (programs[1], corrected.name), loaded, options, outside=outside
+    )
     return Verification(done.report, done.findings, done.table, done.confidence)
 
 

@@ -15,6 +15,11 @@ import olp
 DAY = datetime.date(2026, 11, 21)
 #: units, a path tolerance and known axes, so that nothing else is found
 HEAD = b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"
+#: a feed comes first, so no rapid can take the backlash up
+COLD = b"G21 G90 G54 G64 P0.0001 Q0\nF600\n"
+ORIGIN = "X = 0.0, Y = 0.0, Z = 0.0"
+#: probabilities are stated for a part tolerance
+PART: dict[str, Any] = {"part_tolerance_um": 1.0}
 DMIS = b"DMISMN/'CHECK',05.2\nUNITS/MM,ANGDEC\n"
 MCS = '[work_offsets.MCS]\nset_by = "true"\n'
 PROBED = b"GOTO/10,10,10\nMEAS/POINT,F(A),1\nPTMEAS/CART,10,10,0,0,0,1\nENDMES\nENDFIL\n"
@@ -25,11 +30,6 @@ TOUCH = "[work_offsets.G54]\n"
 LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
 TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
 LISTED = 'dialect = "layout.toml"\n'
-#: a list without header words, whose rows are all that may be written
-LISTING = {"head": LIST, "controller": "list"}
-#: a part tolerance: probabilities are stated with one alone
-TOLD = {"options": {"part_tolerance_um": 50.0}}
-ONE_UM = {"options": {"part_tolerance_um": 1.0}}
 LAYOUT = {
     "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\n'
     b'unit = "mm"\nframe = "G54"\n[columns]\nX = "X_mm"\nY = "Y_mm"\nZ = "Z_mm"\n'
@@ -115,6 +115,16 @@ def valued(*um: float) -> dict[str, Any]:
     rows = "".join(f"{-1000.0 + k * step},{value}\n" for k, value in enumerate(um))
     table = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
     return {"calibration": table, "curves": {"x.csv": f"X_mm,EXX_um\n{rows}"}}
+
+
+def with_square(um: float) -> dict[str, Any]:
+    """A curve that ends at so much, beside squareness."""
+    calls = valued(0.0, um)
+    return {**calls, "calibration": calls["calibration"] + "[squareness]\nC0Y_urad = 10.0\n"}
+
+
+def tilted() -> dict[str, Any]:
+    return {"calibration": "[squareness]\nB0Z_urad = 100.0\n"}
 
 
 def per_axis(x_um: float, others_um: float) -> dict[str, Any]:
@@ -212,6 +222,8 @@ def clamp(high: float, role: str = "fixture", frame: str = "G54") -> dict[str, A
     }
 
 
+ENDLESS = {"valid_until = 2099-01-01\n": ""}
+UNTIL = {"2099-01-01": "2027-06-01"}
 OVER = b"G0 Z10\nG0 X100\n"
 
 #: code -> (a call that triggers it, one that just does not)
@@ -223,22 +235,21 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     "OLP102": (Call(b"G53 G0 Z0\n"), Call(b"G0 Z0\n")),
     "OLP103": (
-        Call(b"0,0,0\n100,0,0\n", calibration="[backlash]\nX_um = 2.01\n", **LISTING),
-        Call(b"0,0,0\n100,0,0\n", calibration="[backlash]\nX_um = 1.99\n", **LISTING),
+        Call(head=COLD, start=ORIGIN, calibration="[backlash]\nX_um = 2.1\n"),
+        Call(head=COLD, start=ORIGIN, calibration="[backlash]\nX_um = 1.9\n"),
     ),
     "OLP104": (Call(b"G1 X100 A90\n"), Call(b"G1 X100\n")),
     # the middle of the stroke is exact: its ends are off by 100 urad times half of it
     "OLP105": (
-        Call(b"G81 X10 Y10 Z-21 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
-        Call(b"G81 X10 Y10 Z-5 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n"),
-    ),
-    # 1.05 um at the ends of the stroke, with rounding
-    "OLP108": (
-        Call(b"G81 X10 Y10 Z-21 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n", **ONE_UM),
-        Call(b"G81 X10 Y10 Z-5 R0\nG80\n", calibration="[squareness]\nB0Z_urad = 100.0\n", **ONE_UM),
+        Call(b"G81 X10 Y10 Z-21 R0\nG80\n", increment_mm=1e-4, **tilted()),
+        Call(b"G81 X10 Y10 Z-18 R0\nG80\n", increment_mm=1e-4, **tilted()),
     ),
     "OLP106": (Call(tables=tool(100.0), **roll(201.0)), Call(tables=tool(100.0), **roll(199.0))),
     "OLP107": (Call(b"G53 G0 X0 Y0 Z0\n", head=b"G21 G90\n"), Call()),
+    "OLP108": (
+        Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 0.9}),
+        Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 1.1}),
+    ),
     "OLP201": (Call(b"G64\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
     "OLP202": (
         Call(b"G64 P0.0101 Q0\nG1 X100\n", **scaled(10.0)),
@@ -284,8 +295,13 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP311": (Call(b"G1 X1\n" + STAMP * 2), Call(b"G1 X1\n" + STAMP)),
     "OLP312": (Call(b"G1 X1\n" + STAMP), Call(b"G1 X1\n")),
     "OLP401": (
-        Call(swap={"valid_until = 2099-01-01\n": ""}, options={"date": datetime.date(2027, 1, 16)}),
-        Call(swap={"valid_until = 2099-01-01\n": ""}, options={"date": datetime.date(2027, 1, 15)}),
+        Call(swap=UNTIL, options={"date": datetime.date(2027, 6, 2)}),
+        Call(swap=UNTIL, options={"date": datetime.date(2027, 6, 1)}),
+    ),
+    "OLP462": (Call(swap=ENDLESS, options={"date": None}), Call(options={"date": None})),
+    "OLP463": (
+        Call(swap=ENDLESS, options={"date": datetime.date(2027, 1, 16)}),
+        Call(swap=ENDLESS, options={"date": datetime.date(2027, 1, 15)}),
     ),
     "OLP402": (Call(ARC, swap=travel(109.999)), Call(ARC, swap=travel(110.0))),
     "OLP403": (
@@ -344,8 +360,8 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(job=sensor(30.0), options={"outside_box": "hold"}, **structure()),
     ),
     # one waypoint: the gain of 10 um exceeds its uncertainty up to a sigma of 5 um
-    "OLP431": (Call(**known(5.1), **ONE_UM), Call(**known(4.9), **ONE_UM)),
-    "OLP432": (Call(**known(5.1), **TOLD), Call(**known(4.9), **TOLD)),
+    "OLP431": (Call(**known(5.1), options=PART), Call(**known(4.9), options=PART)),
+    "OLP432": (Call(**known(5.1), options=PART), Call(**known(4.9), options=PART)),
     # 20 um are 1.96 sigma of 10.2 um; drawn, so not nearer
     "OLP433": (
         Call(**known(11.2), options={"part_tolerance_um": 20.0}),
@@ -353,8 +369,8 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     # 11.5 um/(m K) at 100 mm, half a um
     "OLP434": (
-        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n", **ONE_UM),
-        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n", **ONE_UM),
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.45\n", options=PART),
+        Call(**known(0.01), job="[temperatures_degC]\nX_scale = 20.42\n", options=PART),
     ),
     # the mean of a curve of two independent halves is known to sigma / sqrt(2)
     "OLP435": (Call(**known(7.2)), Call(**known(6.9))),
@@ -423,6 +439,13 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"G1 X1000\n", head=FANUC.replace(b".", b""), controller="fanuc"),
         Call(b"G1 X1000\n", head=FANUC, controller="fanuc"),
     ),
+    # an offset counts above 200 um, and ten times what the column varies by
+    "OLP464": (Call(**valued(300.0, 305.0, 335.0)), Call(**valued(300.0, 305.0, 336.0))),
+    "OLP465": (
+        Call(swap={"velocity_mm_s = 500.0": "velocity_mm_s = 5501.0"}),
+        Call(swap={"velocity_mm_s = 500.0": "velocity_mm_s = 5500.0"}),
+    ),
+    "OLP466": (Call(**with_square(0.0)), Call(**with_square(0.1))),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),
         Call(OVER, tables=tool(50.0), **clamp(9.999)),

@@ -37,7 +37,7 @@ _IN_TABLES = frozenset(
     {
         "machine", "box_mm", "model", "datum_mm", "curves", "squareness", "backlash_mm", "cyclic",
         "temperature_degC", "measured", "valid_until", "active_during_measurement", "repeatability_mm",
-        "payload_kg", "more",
+        "payload_kg", "quality", "more",
     }
 )  # fmt: skip
 

@@ -88,8 +88,7 @@ RULES = (
         "OLP401",
         "calibration expired",
         Severity.ERROR,
-        "The date given is later than valid_until of the calibration. Without valid_until, the calibration "
-        "is older than calibration_days of [check].",
+        "The date given is later than valid_until of the calibration.",
         "Measure the machine again.",
         "`--date 2027-06-01`, and `valid_until = 2027-05-14`.",
         doubt=True,

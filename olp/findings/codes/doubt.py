@@ -210,4 +210,49 @@ RULES = (
         'State decimal_point = "increment" or "calculator" in the machine file.',
         "`G1 X100 Y200` alone on a Fanuc control.",
     ),
+    _rule(
+        "OLP462",
+        "validity of the calibration not stated",
+        Severity.INFO,
+        "The calibration states no last day, so no date can be later.",
+        "Write valid_until into the calibration file.",
+        "A calibration file without `valid_until`.",
+    ),
+    _rule(
+        "OLP463",
+        "calibration measured long ago",
+        Severity.WARNING,
+        "The calibration states no last day, and on the date given it is older than calibration_days of "
+        "[check] (365). Machines change.",
+        "Check the machine with a circle or some points, and write valid_until into the calibration file. "
+        "Else measure it again.",
+        "`--date 2027-06-01`, and `measured = 2026-05-14`.",
+    ),
+    _rule(
+        "OLP464",
+        "column not set to zero",
+        Severity.ERROR,
+        "All values of a column are almost the same, and larger than any machine is wrong by. The instrument "
+        "was not set to zero, or the values are readings and no errors.",
+        "Subtract the reading at the datum from the column.",
+        "1000.2, 1003.1, 999.8 ... um in the column EXX_um.",
+    ),
+    _rule(
+        "OLP465",
+        "limit of an axis not plausible",
+        Severity.ERROR,
+        "The least increment is above 0.1 mm, or the axis is faster than any or would take 20 minutes for "
+        "its travel. Values in um, in mm/min or in m/s do that.",
+        "Check least_increment_mm and velocity_mm_s of this axis in the machine file.",
+        "`least_increment_mm = 1.0`, and `velocity_mm_s = 30000`.",
+    ),
+    _rule(
+        "OLP466",
+        "curve of zeros",
+        Severity.WARNING,
+        "Every value of a curve is zero, and other parts of the calibration are not. That is what `olp init` "
+        "writes before you put in what was measured.",
+        "Put measured values into the file, or remove this curve from the calibration.",
+        "z.csv as `olp init` wrote it, beside x.csv and y.csv that were measured.",
+    ),
 )

@@ -85,8 +85,9 @@ RULES = (
         "OLP306",
         "feed move from an uncorrected position",
         Severity.WARNING,
-        "A feed move starts where a rapid ended uncorrected, or where a canned cycle ended. So its beginning "
-        "deviates from the nominal path, and counts in the verdict.",
+        "A feed move starts where a move ended uncorrected, or where a canned cycle ended, which is right at "
+        "one depth only. So its beginning deviates by more than the numerical tolerance, and counts in the "
+        "verdict.",
         "Command all axes in rapids first, or put a rapid in front, after (olp on). Or give start_mm in the "
         "job file.",
         "`G0 X10`, then `G1 X50 Y10 Z1 F600`, with Y and Z unknown at the G0. Or a feed move after (olp off) "

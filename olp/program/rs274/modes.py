@@ -222,7 +222,10 @@ def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str
     for letter in np.unique(chunk.letter[bare]).tolist():
         mine = bare[chunk.letter[bare] == letter]
         numbers[mine] *= state.increment(chr(letter))
-    remarks.setdefault("increments", (context.number(int(chunk.line[bare[0]])), ""))
+    # 0 is 0 either way, and K counts the holes of a cycle too
+    some = bare[(context.value[bare] != 0.0) & (chunk.letter[bare] != ord("K"))]
+    if some.size:
+        remarks.setdefault("increments", (context.number(int(chunk.line[some[0]])), ""))
     context.scaled[state.unit_mm] = numbers
     return numbers
 
