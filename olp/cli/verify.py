@@ -7,7 +7,13 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, exit_for, given, options_of, put, source
-from olp.cli.options import confidence_options, proof_options, quiet_option, setup_options
+from olp.cli.options import (
+    confidence_options,
+    proof_options,
+    quiet_option,
+    setup_options,
+    unroll_options,
+)
 from olp.core.errors import UsageError
 
 
@@ -16,6 +22,7 @@ from olp.core.errors import UsageError
 @click.argument("corrected")
 @setup_options
 @proof_options
+@unroll_options
 @confidence_options
 @quiet_option("No report; only the exit code.")
 def command(
@@ -25,7 +32,8 @@ def command(
     """Prove a corrected program from the nominal and the corrected text alone.
 
     CORRECTED may come from any source. It is read, run through the model of the machine's errors, and
-    compared with the path of NOMINAL.
+    compared with the path of NOMINAL. Where it was corrected with --flatten or --expand-cycles, give the
+    same options here.
     """
     if nominal == corrected == STREAM:
         raise UsageError("NOMINAL and CORRECTED cannot both come from stdin; name one of the files")

@@ -38,7 +38,7 @@ from olp.workflows.compare_runs import Ground, How, judged
 from olp.workflows.confidence import unknowns_of
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.correct import corrected as correct_program
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import as_asked
 from olp.workflows.proof import ProofOptions, Run, verify_programs
 from olp.workflows.retime import RetimeOptions, Retiming
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -109,7 +109,8 @@ def view(
 ) -> Review:
     """A program, its correction and measurements of it, for a browser.
 
-    `corrected` is the corrected program, which is proved as in `verify`. Without it the program is corrected
+    `corrected` is the corrected program, which is proved as in `verify`, against the nominal program unrolled
+    where `flatten` or `expand_cycles` ask for it. Without it the program is corrected
     as in `correct`, or `correction` is the result of that, under the name `corrected_name`. `measured` are
     files of tip positions, read and placed on the path as in `olp.compare`; the findings of that are added
     to the others. Without `time` the motion is not planned: times are those of the
@@ -148,7 +149,7 @@ def run(
     program.load()
     with program.errors():
         loaded = session.loaded(outside, only_sure=options.only_sure_components).reading(program)
-        data = _unrolled(session, program, loaded, options)
+        data = as_asked(session.sources, program, loaded.setup, loaded.dialect, options).data
     if corrected is not None:
         corrected.load()
         other, corrected_name = corrected.data, corrected.name
@@ -205,15 +206,6 @@ class _Shown:
 
     samples: Samples
     plan: Retiming | None
-
-
-def _unrolled(session: Session, program: Source, loaded: Loaded, options: ViewOptions) -> bytes:
-    if not (options.flatten or options.expand_cycles):
-        return program.data
-    return unrolled(
-        session.sources, program, loaded.setup, loaded.dialect, expand_cycles=options.expand_cycles,
-        peck_clearance_mm=options.peck_clearance_mm,
-    )  # fmt: skip
 
 
 def _corrected(session: Session, data: bytes, loaded: Loaded, options: ViewOptions, tell: Progress) -> Run:
