@@ -75,11 +75,11 @@ def statistics(scene: Scene) -> Iterator[dict[str, Any]]:
     """The figures of the report, of each layer and of the job."""
     deviation, table = scene.report["deviation"], scene.table
     largest = {
-        "uncorrected": np.nan_to_num(table.uncorrected[table.judged]).max(initial=0.0) * UM_PER_MM,
+        "uncorrected": float(np.nan_to_num(table.uncorrected[table.judged]).max(initial=0.0)) * UM_PER_MM,
         "result": table.largest_mm() * UM_PER_MM,
     }
     for side, layer in (("before", "uncorrected"), ("after", "result")):
-        yield {"label": "largest", "value": float(largest[layer]), "unit": "um", "layer": layer}
+        yield {"label": "largest", "value": largest[layer], "unit": "um", "layer": layer}
         rms, waypoints = deviation[side]["between"]["rms_um"], deviation[side]["waypoints"]["max_um"]
         yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
         yield {"label": "at waypoints", "value": float(waypoints), "unit": "um", "layer": layer}
