@@ -60,9 +60,9 @@ def nominal_of(
 
 
 def counting(toolpath: Toolpath, *, points: bool) -> tuple[Mask, Mask]:
-    """(n,) moves that count when measured, as in the table of judgements: those that count along their path,
-    which is all that cuts, also where the program leaves it uncorrected, and those that count at their end,
-    the points of a program of points and of touches."""
+    """(n,) moves that count when measured, along their path and at their end, as in the table of judgements.
+    Along the path counts all that cuts, also where the program leaves it uncorrected. At the end count the
+    points of a program of points, and touches."""
     feed = toolpath.kind != Kind.RAPID
     hole = feed & ((toolpath.flag & np.uint8(Flag.CYCLE)) != 0)
     along = cutting_moves(toolpath) | hole
