@@ -101,9 +101,10 @@ def test_largest_errors_are_those_of_the_samples_of_the_line(tmp_path: Path) -> 
     for name, layer in (("error_um", "uncorrected"), ("result_um", "result")):
         size = np.linalg.norm(page.array(page.layer(layer)["delta"]), axis=1) * 1e3
         stated = page.array(page.manifest["listing"][name])
-        assert np.flatnonzero(np.isfinite(stated)).tolist() == np.unique(row).tolist()
+        # below 0: not known
+        assert np.flatnonzero(stated >= 0.0).tolist() == np.unique(row).tolist()
         for k in np.unique(row):
-            assert stated[k] == pytest.approx(size[row == k].max(), rel=2e-3, abs=1e-3)
+            assert stated[k] == pytest.approx(size[row == k].max(), rel=2e-3, abs=0.006)
 
 
 # -- texts ----------------------------------------------------------------------------------------------
